@@ -1,0 +1,26 @@
+"""Every array shape in the package is checked at run time while the tests run."""
+
+import sys
+from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from types import ModuleType
+
+from jaxtyping import install_import_hook
+
+COMPILED = ("kernels", "simd")
+
+
+class PlainCompiledModules(MetaPathFinder):
+    """Keeps the hook away from modules that numba compiles: it can compile bare functions only."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if fullname.startswith("equimorph.") and fullname.rpartition(".")[2] in COMPILED:
+            return PathFinder.find_spec(fullname, path, target)
+        return None
+
+
+install_import_hook("equimorph", "beartype.beartype")
+sys.meta_path.insert(0, PlainCompiledModules())
