@@ -1,0 +1,48 @@
+"""Quasi-static shape control of soft, morphing structures.
+
+Names are loaded when they are first used, so that importing the package costs nothing.
+"""
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "equimorph.errors": ("EquimorphError", "InputError"),
+    "equimorph.model": ("Box", "Constraint", "Descriptor", "Grid", "Parameter", "Schedule"),
+    "equimorph.structures": ("Rod", "Spring", "State", "States", "Structure"),
+    "equimorph.equilibria": (
+        "Event",
+        "LimitLoad",
+        "Path",
+        "TraceOptions",
+        "find_equilibria",
+        "lift",
+        "limit_load",
+    ),
+    "equimorph.manifold": ("Audit", "EquilibriumSet", "equilibrium_set"),
+    "equimorph.tasks": ("Route", "plan"),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_LAYERS = ("errors", "linalg", "model", "structures", "equilibria", "manifold", "tasks",
+           "plotting", "storage", "study", "cli")  # fmt: skip
+
+__all__ = [  # noqa: PLE0604  # names are listed with their homes above
+    "__version__",
+    *_HOME,
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name or a layer on first use."""
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    if name in _LAYERS:
+        return import_module(f"equimorph.{name}")
+    raise AttributeError(f"module 'equimorph' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Public names and layers."""
+    return sorted([*__all__, *_LAYERS])

@@ -1,0 +1,106 @@
+"""Curves that the tracer follows: a path in parameter space, or a homotopy."""
+
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.structures import Advance, Structure, bordered_advance
+
+Lanes = Float[np.ndarray, "lanes size"]
+Values = Float[np.ndarray, " lanes"]
+
+MULTIPLIER_WEIGHT = 1e-2
+"""Weight of the multipliers' squares in the norm of corrections (they are not in the metric)."""
+
+
+class Curve(Protocol):
+    """One curve F(z, t) = 0 per lane, t the share of the way from start (0) to goal (1)."""
+
+    @property
+    def structure(self) -> Structure: ...
+    @property
+    def weight(self) -> Values:
+        """Length of the curve's own part of the metric: dt counts as weight·dt."""
+        ...
+
+    def take(self, lanes: Int[np.ndarray, " some"]) -> Self: ...
+    def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]: ...
+    def advance(
+        self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values
+    ) -> Advance: ...
+
+
+@dataclass(frozen=True)
+class ParameterLine:
+    """Straight line p(t) = start + t·velocity in parameter space."""
+
+    structure: Structure
+    start: Float[np.ndarray, "lanes parameters"]
+    velocity: Float[np.ndarray, "lanes parameters"]
+
+    @property
+    def weight(self) -> Values:
+        """Scaled length of the line."""
+        return np.asarray(np.linalg.norm(self.velocity / self.structure.scales, axis=1))
+
+    def take(self, lanes: Int[np.ndarray, " some"]) -> "ParameterLine":
+        """Return some of the lanes."""
+        return ParameterLine(self.structure, self.start[lanes], self.velocity[lanes])
+
+    def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """p(t)."""
+        return self.start + t[:, None] * self.velocity
+
+    def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
+        """Newton step and tangent; see `Advance`."""
+        return self.structure.advance(z, self.parameters(t), self.velocity, row, corner, defect)
+
+
+@dataclass(frozen=True)
+class NewtonHomotopy:
+    """F(z, p) = (1 − t) F(z₀, p): from any guess z₀ at t = 0 to equilibria at t = 1."""
+
+    structure: Structure
+    p: Float[np.ndarray, "lanes parameters"]
+    defect: Lanes
+    """F(z₀, p)."""
+
+    @property
+    def weight(self) -> Values:
+        """One unit of length from guess to goal."""
+        return np.ones(len(self.p))
+
+    def take(self, lanes: Int[np.ndarray, " some"]) -> "NewtonHomotopy":
+        """Return some of the lanes."""
+        return NewtonHomotopy(self.structure, self.p[lanes], self.defect[lanes])
+
+    def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """Parameters, the same for all t."""
+        return self.p + 0.0 * t[:, None]
+
+    def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
+        """Newton step and tangent by the general bordered solve."""
+        residual = self.structure.residual(z, self.p) - (1.0 - t)[:, None] * self.defect
+        closing = (row, corner, defect)
+        return bordered_advance(self.structure, z, self.p, residual, self.defect, closing)
+
+
+def squared_length(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> Values:
+    """Squared length of a step (dz, dt) in the structure's metric and the curve's own."""
+    return np.asarray(dz[:, : structure.unknowns] ** 2 @ structure.mass + (weight * dt) ** 2)
+
+
+def correction_size(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> Values:
+    """Size of a Newton correction: its length, with the multipliers included lightly."""
+    multipliers = dz[:, structure.unknowns :]
+    extra = MULTIPLIER_WEIGHT * (multipliers**2).sum(axis=1)
+    return np.asarray(np.sqrt(squared_length(structure, weight, dz, dt) + extra))
+
+
+def dual(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> tuple[Lanes, Values]:
+    """Row whose product with a step is the metric's inner product with (dz, dt)."""
+    row = np.zeros_like(dz)
+    row[:, : structure.unknowns] = dz[:, : structure.unknowns] * structure.mass
+    return row, weight**2 * dt

@@ -1,0 +1,195 @@
+"""From brackets to events: what happened to each lane of a trace, and exactly where."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria.curves import Curve
+from equimorph.equilibria.location import (
+    Located,
+    locate_branch_point,
+    locate_fold,
+    locate_goal,
+    locate_root,
+)
+from equimorph.equilibria.tracing import (
+    ARRIVAL,
+    BRANCH,
+    CONSTRAINT,
+    FOLD,
+    RETURN,
+    Bracket,
+    Front,
+    TraceOptions,
+    Traces,
+    initial_front,
+    trace,
+)
+from equimorph.model import Constraint
+
+Lanes = Float[np.ndarray, "lanes size"]
+Values = Float[np.ndarray, " lanes"]
+
+LOST = 0
+KINDS = {
+    ARRIVAL: "arrived",
+    RETURN: "returned",
+    FOLD: "fold",
+    BRANCH: "branch point",
+    CONSTRAINT: "constraint",
+    LOST: "lost",
+}
+
+
+@dataclass(frozen=True)
+class Happenings:
+    """Located events of all lanes, sorted by lane and then by arclength.
+
+    `code` as in `tracing`; `index` before and after; `terminal` marks the one that ended its lane.
+    """
+
+    lanes: Int[np.ndarray, " events"]
+    code: Int[np.ndarray, " events"]
+    z: Float[np.ndarray, "events size"]
+    t: Float[np.ndarray, " events"]
+    travelled: Float[np.ndarray, " events"]
+    index: Int[np.ndarray, "events 2"]
+    found: Bool[np.ndarray, " events"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How each lane ended, the events on its way, and its points if they were recorded."""
+
+    code: Int[np.ndarray, " lanes"]
+    z: Lanes
+    t: Values
+    index: Int[np.ndarray, " lanes"]
+    travelled: Values
+    why: dict[int, str]
+    passed: Happenings
+    traces: Traces
+
+
+def follow(
+    curve: Curve,
+    z: Lanes,
+    constraints: tuple[Constraint, ...] = (),
+    options: TraceOptions | None = None,
+) -> Outcome:
+    """Trace every lane from t = 0 and locate everything that happened.
+
+    Of the events in the last step of a lane the first along the curve is its end.
+    """
+    options = options or TraceOptions()
+    lanes = len(z)
+    start = initial_front(curve, z, np.zeros(lanes))
+    traces = trace(curve, start, constraints, options)
+    bits = [FOLD, BRANCH, ARRIVAL, RETURN, CONSTRAINT]
+    if not options.locate_passed:
+        bits = [bit for bit in bits if bit & _stops(options)]
+    events = _locate_all(curve, traces.brackets, bits, constraints)
+    return _settle(start, traces, events, options)
+
+
+def _stops(options: TraceOptions) -> int:
+    """Events that end a lane."""
+    stop = ARRIVAL | RETURN | CONSTRAINT
+    stop |= 0 if options.through_folds else FOLD
+    return stop | (0 if options.through_branch_points else BRANCH)
+
+
+def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
+    """All brackets in which `bit` happened, as one."""
+    parts = [(b, np.flatnonzero(b.what & bit)) for b in brackets]
+    parts = [(b, at) for b, at in parts if len(at)]
+    if not parts:
+        return None
+
+    def gather(name: str) -> Front:
+        fronts = [vars(getattr(b, name).take(at)) for b, at in parts]
+        return Front(**{key: np.concatenate([f[key] for f in fronts]) for key in fronts[0]})
+
+    return Bracket(
+        np.concatenate([b.lanes[at] for b, at in parts]),
+        gather("before"),
+        gather("after"),
+        np.concatenate([b.step[at] for b, at in parts]),
+        np.concatenate([b.travelled[at] for b, at in parts]),
+        np.concatenate([b.what[at] for b, at in parts]),
+    )
+
+
+def _locate(curve: Curve, bracket: Bracket, bit: int, constraints: tuple[Constraint, ...]) -> Located:
+    here = curve.take(bracket.lanes)
+    if bit == FOLD:
+        return locate_fold(here, bracket)
+    if bit == BRANCH:
+        return locate_branch_point(here, bracket)
+    if bit in {ARRIVAL, RETURN}:
+        return locate_goal(here, bracket, 1.0 if bit == ARRIVAL else 0.0)
+
+    def worst(z: Lanes, t: Values) -> Values:
+        p = here.parameters(t)
+        return np.asarray(np.max([c.excess(z, p) for c in constraints], axis=0))
+
+    return locate_root(here, bracket, worst)
+
+
+def _locate_all(
+    curve: Curve, brackets: list[Bracket], bits: list[int], constraints: tuple[Constraint, ...]
+) -> Happenings:
+    size = curve.structure.size
+    rows: list[tuple[np.ndarray, ...]] = []
+    for bit in bits:
+        bracket = _join(brackets, bit)
+        if bracket is None:
+            continue
+        place = _locate(curve, bracket, bit, constraints)
+        count = len(bracket.lanes)
+        rows.append((
+            bracket.lanes, np.full(count, bit), place.z, place.t,
+            bracket.travelled + place.step,
+            np.stack([bracket.before.index, bracket.after.index], 1), place.found,
+        ))  # fmt: skip
+    if not rows:
+        none = np.zeros(0, int)
+        return Happenings(none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
+                          np.zeros((0, 2), int), np.zeros(0, bool))  # fmt: skip
+    columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
+    order = np.lexsort((columns[4], columns[0]))
+    return Happenings(*(column[order] for column in columns))
+
+
+def _settle(
+    start: Front, traces: Traces, events: Happenings, options: TraceOptions
+) -> Outcome:
+    """Choose each lane's end: its first terminal event; lanes without one are lost."""
+    lanes = len(start.t)
+    stop = _stops(options)
+    terminal = np.flatnonzero(events.code & stop)
+    first = terminal[np.unique(events.lanes[terminal], return_index=True)[1]]
+    code, z, t = np.zeros(lanes, int), start.z.copy(), start.t.copy()
+    index, travelled = start.index.copy(), np.zeros(lanes)
+    why: dict[int, str] = {}
+    for lane, (reason, front) in traces.lost.items():
+        z[lane], t[lane], index[lane], why[lane] = front.z[0], front.t[0], front.index[0], reason
+    at = events.lanes[first]
+    code[at], z[at], t[at] = events.code[first], events.z[first], events.t[first]
+    index[at], travelled[at] = events.index[first, 0], events.travelled[first]
+    for i in first[~events.found[first]]:
+        lane = int(events.lanes[i])
+        code[lane] = LOST
+        why[lane] = f"the {KINDS[int(events.code[i])]} could not be located"
+    ends = np.full(lanes, np.inf)
+    ends[at] = events.travelled[first]
+    passing = ((events.code & ~stop) != 0) & (events.travelled < ends[events.lanes])
+    bad = passing & ~events.found
+    for i in np.flatnonzero(bad):
+        lane = int(events.lanes[i])
+        code[lane] = LOST
+        why[lane] = f"a {KINDS[int(events.code[i])]} on the way could not be located"
+    keep = np.flatnonzero(passing)
+    passed = Happenings(*(column[keep] for column in vars(events).values()))
+    return Outcome(code, z, t, index, travelled, why, passed, traces)

@@ -1,0 +1,89 @@
+"""Dense bordered solves: for small structures, and where the condensed factorisation is unsafe."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.linalg.kernels import count_negative
+
+
+@dataclass(frozen=True)
+class BorderedSolution:
+    """Solutions of ``[A C; R D] x = rhs`` for symmetric saddle-point matrices A, with inertia.
+
+    x holds one solution per right-hand side; `negative` counts the negative eigenvalues of A;
+    `pivot_ratio` is the smallest over the largest pivot (1 where pivoting made it irrelevant);
+    `pivoted` tells which lanes took the pivoted dense factorisation.
+    """
+
+    x: Float[np.ndarray, "lanes sides bordered"]
+    negative: Int[np.ndarray, " lanes"]
+    pivot_ratio: Float[np.ndarray, " lanes"]
+    pivoted: Bool[np.ndarray, " lanes"]
+
+
+def negative_eigenvalues(matrix: Float[np.ndarray, "lanes n n"]) -> Int[np.ndarray, " lanes"]:
+    """Count the negative eigenvalues of symmetric matrices.
+
+    LDLᵀ with complete pivoting [BunchParlett1971]_ and Sylvester's law of inertia. A matrix with
+    entries that are not finite counts as −1.
+    """
+    out = np.full(len(matrix), -1, dtype=np.int64)
+    finite = np.isfinite(matrix).all(axis=(1, 2))
+    if finite.any():
+        counts = np.empty(int(finite.sum()), dtype=np.int64)
+        count_negative(np.ascontiguousarray(matrix[finite]), counts)
+        out[finite] = counts
+    return out
+
+
+def solve_bordered(
+    matrix: Float[np.ndarray, "lanes n n"],
+    columns: Float[np.ndarray, "lanes k n"],
+    rows: Float[np.ndarray, "lanes k n"],
+    corner: Float[np.ndarray, "lanes k k"],
+    rhs: Float[np.ndarray, "lanes sides bordered"],
+) -> BorderedSolution:
+    """Solve ``[A Cᵀ; R D] x = rhs`` per lane by LU with partial pivoting, with the inertia of A.
+
+    Parameters
+    ----------
+    matrix
+        Symmetric A.
+    columns, rows, corner
+        Border; k may be 0.
+    rhs
+        Right-hand sides of length n + k, one per row.
+
+    Returns
+    -------
+    Solutions; lanes whose bordered matrix is singular or not finite are filled with NaN.
+    """
+    n, k = matrix.shape[1], columns.shape[1]
+    full = np.empty((len(matrix), n + k, n + k))
+    full[:, :n, :n] = matrix
+    full[:, :n, n:] = columns.transpose(0, 2, 1)
+    full[:, n:, :n] = rows
+    full[:, n:, n:] = corner
+    x = _solve(full, rhs.transpose(0, 2, 1)).transpose(0, 2, 1)
+    lanes = len(matrix)
+    return BorderedSolution(
+        np.ascontiguousarray(x), negative_eigenvalues(matrix), np.ones(lanes), np.ones(lanes, bool)
+    )
+
+
+def _solve(
+    full: Float[np.ndarray, "lanes b b"], rhs: Float[np.ndarray, "lanes b sides"]
+) -> Float[np.ndarray, "lanes b sides"]:
+    usable = np.isfinite(full).all(axis=(1, 2)) & np.isfinite(rhs).all(axis=(1, 2))
+    x = np.full(rhs.shape, np.nan)
+    try:
+        x[usable] = np.linalg.solve(full[usable], rhs[usable])
+    except np.linalg.LinAlgError:  # one singular lane fails the batch: go one by one
+        for lane in np.flatnonzero(usable):
+            try:
+                x[lane] = np.linalg.solve(full[lane], rhs[lane])
+            except np.linalg.LinAlgError:
+                continue
+    return x

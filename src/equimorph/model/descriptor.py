@@ -1,0 +1,100 @@
+"""Descriptors: scalars of a state; constraints: comparisons of descriptors with numbers."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol, overload
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from equimorph.errors import InputError
+
+Evaluate = Callable[
+    [Float[np.ndarray, "lanes size"], Float[np.ndarray, "lanes parameters"]],
+    Float[np.ndarray, " lanes"],
+]
+
+
+class OneState(Protocol):
+    """What a descriptor needs of a single state."""
+
+    @property
+    def z(self) -> Float[np.ndarray, " size"]: ...
+    @property
+    def p(self) -> Float[np.ndarray, " parameters"]: ...
+
+
+class ManyStates(Protocol):
+    """What a descriptor needs of a batch of states."""
+
+    @property
+    def z(self) -> Float[np.ndarray, "lanes size"]: ...
+    @property
+    def p(self) -> Float[np.ndarray, "lanes parameters"]: ...
+    def __len__(self) -> int: ...
+
+
+@dataclass(frozen=True)
+class Descriptor:
+    """A scalar of a state, with its name, unit and symbol for axes.
+
+    Call it on a state for a float, on a batch of states for an array; compare it with a number for
+    a `Constraint`.
+    """
+
+    name: str
+    unit: str
+    function: Evaluate
+    symbol: str = ""
+
+    @overload
+    def __call__(self, states: ManyStates) -> Float[np.ndarray, " lanes"]: ...
+    @overload
+    def __call__(self, states: OneState) -> float: ...
+    def __call__(self, states: Any) -> Any:
+        """Value on a state (float) or on a batch of states (array)."""
+        if states.z.ndim == 1:
+            return float(self.function(states.z[None], states.p[None])[0])
+        return self.function(states.z, states.p)
+
+    def __le__(self, bound: float) -> "Constraint":
+        """Return the constraint that the descriptor stays at or below `bound`."""
+        return Constraint(self, "<=", _number(self.name, bound))
+
+    def __ge__(self, bound: float) -> "Constraint":
+        """Return the constraint that the descriptor stays at or above `bound`."""
+        return Constraint(self, ">=", _number(self.name, bound))
+
+
+def _number(name: str, bound: Any) -> float:
+    try:
+        number = float(bound)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not np.isfinite(number):
+        raise InputError(f"`{name}` must be compared with a finite number; got {bound!r}.")
+    return number
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A descriptor held on one side of a bound."""
+
+    descriptor: Descriptor
+    sense: Literal["<=", ">="]
+    bound: float
+
+    def __str__(self) -> str:
+        """Return it as it is written."""
+        return f"{self.descriptor.name} {self.sense} {self.bound:g}"
+
+    def excess(
+        self, z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
+    ) -> Float[np.ndarray, " lanes"]:
+        """Amount by which states exceed the bound: positive where violated."""
+        sign = 1.0 if self.sense == "<=" else -1.0
+        return sign * (self.descriptor.function(z, p) - self.bound)
+
+    def holds(self, states: ManyStates) -> Bool[np.ndarray, " lanes"]:
+        """Whether states obey the constraint."""
+        return self.excess(states.z, states.p) <= 0.0

@@ -1,0 +1,43 @@
+"""Structures: what can be bent, and the states it can be in."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from equimorph.errors import InputError
+from equimorph.structures.contract import Advance, Structure, Symmetry, bordered_advance
+from equimorph.structures.rod import Rod
+from equimorph.structures.spring import Spring
+from equimorph.structures.states import State, States
+
+KINDS: dict[str, type[Rod] | type[Spring]] = {"rod": Rod, "spring": Spring}
+
+__all__ = [
+    "KINDS",
+    "Advance",
+    "Rod",
+    "Spring",
+    "State",
+    "States",
+    "Structure",
+    "Symmetry",
+    "bordered_advance",
+    "from_identity",
+]
+
+
+def from_identity(identity: Mapping[str, Any]) -> Structure:
+    """Build the structure that ``Structure.identity`` describes.
+
+    Raises
+    ------
+    InputError
+        For an unknown kind or data that the kind does not take.
+    """
+    data = dict(identity)
+    kind = data.pop("kind", None)
+    if kind not in KINDS:
+        raise InputError(f"`kind` must be one of {', '.join(KINDS)}; got {kind!r}.")
+    try:
+        return KINDS[kind](**data)
+    except TypeError as error:
+        raise InputError(f"`structure` must have the data of a {kind}; got {error}.") from None

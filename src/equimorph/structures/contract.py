@@ -1,0 +1,188 @@
+"""What a structure must offer so that everything else works with it."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.linalg import BorderedSolution
+from equimorph.model import Descriptor, Parameter
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Direction = tuple[Lanes, Parameters]
+
+
+@dataclass(frozen=True)
+class Advance:
+    """One Newton step on a curve through the equilibrium set, with the tangent.
+
+    The bordered system is ``[F_z F_t; row corner] [dz; dt] = −[F; defect]`` with
+    ``F_t = F_p·dp``; the tangent solves it for the right-hand side ``[0; 1]``.
+    """
+
+    dz: Float[np.ndarray, "lanes size"]
+    dt: Float[np.ndarray, " lanes"]
+    tangent_z: Float[np.ndarray, "lanes size"]
+    tangent_t: Float[np.ndarray, " lanes"]
+    residual: Float[np.ndarray, " lanes"]
+    index: Int[np.ndarray, " lanes"]
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """An involution of unknowns and parameters that maps equilibria to equilibria."""
+
+    name: str
+    apply: Callable[[Lanes, Parameters], tuple[Lanes, Parameters]]
+    signs: Float[np.ndarray, " parameters"]
+    """Sign of each parameter under the symmetry: −1 where it is reversed."""
+
+
+class Structure(ABC):
+    """A structure with energy E(u; p), constraints c(u; p) = 0 and L = E + λ·c.
+
+    All methods take and return batches, lanes first. ``z = (u, λ)`` has `unknowns` + `constraints`
+    entries and F = (∂L/∂u, c).
+    """
+
+    kind: ClassVar[str]
+    parameters: tuple[Parameter, ...]
+    unknowns: int
+    constraints: int
+    mass: Float[np.ndarray, " unknowns"]
+    """Diagonal of the mass matrix: the metric of margins, distances and lengths."""
+
+    @property
+    def size(self) -> int:
+        """Length of z."""
+        return self.unknowns + self.constraints
+
+    @cached_property
+    def scales(self) -> Float[np.ndarray, " parameters"]:
+        """Change of each parameter that counts as one unit of length."""
+        return np.array([parameter.scale for parameter in self.parameters])
+
+    @abstractmethod
+    def identity(self) -> dict[str, Any]:
+        """Return the kind and the data from which the structure can be built again."""
+
+    @abstractmethod
+    def energy(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+        """Potential energy E."""
+
+    @abstractmethod
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+
+    @abstractmethod
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+
+    @abstractmethod
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w], second derivative of F along two directions (dz, dp)."""
+
+    @abstractmethod
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p: work-conjugates of the parameters (actuator efforts, the loads' displacements)."""
+
+    @abstractmethod
+    def solve(  # the bordered system has this many parts
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: tuple[
+            Float[np.ndarray, "lanes k size"],
+            Float[np.ndarray, "lanes k size"],
+            Float[np.ndarray, "lanes k k"],
+        ]
+        | None = None,
+        shift: Float[np.ndarray, " lanes"] | None = None,
+    ) -> BorderedSolution:
+        """Solve with the KKT matrix F_z − shift·mass, bordered by (columns, rows, corner)."""
+
+    @abstractmethod
+    def natural(
+        self, p: Parameters
+    ) -> tuple[Float[np.ndarray, "lanes size"], Bool[np.ndarray, " lanes"]]:
+        """Unloaded state from which the structure starts, and whether it was found."""
+
+    @abstractmethod
+    def unloaded(self) -> Mapping[str, float]:
+        """Parameter values at which natural states are defined (loads at zero)."""
+
+    @abstractmethod
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Random guesses, one per lane, spread over what equilibria may look like."""
+
+    @abstractmethod
+    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """Whether states lie within what the discretisation can represent."""
+
+    @abstractmethod
+    def shape(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "lanes points 2"]:
+        """Coordinates to draw."""
+
+    @abstractmethod
+    def descriptor(self, text: str) -> Descriptor:
+        """Return the descriptor written as `text`, like ``height(0.5)``."""
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Symmetries of the equilibrium set; none unless the structure says so."""
+        return ()
+
+    def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+        """Discretisation error of the unknowns; zero for discrete structures."""
+        return np.zeros(len(z))
+
+    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian."""
+        nothing = np.zeros((len(z), 0, self.size))
+        return self.solve(z, p, nothing).negative - self.constraints
+
+    def advance(  # the fused step of the hot path
+        self,
+        z: Lanes,
+        p: Parameters,
+        dp: Parameters,
+        row: Lanes,
+        corner: Float[np.ndarray, " lanes"],
+        defect: Float[np.ndarray, " lanes"],
+    ) -> Advance:
+        """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
+        residual = self.residual(z, p)
+        column = self.parameter_derivative(z, p, dp)
+        return bordered_advance(self, z, p, residual, column, (row, corner, defect))
+
+
+def bordered_advance(
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    residual: Lanes,
+    column: Lanes,
+    closing: tuple[Lanes, Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]],
+) -> Advance:
+    """`Advance` for any residual and column, by the structure's general bordered solve."""
+    row, corner, defect = closing
+    rhs = np.zeros((len(z), 2, structure.size + 1))
+    rhs[:, 0, :-1], rhs[:, 0, -1], rhs[:, 1, -1] = -residual, -defect, 1.0
+    border = (column[:, None], row[:, None], corner[:, None, None])
+    solution = structure.solve(z, p, rhs, border)
+    step, tangent = solution.x[:, 0], solution.x[:, 1]
+    return Advance(
+        np.ascontiguousarray(step[:, :-1]),
+        step[:, -1].copy(),
+        np.ascontiguousarray(tangent[:, :-1]),
+        tangent[:, -1].copy(),
+        np.abs(residual).max(axis=1),
+        solution.negative - structure.constraints,
+    )

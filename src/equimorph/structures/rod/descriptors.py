@@ -1,0 +1,156 @@
+"""Descriptors of the rod."""
+
+import re
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+from equimorph.model import Descriptor
+from equimorph.structures.rod.mechanics import RodMechanics
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+
+WRITTEN = (
+    "height(s), x(s), angle(s), curvature(s), max_curvature, energy, support_force(lambda), "
+    "support_force(mu), end_moment(0), end_moment(1)"
+)
+_SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
+
+
+def _arclength(s: float) -> float:
+    try:
+        value = float(s)
+    except (TypeError, ValueError):
+        value = np.nan
+    if not 0.0 <= value <= 1.0:
+        raise InputError(f"`s` must be an arclength between 0 and 1; got {s!r}.")
+    return value
+
+
+def _symbol(letter: str, s: float) -> str:
+    return f"{letter}({_SYMBOLS.get(s, f'{s:g}')})"
+
+
+def coordinate(rod: RodMechanics, s: float, axis: int) -> Descriptor:
+    """x(s) (axis 0) or y(s) (axis 1): the integral of cos θ or sin θ, spectral in elements."""
+    at = _arclength(s)
+    row = rod.mesh.integration(np.array([at]))[0]
+    wave = np.sin if axis else np.cos
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return np.asarray(wave(rod.nodal_angles(z, p)) @ row)
+
+    name = "height" if axis else "x"
+    return Descriptor(f"{name}({at:.6g})", "L", value, _symbol("y" if axis else "x", at))
+
+
+def angle(rod: RodMechanics, s: float) -> Descriptor:
+    """θ(s), interpolated in its element."""
+    at = _arclength(s)
+    row = rod.mesh.interpolation(np.array([at]))[0]
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return np.asarray(rod.nodal_angles(z, p) @ row)
+
+    return Descriptor(f"angle({at:.6g})", "rad", value, _symbol("θ", at))
+
+
+def curvature(rod: RodMechanics, s: float) -> Descriptor:
+    """κ(s): moment at the left end of the element plus the integral of κ' to s."""
+    at = _arclength(s)
+    element, t = rod.mesh.locate(np.array([at]))
+    e = int(element[0])
+    ref = rod.mesh.reference
+    basis = [np.polynomial.legendre.legint(r, lbnd=-1) for r in np.eye(ref.degree + 1)]
+    x = 2.0 * t[0] - 1.0
+    sums = np.array([0.5 * np.polynomial.legendre.legval(x, b) for b in basis])
+    row = 4.0 * np.pi**2 * rod.mesh.lengths[e] * (sums @ ref.to_legendre)
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        kappa, force = rod.nodal_curvature(z, p)
+        return np.asarray(kappa[:, e, 0] + force[:, e] @ row)
+
+    return Descriptor(f"curvature({at:.6g})", "1/L", value, _symbol("κ", at))
+
+
+def max_curvature(rod: RodMechanics) -> Descriptor:
+    """max_s |κ(s)|."""
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return rod.largest_curvature(z, p)[0]
+
+    return Descriptor("max_curvature", "1/L", value, "max |κ|")
+
+
+def support_force(rod: RodMechanics, component: str) -> Descriptor:
+    """λ or μ, in units of 4π²B/L²."""
+    if component not in {"lambda", "mu"}:
+        raise InputError(f"`component` must be 'lambda' or 'mu'; got {component!r}.")
+    place = rod.unknowns + (component == "mu")
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return z[:, place].copy()
+
+    symbol = "λ" if component == "lambda" else "μ"
+    return Descriptor(f"support_force({component})", "4π²B/L²", value, symbol)
+
+
+def end_moment(rod: RodMechanics, end: int) -> Descriptor:
+    """∂L/∂θ(0) or ∂L/∂θ(1)."""
+    if end not in {0, 1}:
+        raise InputError(f"`end` must be 0 or 1; got {end!r}.")
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        effort = rod.effort(z, p)
+        # efforts of Θ and Δ are the difference and the sum of those of θ(0) and θ(1)
+        return 0.5 * (effort[:, 1] + (1.0 if end == 0 else -1.0) * effort[:, 0])
+
+    return Descriptor(f"end_moment({end})", "4π²B/L", value, f"M({end})")
+
+
+def named(rod: RodMechanics, text: str) -> Descriptor:
+    """Descriptor written as text."""
+    match = re.fullmatch(r"\s*(\w+)\s*(?:\(\s*([^()]*?)\s*\))?\s*", text)
+    name, argument = (match.group(1), match.group(2)) if match else ("", None)
+    if argument is None and name in {"max_curvature", "energy"}:
+        return max_curvature(rod) if name == "max_curvature" else _energy(rod)
+    if argument is not None and name == "support_force":
+        return support_force(rod, argument)
+    if argument in {"0", "1"} and name == "end_moment":
+        return end_moment(rod, int(argument))
+    if argument is not None and name in {"height", "x", "angle", "curvature"}:
+        s = _fraction(argument)
+        if name in {"height", "x"}:
+            return coordinate(rod, s, int(name == "height"))
+        return angle(rod, s) if name == "angle" else curvature(rod, s)
+    raise InputError(f"`descriptor` must be one of {WRITTEN}; got {text!r}.")
+
+
+def _energy(rod: RodMechanics) -> Descriptor:
+    return Descriptor("energy", "4π²B/L", rod.energy, "E")
+
+
+def _fraction(text: str) -> float:
+    try:
+        above, _, below = text.partition("/")
+        return float(above) / float(below or 1.0)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f"`s` must be a number or a fraction like 1/3; got {text!r}.") from None
+
+
+def curvature_change(
+    rod: RodMechanics, finer: RodMechanics, z: Lanes, p: Parameters
+) -> Float[np.ndarray, " lanes"]:
+    """|max |κ| on the rod − max |κ| on a finer rod| after Newton on the finer one."""
+    n = finer.unknowns
+    matrix = rod.mesh.interpolation(finer.mesh.nodes[1:-1])
+    fine = np.concatenate([rod.nodal_angles(z, p) @ matrix.T, z[:, -2:]], axis=1)
+    still = np.zeros((len(z), finer.size))
+    one, none = np.ones(len(z)), np.zeros(len(z))
+    for _ in range(4):
+        fine = fine + finer.advance(fine, p, np.zeros_like(p), still, one, none).dz
+    change = np.abs(finer.largest_curvature(fine, p)[0] - rod.largest_curvature(z, p)[0])
+    return np.asarray(np.where(np.isfinite(fine[:, :n]).all(axis=1), change, np.inf))

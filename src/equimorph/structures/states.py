@@ -1,0 +1,153 @@
+"""Equilibrium states: one, or a batch."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, overload
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.model import names_of, position
+from equimorph.structures.contract import Structure
+from equimorph.structures.margin import stability_margin
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """A batch of equilibrium states of one structure, one per lane."""
+
+    structure: Structure
+    z: Float[np.ndarray, "lanes size"]
+    p: Float[np.ndarray, "lanes parameters"]
+
+    def __len__(self) -> int:
+        """Number of states."""
+        return len(self.z)
+
+    def __iter__(self) -> Iterator["State"]:
+        """Go through the states one by one."""
+        return (State(self.structure, z, p) for z, p in zip(self.z, self.p, strict=True))
+
+    @overload
+    def __getitem__(self, key: int | np.integer[Any]) -> "State": ...
+    @overload
+    def __getitem__(self, key: str) -> Float[np.ndarray, " lanes"]: ...
+    @overload
+    def __getitem__(self, key: slice | np.ndarray | list[int]) -> "States": ...
+    def __getitem__(self, key: Any) -> Any:
+        """One state, a parameter of all states by name, or a sub-batch."""
+        if isinstance(key, str):
+            return self.p[:, position(self.structure.parameters, key)]
+        if isinstance(key, int | np.integer):
+            return State(self.structure, self.z[key], self.p[key])
+        return States(self.structure, self.z[key], self.p[key])
+
+    @cached_property
+    def index(self) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian; 0 is stable."""
+        return self.structure.index(self.z, self.p)
+
+    @property
+    def stable(self) -> "States":
+        """The stable ones."""
+        return self[self.index == 0]
+
+    @cached_property
+    def margin(self) -> Float[np.ndarray, " lanes"]:
+        """Smallest eigenvalue of the constrained Hessian with respect to the mass matrix."""
+        return stability_margin(self.structure, self.z, self.p)
+
+    @cached_property
+    def energy(self) -> Float[np.ndarray, " lanes"]:
+        """Potential energy E."""
+        return self.structure.energy(self.z, self.p)
+
+    @property
+    def multipliers(self) -> Float[np.ndarray, "lanes constraints"]:
+        """Multipliers λ of the constraints: the supports' forces on a rod."""
+        return self.z[:, self.structure.unknowns :]
+
+    @cached_property
+    def residual(self) -> Float[np.ndarray, " lanes"]:
+        """Largest absolute entry of F."""
+        return np.abs(self.structure.residual(self.z, self.p)).max(axis=1)
+
+    @cached_property
+    def error_estimate(self) -> Float[np.ndarray, " lanes"]:
+        """Estimated discretisation error; see the structure for what it bounds."""
+        return self.structure.error_estimate(self.z, self.p)
+
+    def shape(
+        self, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "lanes points 2"]:
+        """Coordinates to draw, in the structure's unit of length."""
+        return self.structure.shape(self.z, self.p, s)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One equilibrium state: unknowns and multipliers z, and all parameters p."""
+
+    structure: Structure
+    z: Float[np.ndarray, " size"]
+    p: Float[np.ndarray, " parameters"]
+
+    @cached_property
+    def batch(self) -> States:
+        """The state as a batch of one."""
+        return States(self.structure, self.z[None].copy(), self.p[None].copy())
+
+    def __getitem__(self, name: str) -> float:
+        """Parameter by name."""
+        return float(self.p[position(self.structure.parameters, name)])
+
+    def __repr__(self) -> str:
+        """Kind, parameters and index."""
+        values = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items())
+        return f"State({self.structure.kind}: {values}; index {self.index})"
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """All parameters by name."""
+        names = names_of(self.structure.parameters)
+        return dict(zip(names, map(float, self.p), strict=True))
+
+    @property
+    def index(self) -> int:
+        """Negative eigenvalues of the constrained Hessian; 0 is stable."""
+        return int(self.batch.index[0])
+
+    @property
+    def stable(self) -> bool:
+        """Whether the state is a strict constrained minimum of the energy."""
+        return self.index == 0
+
+    @property
+    def margin(self) -> float:
+        """Smallest eigenvalue of the constrained Hessian with respect to the mass matrix."""
+        return float(self.batch.margin[0])
+
+    @property
+    def energy(self) -> float:
+        """Potential energy E."""
+        return float(self.batch.energy[0])
+
+    @property
+    def multipliers(self) -> Float[np.ndarray, " constraints"]:
+        """Multipliers λ of the constraints: the support's force on a rod."""
+        return self.batch.multipliers[0]
+
+    @property
+    def residual(self) -> float:
+        """Largest absolute entry of F."""
+        return float(self.batch.residual[0])
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated discretisation error; see the structure for what it bounds."""
+        return float(self.batch.error_estimate[0])
+
+    def shape(self, s: Float[np.ndarray, " points"] | None = None) -> Float[np.ndarray, "points 2"]:
+        """Coordinates to draw, in the structure's unit of length."""
+        return self.batch.shape(s)[0]
