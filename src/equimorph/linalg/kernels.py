@@ -5,208 +5,278 @@ own for every lane). Elements are chained: the last node of one is the first nod
 nodes are eliminated inside each element; what remains is tridiagonal in the vertices. Everything is
 kept as ``LDLᵀ`` so that the signs of the pivots are the inertia (Sylvester).
 
-Arrays of a block carry the lanes last, ``columns[c, node, lane]``, and are read by row. Columns go
-four at a time (their number is a multiple of `TILE`): four independent sums hide the latency of
-the fused multiply-add, and an entry of L is loaded once for all four.
+Work arrays have rows of eight lanes. Columns lie in tiles, ``columns[tile, node, slot]``: the
+`TILE` slots of a node are one bundle, so that one entry of L serves eight columns while it is in a
+register. The first two slots of the first tile are the *ties*, the columns of an element's inner
+nodes at its left and right vertex: eliminated like any other column, they leave the Schur
+complement of the vertices in their slots there.
 """
 
 import numpy as np
 from numba import njit
 
-from equimorph.linalg.simd import LANES, load, spread, store
+from equimorph.linalg.simd import (
+    LANES,
+    absolute,
+    larger,
+    load,
+    load2,
+    load4,
+    load8,
+    repeat2,
+    repeat4,
+    repeat8,
+    row_of,
+    smaller,
+    spread,
+    store,
+    where_less,
+    work_rows,
+)
 
-TILE = 4
+TILE = 8
+TIES = 2
+GROUP = 4
 FLAGS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
 
 
 @njit(**FLAGS)
-def _factor_inner(stiffness, e, diagonal, lower, pivots):
-    """LDLᵀ of the inner block of element `e`, column by column (its updates are independent)."""
-    inner = stiffness.shape[1] - 2
-    base, one = e * (inner + 1) + 1, spread(1.0)
-    for i in range(inner):
-        at = (e * inner + i) * inner
-        for j in range(i):
-            store(lower, at + j, spread(stiffness[e, i + 1, j + 1]))
-        store(lower, at + i, spread(stiffness[e, i + 1, i + 1]) + load(diagonal, base + i))
+def lower_row(e, inner):
+    """Row of L₀₀ of element `e`; entry (i, j) lies ``(i·inner + j)·GROUP`` rows further."""
+    return (e // GROUP) * inner * inner * GROUP + e % GROUP
+
+
+@njit(**FLAGS)
+def work_arrays(elements, inner, tiles):
+    """Work arrays ``lower, vertices, columns, extremes`` of `reduce_block`; columns are zero."""
+    groups = (elements + GROUP - 1) // GROUP
+    columns = work_rows(tiles * (elements * (inner + 1) + 1) * TILE)
+    columns[:] = 0.0
+    lower, vertices = work_rows(groups * inner * inner * GROUP), work_rows(2 * (elements + 1))
+    return lower, vertices, columns, work_rows(3)
+
+
+@njit(**FLAGS)
+def _factor_group(stiffness, group, diagonal, lower):
+    """LDLᵀ of the inner blocks of `GROUP` elements side by side, reciprocal pivots on the diagonal.
+
+    Column by column: one element alone would wait for its divisions.
+    """
+    elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
+    base = group * inner * inner * GROUP
+    for member in range(GROUP):
+        e = min(group * GROUP + member, elements - 1)  # spare members repeat the last element
+        for i in range(inner):
+            at = base + i * inner * GROUP + member
+            for j in range(i):
+                store(lower, at + j * GROUP, spread(stiffness[e, i + 1, j + 1]))
+            own = load(diagonal, e * (inner + 1) + 1 + i)
+            store(lower, at + i * GROUP, spread(stiffness[e, i + 1, i + 1]) + own)
+    one = repeat4(spread(1.0))
     for j in range(inner):
-        inverse = one / load(lower, (e * inner + j) * inner + j)
-        store(pivots, base + j, inverse)
+        at_pivot = base + (j * inner + j) * GROUP
+        inverse = one / load4(lower, at_pivot)
+        store(lower, at_pivot, inverse)
         for i in range(j + 1, inner):
-            at = (e * inner + i) * inner
-            factor = load(lower, at + j) * inverse
-            store(lower, at + i, load(lower, at + i) - factor * load(lower, at + j))
-            for c in range(i + 1, inner):
-                below = (e * inner + c) * inner
-                store(lower, below + i, load(lower, below + i) - factor * load(lower, below + j))
-            store(lower, at + j, factor)
+            row = base + i * inner * GROUP
+            value = load4(lower, row + j * GROUP)
+            factor = value * inverse
+            for c in range(j + 1, i):
+                other = load4(lower, base + (c * inner + j) * GROUP)  # already divided
+                at = row + c * GROUP
+                store(lower, at, load4(lower, at) - value * other)
+            at = row + i * GROUP
+            store(lower, at, load4(lower, at) - value * factor)
+            store(lower, row + j * GROUP, factor)
 
 
 @njit(**FLAGS)
-def _forward_tile(lower, e, columns, c, nodes, base):
-    """Forward-substitute four columns in the inner nodes of element `e`."""
-    inner = lower.shape[1]
-    at0, at1 = c * nodes + base, (c + 1) * nodes + base
-    at2, at3 = (c + 2) * nodes + base, (c + 3) * nodes + base
-    for i in range(1, inner):
-        row = (e * inner + i) * inner
-        v0, v1 = load(columns, at0 + i), load(columns, at1 + i)
-        v2, v3 = load(columns, at2 + i), load(columns, at3 + i)
-        for j in range(i):
-            factor = load(lower, row + j)
-            v0 = v0 - factor * load(columns, at0 + j)
-            v1 = v1 - factor * load(columns, at1 + j)
-            v2 = v2 - factor * load(columns, at2 + j)
-            v3 = v3 - factor * load(columns, at3 + j)
-        store(columns, at0 + i, v0)
-        store(columns, at1 + i, v1)
-        store(columns, at2 + i, v2)
-        store(columns, at3 + i, v3)
+def _set_ties(stiffness, e, columns):
+    """Write the ties of element `e` into the first two slots of its nodes."""
+    order = stiffness.shape[1]
+    at = e * (order - 1) * TILE
+    for i in range(order):
+        inside = 0 < i < order - 1
+        store(columns, at + i * TILE, spread(stiffness[e, i, 0] if inside else 0.0))
+        store(columns, at + i * TILE + 1, spread(stiffness[e, i, order - 1] if inside else 0.0))
 
 
 @njit(**FLAGS)
-def _condense_tile(ties, pivots, e, inner, columns, c):
-    """Take the eliminated inner nodes of element `e` out of four columns at its vertices."""
-    nodes = pivots.shape[0]
-    start = e * (inner + 1)
-    stop = start + inner + 1
-    at0, at1, at2, at3 = c * nodes, (c + 1) * nodes, (c + 2) * nodes, (c + 3) * nodes
-    l0, l1 = load(columns, at0 + start), load(columns, at1 + start)
-    l2, l3 = load(columns, at2 + start), load(columns, at3 + start)
-    r0, r1 = load(columns, at0 + stop), load(columns, at1 + stop)
-    r2, r3 = load(columns, at2 + stop), load(columns, at3 + stop)
-    for i in range(start + 1, stop):
-        pivot = load(pivots, i)
-        left, right = load(ties, i) * pivot, load(ties, nodes + i) * pivot
-        v0, v1 = load(columns, at0 + i), load(columns, at1 + i)
-        v2, v3 = load(columns, at2 + i), load(columns, at3 + i)
-        l0, l1, l2, l3 = l0 - left * v0, l1 - left * v1, l2 - left * v2, l3 - left * v3
-        r0, r1, r2, r3 = r0 - right * v0, r1 - right * v1, r2 - right * v2, r3 - right * v3
-    store(columns, at0 + start, l0)
-    store(columns, at1 + start, l1)
-    store(columns, at2 + start, l2)
-    store(columns, at3 + start, l3)
-    store(columns, at0 + stop, r0)
-    store(columns, at1 + stop, r1)
-    store(columns, at2 + stop, r2)
-    store(columns, at3 + stop, r3)
-
-
-@njit(**FLAGS)
-def _reduce_ties(stiffness, e, lower, pivots, ties, chain):
-    """Forward-reduce the ties of element `e` to its vertices; Schur complement of the vertices."""
-    inner, nodes = lower.shape[1], pivots.shape[0]
-    start = e * (inner + 1)
-    stop = start + inner + 1
-    from_start = load(pivots, start) + spread(stiffness[e, 0, 0])
-    from_stop = load(pivots, stop) + spread(stiffness[e, inner + 1, inner + 1])
-    tie = spread(stiffness[e, 0, inner + 1])
+def _reduce_tile(lower, base, inner, columns, ties, first):
+    """Forward-substitute a tile in an element's inner nodes, and take them out of its vertices."""
+    left, right = load8(columns, first - TILE), load8(columns, first + inner * TILE)
     for i in range(inner):
-        left = spread(stiffness[e, i + 1, 0])
-        right = spread(stiffness[e, i + 1, inner + 1])
+        row, at = base + i * inner * GROUP, first + i * TILE
+        value = load8(columns, at)
         for j in range(i):
-            factor = load(lower, (e * inner + i) * inner + j)
-            left = left - factor * load(ties, start + 1 + j)
-            right = right - factor * load(ties, nodes + start + 1 + j)
-        store(ties, start + 1 + i, left)
-        store(ties, nodes + start + 1 + i, right)
-        pivot = load(pivots, start + 1 + i)
-        from_start = from_start - left * left * pivot
-        tie = tie - left * right * pivot
-        from_stop = from_stop - right * right * pivot
-    store(pivots, start, from_start)
-    store(pivots, stop, from_stop)
-    store(chain, e, tie)
+            factor = repeat8(load(lower, row + j * GROUP))
+            value = value - factor * load8(columns, first + j * TILE)
+        store(columns, at, value)
+        pivot = load(lower, row + i * GROUP)
+        left = left - repeat8(load(columns, ties + i * TILE) * pivot) * value
+        right = right - repeat8(load(columns, ties + i * TILE + 1) * pivot) * value
+    store(columns, first - TILE, left)
+    store(columns, first + inner * TILE, right)
 
 
 @njit(**FLAGS)
-def reduce_block(stiffness, diagonal, ends, columns, lower, pivots, ties, chain):
+def _note_pivots(lower, base, inner, extremes):
+    """Count negative pivots of an element; note the smallest and largest reciprocal."""
+    count, small, large = load(extremes, 0), load(extremes, 1), load(extremes, 2)
+    for i in range(inner):
+        value = load(lower, base + (i * inner + i) * GROUP)
+        count = count + where_less(value, spread(0.0), spread(1.0), spread(0.0))
+        small, large = smaller(small, absolute(value)), larger(large, absolute(value))
+    store(extremes, 0, count)
+    store(extremes, 1, small)
+    store(extremes, 2, large)
+
+
+@njit(**FLAGS)
+def _eliminate_vertex(e, last, degree, vertices, columns, tiles, extremes):
+    """Invert the pivot of vertex `e` and take the vertex out of the next one, if that is unknown."""
+    inverse = spread(1.0) / load(vertices, 2 * e)
+    store(vertices, 2 * e, inverse)
+    _note_pivots(vertices, 2 * e, 1, extremes)
+    if e < last:
+        tie = load(vertices, 2 * e + 1)
+        factor = tie * inverse
+        store(vertices, 2 * e + 1, factor)
+        store(vertices, 2 * e + 2, load(vertices, 2 * e + 2) - factor * tie)
+        rows = columns.shape[0] // tiles
+        for t in range(tiles):
+            at = t * rows + e * degree * TILE
+            following = at + degree * TILE
+            value = load8(columns, following) - repeat8(factor) * load8(columns, at)
+            store(columns, following, value)
+
+
+@njit(**FLAGS)
+def reduce_block(stiffness, diagonal, ends, tiles, lower, vertices, columns, extremes):
     """Factor one block of lanes and forward-reduce its columns in place.
 
     stiffness (elements, degree + 1, degree + 1); diagonal (nodes, 8); ends: first and last vertex
-    that is unknown; columns (c, nodes, 8). Filled for `restore_block`: lower (elements,
-    degree - 1, degree - 1, 8), pivots (nodes, 8) as reciprocals, ties (2, nodes, 8), chain
-    (elements + 1, 8).
+    that is unknown; columns (tiles, nodes, TILE, 8), ties left to this function. Filled: lower
+    (see `lower_row`); vertices (elements + 1, 2, 8), reciprocal pivot and factor to the next;
+    extremes (3, 8): negative pivots, smallest and largest |reciprocal|.
     """
     elements, degree = stiffness.shape[0], stiffness.shape[1] - 1
-    nodes, count = pivots.shape[0], columns.shape[0]
-    one = spread(1.0)
-    for e in range(elements + 1):
-        store(pivots, e * degree, load(diagonal, e * degree))
+    inner, rows = degree - 1, columns.shape[0] // tiles
+    store(extremes, 0, spread(0.0))
+    store(extremes, 1, spread(np.inf))
+    store(extremes, 2, spread(0.0))
+    store(vertices, 0, load(diagonal, 0))
     for e in range(elements):
-        _factor_inner(stiffness, e, diagonal, lower, pivots)
-        _reduce_ties(stiffness, e, lower, pivots, ties, chain)
-        for c in range(0, count, TILE):
-            _forward_tile(lower, e, columns, c, nodes, e * degree + 1)
-            _condense_tile(ties, pivots, e, degree - 1, columns, c)
-    for e in range(ends[0], ends[1] + 1):
-        node, following = e * degree, (e + 1) * degree
-        inverse = one / load(pivots, node)
-        store(pivots, node, inverse)
-        if e < ends[1]:
-            tie = load(chain, e)
-            factor = tie * inverse
-            store(chain, e, factor)
-            store(pivots, following, load(pivots, following) - factor * tie)
-            for c in range(count):
-                at = c * nodes
-                value = load(columns, at + following) - factor * load(columns, at + node)
-                store(columns, at + following, value)
+        if e % GROUP == 0:
+            _factor_group(stiffness, e // GROUP, diagonal, lower)
+        _set_ties(stiffness, e, columns)
+        base, start = lower_row(e, inner), e * degree * TILE
+        stop = start + degree * TILE
+        for t in range(tiles):
+            _reduce_tile(lower, base, inner, columns, start + TILE, t * rows + start + TILE)
+        _note_pivots(lower, base, inner, extremes)
+        own = load(vertices, 2 * e) + spread(stiffness[e, 0, 0])
+        store(vertices, 2 * e, own + load(columns, start))
+        store(vertices, 2 * e + 1, spread(stiffness[e, 0, degree]) + load(columns, start + 1))
+        own = load(diagonal, (e + 1) * degree) + spread(stiffness[e, degree, degree])
+        store(vertices, 2 * e + 2, own + load(columns, stop + 1))
+        if ends[0] <= e <= ends[1]:
+            _eliminate_vertex(e, ends[1], degree, vertices, columns, tiles, extremes)
+    if ends[1] == elements:
+        _eliminate_vertex(elements, elements, degree, vertices, columns, tiles, extremes)
 
 
 @njit(**FLAGS)
-def restore_block(lower, pivots, ties, chain, ends, columns, c):
-    """Back-substitute the forward-reduced columns c and c + 1 in place: H⁻¹ times the column."""
-    elements, inner, nodes = lower.shape[0], lower.shape[1], pivots.shape[0]
-    degree, at, to = inner + 1, c * nodes, (c + 1) * nodes
-    for node in (0, nodes - 1):
-        if (node == 0 and ends[0] > 0) or (node > 0 and ends[1] < elements):
-            store(columns, at + node, spread(0.0))
-            store(columns, to + node, spread(0.0))
-    for e in range(ends[1], ends[0] - 1, -1):
-        node = e * degree
-        value = load(columns, at + node) * load(pivots, node)
-        other = load(columns, to + node) * load(pivots, node)
-        if e < ends[1]:
-            value = value - load(chain, e) * load(columns, at + node + degree)
-            other = other - load(chain, e) * load(columns, to + node + degree)
-        store(columns, at + node, value)
-        store(columns, to + node, other)
-    for e in range(elements):
-        start = e * degree
-        stop = start + degree
-        v_start, v_stop = load(columns, at + start), load(columns, at + stop)
-        w_start, w_stop = load(columns, to + start), load(columns, to + stop)
-        for i in range(inner - 1, -1, -1):
-            node = start + 1 + i
-            left, right, pivot = load(ties, node), load(ties, nodes + node), load(pivots, node)
-            value = (load(columns, at + node) - left * v_start - right * v_stop) * pivot
-            other = (load(columns, to + node) - left * w_start - right * w_stop) * pivot
-            for j in range(i + 1, inner):
-                factor = load(lower, (e * inner + j) * inner + i)
-                value = value - factor * load(columns, at + start + 1 + j)
-                other = other - factor * load(columns, to + start + 1 + j)
-            store(columns, at + node, value)
-            store(columns, to + node, other)
+def restore_block(elements, inner, ends, lower, vertices, columns, values, at, step):
+    """Back-substitute two forward-reduced columns in place: H⁻¹ times the columns.
 
-
-@njit(**FLAGS)
-def pivot_signs_block(pivots, first, last, negative, ratio):
-    """Count of negative pivots, and smallest over largest |pivot|, of the nodes first … last.
-
-    A pivot that is not a number makes the ratio not a number: the caller's guard is
-    ``not ratio >= bound``.
+    They are rows at, at + 1 of `values` for the first node, and `step` rows further for each
+    following one; `columns` holds the reduced ties.
     """
-    for k in range(LANES):
-        count, small, large, total = 0, 0.0, np.inf, 0.0
-        for i in range(first, last + 1):
-            value = pivots[i, k]
-            count += value < 0.0
-            small = max(small, abs(value))
-            large = min(large, abs(value))
-            total += value
-        negative[k] = count
-        ratio[k] = large / small if total == total else np.nan  # noqa: PLR0124
+    degree = inner + 1
+    zero = repeat2(spread(0.0))
+    if ends[0] > 0:
+        store(values, at, zero)
+    if ends[1] < elements:
+        store(values, at + elements * degree * step, zero)
+    for e in range(elements, -1, -1):
+        start = at + e * degree * step
+        stop = start + degree * step
+        if ends[0] <= e <= ends[1]:
+            value = load2(values, start) * repeat2(load(vertices, 2 * e))
+            if e < ends[1]:
+                value = value - repeat2(load(vertices, 2 * e + 1)) * load2(values, stop)
+            store(values, start, value)
+        if e < elements:
+            ties = (e * degree + 1) * TILE
+            _restore_inner(lower, lower_row(e, inner), inner, columns, ties, values, start, step)
+
+
+@njit(**FLAGS)
+def _restore_inner(lower, base, inner, columns, ties, values, start, step):
+    """Back-substitute two columns in the inner nodes of an element whose vertices are known."""
+    v_start, v_stop = load2(values, start), load2(values, start + (inner + 1) * step)
+    for i in range(inner - 1, -1, -1):
+        tie, at = ties + i * TILE, start + (i + 1) * step
+        value = load2(values, at) - repeat2(load(columns, tie)) * v_start
+        value = value - repeat2(load(columns, tie + 1)) * v_stop
+        value = value * repeat2(load(lower, base + (i * inner + i) * GROUP))
+        for j in range(inner - 1, i, -1):
+            factor = repeat2(load(lower, base + (j * inner + i) * GROUP))
+            value = value - factor * load2(values, start + (j + 1) * step)
+        store(values, at, value)
+
+
+@njit(**FLAGS)
+def pivot_products(elements, inner, ends, lower, vertices, columns, products):
+    """Products aᵀH⁻¹b of forward-reduced columns of one tile: Σ aᵢ bᵢ / dᵢ.
+
+    a: slots 4, 5 and 2; b: slots 4 to 7. products (12, 8), a by a.
+    """
+    zero = repeat4(spread(0.0))
+    first, second, third = zero, zero, zero
+    for e in range(elements + 1):
+        base = lower_row(min(e, elements - 1), inner)
+        for i in range(inner + 1 if e < elements else 1):
+            if i == 0 and not ends[0] <= e <= ends[1]:
+                continue
+            at = (e * (inner + 1) + i) * TILE
+            pivot = load(vertices, 2 * e)
+            if i > 0:
+                pivot = load(lower, base + (i - 1) * (inner + 1) * GROUP)
+            many = load4(columns, at + 4)
+            first = first + repeat4(load(columns, at + 4) * pivot) * many
+            second = second + repeat4(load(columns, at + 5) * pivot) * many
+            third = third + repeat4(load(columns, at + 2) * pivot) * many
+    store(products, 0, first)
+    store(products, 4, second)
+    store(products, 8, third)
+
+
+@njit(**FLAGS)
+def solve_lanes(a, size, width):
+    """Gauss with partial pivoting on eight systems at once: a (size, width, 8), right sides last."""
+    for k in range(size):
+        for i in range(k + 1, size):
+            here, there = absolute(load(a, k * width + k)), absolute(load(a, i * width + k))
+            for j in range(k, width):
+                upper, lower = load(a, k * width + j), load(a, i * width + j)
+                store(a, k * width + j, where_less(here, there, lower, upper))
+                store(a, i * width + j, where_less(here, there, upper, lower))
+        inverse = spread(1.0) / load(a, k * width + k)
+        for j in range(k + 1, width):
+            store(a, k * width + j, load(a, k * width + j) * inverse)
+        for i in range(k + 1, size):
+            factor = load(a, i * width + k)
+            for j in range(k + 1, width):
+                at = i * width + j
+                store(a, at, load(a, at) - factor * load(a, k * width + j))
+    for k in range(size - 2, -1, -1):
+        for i in range(k + 1, size):
+            factor = load(a, k * width + i)
+            for j in range(size, width):
+                at = k * width + j
+                store(a, at, load(a, at) - factor * load(a, i * width + j))
 
 
 @njit(**FLAGS)
@@ -305,7 +375,9 @@ def solve_small(a, b):
 
 
 @njit(**FLAGS)
-def solve_condensed(stiffness, ends, diagonal, border, columns, rows, corner, rhs, x, negative, ratio):
+def solve_condensed(
+    stiffness, ends, diagonal, border, columns, rows, corner, rhs, x, negative, ratio
+):
     """Bordered solves ``[H B C; Bᵀ 0 …; R … D] x = rhs`` for lanes-first arrays; see `condensed`.
 
     diagonal (lanes, nodes); border (lanes, m, nodes); columns (lanes, k, n + m) and rows alike;
@@ -315,39 +387,45 @@ def solve_condensed(stiffness, ends, diagonal, border, columns, rows, corner, rh
     lanes, nodes = diagonal.shape
     m, k, r = border.shape[1], columns.shape[1], rhs.shape[1]
     first, last = min(ends[0], 1), nodes - 1 - min(elements - ends[1], 1)
-    n = last - first + 1
-    total = (m + k + r + TILE - 1) // TILE * TILE
-    work = np.zeros((total, nodes, LANES))
-    lower = np.empty((elements, degree - 1, degree - 1, LANES))
-    pivots, ties = np.empty((nodes, LANES)), np.empty((2, nodes, LANES))
-    chain, block = np.empty((elements + 1, LANES)), np.ones((nodes, LANES))
-    signs, ratios = np.empty(LANES, np.int64), np.empty(LANES)
+    n, total = last - first + 1, m + k + r
+    tiles = (TIES + total + TILE - 1) // TILE
+    lower, vertices, work, extremes = work_arrays(elements, degree - 1, tiles)
+    block, plain = work_rows(nodes), np.empty((total, nodes, LANES))
+    block[:] = 1.0
     for start in range(0, lanes, LANES):
         active = min(LANES, lanes - start)
         work[:] = 0.0
         for lane in range(active):
             at = start + lane
-            for i in range(nodes):
-                block[i, lane] = diagonal[at, i]
-            for c in range(m):
-                for i in range(nodes):
-                    work[c, i, lane] = border[at, c, i]
-            for c in range(k):
-                for i in range(n):
-                    work[m + c, first + i, lane] = columns[at, c, i]
-            for c in range(r):
-                for i in range(n):
-                    work[m + k + c, first + i, lane] = rhs[at, c, i]
-        reduce_block(stiffness, block, ends, work, lower, pivots, ties, chain)
+            block[:, lane] = diagonal[at]
+            for c in range(total):
+                for i in range(nodes if c < m else n):
+                    if c < m:
+                        work[_row(c, i, nodes), lane] = border[at, c, i]
+                    elif c < m + k:
+                        work[_row(c, first + i, nodes), lane] = columns[at, c - m, i]
+                    else:
+                        work[_row(c, first + i, nodes), lane] = rhs[at, c - m - k, i]
+        reduce_block(stiffness, block, ends, tiles, lower, vertices, work, extremes)
         for c in range(0, total, 2):
-            restore_block(lower, pivots, ties, chain, ends, work, c)
-        pivot_signs_block(pivots, first, last, signs, ratios)
+            at = _row(c, 0, nodes)
+            restore_block(elements, degree - 1, ends, lower, vertices, work, work, at, TILE)
+        for c in range(total):
+            for i in range(nodes):
+                plain[c, i] = work[_row(c, i, nodes)]
         for lane in range(active):
             at = start + lane
-            negative[at] = signs[lane] + _close_border(
-                border[at], columns[at], rows[at], corner[at], rhs[at], work, lane, first, x[at]
+            negative[at] = np.int64(extremes[0, lane]) + _close_border(
+                border[at], columns[at], rows[at], corner[at], rhs[at], plain, lane, first, x[at]
             )
-            ratio[at] = ratios[lane]
+            ratio[at] = extremes[1, lane] / extremes[2, lane]
+
+
+@njit(**FLAGS)
+def _row(c, node, nodes):
+    """Row of column c (ties not counted) at a node."""
+    slot = TIES + c
+    return ((slot // TILE) * nodes + node) * TILE + slot % TILE
 
 
 @njit(**FLAGS)

@@ -1,12 +1,14 @@
 """Running a compiled kernel over many lanes on several threads."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+
+from equimorph.linalg.simd import LANES
 
 SMALLEST_SHARE = 256
 """Lanes below which handing a share to another thread costs more than it saves."""
@@ -21,19 +23,32 @@ def _threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def over_lanes(kernel: Callable[..., Any], shared: tuple[Any, ...], *batches: np.ndarray) -> None:
-    """Call ``kernel(*shared, *batches)``, the batches cut along their lanes into one per thread.
+def over_lanes(
+    kernel: Callable[..., Any],
+    shared: tuple[Any, ...],
+    inputs: Sequence[np.ndarray],
+    outputs: Sequence[np.ndarray],
+) -> None:
+    """Call ``kernel(*shared, *inputs, *outputs)``, the batches cut along lanes into one per thread.
 
     Kernels treat lanes independently, so that the result does not depend on the number of threads.
+    They need at least eight lanes: fewer are filled up with copies of the last one.
     """
-    lanes = len(batches[0])
+    lanes = len(inputs[0])
     shares = min(_threads(), lanes // SMALLEST_SHARE)
+    if 0 < lanes < LANES:
+        at = np.minimum(np.arange(LANES), lanes - 1)
+        wide = [np.empty((LANES, *array.shape[1:]), array.dtype) for array in outputs]
+        kernel(*shared, *[array[at] for array in inputs], *wide)
+        for array, result in zip(outputs, wide, strict=True):
+            array[:] = result[:lanes]
+        return
     if shares < 2:
-        kernel(*shared, *batches)
+        kernel(*shared, *inputs, *outputs)
         return
     cuts = [(lanes * i // shares + 7) // 8 * 8 for i in range(shares)] + [lanes]
     jobs = [
-        _pool().submit(kernel, *shared, *[batch[a:b] for batch in batches])
+        _pool().submit(kernel, *shared, *[batch[a:b] for batch in (*inputs, *outputs)])
         for a, b in zip(cuts[:-1], cuts[1:], strict=True)
     ]
     for job in jobs:

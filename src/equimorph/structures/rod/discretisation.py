@@ -37,7 +37,9 @@ def reference_element(degree: int) -> Reference:
     vander = legendre.legvander(x, degree)
     to_legendre = np.linalg.inv(vander)
     slopes = np.stack([legendre.legval(x, legendre.legder(row)) for row in np.eye(degree + 1)], 1)
-    sums = np.stack([legendre.legval(x, legendre.legint(r, lbnd=-1)) for r in np.eye(degree + 1)], 1)
+    sums = np.stack(
+        [legendre.legval(x, legendre.legint(r, lbnd=-1)) for r in np.eye(degree + 1)], 1
+    )
     return Reference(
         degree,
         0.5 * (x + 1.0),
@@ -99,9 +101,7 @@ class Mesh:
         unit = 0.5 * (unit + unit.T)
         return unit / self.lengths[:, None, None]
 
-    def assemble(
-        self, values: Float[np.ndarray, "elements order"]
-    ) -> Float[np.ndarray, " nodes"]:
+    def assemble(self, values: Float[np.ndarray, "elements order"]) -> Float[np.ndarray, " nodes"]:
         """Sum quadrature weight times `values`, given element by element, at the nodes."""
         total = np.zeros(self.elements * self.degree + 1)
         np.add.at(total, self.element_nodes, self.element_weights * values)
@@ -114,17 +114,13 @@ class Mesh:
         element = np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, self.elements - 1)
         return element, (s - self.breaks[element]) / self.lengths[element]
 
-    def interpolation(
-        self, s: Float[np.ndarray, " points"]
-    ) -> Float[np.ndarray, "points nodes"]:
+    def interpolation(self, s: Float[np.ndarray, " points"]) -> Float[np.ndarray, "points nodes"]:
         """Matrix that evaluates a nodal field at arclengths."""
         element, t = self.locate(s)
         local = legendre.legvander(2.0 * t - 1.0, self.degree) @ self.reference.to_legendre
         return self._spread(element, local)
 
-    def integration(
-        self, s: Float[np.ndarray, " points"]
-    ) -> Float[np.ndarray, "points nodes"]:
+    def integration(self, s: Float[np.ndarray, " points"]) -> Float[np.ndarray, "points nodes"]:
         """Matrix that integrates a nodal field from 0 to arclengths."""
         element, t = self.locate(s)
         x = 2.0 * t - 1.0

@@ -1,7 +1,8 @@
 """Compiled kernels of the rod, eight lanes at a time.
 
 L = Σ ½ θᵀKθ + Σᵢ (μ mᵢ − q Rᵢ) sin θᵢ + λ mᵢ cos θᵢ − λν with quadrature weights m, load weights
-R = m ρ and K the stiffness over 4π².
+R = m ρ and K the stiffness over 4π². Kernels need at least eight lanes; where these are not a
+multiple of eight the last block overlaps the one before.
 """
 
 import numpy as np
@@ -9,242 +10,360 @@ from numba import njit
 
 from equimorph.linalg.kernels import (
     FLAGS,
-    factor_symmetric,
-    pivot_signs_block,
+    TILE,
+    pivot_products,
     reduce_block,
     restore_block,
-    solve_small,
+    solve_lanes,
+    work_arrays,
 )
-from equimorph.linalg.simd import LANES, load, sincos, spread, store
+from equimorph.linalg.simd import (
+    LANES,
+    absolute,
+    lanes_less,
+    larger,
+    load,
+    sincos,
+    spread,
+    stack2,
+    store,
+    transpose,
+    where_less,
+    work_rows,
+)
+
+ROW, FIRST, SECOND, COLUMN, FORCE = 2, 4, 5, 6, 7
+"""Slots of a node: closing row; border −m sin θ and m cos θ; F_p·dp; −∂L/∂θ."""
+START, STOP, LOAD, SPAN, ROW_LAMBDA, ROW_MU, CORNER, DEFECT = range(8)
+"""Rows of the closing data: the parameters' velocity, then the row's other entries."""
+LAMBDA, MU = 0, 1
+ACROSS = 4.0 * np.pi**2
 
 
 @njit(**FLAGS)
-def _gather(z, p, start, n, theta, scalars):
-    """Fill a block with the nodal angles and (λ, μ, q, ν) of lanes; spare lanes repeat the last."""
+def _read(source, start, count, target, row, step):
+    """Read the first entries of lanes of a lanes-first array into rows `step` apart."""
+    flat, out, width = source.reshape(-1), target.reshape(-1), source.shape[1]
+    if count < LANES:
+        for i in range(count):
+            for k in range(LANES):
+                target[row + i * step, k] = source[start + k, i]
+    else:
+        for block in range(0, count, LANES):
+            i = min(block, count - LANES)
+            at = (row + i * step) * LANES
+            transpose(flat, start * width + i, width, out, at, step * LANES)
+
+
+@njit(**FLAGS)
+def _write(source, row, step, target, start):
+    """Write rows `step` apart into lanes of a lanes-first array."""
+    flat, out, width = source.reshape(-1), target.reshape(-1), target.shape[1]
+    if width < LANES:
+        for i in range(width):
+            for k in range(LANES):
+                target[start + k, i] = source[row + i * step, k]
+    else:
+        for block in range(0, width, LANES):
+            i = min(block, width - LANES)
+            at = (row + i * step) * LANES
+            transpose(flat, at, step * LANES, out, start * width + i, width)
+
+
+@njit(**FLAGS)
+def _read_state(z, p, start, n, theta, scalars):
+    """Fill a block with the nodal angles and (λ, μ, q, ν) of lanes; theta has n + 3 rows."""
+    _read(z, start, n + 2, theta, 1, 1)
+    store(scalars, 0, load(theta, n + 1))
+    store(scalars, 1, load(theta, n + 2))
     for k in range(LANES):
-        at = min(start + k, z.shape[0] - 1)
-        for i in range(n):
-            theta[i + 1, k] = z[at, i]
-        theta[0, k] = p[at, 1] + p[at, 0]
-        theta[n + 1, k] = p[at, 1] - p[at, 0]
-        scalars[0, k] = z[at, n]
-        scalars[1, k] = z[at, n + 1]
-        scalars[2, k] = p[at, 2]
-        scalars[3, k] = p[at, 3]
+        theta[0, k] = p[start + k, 1] + p[start + k, 0]
+        theta[n + 1, k] = p[start + k, 1] - p[start + k, 0]
+        scalars[2, k], scalars[3, k] = p[start + k, 2], p[start + k, 3]
 
 
 @njit(**FLAGS)
-def _assemble(weights, loads, theta, scalars, diagonal, columns, sums):
-    """Diagonal of the Hessian, border columns 0 and 1, gradient without stiffness in column 3."""
-    nodes = theta.shape[0]
+def _read_closing(dp, row, corner, defect, start, n, columns, closing):
+    """Fill a block with the closing row and the data named by START … DEFECT."""
+    _read(row, start, n, columns, TILE + ROW, TILE)
+    for k in range(LANES):
+        at = start + k
+        closing[START, k], closing[STOP, k] = dp[at, 1] + dp[at, 0], dp[at, 1] - dp[at, 0]
+        closing[LOAD, k], closing[SPAN, k] = dp[at, 2], dp[at, 3]
+        closing[ROW_LAMBDA, k], closing[ROW_MU, k] = row[at, n], row[at, n + 1]
+        closing[CORNER, k], closing[DEFECT, k] = corner[at], defect[at]
+
+
+@njit(**FLAGS)
+def _assemble(weights, loads, theta, scalars, velocity, diagonal, columns, sums):
+    """Diagonal of the Hessian, border, load part of F_p·dp, gradient without stiffness."""
     lam, mu, q = load(scalars, 0), load(scalars, 1), load(scalars, 2)
     along, across = spread(0.0), spread(0.0)
-    for i in range(nodes):
+    for i in range(weights.shape[0]):
         sine, cosine = sincos(load(theta, i))
-        m = spread(weights[i])
-        a = mu * m - q * spread(loads[i])
-        b = lam * m
+        m, r = spread(weights[i]), spread(loads[i])
+        a, b = mu * m - q * r, lam * m
+        first, second = spread(0.0) - m * sine, m * cosine
         store(diagonal, i, spread(0.0) - a * sine - b * cosine)
-        store(columns, i, spread(0.0) - m * sine)
-        store(columns, nodes + i, m * cosine)
-        store(columns, 2 * nodes + i, spread(loads[i]) * cosine)
-        store(columns, 3 * nodes + i, b * sine - a * cosine)
-        along = along + m * cosine
-        across = across + m * sine
+        store(columns, i * TILE + FIRST, first)
+        store(columns, i * TILE + SECOND, second)
+        store(columns, i * TILE + COLUMN, spread(0.0) - velocity * r * cosine)
+        store(columns, i * TILE + FORCE, b * sine - a * cosine)
+        along, across = along + second, across - first
     store(sums, 0, along - load(scalars, 3))
     store(sums, 1, across)
 
 
 @njit(**FLAGS)
-def _subtract_stiffness(stiffness, theta, columns, c):
-    """columns[c] −= K θ."""
-    elements, order = stiffness.shape[0], stiffness.shape[1]
-    nodes = theta.shape[0]
-    for e in range(elements):
+def _subtract_stiffness(stiffness, theta, columns):
+    """Subtract K θ from the force, two rows of an element at a time."""
+    order = stiffness.shape[1]
+    for e in range(stiffness.shape[0]):
         base = e * (order - 1)
-        for i in range(order):
-            even, odd = spread(0.0), spread(0.0)
-            for j in range(0, order - 1, 2):
-                even = even + spread(stiffness[e, i, j]) * load(theta, base + j)
-                odd = odd + spread(stiffness[e, i, j + 1]) * load(theta, base + j + 1)
-            if order % 2 == 1:
-                even = even + spread(stiffness[e, i, order - 1]) * load(theta, base + order - 1)
-            at = c * nodes + base + i
-            store(columns, at, load(columns, at) - even - odd)
+        for i in range(0, order, 2):
+            other = min(i + 1, order - 1)
+            first, second = spread(0.0), spread(0.0)
+            for j in range(order):
+                angle = load(theta, base + j)
+                first = first + spread(stiffness[e, i, j]) * angle
+                second = second + spread(stiffness[e, other, j]) * angle
+            at = (base + i) * TILE + FORCE
+            store(columns, at, load(columns, at) - first)
+            if other > i:
+                store(columns, at + TILE, load(columns, at + TILE) - second)
 
 
 @njit(**FLAGS)
-def _parameter_column(stiffness, weights, columns, velocity, k, closing):
-    """Finish column 2, F_p·dp, of lane k: scaled load, ends through the stiffness, constraints."""
+def _close_column(stiffness, columns, closing, sums):
+    """Ends' part of F_p·dp: through the stiffness in its slot, through the constraints in `sums`."""
     elements, order = stiffness.shape[0], stiffness.shape[1]
-    last = columns.shape[1] - 1
-    start, stop = velocity[1] + velocity[0], velocity[1] - velocity[0]
-    for i in range(last + 1):
-        columns[2, i, k] *= -velocity[2]
+    start, stop = load(closing, START), load(closing, STOP)
+    last = elements * (order - 1) * TILE
     for i in range(order):
-        columns[2, i, k] += stiffness[0, i, 0] * start
-        columns[2, last - order + 1 + i, k] += stiffness[elements - 1, i, order - 1] * stop
-    closing[0, k] = columns[0, 0, k] * start + columns[0, last, k] * stop - velocity[3]
-    closing[1, k] = columns[1, 0, k] * start + columns[1, last, k] * stop
+        at, to = i * TILE + COLUMN, last + (i + 1 - order) * TILE + COLUMN
+        store(columns, at, load(columns, at) + spread(stiffness[0, i, 0]) * start)
+        by_stop = spread(stiffness[elements - 1, i, order - 1]) * stop
+        store(columns, to, load(columns, to) + by_stop)
+    first = load(columns, FIRST) * start + load(columns, last + FIRST) * stop
+    second = load(columns, SECOND) * start + load(columns, last + SECOND) * stop
+    store(sums, 2, first - load(closing, SPAN))
+    store(sums, 3, second)
 
 
 @njit(**FLAGS)
-def _dot(a, b, c, nodes):
-    """Sum over the inner nodes of row block a (flattened at a) times column c, per lane."""
-    even, odd = spread(0.0), spread(0.0)
-    for i in range(1, nodes - 2, 2):
-        even = even + load(a, i) * load(b, c * nodes + i)
-        odd = odd + load(a, i + 1) * load(b, c * nodes + i + 1)
-    if nodes % 2 == 1:
-        even = even + load(a, nodes - 2) * load(b, c * nodes + nodes - 2)
-    return even + odd
+def _largest_residual(columns, sums, n):
+    """Largest absolute entry of F; not a number if one of them is not."""
+    worst = larger(absolute(load(sums, 0)), absolute(load(sums, 1)))
+    for i in range(1, n + 1):
+        worst = larger(worst, absolute(load(columns, i * TILE + FORCE)))
+    return worst
+
+
+@njit(**FLAGS)
+def _small_system(products, sums, closing, small):
+    """Schur system of (λ, μ, t) with the two right-hand sides, in rows of five."""
+    zero, one = spread(0.0), spread(1.0)
+    for a in range(2):
+        store(small, 5 * a, zero - load(products, 4 * a))
+        store(small, 5 * a + 1, zero - load(products, 4 * a + 1))
+        store(small, 5 * a + 2, load(sums, 2 + a) - load(products, 4 * a + 2))
+        store(small, 5 * a + 3, zero - load(sums, a) - load(products, 4 * a + 3))
+        store(small, 5 * a + 4, zero)
+        store(small, 10 + a, load(closing, ROW_LAMBDA + a) - load(products, 8 + a))
+    store(small, 12, load(closing, CORNER) - load(products, 10))
+    store(small, 13, zero - load(closing, DEFECT) - load(products, 11))
+    store(small, 14, one)
+
+
+@njit(**FLAGS)
+def _negative_of_two(small):
+    """Negative eigenvalues of the leading 2 × 2 block, by its determinant and trace."""
+    zero, one = spread(0.0), spread(1.0)
+    a, b, c = load(small, 0), load(small, 1), load(small, 6)
+    determinant = a * c - b * b
+    definite = where_less(a + c, zero, one + one, zero)
+    return where_less(determinant, zero, one, definite)
+
+
+@njit(**FLAGS)
+def _combine(columns, small, n, solution):
+    """Reduced columns of the step and of the tangent, side by side."""
+    step0, step1, step2 = load(small, 3), load(small, 8), load(small, 13)
+    turn0, turn1, turn2 = load(small, 4), load(small, 9), load(small, 14)
+    for i in range(1, n + 1):
+        at = i * TILE
+        first, second = load(columns, at + FIRST), load(columns, at + SECOND)
+        column = load(columns, at + COLUMN)
+        step = load(columns, at + FORCE) - first * step0 - second * step1 - column * step2
+        turn = spread(0.0) - first * turn0 - second * turn1 - column * turn2
+        store(solution, 2 * i, stack2(step, turn))
 
 
 @njit(**FLAGS)
 def advance_lanes(
     stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
     dz, dt, tangent_z, tangent_t, residual, index, ratio,
-):
-    """Fused Newton step, tangent and inertia of the rod; see `structures.contract.Advance`."""
-    elements, degree = stiffness.shape[0], stiffness.shape[1] - 1
-    lanes, nodes = z.shape[0], weights.shape[0]
-    n = nodes - 2
-    theta, scalars = np.empty((nodes, LANES)), np.empty((4, LANES))
-    diagonal, columns = np.empty((nodes, LANES)), np.empty((4, nodes, LANES))
-    border = np.empty((3, nodes, LANES))
-    sums, closing = np.empty((2, LANES)), np.empty((2, LANES))
-    lower = np.empty((elements, degree - 1, degree - 1, LANES))
-    pivots, ties = np.empty((nodes, LANES)), np.empty((2, nodes, LANES))
-    chain, dots = np.empty((elements + 1, LANES)), np.empty((12, LANES))
-    signs, ratios = np.empty(LANES, np.int64), np.empty(LANES)
-    worst = np.empty(LANES)
-    schur, small, corner2 = np.empty((3, 3)), np.empty((3, 2)), np.empty((2, 2))
-    for start in range(0, lanes, LANES):
-        active = min(LANES, lanes - start)
-        _gather(z, p, start, n, theta, scalars)
-        _assemble(weights, loads, theta, scalars, diagonal, columns, sums)
-        _subtract_stiffness(stiffness, theta, columns, 3)
+):  # fmt: skip
+    """Fused Newton step, tangent and inertia of the rod; see `structures.contract.Advance`.
+
+    With H = LDLᵀ, products bᵀH⁻¹c need the forward-reduced columns only; the step and the tangent
+    are combined from these before the one back-substitution.
+    """
+    elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
+    lanes, n = z.shape[0], z.shape[1] - 2
+    theta, diagonal = work_rows(n + 3), work_rows(n + 2)
+    scalars, closing, sums = work_rows(4), work_rows(8), work_rows(4)
+    products, small, solution = work_rows(12), work_rows(15), work_rows(2 * (n + 3))
+    lower, vertices, columns, extremes = work_arrays(elements, inner, 1)
+    for block in range(0, lanes, LANES):
+        start = min(block, lanes - LANES)
+        _read_state(z, p, start, n, theta, scalars)
+        _read_closing(dp, row, corner, defect, start, n, columns, closing)
+        _assemble(weights, loads, theta, scalars, load(closing, LOAD), diagonal, columns, sums)
+        _subtract_stiffness(stiffness, theta, columns)
+        _close_column(stiffness, columns, closing, sums)
+        store(scalars, 0, _largest_residual(columns, sums, n))
+        reduce_block(stiffness, diagonal, ends, 1, lower, vertices, columns, extremes)
+        pivot_products(elements, inner, ends, lower, vertices, columns, products)
+        _small_system(products, sums, closing, small)
+        store(extremes, 0, load(extremes, 0) + _negative_of_two(small))
+        solve_lanes(small, 3, 5)
+        _combine(columns, small, n, solution)
+        restore_block(elements, inner, ends, lower, vertices, columns, solution, 0, 2)
+        store(solution, 2 * (n + 1), stack2(load(small, 3), load(small, 4)))
+        store(solution, 2 * (n + 2), stack2(load(small, 8), load(small, 9)))
+        _write(solution, 2, 2, dz, start)
+        _write(solution, 3, 2, tangent_z, start)
         for k in range(LANES):
-            at = min(start + k, lanes - 1)
-            _parameter_column(stiffness, weights, columns, dp[at], k, closing)
-            worst[k] = max(abs(sums[0, k]), abs(sums[1, k]))
-            for i in range(n):
-                border[2, i + 1, k] = row[at, i]
-                worst[k] = max(worst[k], abs(columns[3, i + 1, k]))
-        border[:2] = columns[:2]
-        reduce_block(stiffness, diagonal, ends, columns, lower, pivots, ties, chain)
-        restore_block(lower, pivots, ties, chain, ends, columns, 0)
-        restore_block(lower, pivots, ties, chain, ends, columns, 2)
-        pivot_signs_block(pivots, 1, n, signs, ratios)
-        for a in range(3):
-            for c in range(4):
-                store(dots, 4 * a + c, _dot(border[a], columns, c, nodes))
-        for k in range(active):
             at = start + k
-            for a in range(2):
-                for c in range(2):
-                    schur[a, c] = -dots[4 * a + c, k]
-                    corner2[a, c] = schur[a, c]
-                schur[a, 2] = closing[a, k] - dots[4 * a + 2, k]
-                schur[2, a] = row[at, n + a] - dots[8 + a, k]
-                small[a, 0] = -sums[a, k] - dots[4 * a + 3, k]
-                small[a, 1] = 0.0
-            schur[2, 2] = corner[at] - dots[10, k]
-            small[2, 0] = -defect[at] - dots[11, k]
-            small[2, 1] = 1.0
-            index[at] = signs[k] + factor_symmetric(corner2) - 2
-            ratio[at] = ratios[k]
-            residual[at] = worst[k]
-            solve_small(schur, small)
-            for i in range(n):
-                w0, w1, w2 = columns[0, i + 1, k], columns[1, i + 1, k], columns[2, i + 1, k]
-                dz[at, i] = columns[3, i + 1, k] - (
-                    w0 * small[0, 0] + w1 * small[1, 0] + w2 * small[2, 0]
-                )
-                tangent_z[at, i] = -(w0 * small[0, 1] + w1 * small[1, 1] + w2 * small[2, 1])
-            for a in range(2):
-                dz[at, n + a] = small[a, 0]
-                tangent_z[at, n + a] = small[a, 1]
-            dt[at] = small[2, 0]
-            tangent_t[at] = small[2, 1]
+            dt[at], tangent_t[at] = small[13, k], small[14, k]
+            residual[at], index[at] = scalars[0, k], np.int64(extremes[0, k]) - 2
+            ratio[at] = extremes[1, k] / extremes[2, k]
 
 
 @njit(**FLAGS)
-def curvature_lanes(stiffness, lengths, nodal_weights, integral, rho, z, p, kappa, force):
+def _curvature_block(stiffness, lengths, nodal_weights, integral, rho, theta, scalars, waves, out):
     """Curvature by moment balance, and its derivative over 4π², at the nodes of every element.
 
     κ = −4π² r₀ at the left end of an element, r₀ its residual there, and κ' = 4π² g inside with
-    g = λ·(−sin θ) + (μ − qρ) cos θ. kappa and force (lanes, elements, degree + 1).
+    g = λ·(−sin θ) + (μ − qρ) cos θ. out (2, elements, degree + 1, 8).
     """
     elements, order = stiffness.shape[0], stiffness.shape[1]
-    lanes, n = z.shape[0], z.shape[1] - 2
-    theta, scalars = np.empty((n + 2, LANES)), np.empty((4, LANES))
-    sines, cosines = np.empty((n + 2, LANES)), np.empty((n + 2, LANES))
-    local, bend = np.empty((order, LANES)), np.empty((order, LANES))
-    factor = spread(4.0 * np.pi**2)
-    for start in range(0, lanes, LANES):
-        active = min(LANES, lanes - start)
-        _gather(z, p, start, n, theta, scalars)
-        for i in range(n + 2):
-            sine, cosine = sincos(load(theta, i))
-            store(sines, i, sine)
-            store(cosines, i, cosine)
-        lam, mu, q = load(scalars, 0), load(scalars, 1), load(scalars, 2)
-        for e in range(elements):
-            base = e * (order - 1)
-            for i in range(order):
-                value = (mu - q * spread(rho[e, i])) * load(cosines, base + i)
-                store(local, i, value - lam * load(sines, base + i))
-            moment = spread(lengths[e] * nodal_weights[0]) * load(local, 0)
+    lam, mu, q = load(scalars, 0), load(scalars, 1), load(scalars, 2)
+    for i in range(elements * (order - 1) + 1):
+        sine, cosine = sincos(load(theta, i))
+        store(waves, 2 * i, lam * sine)
+        store(waves, 2 * i + 1, cosine)
+    for e in range(elements):
+        base, kappa = e * (order - 1), e * order
+        force = kappa + elements * order
+        moment = spread(0.0)
+        for i in range(order):
+            lever = (mu - q * spread(rho[e, i])) * load(waves, 2 * (base + i) + 1)
+            store(out, force + i, lever - load(waves, 2 * (base + i)))
+            moment = moment + spread(stiffness[e, 0, i]) * load(theta, base + i)
+        moment = moment + spread(lengths[e] * nodal_weights[0]) * load(out, force)
+        for i in range(0, order, 2):
+            other = min(i + 1, order - 1)
+            first, second = spread(0.0), spread(0.0)
             for j in range(order):
-                moment = moment + spread(stiffness[e, 0, j]) * load(theta, base + j)
-            for i in range(order):
-                total = spread(0.0)
-                for j in range(order):
-                    total = total + spread(integral[i, j]) * load(local, j)
-                store(bend, i, factor * (spread(lengths[e]) * total - moment))
-            for k in range(active):
-                for i in range(order):
-                    kappa[start + k, e, i] = bend[i, k]
-                    force[start + k, e, i] = local[i, k]
+                own = load(out, force + j)
+                first = first + spread(integral[i, j]) * own
+                second = second + spread(integral[other, j]) * own
+            store(out, kappa + i, spread(ACROSS) * (spread(lengths[e]) * first - moment))
+            store(out, kappa + other, spread(ACROSS) * (spread(lengths[e]) * second - moment))
 
 
 @njit(**FLAGS)
-def largest_curvature(kappa, force, lengths, nodes, to_legendre, out, place):
+def curvature_lanes(stiffness, lengths, nodal_weights, integral, rho, z, p, both):
+    """Nodal curvature and force of every lane; both (lanes, 2 · elements · (degree + 1))."""
+    n = z.shape[1] - 2
+    theta, scalars, waves = work_rows(n + 3), work_rows(4), work_rows(2 * (n + 2))
+    out = work_rows(both.shape[1])
+    for block in range(0, z.shape[0], LANES):
+        start = min(block, z.shape[0] - LANES)
+        _read_state(z, p, start, n, theta, scalars)
+        _curvature_block(
+            stiffness, lengths, nodal_weights, integral, rho, theta, scalars, waves, out
+        )
+        _write(out, 0, 1, both, start)
+
+
+@njit(**FLAGS)
+def largest_lanes(
+    stiffness, lengths, nodal_weights, integral, rho, nodes, to_legendre, z, p, largest, place
+):
     """Largest |κ| over s of each lane and where: nodal maximum, then every interior extremum.
 
     Extrema are roots of the interpolated κ' between nodes where it changes sign; `place` holds
     element + local coordinate.
     """
-    lanes, elements, order = kappa.shape
-    coefficients = np.empty(order)
-    for lane in range(lanes):
-        best, where = 0.0, 0.0
-        for e in range(elements):
-            for i in range(order):
-                if abs(kappa[lane, e, i]) > best:
-                    best, where = abs(kappa[lane, e, i]), e + nodes[i]
-        rough = best
+    elements, order, n = stiffness.shape[0], stiffness.shape[1], z.shape[1] - 2
+    theta, scalars, waves = work_rows(n + 3), work_rows(4), work_rows(2 * (n + 2))
+    out, best, series = work_rows(2 * elements * order), work_rows(2), np.empty(order)
+    for block in range(0, z.shape[0], LANES):
+        start = min(block, z.shape[0] - LANES)
+        _read_state(z, p, start, n, theta, scalars)
+        _curvature_block(
+            stiffness, lengths, nodal_weights, integral, rho, theta, scalars, waves, out
+        )
+        _nodal_maximum(out, elements, nodes, best)
         for e in range(elements):
             for i in range(order - 1):
-                f0, f1 = force[lane, e, i], force[lane, e, i + 1]
+                at = e * order + i
                 width = (nodes[i + 1] - nodes[i]) * lengths[e]
-                size = max(abs(kappa[lane, e, i]), abs(kappa[lane, e, i + 1]))
-                reach = size + 4.0 * np.pi**2 * width * max(abs(f0), abs(f1))
-                if f0 * f1 >= 0.0 or reach <= rough:
-                    continue
-                for a in range(order):
-                    coefficients[a] = 0.0
-                    for b in range(order):
-                        coefficients[a] += to_legendre[a, b] * force[lane, e, b]
-                t = _root(coefficients, nodes[i], nodes[i + 1], f0)
-                value = abs(
-                    kappa[lane, e, 0]
-                    + 4.0 * np.pi**2 * lengths[e] * _integral(coefficients, t)
-                )
-                if value > best:
-                    best, where = value, e + t
-        out[lane], place[lane] = best, where
+                lanes = _may_exceed(out, at, elements * order, width, best)
+                for k in range(LANES):
+                    if lanes >> k & 1:
+                        _refine(out, e, i, k, lengths[e], nodes, to_legendre, series, best)
+        for k in range(LANES):
+            largest[start + k], place[start + k] = best[0, k], best[1, k]
+
+
+@njit(**FLAGS)
+def _nodal_maximum(out, elements, nodes, best):
+    """Largest nodal |κ| in row 0 and its element + local coordinate in row 1 of best."""
+    order = nodes.shape[0]
+    most, where = spread(0.0), spread(0.0)
+    for e in range(elements):
+        for i in range(order):
+            value = absolute(load(out, e * order + i))
+            where = where_less(most, value, spread(e + nodes[i]), where)
+            most = larger(most, value)
+    store(best, 0, most)
+    store(best, 1, where)
+
+
+@njit(**FLAGS)
+def _may_exceed(out, at, forces, width, best):
+    """Lanes (bits) where κ' changes sign between two nodes and |κ| may rise above the best there.
+
+    Between the nodes |κ| stays below the mean of both plus half the way at the steeper slope; twice
+    that allows for a slope that bends.
+    """
+    left, right = load(out, forces + at), load(out, forces + at + 1)
+    turning = lanes_less(left * right, spread(0.0))
+    if turning == 0:
+        return turning
+    mean = spread(0.5) * (absolute(load(out, at)) + absolute(load(out, at + 1)))
+    rise = spread(ACROSS * width) * larger(absolute(left), absolute(right))
+    return turning & lanes_less(load(best, 0), mean + rise)
+
+
+@njit(**FLAGS)
+def _refine(out, e, i, k, length, nodes, to_legendre, series, best):
+    """Take the extremum of κ between nodes i and i + 1 of an element into the best of lane k."""
+    order = nodes.shape[0]
+    forces = out.shape[0] // 2 + e * order
+    for a in range(order):
+        total = 0.0
+        for b in range(order):
+            total += to_legendre[a, b] * out[forces + b, k]
+        series[a] = total
+    t = _root(series, nodes[i], nodes[i + 1], out[forces + i, k], out[forces + i + 1, k])
+    value = abs(out[e * order, k] + ACROSS * length * _integral(series, t))
+    if value > best[0, k]:
+        best[0, k], best[1, k] = value, e + t
 
 
 @njit(**FLAGS)
@@ -276,20 +395,23 @@ def _integral(coefficients, t):
 
 
 @njit(**FLAGS)
-def _root(coefficients, low, high, f_low):
-    """Root of a Legendre series between two points of opposite sign: Newton kept in its bracket."""
-    t = 0.5 * (low + high)
+def _root(coefficients, low, high, f_low, f_high):
+    """Root of a Legendre series between two points of opposite sign: Newton kept in its bracket.
+
+    The last step is below 1e-8, so that its successor would be below round-off.
+    """
+    t = low + (high - low) * f_low / (f_low - f_high)
     for _ in range(60):
         value, slope = _value(coefficients, t)
         if value * f_low > 0.0:
             low = t
         else:
             high = t
-        step = -value / slope if slope != 0.0 else 0.0
+        step = -value / slope if slope != 0.0 else np.inf
         following = t + step
-        if not (low < following < high) or step == 0.0:
-            following = 0.5 * (low + high)
-        if abs(following - t) < 1e-15:
+        if abs(step) < 1e-8:
+            return min(max(following, low), high)
+        t = following if low < following < high else 0.5 * (low + high)
+        if high - low < 1e-15:
             break
-        t = following
     return t

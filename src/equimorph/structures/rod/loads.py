@@ -65,7 +65,9 @@ def load_shape(spec: LoadSpec, kinks: Sequence[float] = ()) -> LoadShape:
     try:
         table = np.array(spec, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"`load` must be a table of numbers [[s, Q], ...]; got {spec!r}.") from None
+        raise InputError(
+            f"`load` must be a table of numbers [[s, Q], ...]; got {spec!r}."
+        ) from None
     return _from_table(table.tolist(), table)
 
 

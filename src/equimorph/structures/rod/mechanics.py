@@ -1,5 +1,6 @@
 """Mechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
 
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,12 +11,16 @@ from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Advance, Direction, Structure, Symmetry
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.kernels import advance_lanes, curvature_lanes, largest_curvature
+from equimorph.structures.rod.kernels import advance_lanes, curvature_lanes, largest_lanes
 from equimorph.structures.rod.loads import LoadShape
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Nodal = Float[np.ndarray, "lanes nodes"]
+
+
+def _contiguous(*arrays: np.ndarray) -> list[np.ndarray]:
+    return [np.ascontiguousarray(array) for array in arrays]
 
 
 class RodMechanics(Structure):
@@ -52,27 +57,26 @@ class RodMechanics(Structure):
         Float[np.ndarray, "lanes elements order"], Float[np.ndarray, "lanes elements order"]
     ]:
         """Curvature at the nodes of each element by moment balance, and κ'/(4π²)."""
-        lanes, mesh = len(z), self.mesh
-        kappa = np.empty((lanes, mesh.elements, mesh.degree + 1))
-        force = np.empty_like(kappa)
-        ref = mesh.reference
-        shared = (
-            self.layout.stiffness, mesh.lengths, ref.weights, ref.integral, self.rho,
-        )  # fmt: skip
-        z, p = np.ascontiguousarray(z), np.ascontiguousarray(p)
-        over_lanes(curvature_lanes, shared, z, p, kappa, force)
+        mesh, order = self.mesh, self.mesh.degree + 1
+        both = np.empty((len(z), 2 * mesh.elements * order))
+        over_lanes(curvature_lanes, self._curvature_data, _contiguous(z, p), [both])
+        kappa, force = np.split(both.reshape(len(z), 2 * mesh.elements, order), 2, axis=1)
         return kappa, force
+
+    @cached_property
+    def _curvature_data(self) -> tuple[np.ndarray, ...]:
+        ref = self.mesh.reference
+        return self.layout.stiffness, self.mesh.lengths, ref.weights, ref.integral, self.rho
 
     def largest_curvature(
         self, z: Lanes, p: Parameters
     ) -> tuple[Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
-        kappa, force = self.nodal_curvature(z, p)
-        ref, lengths = self.mesh.reference, self.mesh.lengths
-        out, place = np.empty(len(z)), np.empty(len(z))
-        largest_curvature(kappa, force, lengths, ref.nodes, ref.to_legendre, out, place)
+        ref, out, place = self.mesh.reference, np.empty(len(z)), np.empty(len(z))
+        shared = (*self._curvature_data, ref.nodes, ref.to_legendre)
+        over_lanes(largest_lanes, shared, _contiguous(z, p), [out, place])
         element = np.minimum(place.astype(int), self.mesh.elements - 1)
-        return out, self.mesh.breaks[element] + (place - element) * lengths[element]
+        return out, self.mesh.breaks[element] + (place - element) * self.mesh.lengths[element]
 
     def _coefficients(self, z: Lanes, p: Parameters) -> tuple[Nodal, Nodal]:
         """Factors a of sin θᵢ and b of cos θᵢ in L."""
@@ -171,7 +175,7 @@ class RodMechanics(Structure):
     ) -> Advance:
         """Fused kernel; lanes with an unsafe pivot take the general solve."""
         lanes = len(z)
-        inputs = [np.ascontiguousarray(x) for x in (z, p, dp, row, corner, defect)]
+        inputs = _contiguous(z, p, dp, row, corner, defect)
         out = Advance(
             np.empty_like(inputs[0]),
             np.empty(lanes),
@@ -183,7 +187,7 @@ class RodMechanics(Structure):
         ratio = np.empty(lanes)
         shared = (self.layout.stiffness, self.layout.ends, self.mesh.weights, self.loads)
         outputs = (out.dz, out.dt, out.tangent_z, out.tangent_t, out.residual, out.index, ratio)
-        over_lanes(advance_lanes, shared, *inputs, *outputs)
+        over_lanes(advance_lanes, shared, inputs, outputs)
         unsafe = ~(ratio >= PIVOT_GUARD)
         if unsafe.any():
             again = super().advance(*(x[unsafe] for x in inputs))

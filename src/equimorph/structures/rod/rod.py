@@ -144,9 +144,7 @@ class Rod(RodMechanics):
             )
         return State(self, z[0], p)
 
-    def natural_states(
-        self, p: Parameters
-    ) -> tuple[States, Bool[np.ndarray, " lanes"]]:
+    def natural_states(self, p: Parameters) -> tuple[States, Bool[np.ndarray, " lanes"]]:
         """Natural states of many settings, and which of them were found."""
         z, found = self.natural(p)
         return States(self, z, p), found
