@@ -1,0 +1,209 @@
+"""Cut directed plane edges, across which a count jumps, where they cross or touch each other.
+
+All places are whole multiples of a small grid spacing (snap rounding): what coincides, coincides
+exactly. An edge that passes a vertex within one spacing is led through it.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+Places = Float[np.ndarray, "places 2"]
+Edges = Int[np.ndarray, "edges 2"]
+Jumps = Int[np.ndarray, " edges"]
+Drawing = tuple[Places, Edges, Jumps]
+# Before merging or cutting there are others, and another number of them.
+OldPlaces = Float[np.ndarray, "old_places 2"]
+OldEdges = Int[np.ndarray, "old_edges 2"]
+OldJumps = Int[np.ndarray, " old_edges"]
+
+_CHUNK = 4_000_000  # elements of a temporary table of edges against edges
+_TOUCH = 0.75  # in grid spacings: a little more than rounding moves a vertex, √½
+_ROUNDS = 12
+
+
+def outline(coordinates: OldPlaces, cells: Int[np.ndarray, "cells 3"]) -> tuple[Edges, Jumps]:
+    """Sum of the directed edges of all triangles, each of them turned counter-clockwise.
+
+    Edges between neighbours that lie side by side cancel. Flat triangles cover nothing.
+
+    Returns
+    -------
+    Vertex pairs, and for each the count on its left less the count on its right.
+    """
+    a, b, c = (coordinates[cells[:, k]] for k in range(3))
+    turn = cross(b - a, c - a)
+    ordered = np.where(turn[:, None] > 0, cells, cells[:, ::-1])[turn != 0]
+    edges = np.concatenate([ordered[:, [0, 1]], ordered[:, [1, 2]], ordered[:, [2, 0]]])
+    return _merge(edges, np.ones(len(edges), int))
+
+
+def arrange(places: OldPlaces, edges: OldEdges, jump: OldJumps) -> Drawing:
+    """Edges that meet nowhere but at their ends, with the same jumps as the given ones.
+
+    Parameters
+    ----------
+    places
+        Vertices in units of the grid spacing, not yet rounded.
+    edges, jump
+        As `outline` gives them.
+
+    Returns
+    -------
+    Rounded vertices, edges and jumps.
+    """
+    places, edges, jump = _weld(places, edges, jump)
+    for _ in range(_ROUNDS):
+        start, along = places[edges[:, 0]], places[edges[:, 1]] - places[edges[:, 0]]
+        owner, fraction, place = _cuts(start, along)
+        if not len(owner):
+            break
+        # Every edge keeps its ends as cuts 0 and 1; sorted by (edge, fraction) they list pieces.
+        number = np.arange(len(edges))
+        owner = np.concatenate([number, number, owner])
+        fraction = np.concatenate([np.zeros(len(edges)), np.ones(len(edges)), fraction])
+        place = np.concatenate([start, start + along, place])
+        order = np.lexsort((fraction, owner))
+        owner, place = owner[order], place[order]
+        first = np.flatnonzero(owner[:-1] == owner[1:])
+        places, edges, jump = _weld(place, np.stack([first, first + 1], axis=1), jump[owner[first]])
+    return places, edges, jump
+
+
+def sides(ends: Float[np.ndarray, "edges 2 2"], jump: Jumps) -> tuple[Jumps, Jumps]:
+    """Count on the left and on the right of every arranged edge, by a ray from its middle."""
+    along = ends[:, 1] - ends[:, 0]
+    flat = np.abs(along[:, 0]) > np.abs(along[:, 1])
+    # The ray runs across the edge, not along it: flat edges are looked at with x and y exchanged,
+    # which also exchanges left and right.
+    right = np.where(
+        flat,
+        _right_of(ends[..., ::-1], -jump, flat) - jump,
+        _right_of(ends, jump, ~flat),
+    )
+    return right + jump, right
+
+
+def winding(
+    places: Places,
+    ends: Float[np.ndarray, "edges 2 2"],
+    jump: Jumps,
+    skip: Int[np.ndarray, " places"] | None = None,
+) -> Int[np.ndarray, " places"]:
+    """Sum of the jumps that a ray in +x meets from each place.
+
+    Parameters
+    ----------
+    places
+        Where to count.
+    ends, jump
+        Edges of closed curves.
+    skip
+        For each place the number of one edge that its ray does not see.
+
+    Returns
+    -------
+    The count at each place.
+    """
+    count = np.empty(len(places), int)
+    (xa, ya), (xb, yb) = ends[:, 0].T, ends[:, 1].T
+    slope = (xb - xa) / np.where(yb == ya, 1.0, yb - ya)
+    step = max(1, _CHUNK // max(1, len(jump)))
+    for first in range(0, len(places), step):
+        block = slice(first, first + step)
+        x, y = places[block, :1], places[block, 1:]
+        upward, downward = (ya <= y) & (y < yb), (yb <= y) & (y < ya)
+        ahead = xa + (y - ya) * slope > x
+        if skip is not None:
+            ahead[np.arange(len(x)), skip[block]] = False
+        count[block] = ((upward & ahead).astype(np.int64) - (downward & ahead)) @ jump
+    return count
+
+
+def cross(a: Float[np.ndarray, "*n 2"], b: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
+    """Signed area of the parallelogram of two plane vectors."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _merge(edges: OldEdges, jump: OldJumps) -> tuple[Edges, Jumps]:
+    """Add up the jumps of equal edges, whichever way they run; drop those that cancel."""
+    sign = np.where(edges[:, 0] < edges[:, 1], 1, -1)
+    unique, inverse = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    total = np.zeros(len(unique), int)
+    np.add.at(total, inverse.reshape(-1), sign * jump)
+    keep = (total != 0) & (unique[:, 0] != unique[:, 1])
+    return unique[keep], total[keep]
+
+
+def _weld(places: OldPlaces, edges: OldEdges, jump: OldJumps) -> Drawing:
+    """Unite vertices that coincide in the plane: equilibria of several sheets over one p."""
+    used, local = np.unique(edges, return_inverse=True)
+    unique, inverse = np.unique(np.rint(places[used]), axis=0, return_inverse=True)
+    return unique, *_merge(inverse.reshape(-1)[local.reshape(-1, 2)], jump)
+
+
+def _cuts(
+    start: Places, along: Places
+) -> tuple[Int[np.ndarray, " cuts"], Float[np.ndarray, " cuts"], Float[np.ndarray, "cuts 2"]]:
+    """Interior places of edges that another edge crosses, or at which another one ends."""
+    first, second = _near_pairs(start, along)
+    d, e = along[first], along[second]
+    offset = start[second] - start[first]
+    across = cross(d, e)
+    proper = across != 0
+    safe = np.where(proper, across, 1.0)
+    s, t = cross(offset, e) / safe, cross(offset, d) / safe
+    proper &= _interior(s, d) & _interior(t, e)
+    point = start[first] + s[:, None] * d
+    owner = [first[proper], second[proper]]
+    fraction = [s[proper], t[proper]]
+    place = [point[proper], point[proper]]
+    for mine, other in ((first, second), (second, first)):
+        for end in (start[other], start[other] + along[other]):
+            length = np.hypot(*along[mine].T)
+            reach = end - start[mine]
+            at = (reach * along[mine]).sum(axis=1) / length**2
+            beside = np.abs(cross(along[mine], reach)) / length
+            touching = (beside < _TOUCH) & _interior(at, along[mine])
+            touching &= (end != start[mine]).any(axis=1)
+            touching &= (end != start[mine] + along[mine]).any(axis=1)
+            owner.append(mine[touching])
+            fraction.append(at[touching])
+            place.append(end[touching])
+    return np.concatenate(owner), np.concatenate(fraction), np.concatenate(place)
+
+
+def _near_pairs(
+    start: Places, along: Places
+) -> tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]]:
+    """Pairs of edges whose bounding boxes meet, each pair once."""
+    low = np.minimum(start, start + along) - 1
+    high = np.maximum(start, start + along) + 1
+    pairs = []
+    step = max(1, _CHUNK // max(1, len(start)))
+    for block in range(0, len(start), step):
+        mine = slice(block, block + step)
+        meet = ((low[mine, None] <= high) & (low <= high[mine, None])).all(axis=-1)
+        first, second = np.nonzero(meet)
+        pairs.append(np.stack([first + block, second]))
+    first, second = np.concatenate(pairs, axis=1)
+    keep = first < second
+    return first[keep], second[keep]
+
+
+def _interior(
+    fraction: Float[np.ndarray, " n"], along: Float[np.ndarray, "n 2"]
+) -> Bool[np.ndarray, " n"]:
+    """Whether a place on an edge lies off both ends by more than rounding."""
+    return np.asarray(np.minimum(fraction, 1 - fraction) * np.hypot(*along.T) > 0.5)
+
+
+def _right_of(
+    ends: Float[np.ndarray, "edges 2 2"], jump: Jumps, chosen: Bool[np.ndarray, " edges"]
+) -> Jumps:
+    """Count on the right of the chosen edges, none of which is flat; elsewhere 0."""
+    own = np.flatnonzero(chosen)
+    right = np.zeros(len(jump), int)
+    beyond = winding(ends[own].mean(axis=1), ends, jump, skip=own)
+    upward = ends[own, 1, 1] > ends[own, 0, 1]
+    right[own] = np.where(upward, beyond, beyond - jump[own])
+    return right

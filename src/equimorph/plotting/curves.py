@@ -1,0 +1,166 @@
+"""Curves of an equilibrium set and of a route that several figures draw."""
+
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, Shaped
+
+from equimorph.equilibria import Path, newton
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import position
+from equimorph.structures import States
+from equimorph.tasks import Route
+
+# Relative to the width of the box: boundary vertices lie on it to rounding.
+_ON_BOX = 1e-9
+
+
+def fold_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]:
+    """Fold curves, cut where the index of their sides changes.
+
+    Returns
+    -------
+    Vertices of each piece in order, and the lower index of its two sides: 0 on the boundary of
+    stability.
+    """
+    pieces = []
+    for fold in eset.folds:
+        low = _lowest_index_beside(eset, fold)
+        pieces += [(fold[a : b + 1], int(low[a])) for a, b in _runs(low)]
+    return pieces
+
+
+def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[Int[np.ndarray, " _"]]:
+    """Boundary curves, either those on the box or those on a cap, where a constraint cuts the set.
+
+    Parameters
+    ----------
+    eset
+        Equilibrium set over two free parameters.
+    box
+        True for the pieces on the box, False for the others.
+
+    Returns
+    -------
+    Vertices of each piece in order.
+    """
+    pieces = []
+    for boundary in eset.boundaries:
+        vertices = boundary.vertices
+        on_box = _runs_along_box(eset, vertices)
+        pieces += [vertices[a : b + 1] for a, b in _runs(on_box) if bool(on_box[a]) is box]
+    return pieces
+
+
+def track(eset: EquilibriumSet, states: States) -> Float[np.ndarray, "points 2"]:
+    """Free parameters of the set at states, in order."""
+    columns = [position(states.structure.parameters, name) for name in eset.names]
+    return np.asarray(states.p[:, columns])
+
+
+def way_points(eset: EquilibriumSet, route: Route) -> Float[np.ndarray, "corners 2"]:
+    """Free parameters at the corners of a route, start and goal included; none without a path."""
+    if route.path is None:
+        return np.empty((0, 2))
+    if route.schedule is None:
+        return track(eset, route.path.states)[[0, -1]]
+    columns = [route.schedule.names.index(name) for name in eset.names]
+    return np.asarray(route.schedule.values[corner_steps(route)][:, columns])
+
+
+def corner_steps(route: Route) -> Int[np.ndarray, " corners"]:
+    """Steps of the schedule at the corners of a route, first and last included."""
+    assert route.schedule is not None
+    last = len(route.schedule.progress) - 1
+    return np.unique(np.concatenate([[0], route.schedule.way_points, [last]])).astype(int)
+
+
+def path_of(path_or_route: Path | Route) -> Path:
+    """Path of a route, or the path itself.
+
+    Raises
+    ------
+    InputError
+        If the route has none; its reason is named.
+    """
+    if isinstance(path_or_route, Path):
+        return path_or_route
+    if path_or_route.path is None:
+        raise InputError(f"`route` must have a path; got a refused route: {path_or_route.why}")
+    return path_or_route.path
+
+
+def states_along(path: Path, count: int) -> States:
+    """Equilibria at even distances along a path.
+
+    Interpolated between its states and corrected by Newton's method at fixed parameters; where that
+    leaves the interval (next to a fold), the nearest state of the path is taken.
+
+    Parameters
+    ----------
+    path
+        A lifted curve.
+    count
+        How many; the first and the last state of the path are among them.
+    """
+    structure, known = path.states.structure, path.states
+    length = np.linspace(path.length[0], path.length[-1], count)
+    after = np.clip(np.searchsorted(path.length, length), 1, len(path.length) - 1)
+    width = path.length[after] - path.length[after - 1]
+    share = (length - path.length[after - 1]) / np.where(width > 0, width, 1.0)
+    z = known.z[after - 1] + share[:, None] * (known.z[after] - known.z[after - 1])
+    p = known.p[after - 1] + share[:, None] * (known.p[after] - known.p[after - 1])
+    solved, found = newton(structure, z, p)
+    shift = (solved - z)[:, : structure.unknowns]
+    found &= np.sqrt(shift**2 @ structure.mass) <= 0.5 * width
+    nearest = np.where(share < 0.5, after - 1, after)
+    z = np.where(found[:, None], solved, known.z[nearest])
+    p = np.where(found[:, None], p, known.p[nearest])
+    return States(structure, z, p)
+
+
+def _lowest_index_beside(
+    eset: EquilibriumSet, line: Int[np.ndarray, " vertices"]
+) -> Int[np.ndarray, " edges"]:
+    """Lowest index of the cells at each edge of a polyline of vertices."""
+    count = len(eset.coordinates)
+    sides = np.concatenate([eset.cells[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    keys = _edge_keys(sides[:, 0], sides[:, 1], count)
+    wanted = _edge_keys(line[:-1], line[1:], count)
+    names, place = np.unique(wanted, return_inverse=True)
+    at = np.minimum(np.searchsorted(names, keys), len(names) - 1)
+    hit = names[at] == keys
+    lowest = np.full(len(names), np.iinfo(int).max)
+    np.minimum.at(lowest, at[hit], np.tile(eset.cell_index, 3)[hit])
+    # An edge that no cell has (a fold seen from outside the set) takes the index of its ends.
+    ends = np.minimum(eset.index[line[:-1]], eset.index[line[1:]])
+    return np.where(lowest[place] == np.iinfo(int).max, ends, lowest[place])
+
+
+def _edge_keys(
+    a: Int[np.ndarray, " edges"], b: Int[np.ndarray, " edges"], count: int
+) -> Int[np.ndarray, " edges"]:
+    """One number per undirected edge."""
+    return np.asarray(np.minimum(a, b).astype(np.int64) * count + np.maximum(a, b))
+
+
+def _runs_along_box(
+    eset: EquilibriumSet, vertices: Int[np.ndarray, " vertices"]
+) -> Bool[np.ndarray, " edges"]:
+    """Whether each edge of a polyline lies on one side of the box."""
+    slack = _ON_BOX * (eset.box.upper - eset.box.lower)
+    places = eset.coordinates[vertices]
+    on_side = np.stack(
+        [np.abs(places - eset.box.lower) <= slack, np.abs(places - eset.box.upper) <= slack]
+    )
+    return np.asarray((on_side[:, :-1] & on_side[:, 1:]).any(axis=(0, 2)))
+
+
+def _runs(values: Shaped[np.ndarray, " edges"]) -> list[tuple[int, int]]:
+    """First and last-plus-one place of every run of equal values."""
+    if not len(values):
+        return []
+    cuts = np.flatnonzero(values[1:] != values[:-1]) + 1
+    ends = [0, *cuts.tolist(), len(values)]
+    return list(pairwise(ends))

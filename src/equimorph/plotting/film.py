@@ -1,0 +1,185 @@
+"""A film of the structure on its way along a route, beside the moving point in the plane."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from PIL import Image
+
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.plotting import style
+from equimorph.plotting.curves import path_of, states_along, track
+from equimorph.plotting.furniture import MovingParts, draw_supports, frame_shapes, moving_parts
+from equimorph.plotting.plane import draw_folds, draw_track, frame_plane, shade_regions
+from equimorph.plotting.regions import count_regions
+from equimorph.plotting.symbols import symbol
+from equimorph.structures import States
+from equimorph.tasks import Route
+
+_WIDTH, _HEIGHT, _DOTS = 6.4, 3.1, 120
+_LARGER = {"font.size": 9, "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8}
+_CURVATURE = "max_curvature"
+_COLOURS = 64
+_PAUSE_FIRST, _PAUSE_LAST = 0.8, 1.6  # seconds
+_HUNDREDTHS = 10  # GIF counts time in hundredths of a second: milliseconds in tens
+
+
+def film(
+    route: Route,
+    path: str | FilePath,
+    eset: EquilibriumSet,
+    *,
+    frames: int = 96,
+    fps: int = 20,
+) -> FilePath:
+    """Write an animated GIF: the structure on the left, its point in the parameter plane right.
+
+    Every frame shows an equilibrium of the route, at even distances along it.
+
+    Parameters
+    ----------
+    route
+        A route with a path.
+    path
+        File to write; its folder must exist.
+    eset
+        The equilibrium set on whose parameter plane the route is shown.
+    frames
+        Number of pictures, at least 2.
+    fps
+        Pictures per second.
+
+    Returns
+    -------
+    The file.
+
+    Raises
+    ------
+    InputError
+        If the route has no path, or `frames` or `fps` is too small.
+    """
+    if frames < 2 or fps < 1:
+        raise InputError(
+            f"`frames` must be at least 2 and `fps` at least 1; got {frames!r} and {fps!r}."
+        )
+    states = states_along(path_of(route), frames)
+    with style.house_style(_LARGER):
+        stage = _set_stage(states, route, eset)
+        pictures = _pictures(stage, states, eset, route)
+    file = FilePath(path)
+    _write(pictures, file, _durations(frames, fps))
+    return file
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """The figure, drawn once, and what moves on it."""
+
+    canvas: Any  # matplotlib's canvas has no types
+    background: Any
+    shape: Line2D
+    parts: MovingParts
+    travelled: Line2D
+    point: Line2D
+    reading: Text
+
+    def picture(self) -> Image.Image:
+        """Return the background with the moving artists as they are now, from back to front."""
+        self.canvas.restore_region(self.background)
+        renderer = self.canvas.get_renderer()
+        for artist in self._moving():
+            artist.draw(renderer)
+        return Image.fromarray(np.array(self.canvas.buffer_rgba())[..., :3])
+
+    def _moving(self) -> tuple[Artist, ...]:
+        return (self.shape, *self.parts.artists(), self.travelled, self.point, self.reading)
+
+
+def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
+    """Draw what stays and prepare what moves."""
+    figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=_DOTS)
+    canvas: Any = FigureCanvasAgg(figure)
+    left = figure.add_axes((0.01, 0.15, 0.54, 0.84))
+    right = figure.add_axes((0.64, 0.17, 0.335, 0.79))
+    outlines = states.shape()
+    frame_shapes(left, outlines, room=0.15)
+    left.axis("off")
+    draw_supports(left, states)
+    for outline in outlines[[0, -1]]:
+        left.plot(*outline.T, color="#cfcfcf", linewidth=2.0, zorder=1)
+    frame_plane(right, eset)
+    shade_regions(right, eset, count_regions(eset.coordinates, eset.cells))
+    draw_folds(right, eset)
+    draw_track(right, eset, route, path_of(route))
+    (shape,) = left.plot([], [], color=style.INDEX_COLOURS[0], linewidth=3.0, zorder=4)
+    (travelled,) = right.plot([], [], color=style.INK, linewidth=2.0, zorder=8)
+    (point,) = right.plot([], [], "o", color=style.INK, markeredgecolor="white", ms=7, zorder=9)
+    parts = moving_parts(left, states)
+    reading = figure.text(0.03, 0.03, "", va="bottom", linespacing=1.5)
+    # Animated artists are left out of the background.
+    stage = _Stage(canvas, None, shape, parts, travelled, point, reading)
+    for artist in stage._moving():
+        artist.set_animated(True)
+    canvas.draw()
+    return replace(stage, background=canvas.copy_from_bbox(figure.bbox))
+
+
+def _pictures(
+    stage: _Stage, states: States, eset: EquilibriumSet, route: Route
+) -> list[Image.Image]:
+    """One picture per state."""
+    outlines, places, readings = states.shape(), track(eset, states), _readings(states, eset, route)
+    pictures = []
+    for k in range(len(states)):
+        stage.shape.set_data(*outlines[k].T)
+        stage.parts.follow(k)
+        stage.travelled.set_data(*places[: k + 1].T)
+        stage.point.set_data(*places[k : k + 1].T)
+        stage.reading.set_text(readings[k])
+        pictures.append(stage.picture())
+    return pictures
+
+
+def _readings(states: States, eset: EquilibriumSet, route: Route) -> list[str]:
+    """Numbers under each picture: parameters, then stability margin and curvature."""
+    first = [(symbol(name), states[name], "5.2f") for name in eset.names]
+    second = [("stability margin", states.margin, "5.2f")]
+    if route.schedule is not None and _CURVATURE in route.schedule.descriptors:
+        curvature = states.structure.descriptor(_CURVATURE)
+        second.append((curvature.symbol, curvature(states), "4.1f"))
+    return [
+        "\n".join("    ".join(_number(entry, k) for entry in line) for line in (first, second))
+        for k in range(len(states))
+    ]
+
+
+def _number(entry: tuple[str, Float[np.ndarray, " lanes"], str], k: int) -> str:
+    """One reading, padded with spaces as wide as digits so that nothing jumps."""
+    label, values, form = entry
+    digits = format(float(values[k]), form).replace("-", "−").replace(" ", "\u2007")
+    return f"{label} = {digits}"
+
+
+def _durations(frames: int, fps: int) -> list[int]:
+    """Milliseconds that each picture stays; start and goal stay longer."""
+    each = max(2, round(100 / fps)) * _HUNDREDTHS
+    return [int(1000 * _PAUSE_FIRST), *[each] * (frames - 2), int(1000 * _PAUSE_LAST)]
+
+
+def _write(pictures: list[Image.Image], file: FilePath, durations: list[int]) -> None:
+    """Write an endless GIF with one palette, so that still parts cost nothing."""
+    # The palette is made from pictures all along the way: none of the colours is missed.
+    sample = [np.asarray(pictures[k]) for k in np.linspace(0, len(pictures) - 1, 4).astype(int)]
+    palette = Image.fromarray(np.concatenate(sample)).quantize(_COLOURS, Image.Quantize.MAXCOVERAGE)
+    reduced = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
+    reduced[0].save(
+        file, save_all=True, append_images=reduced[1:], duration=durations, loop=0, optimize=False
+    )

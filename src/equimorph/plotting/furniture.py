@@ -1,0 +1,142 @@
+"""What stands around a structure in a picture: supports and loads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Polygon
+from matplotlib.quiver import Quiver
+
+from equimorph.plotting import style
+from equimorph.structures import Rod, States, Structure
+
+_HUB = 0.026  # radius of a rotary actuator, in lengths of the rod
+_STATIONS = np.linspace(0.05, 0.95, 13)
+_LONGEST_ARROW = 0.1  # as a share of the width of the picture
+_CLEARANCE = 0.012  # between arrow heads and rod, in lengths of the rod
+_GROUND = "#d9d9d9"
+
+
+def frame_shapes(ax: Axes, outlines: Float[np.ndarray, "lanes points 2"], room: float) -> None:
+    """Equal aspect, and limits around all outlines with `room`, a share of their width."""
+    points = outlines.reshape(-1, 2)
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = room * max(high - low)
+    ax.set_xlim(low[0] - margin, high[0] + margin)
+    ax.set_ylim(low[1] - margin, high[1] + margin)
+    ax.set_aspect("equal")
+
+
+def draw_supports(ax: Axes, states: States) -> None:
+    """Supports of a structure, where they stay on the way through the states."""
+    if isinstance(states.structure, Rod):
+        _draw_rotary_actuators(ax, states)
+    else:
+        _draw_guides(ax, states)
+
+
+def length_unit(structure: Structure) -> str:
+    """Unit of the coordinates of a structure's shape."""
+    return "L" if isinstance(structure, Rod) else "natural length"
+
+
+@dataclass(frozen=True)
+class MovingParts:
+    """Parts of a picture that follow the structure from state to state.
+
+    Attributes
+    ----------
+    pointers, pointer_lines
+        Lines that turn with the actuators, and their ends for every state.
+    arrows, tails, heads
+        Arrows of the load, and for every state where they start and how far they reach.
+    """
+
+    pointers: tuple[Line2D, ...]
+    pointer_lines: Float[np.ndarray, "pointers states 2 2"]
+    arrows: Quiver | None
+    tails: Float[np.ndarray, "states arrows 2"]
+    heads: Float[np.ndarray, "states arrows 2"]
+
+    def follow(self, k: int) -> None:
+        """Move the parts to where they belong at state number `k`."""
+        for pointer, lines in zip(self.pointers, self.pointer_lines, strict=True):
+            pointer.set_data(*lines[k].T)
+        if self.arrows is not None:
+            self.arrows.set_offsets(self.tails[k])
+            self.arrows.set_UVC(*self.heads[k].T)
+
+    def artists(self) -> tuple[Artist, ...]:
+        """Artists to draw anew in each picture."""
+        return self.pointers if self.arrows is None else (*self.pointers, self.arrows)
+
+
+def moving_parts(ax: Axes, states: States) -> MovingParts:
+    """Prepare the moving parts for the way through the states; `follow` places them."""
+    structure = states.structure
+    rod = structure if isinstance(structure, Rod) else None
+    lines = np.empty((0, len(states), 2, 2)) if rod is None else _pointer_lines(states)
+    pointers = tuple(ax.plot([], [], color=style.INK, lw=1.2, zorder=6)[0] for _ in lines)
+    tails, heads = _tip_arrow(states) if rod is None else _rod_arrows(rod, states)
+    longest = float(np.abs(heads).max())
+    if longest == 0.0:
+        return MovingParts(pointers, lines, None, tails, heads)
+    # As long as reads well, whatever the unit of the load.
+    heads = heads * (_LONGEST_ARROW * np.ptp(ax.get_xlim()) / longest)
+    if rod is not None:  # the arrows end on the rod, the force starts at the free end
+        tails = tails - np.minimum(heads, 0.0) + [0.0, _CLEARANCE]
+    arrows = ax.quiver(
+        *tails[0].T, *heads[0].T, angles="xy", scale_units="xy", scale=1.0, color=style.FAINT,
+        width=0.0045, headwidth=4.0, headlength=4.5, headaxislength=4.2, zorder=3,
+    )  # fmt: skip
+    return MovingParts(pointers, lines, arrows, tails, heads)
+
+
+def _pointer_lines(states: States) -> Float[np.ndarray, "ends states 2 2"]:
+    """Lines along the end tangents of a rod, through the hubs."""
+    hubs = states.shape()[:, [0, -1]].swapaxes(0, 1)
+    angles = np.stack([states["Delta"] + states["Theta"], states["Delta"] - states["Theta"]])
+    along = 1.7 * _HUB * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return np.stack([hubs - along, hubs + along], axis=2)
+
+
+def _rod_arrows(
+    rod: Rod, states: States
+) -> tuple[Float[np.ndarray, "states arrows 2"], Float[np.ndarray, "states arrows 2"]]:
+    """Line load qQ(s), downward if positive, at stations along the rod."""
+    tips = states.shape(_STATIONS)
+    down = states["q"][:, None] * rod.load.density(_STATIONS)
+    return tips, np.stack([np.zeros_like(down), -down], axis=-1)
+
+
+def _tip_arrow(
+    states: States,
+) -> tuple[Float[np.ndarray, "states arrows 2"], Float[np.ndarray, "states arrows 2"]]:
+    """Force F on the free end of the spring, downward if positive."""
+    down = states["F"][:, None]
+    return states.shape()[:, -1:], np.stack([np.zeros_like(down), -down], axis=-1)
+
+
+def _draw_rotary_actuators(ax: Axes, states: States) -> None:
+    """Hubs at both ends and the line between them."""
+    ends = states[0].shape()[[0, -1]]
+    ax.plot(*ends.T, color=style.FAINT, linewidth=0.5, linestyle=(0, (6, 3)), zorder=0)
+    for end in ends:
+        ax.add_patch(Circle(end, _HUB, facecolor=_GROUND, edgecolor=style.INK, lw=0.6, zorder=5))
+        ax.plot(*end, ".", color=style.INK, markersize=2.5, zorder=7)
+
+
+def _draw_guides(ax: Axes, states: States) -> None:
+    """Rail of the moved end on y = 0 and guide of the free end on x = 0."""
+    outlines = states.shape()
+    reach = outlines[:, 0, 0].max()
+    low, high = outlines[:, -1, 1].min(), outlines[:, -1, 1].max()
+    room = 0.12 * max(reach, high - low)
+    for x, y in (([0, 0], [low - room, high + room]), ([0, reach + room], [0, 0])):
+        ax.plot(x, y, color=_GROUND, linewidth=3.0, solid_capstyle="butt", zorder=0)
+    for foot in (outlines[0, 0], outlines[-1, 0]):
+        corners = foot + 0.3 * room * np.array([[0.0, 0.0], [-0.6, -1.0], [0.6, -1.0]])
+        ax.add_patch(Polygon(corners, facecolor="white", edgecolor=style.INK, lw=0.6, zorder=5))

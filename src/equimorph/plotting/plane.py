@@ -1,0 +1,230 @@
+"""The plane of free parameters: how many equilibria where, the folds between, and the route."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+from scipy import ndimage
+
+from equimorph.equilibria import Path
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.plotting import style
+from equimorph.plotting.curves import boundary_pieces, fold_pieces, track, way_points
+from equimorph.plotting.regions import Regions, count_regions
+from equimorph.plotting.symbols import constraint_label, parameter_label
+from equimorph.tasks import Route
+
+_STABILITY_BOUNDARY: dict[str, Any] = {"color": style.INK, "linewidth": 1.4, "zorder": 4}
+_OTHER_FOLD: dict[str, Any] = {"color": style.INK, "linewidth": 0.6, "zorder": 3}
+_CAP: dict[str, Any] = {
+    "color": style.INK,
+    "linewidth": 0.6,
+    "linestyle": (0, (3, 2)),
+    "zorder": 3,
+}
+_ROUTE: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.6, "zorder": 6}
+
+# Slivers of the mesh smaller than this share of the picture are no region of their own.
+_INVISIBLE = 2e-5
+_RASTER = 160
+# A number needs this much room around it, as a share of the picture.
+_ROOM = 0.03
+# A route planned over the set may have a corner at every cell: number way-points, not those.
+_MOST_NUMBERS = 12
+# Legs shorter than this share of the picture get no arrow head.
+_LONG_LEG = 0.12
+
+
+def parameter_plane(
+    eset: EquilibriumSet,
+    route: Route | None = None,
+    ax: Axes | None = None,
+    *,
+    count: str = "all",
+) -> Axes:
+    """Number of equilibria over the parameters, with fold curves and a route.
+
+    Regions are exact for the cells of the set, see `equimorph.plotting.regions`.
+
+    Parameters
+    ----------
+    eset
+        Equilibrium set over two free parameters.
+    route
+        Drawn with its way-points numbered; one without a path is left out.
+    ax
+        Where to draw; None makes a figure one column wide.
+    count
+        Which equilibria to count: "all" or "stable".
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        If `count` is neither "all" nor "stable".
+    """
+    if count not in ("all", "stable"):
+        raise InputError(f'`count` must be "all" or "stable"; got {count!r}.')
+    with style.house_style():
+        if ax is None:
+            ax = style.new_axes(style.SINGLE_COLUMN, 0.86 * style.SINGLE_COLUMN)
+        regions = count_regions(
+            eset.coordinates, eset.cells if count == "all" else eset.cells[eset.cell_index == 0]
+        )
+        frame_plane(ax, eset)
+        largest = shade_regions(ax, eset, regions)
+        lines = draw_folds(ax, eset)
+        corners = np.empty((0, 2))
+        if route is not None and route.path is not None:
+            lines.append(draw_track(ax, eset, route, route.path))
+            corners = way_points(eset, route)[: None if route.status == "arrived" else -1]
+            _draw_directions(ax, corners)
+            _number_way_points(ax, corners)
+        _write_counts(ax, regions, largest, _taken(eset, route, corners))
+        _count_bar(ax, largest, "equilibria" if count == "all" else "stable equilibria")
+        if lines:
+            ax.figure.legend(handles=lines, loc="outside lower center", ncols=2)
+    return ax
+
+
+def frame_plane(ax: Axes, eset: EquilibriumSet) -> None:
+    """Limits and labels of the plane of the free parameters."""
+    ax.set_xlim(eset.box.lower[0], eset.box.upper[0])
+    ax.set_ylim(eset.box.lower[1], eset.box.upper[1])
+    ax.set_xlabel(parameter_label(eset.structure, eset.names[0]))
+    ax.set_ylabel(parameter_label(eset.structure, eset.names[1]))
+
+
+def shade_regions(ax: Axes, eset: EquilibriumSet, regions: Regions) -> int:
+    """Fill the regions of constant count; return the largest count that can be seen."""
+    visible = _INVISIBLE * float(np.prod(eset.box.upper - eset.box.lower))
+    largest = max((k for k, area in regions.areas().items() if area > visible), default=0)
+    shades = style.count_shades(largest)
+    for level, shade in zip(regions.levels[:largest], shades[1:], strict=True):
+        outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in level))
+        ax.add_patch(PathPatch(outline, facecolor=shade, edgecolor="none", zorder=1))
+    return largest
+
+
+def draw_folds(ax: Axes, eset: EquilibriumSet) -> list[Line2D]:
+    """Draw the stability boundary, the other folds and the caps.
+
+    Returns
+    -------
+    One labelled line of every kind drawn, for a legend.
+    """
+    cap = constraint_label(eset.constraints)
+    pieces = [
+        ("stability boundary", _STABILITY_BOUNDARY, line)
+        if low == 0
+        else ("other folds", _OTHER_FOLD, line)
+        for line, low in fold_pieces(eset)
+    ]
+    pieces += [(cap, _CAP, line) for line in boundary_pieces(eset, box=False)]
+    kinds: dict[str, Line2D] = {}
+    for label, look, vertices in pieces:
+        (kinds[label],) = ax.plot(*eset.coordinates[vertices].T, **look, label=label)
+    return [kinds[label] for label in ("stability boundary", "other folds", cap) if label in kinds]
+
+
+def draw_track(ax: Axes, eset: EquilibriumSet, route: Route, path: Path) -> Line2D:
+    """Draw the way of a route over the plane; one that did not arrive ends in a cross.
+
+    Returns
+    -------
+    The labelled line, for a legend.
+    """
+    places = track(eset, path.states)
+    (line,) = ax.plot(*places.T, **_ROUTE, label="route")
+    rim: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]
+    line.set_path_effects(rim)
+    if route.status != "arrived":
+        line.set_label(f"route, refused (× {path.end.kind})")
+        (cross,) = ax.plot(*places[-1:].T, "x", color=style.ROUTE_COLOUR, ms=6, mew=1.6, zorder=8)
+        cross.set_path_effects(rim)
+    return line
+
+
+def _draw_directions(ax: Axes, corners: Float[np.ndarray, "corners 2"]) -> None:
+    """Arrow heads in the middle of the longer legs of a route."""
+    size = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
+    look = {"arrowstyle": "-|>,head_width=0.22,head_length=0.4", "color": style.ROUTE_COLOUR}
+    for here, there in pairwise(corners):
+        if np.hypot(*((there - here) / size)) > _LONG_LEG:
+            middle = here + 0.5 * (there - here)
+            tip = middle + 0.01 * (there - here)
+            ax.annotate(
+                "", tip, middle, zorder=6.5,
+                arrowprops=look | {"lw": 0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 12},
+            )  # fmt: skip
+
+
+def _number_way_points(ax: Axes, corners: Float[np.ndarray, "corners 2"]) -> None:
+    """Number the way-points; those at one place share a badge."""
+    chosen = range(len(corners)) if len(corners) <= _MOST_NUMBERS else (0, len(corners) - 1)
+    badges: dict[tuple[float, float], list[int]] = {}
+    for k in chosen:
+        place = (round(float(corners[k, 0]), 9), round(float(corners[k, 1]), 9))
+        badges.setdefault(place, []).append(k + 1)
+    box = {"boxstyle": "round,pad=0.2,rounding_size=0.6", "fc": "white", "ec": style.ROUTE_COLOUR}
+    for place, numbers in badges.items():
+        text = ", ".join(map(str, numbers))
+        ax.text(*place, text, ha="center", va="center", size=6.5, zorder=7, bbox=box | {"lw": 0.8})
+
+
+def _taken(
+    eset: EquilibriumSet, route: Route | None, corners: Float[np.ndarray, "corners 2"]
+) -> Float[np.ndarray, "places 2"]:
+    """Places that the route covers, where no count should be written."""
+    if route is None or route.path is None:
+        return corners
+    line = track(eset, route.path.states)
+    between = [line[:-1] + t * np.diff(line, axis=0) for t in (0.0, 0.25, 0.5, 0.75)]
+    return np.concatenate([*between, line[-1:]])
+
+
+def _write_counts(
+    ax: Axes, regions: Regions, largest: int, taken: Float[np.ndarray, "places 2"]
+) -> None:
+    """Write the count into every region, at the place with the most room around it."""
+    low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+    step = (high - low) / _RASTER
+    x, y = (low[i] + step[i] * (np.arange(_RASTER) + 0.5) for i in (0, 1))
+    count = regions.count(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
+    count = np.minimum(count, largest).reshape(_RASTER, _RASTER)
+    column, row = np.clip(((taken - low) / step).astype(int), 0, _RASTER - 1).T
+    free = np.ones_like(count, dtype=bool)
+    free[column, row] = False
+    shades = style.count_shades(largest)
+    for number in np.unique(count).tolist():
+        pieces, many = ndimage.label(count == number)
+        for piece in range(1, many + 1):
+            # A rim of zeros: the frame of the picture is an edge, too.
+            inside = np.pad((pieces == piece) & free, 1)
+            room = ndimage.distance_transform_edt(inside)[1:-1, 1:-1]
+            i, j = np.unravel_index(room.argmax(), room.shape)
+            if room[i, j] > _ROOM * _RASTER:
+                text = ax.text(x[i], y[j], str(number), ha="center", va="center", zorder=5)
+                text.set_path_effects([withStroke(linewidth=1.5, foreground=shades[number])])
+
+
+def _count_bar(ax: Axes, largest: int, what: str) -> None:
+    """Colour bar with one shade per count."""
+    shades = ListedColormap(style.count_shades(largest))
+    norm = BoundaryNorm(np.arange(largest + 2) - 0.5, largest + 1)
+    bar = ax.figure.colorbar(ScalarMappable(norm, shades), ax=ax, aspect=30, pad=0.02)
+    bar.set_ticks(list(range(largest + 1)), labels=[str(k) for k in range(largest + 1)])
+    bar.ax.tick_params(length=0)
+    bar.set_label(f"number of {what}")

@@ -1,0 +1,135 @@
+"""How many equilibria there are over each region of the parameter plane.
+
+Projecting the cells of the set to the plane of parameters, the number of cells over a point is
+
+    N(p) = Σ_T [p ∈ T] = Σ_e j_e w_e(p) ,
+
+a winding number: turn every projected cell counter-clockwise and add up its edges. Inside a sheet
+the contributions of neighbours cancel; what remains are the edges e on which the set folds over
+(jump j = ±2) or ends (±1). Cutting these edges at their crossings gives the exact regions
+of constant N, with no raster in between.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.plotting.arrangement import arrange, cross, outline, sides, winding
+
+# Spacing of the grid to which the cuts are rounded, relative to the extent of the set. The
+# coarser ones are for edges so crowded (cells squeezed flat at a cusp) that rounding tangles them.
+_SPACINGS = (1e-9, 1e-7, 1e-5)
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Regions of constant count, as nested levels.
+
+    Attributes
+    ----------
+    levels
+        For k = 1, 2, …: closed loops, counter-clockwise around and clockwise inside the set of
+        parameters with at least k equilibria; fill them with the non-zero rule.
+    ends, jump
+        Directed edges across which the count jumps, and the count on their left less that on
+        their right.
+    """
+
+    levels: tuple[tuple[Float[np.ndarray, "_ 2"], ...], ...]
+    ends: Float[np.ndarray, "edges 2 2"]
+    jump: Int[np.ndarray, " edges"]
+
+    @property
+    def largest(self) -> int:
+        """Largest count that occurs."""
+        return len(self.levels)
+
+    def count(self, places: Float[np.ndarray, "places 2"]) -> Int[np.ndarray, " places"]:
+        """Number of cells over each of the places; exact off the edges themselves."""
+        return winding(places, self.ends, self.jump)
+
+    def areas(self) -> dict[int, float]:
+        """Area of the parameters with exactly k equilibria, for every k ≥ 1."""
+        at_least = [sum(_area(loop) for loop in level) for level in self.levels] + [0.0]
+        return {k + 1: at_least[k] - at_least[k + 1] for k in range(self.largest)}
+
+
+def count_regions(
+    coordinates: Float[np.ndarray, "vertices 2"], cells: Int[np.ndarray, "cells 3"]
+) -> Regions:
+    """Exact regions of the plane by the number of projected cells that cover them.
+
+    Crossings are rounded to 1e-9 of the extent of the set.
+
+    Parameters
+    ----------
+    coordinates
+        Free parameters at every vertex of the set.
+    cells
+        Vertex numbers of the cells to count: all, or those of one index.
+
+    Returns
+    -------
+    Nested regions; none at all if there is no cell.
+    """
+    edges, jump = outline(coordinates, cells)
+    if not len(edges):
+        return Regions((), np.empty((0, 2, 2)), np.empty(0, int))
+    origin, extent = coordinates.min(axis=0), np.ptp(coordinates, axis=0)
+    for spacing in _SPACINGS:
+        places, pieces, jumps = arrange((coordinates - origin) / (extent * spacing), edges, jump)
+        left, right = sides(places[pieces], jumps)
+        if _balanced(pieces, left, right):
+            break
+    places = origin + places * extent * spacing
+    levels = tuple(
+        tuple(places[loop] for loop in _loops(pieces, left >= k, right >= k))
+        for k in range(1, int(max(left.max(), right.max())) + 1)
+    )
+    return Regions(levels, places[pieces], jumps)
+
+
+def _balanced(
+    edges: Int[np.ndarray, "edges 2"],
+    left: Int[np.ndarray, " edges"],
+    right: Int[np.ndarray, " edges"],
+) -> bool:
+    """Whether the boundary of every level is closed, as it is when no edges are tangled."""
+    surplus = np.zeros(int(edges.max()) + 1, int)
+    for k in range(1, int(max(left.max(), right.max())) + 1):
+        forward = (left >= k).astype(int) - (right >= k)
+        np.add.at(surplus, edges[:, 0], forward)
+        np.subtract.at(surplus, edges[:, 1], forward)
+        if surplus.any():
+            return False
+    return bool(min(left.min(), right.min()) >= 0)
+
+
+def _loops(
+    edges: Int[np.ndarray, "edges 2"],
+    inside_left: Bool[np.ndarray, " edges"],
+    inside_right: Bool[np.ndarray, " edges"],
+) -> list[Int[np.ndarray, " _"]]:
+    """Closed chains of the edges that part inside from outside, with the inside on their left."""
+    forward, backward = inside_left & ~inside_right, inside_right & ~inside_left
+    directed = np.concatenate([edges[forward], edges[backward][:, ::-1]])
+    leaving: dict[int, list[int]] = {}
+    for a, b in directed.tolist():
+        leaving.setdefault(a, []).append(b)
+    loops = []
+    while leaving:
+        chain = [next(iter(leaving))]
+        while chain[-1] in leaving:  # any way out will do: all are part of the same boundary
+            following = leaving[chain[-1]]
+            chain.append(following.pop())
+            if not following:
+                del leaving[chain[-2]]
+        loops.append(np.array(chain))
+    return loops
+
+
+def _area(loop: Float[np.ndarray, "n 2"]) -> float:
+    """Signed area inside a closed loop, relative to its first vertex to keep digits."""
+    spokes = loop - loop[0]
+    return float(cross(spokes[:-1], spokes[1:]).sum() / 2)

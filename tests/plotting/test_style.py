@@ -1,0 +1,65 @@
+"""The looks of the house: colours, and figures that leave no trace in matplotlib's state."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from PIL import Image
+
+from equimorph.plotting import style
+
+
+def lightness(colour):
+    """CIE L* of a colour: what remains of it in greyscale (IEC 61966-2-1, CIE 15)."""
+    linear = np.array([c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour])
+    y = float(linear @ [0.2126, 0.7152, 0.0722])
+    return 116 * (y ** (1 / 3) if y > 0.008856 else 7.787 * y + 16 / 116) - 16
+
+
+def test_importing_and_drawing_leave_the_global_settings_alone():
+    before = dict(mpl.rcParams)
+    with style.house_style():
+        assert mpl.rcParams["font.size"] == 7
+    assert dict(mpl.rcParams) == before
+
+
+def test_colours_of_the_indices_differ_in_greyscale():
+    """Ten units of L* are about two steps of a printer's grey wedge."""
+    steps = np.diff([lightness(to_rgb(style.index_colour(k))) for k in range(4)])
+    assert (steps > 7).all()
+
+
+def test_shades_of_counts_grow_darker_step_by_step():
+    shades = [lightness(shade[:3]) for shade in style.count_shades(6)]
+    assert (np.diff(shades) < -3).all()
+    assert shades[0] == pytest.approx(100.0, abs=0.1)
+
+
+def test_progress_runs_from_dark_to_light_evenly():
+    values = [lightness(colour[:3]) for colour in style.progress_map()(np.linspace(0, 1, 20))]
+    steps = np.diff(values)
+    assert (steps > 0).all()
+    assert steps.max() < 2.5 * steps.mean()
+
+
+@pytest.mark.parametrize(("index", "label"), [(0, "stable"), (2, "index 2"), (5, "index ≥ 3")])
+def test_indices_are_named(index, label):
+    assert style.index_label(index) == label
+
+
+def test_saved_figure_has_column_width_at_two_hundred_dots_per_inch(tmp_path):
+    axes = style.new_axes(style.SINGLE_COLUMN, 2.0)
+    png, svg = style.save(axes, tmp_path / "new", "figure")
+    with Image.open(png) as image:
+        assert image.size == (int(89 / 25.4 * 200), 400)
+    assert svg.read_text(encoding="utf-8").lstrip().startswith("<?xml")
+
+
+def test_the_same_drawing_gives_the_same_file(tmp_path):
+    for name in ("first", "second"):
+        axes = style.new_axes(style.SINGLE_COLUMN, 1.0)
+        axes.plot([0, 1], [0, 1])
+        style.save(axes, tmp_path, name)
+    for extension in ("png", "svg"):
+        first, second = (tmp_path / f"{name}.{extension}" for name in ("first", "second"))
+        assert first.read_bytes() == second.read_bytes()
