@@ -1,0 +1,21 @@
+"""The equilibrium set as a simplicial complex: lifting, folds, strata, audit."""
+
+from equimorph.manifold.audit import Audit
+from equimorph.manifold.build import equilibrium_set
+from equimorph.manifold.equilibrium_set import (
+    Boundary,
+    Component,
+    EquilibriumSet,
+    Stratum,
+    lift_to,
+)
+
+__all__ = [
+    "Audit",
+    "Boundary",
+    "Component",
+    "EquilibriumSet",
+    "Stratum",
+    "equilibrium_set",
+    "lift_to",
+]

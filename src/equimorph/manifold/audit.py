@@ -1,0 +1,71 @@
+"""The audit of an equilibrium set: what was checked, and what was found."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Numbers that tell whether a set can be trusted.
+
+    Must be zero for a clean set: `unpaired` (curves that could not be lifted), `conflicts` left,
+    `parity_violations`, `undecided` triangles, `non_manifold` edges, orientation `contradictions`.
+    `retraced` conflicts were resolved by finer steps, `bisected` triangles by subdivision.
+    `overturned` cells project against the orientation that their index demands: slivers at folds.
+    `missing` of `checked` equilibria found by random search at random points lie off the set.
+    """
+
+    vertices: int
+    cells: int
+    unpaired: int
+    conflicts: int
+    retraced: int
+    parity_violations: int
+    undecided: int
+    bisected: int
+    non_manifold: int
+    contradictions: int
+    overturned: int
+    euler_characteristic: int
+    components: int
+    loops: tuple[tuple[str, int], ...]
+    largest_residual: float
+    checked: int
+    missing: int
+
+    @property
+    def clean(self) -> bool:
+        """Whether everything that must be zero is zero, and residuals are at round-off."""
+        faults = (
+            self.unpaired,
+            self.conflicts,
+            self.parity_violations,
+            self.undecided,
+            self.non_manifold,
+            self.contradictions,
+        )
+        return not any(faults) and self.largest_residual < 1e-9
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Lines to print: what, and how many."""
+        loops = ", ".join(f"{count} {kind}" for kind, count in self.loops) or "none"
+        return [
+            ("equilibria (vertices)", str(self.vertices)),
+            ("cells", str(self.cells)),
+            ("curves not paired", str(self.unpaired)),
+            ("conflicting pairs", f"{self.conflicts} ({self.retraced} resolved by finer steps)"),
+            ("parity violations", str(self.parity_violations)),
+            ("undecided triangles", f"{self.undecided} ({self.bisected} resolved by bisection)"),
+            ("non-manifold edges", str(self.non_manifold)),
+            ("orientation contradictions", str(self.contradictions)),
+            ("overturned cells", str(self.overturned)),
+            ("components", str(self.components)),
+            ("Euler characteristic", str(self.euler_characteristic)),
+            ("boundary loops", loops),
+            ("largest residual", f"{self.largest_residual:.1e}"),
+            (
+                "completeness check",
+                f"{self.missing} of {self.checked} equilibria found at random points are missing"
+                if self.checked
+                else "not made",
+            ),
+        ]

@@ -1,0 +1,352 @@
+"""Sheet lifting, part one: pair the equilibria at both ends of every grid edge by lifting it.
+
+From each known equilibrium over an edge's end, the edge is lifted: the curve ends over the other
+end, or turns at folds and comes back as another equilibrium over the same end, or leaves through a
+constraint. New ends are new equilibria; flood until nothing new appears.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria.outcome import Outcome, follow
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
+from equimorph.manifold.directly import lift_directly
+from equimorph.manifold.mesh import BaseMesh
+from equimorph.manifold.points import BETWEEN, CAP, Points
+from equimorph.manifold.points import FOLD as ON_FOLD
+from equimorph.model import Constraint, Progress
+from equimorph.structures import Structure
+
+UNTRACED, ABANDONED = -1, -2
+EFFORTS = 4
+CHUNK = 4096
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The structure and how points of the plane become its parameters."""
+
+    structure: Structure
+    base: Float[np.ndarray, " parameters"]
+    free: Int[np.ndarray, " 2"]
+    constraints: tuple[Constraint, ...]
+
+    def parameters(self, points: Float[np.ndarray, "some 2"]) -> Float[np.ndarray, "some P"]:
+        """All parameters over points of the plane."""
+        p = np.tile(self.base, (len(points), 1))
+        p[:, self.free] = points
+        return p
+
+    @property
+    def scales(self) -> Float[np.ndarray, " 2"]:
+        """Scales of the free parameters."""
+        return self.structure.scales[self.free]
+
+
+@dataclass
+class Curves:
+    """Lifted edges: edge, start point, end point (−1: left through a constraint), inner points."""
+
+    edge: list[int] = field(default_factory=list)
+    start: list[int] = field(default_factory=list)
+    end: list[int] = field(default_factory=list)
+    inner: dict[int, list[int]] = field(default_factory=dict)
+
+    def add(self, edge: int, start: int, end: int, inner: list[int]) -> int:
+        """Add a curve; return its number."""
+        self.edge.append(edge)
+        self.start.append(start)
+        self.end.append(end)
+        if inner:
+            self.inner[len(self.edge) - 1] = inner
+        return len(self.edge) - 1
+
+
+@dataclass
+class Pairing:
+    """Everything known while the set is being lifted."""
+
+    setting: Setting
+    mesh: BaseMesh
+    points: Points
+    curves: Curves
+    rays: Int[np.ndarray, "capacity slots"]
+    """Curve that starts or ends at a point over one of its vertex's edges; `UNTRACED` if none."""
+    slots: Int[np.ndarray, "E 2"]
+    """Place of an edge among those of its two vertices."""
+    incident: Int[np.ndarray, "V slots"]
+    """Edges of each vertex, in the order of their slots; −1 beyond."""
+    effort: Int[np.ndarray, " E"]
+    conflicts: int = 0
+
+    def ray(self, point: int, edge: int) -> int:
+        """Curve at a point along an edge."""
+        side = int(self.mesh.edges[edge, 1] == self.points.vertex[point])
+        return int(self.rays[point, self.slots[edge, side]])
+
+    def set_ray(self, point: int, edge: int, curve: int) -> None:
+        """Enter the curve at a point along an edge."""
+        side = int(self.mesh.edges[edge, 1] == self.points.vertex[point])
+        self.rays[point, self.slots[edge, side]] = curve
+
+    def fit(self) -> None:
+        """Make room for rays of new points and edges."""
+        shape = (len(self.points.z), self.incident.shape[1])
+        if shape != self.rays.shape:
+            rays = np.full(shape, UNTRACED)
+            rays[: self.rays.shape[0], : self.rays.shape[1]] = self.rays
+            self.rays = rays
+
+    def use_mesh(self, mesh: BaseMesh) -> None:
+        """Take over a mesh with more vertices and edges; curves on removed edges are forgotten."""
+        removed = np.setdiff1d(np.unique(self.mesh.sides), np.unique(mesh.sides))
+        gone = set(removed.tolist())
+        for curve, edge in enumerate(self.curves.edge):
+            if edge in gone:
+                self.forget(curve, ABANDONED)
+        for edge in removed:  # untraced rays of removed edges need no tracing any more
+            for side in range(2):
+                for point in self.points.over(int(self.mesh.edges[edge, side])):
+                    self.rays[point, self.slots[edge, side]] = ABANDONED
+        self.points.grow_vertices(len(mesh.vertices))
+        self.incident, self.slots = _incidence(mesh)
+        more = len(mesh.edges) - len(self.effort)
+        self.effort = np.concatenate([self.effort, np.zeros(more, int)])
+        self.mesh = mesh
+        self.fit()
+
+    def forget(self, curve: int, mark: int = UNTRACED) -> None:
+        """Take a curve back from its ends."""
+        edge = self.curves.edge[curve]
+        for point in (self.curves.start[curve], self.curves.end[curve]):
+            if point >= 0 and self.ray(point, edge) == curve:
+                self.set_ray(point, edge, mark)
+
+
+def _incidence(mesh: BaseMesh) -> tuple[Int[np.ndarray, "V slots"], Int[np.ndarray, "E 2"]]:
+    """Edges of each vertex in the order of their numbers, and the place of each edge there.
+
+    Removed edges keep their places, so that known rays stay where they are.
+    """
+    ends = mesh.edges.ravel()
+    order = np.argsort(ends, kind="stable")
+    degree = np.bincount(ends, minlength=len(mesh.vertices))
+    first = np.concatenate([[0], np.cumsum(degree)[:-1]])
+    place = np.empty(len(ends), int)
+    place[order] = np.arange(len(ends)) - first[ends[order]]
+    incident = np.full((len(mesh.vertices), int(degree.max())), -1)
+    incident[ends, place] = np.arange(len(ends)) // 2
+    return incident, place.reshape(-1, 2)
+
+
+def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
+    """Empty pairing on a mesh."""
+    incident, slots = _incidence(mesh)
+    pairing = Pairing(
+        setting,
+        mesh,
+        Points.empty(setting.structure, len(mesh.vertices)),
+        Curves(),
+        np.full((0, 0), UNTRACED),
+        slots,
+        incident,
+        np.zeros(len(mesh.edges), int),
+    )
+    pairing.fit()
+    return pairing
+
+
+def flood(pairing: Pairing, progress: Progress) -> None:
+    """Lift edges from all known points until every ray is traced or given up."""
+    while True:
+        pairing.fit()
+        points, edges, sides = _pending(pairing)
+        if len(points) == 0:
+            return
+        for at in range(0, len(points), CHUNK):
+            part = slice(at, at + CHUNK)
+            _round(pairing, points[part], edges[part], sides[part])
+            pairing.fit()
+        live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == 0)
+        progress.report("lifting edges", int(live), None)
+
+
+def _pending(
+    pairing: Pairing,
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    """Untraced rays: from one end of an edge at a time, lest a curve be traced from both."""
+    count = pairing.points.count
+    vertex = pairing.points.vertex[:count]
+    open_rays = (pairing.rays[:count] == UNTRACED) & (vertex >= 0)[:, None]
+    points, slots = np.nonzero(open_rays)
+    edges = pairing.incident[vertex[points], slots]
+    points, edges = points[edges >= 0], edges[edges >= 0]
+    sides = (pairing.mesh.edges[edges, 1] == vertex[points]).astype(int)
+    from_first = np.zeros(len(pairing.mesh.edges), bool)
+    from_first[edges[sides == 0]] = True
+    keep = (sides == 0) | ~from_first[edges]
+    return points[keep], edges[keep], sides[keep]
+
+
+def _round(
+    pairing: Pairing,
+    points: Int[np.ndarray, " n"],
+    edges: Int[np.ndarray, " n"],
+    sides: Int[np.ndarray, " n"],
+) -> None:
+    """Lift a batch of rays: directly where one step does it, else by pseudo-arclength."""
+    setting, mesh, store = pairing.setting, pairing.mesh, pairing.points
+    origin = mesh.edges[edges, sides]
+    target = mesh.edges[edges, 1 - sides]
+    start = setting.parameters(mesh.vertices[origin])
+    line = ParameterLine(
+        setting.structure, start, setting.parameters(mesh.vertices[target]) - start
+    )
+    easy = np.flatnonzero(pairing.effort[edges] == 0)
+    direct = lift_directly(
+        line.take(easy), store.z[points[easy]], store.index[points[easy]], setting.constraints
+    )
+    done = easy[direct.good]
+    ids, _ = store.over_vertices(
+        target[done],
+        direct.z[direct.good],
+        setting.parameters(mesh.vertices[target[done]]),
+        direct.index[direct.good],
+    )
+    pairing.fit()
+    for point, edge, end in zip(points[done].tolist(), edges[done].tolist(), ids.tolist(), strict=True):
+        _enter(pairing, point, edge, end, [])
+    left = np.ones(len(points), bool)
+    left[done] = False
+    for effort in range(EFFORTS):
+        lanes = np.flatnonzero(left & (np.maximum(pairing.effort[edges], 0) == effort))
+        if len(lanes):
+            _trace_rays(pairing, points[lanes], edges[lanes], sides[lanes], line.take(lanes), effort)
+    for lane in np.flatnonzero(left & (pairing.effort[edges] >= EFFORTS)):
+        pairing.set_ray(int(points[lane]), int(edges[lane]), ABANDONED)
+
+
+def _trace_rays(
+    pairing: Pairing,
+    points: Int[np.ndarray, " n"],
+    edges: Int[np.ndarray, " n"],
+    sides: Int[np.ndarray, " n"],
+    line: ParameterLine,
+    effort: int,
+) -> None:
+    finer = 0.35**effort
+    options = TraceOptions(
+        through_folds=True,
+        through_branch_points=True,
+        first_step=0.05 * finer,
+        largest_step=0.5 * finer,
+        turning=0.25 * finer,
+    )
+    setting, store = pairing.setting, pairing.points
+    outcome = follow(line, store.z[points], setting.constraints, options)
+    branched = np.unique(outcome.passed.lanes[outcome.passed.code == BRANCH])
+    inner = _inner_points(outcome, line)
+    for lane, (point, edge) in enumerate(zip(points.tolist(), edges.tolist(), strict=True)):
+        code = int(outcome.code[lane])
+        if code not in {ARRIVAL, RETURN, CONSTRAINT} or lane in branched:
+            pairing.effort[edge] += 1
+            continue
+        if pairing.ray(point, edge) not in {UNTRACED, ABANDONED} and code == CONSTRAINT:
+            continue
+        rows = inner.get(lane, [])
+        end = -1
+        if code != CONSTRAINT:
+            side = sides[lane] if code == RETURN else 1 - sides[lane]
+            vertex = pairing.mesh.edges[edge, side]
+            p = setting.parameters(pairing.mesh.vertices[[vertex]])
+            ids, _ = store.over_vertices(
+                np.array([vertex]), outcome.z[[lane]], p, _arrival_index(outcome, lane)
+            )
+            end = int(ids[0])
+            pairing.fit()
+        known = pairing.ray(point, edge)
+        if known >= 0 and _other_end(pairing, known, point) == end:
+            continue  # the same curve, traced from its other end in the same batch
+        numbers = [store.add(z, p, index, kind, edge) for z, p, index, kind in rows]
+        if code == CONSTRAINT:
+            z, p = outcome.z[lane], line.parameters(outcome.t)[lane]
+            numbers.append(store.add(z, p, int(outcome.index[lane]), CAP, edge))
+        pairing.fit()
+        _enter(pairing, point, edge, end, numbers)
+
+
+def _arrival_index(outcome: Outcome, lane: int) -> Int[np.ndarray, " 1"]:
+    return outcome.index[[lane]]
+
+
+def _other_end(pairing: Pairing, curve: int, point: int) -> int:
+    start, end = pairing.curves.start[curve], pairing.curves.end[curve]
+    return end if start == point else start
+
+
+def _enter(pairing: Pairing, point: int, edge: int, end: int, inner: list[int]) -> None:
+    """Register a curve; contradictions take back what they contradict and raise the effort."""
+    known = pairing.ray(point, edge)
+    if known >= 0 and _other_end(pairing, known, point) == end:
+        return
+    taken = end >= 0 and pairing.ray(end, edge) >= 0
+    if known >= 0 or taken or end == point:
+        pairing.conflicts += 1
+        pairing.effort[edge] += 1
+        for curve in {known, pairing.ray(end, edge) if end >= 0 else -1}:
+            if curve >= 0:
+                pairing.forget(curve)
+        return
+    curve = pairing.curves.add(edge, point, end, inner)
+    pairing.set_ray(point, edge, curve)
+    if end >= 0:
+        pairing.set_ray(end, edge, curve)
+
+
+def _inner_points(
+    outcome: Outcome, line: ParameterLine
+) -> dict[int, list[tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"], int, int]]]:
+    """Folds of each lane in order, with one regular point between neighbours."""
+    passed = outcome.passed
+    p = line.start[passed.lanes] + passed.t[:, None] * line.velocity[passed.lanes]
+    rows: dict[int, list[tuple[np.ndarray, np.ndarray, int, int]]] = {}
+    places: dict[int, list[float]] = {}
+    for i in np.flatnonzero(passed.code == FOLD):
+        lane = int(passed.lanes[i])
+        row = (passed.z[i], p[i], int(passed.index[i].min()), ON_FOLD)
+        before = places.setdefault(lane, [])
+        if before:
+            rows[lane].append(_between(outcome, line, lane, (before[-1], passed.travelled[i])))
+        rows.setdefault(lane, []).append(row)
+        before.append(float(passed.travelled[i]))
+    return rows
+
+
+def _between(
+    outcome: Outcome, line: ParameterLine, lane: int, span: tuple[float, float]
+) -> tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"], int, int]:
+    """Recorded point of a lane nearest to the middle of an interval of its length."""
+    middle = 0.5 * (span[0] + span[1])
+    best = None
+    for lanes, travelled, front in outcome.traces.points:
+        for k in np.flatnonzero((lanes == lane) & (travelled >= span[0]) & (travelled <= span[1])):
+            if best is None or abs(travelled[k] - middle) < abs(best[0] - middle):
+                best = (travelled[k], front, int(k))
+    assert best is not None, "two folds in one step are refused by the tracer"
+    _, front, k = best
+    p = line.start[lane] + front.t[k] * line.velocity[lane]
+    return front.z[k], p, int(front.index[k]), BETWEEN
+
+
+def abandoned(pairing: Pairing) -> list[tuple[int, int]]:
+    """Rays that could not be traced: (point, edge) on edges that are in use."""
+    used = np.zeros(len(pairing.mesh.edges) + 1, bool)
+    used[pairing.mesh.sides] = True
+    count = pairing.points.count
+    vertex = pairing.points.vertex[:count]
+    points, slots = np.nonzero((pairing.rays[:count] < 0) & (vertex >= 0)[:, None])
+    edges = pairing.incident[vertex[points], slots]
+    return [(int(a), int(b)) for a, b in zip(points, edges, strict=True) if used[b]]

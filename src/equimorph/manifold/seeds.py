@@ -1,0 +1,93 @@
+"""First equilibria over a few grid vertices, from which the set is flooded."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria import ParameterLine, TraceOptions, find_equilibria
+from equimorph.equilibria.outcome import follow
+from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.manifold.directly import lift_directly
+from equimorph.manifold.mesh import BaseMesh
+from equimorph.manifold.pairing import Setting
+from equimorph.model import names_of, position
+
+COARSE = 5
+"""Natural states are lifted at about COARSE × COARSE vertices."""
+SEARCHED = 3
+"""Vertices at which a random search looks for equilibria that no natural path reaches."""
+
+Seeds = tuple[
+    Int[np.ndarray, " n"],
+    Float[np.ndarray, "n size"],
+    Float[np.ndarray, "n P"],
+    Int[np.ndarray, " n"],
+]
+
+
+def seeds(setting: Setting, mesh: BaseMesh, seed: int) -> Seeds:
+    """Vertices, unknowns, parameters and index of first equilibria; deterministic for a `seed`."""
+    vertices, z = _from_natural_states(setting, _spread(mesh))
+    searched_v, searched_z = _from_search(setting, mesh, seed)
+    vertices, z = np.concatenate([vertices, searched_v]), np.concatenate([z, searched_z])
+    p = setting.parameters(mesh.vertices[vertices])
+    # a line of no length polishes the points and counts their index
+    still = ParameterLine(setting.structure, p, np.zeros_like(p))
+    index = setting.structure.index(z, p)
+    direct = lift_directly(still, z, index, setting.constraints)
+    good = direct.good & setting.structure.resolved(z, p)
+    return vertices[good], direct.z[good], p[good], index[good]
+
+
+def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 2"]]:
+    """About COARSE² vertices spread over the box, off its lines of symmetry."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    share = (np.arange(COARSE) + 0.5) / COARSE
+    grid = np.stack(np.meshgrid(share, share, indexing="ij"), -1).reshape(-1, 2)
+    wanted = low + grid * (high - low)
+    gap = (mesh.vertices[None] - wanted[:, None]) / (high - low)
+    chosen = np.unique((gap**2).sum(axis=2).argmin(axis=1))
+    return chosen, mesh.vertices[chosen]
+
+
+def _from_natural_states(
+    setting: Setting, chosen: tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 2"]]
+) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
+    vertices, points = chosen
+    structure = setting.structure
+    p = setting.parameters(points)
+    unloaded = p.copy()
+    for name, value in structure.unloaded().items():
+        unloaded[:, position(structure.parameters, name)] = value
+    z, found = structure.natural(unloaded)
+    z, p, unloaded, vertices = z[found], p[found], unloaded[found], vertices[found]
+    moving = np.abs(p - unloaded).max(axis=1) > 0
+    line = ParameterLine(structure, unloaded[moving], (p - unloaded)[moving])
+    options = TraceOptions(
+        through_folds=True, through_branch_points=True, record=False, locate_passed=False
+    )
+    outcome = follow(line, z[moving], setting.constraints, options)
+    arrived = outcome.code == ARRIVAL
+    return (
+        np.concatenate([vertices[~moving], vertices[moving][arrived]]),
+        np.concatenate([z[~moving], outcome.z[arrived]]),
+    )
+
+
+def _from_search(
+    setting: Setting, mesh: BaseMesh, seed: int
+) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
+    generator = np.random.default_rng(seed)
+    names = names_of(setting.structure.parameters)
+    vertices, z = [np.zeros(0, int)], [np.zeros((0, setting.structure.size))]
+    for vertex in generator.integers(0, len(mesh.vertices), SEARCHED):
+        p = setting.parameters(mesh.vertices[[vertex]])[0]
+        found = find_equilibria(
+            setting.structure,
+            dict(zip(names, p.tolist(), strict=True)),
+            within=setting.constraints,
+            starts=100,
+            seed=seed,
+        )
+        vertices.append(np.full(len(found), vertex))
+        z.append(found.z)
+    return np.concatenate(vertices), np.concatenate(z)
