@@ -1,0 +1,5 @@
+"""The command line as ``python -m equimorph.cli``."""
+
+from equimorph.cli import main
+
+main()

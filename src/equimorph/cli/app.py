@@ -1,0 +1,102 @@
+"""Commands: parse, call, show.
+
+Everything heavy is imported inside the command that needs it, so that ``--help`` answers at once.
+"""
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from equimorph.errors import InputError
+
+BAD_INPUT = 2
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Quasi-static shape control of soft, morphing structures.",
+)
+
+
+class Kind(StrEnum):
+    """Kinds of studies that can be begun."""
+
+    arch = "arch"
+    spring = "spring"
+
+
+def main() -> None:
+    """Run the command line: the caller's mistakes are one line on stderr and exit code 2."""
+    try:
+        app()
+    except InputError as error:
+        line = " ".join(str(error).split())
+        sys.stderr.write(f"equimorph: {line}\n")
+        sys.exit(BAD_INPUT)
+
+
+def _show_version(wanted: bool) -> bool:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"equimorph {version('equimorph')}")
+        raise typer.Exit
+    return wanted
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def new(
+    file: Annotated[Path, typer.Argument(help="Study file to write, say my-arch.toml.")],
+    kind: Annotated[Kind, typer.Option(help="What to begin with.")] = Kind.arch,
+) -> None:
+    """Begin a study: write an example file to change."""
+    from equimorph.study.template import write_template
+
+    write_template(file, kind.value)
+    typer.echo(f"Wrote {file}. Next: equimorph run {file}")
+
+
+@app.command()
+def check(file: Annotated[Path, typer.Argument(help="Study file.")]) -> None:
+    """Check a study file without computing anything."""
+    from equimorph.study import parse_study, prepare, read_study_text
+
+    study = parse_study(read_study_text(file), file.name)
+    prepare(study)
+    points, routes = _count(len(study.equilibria), "point"), _count(len(study.routes), "route")
+    typer.echo(f"{file} is a sound study with {points} and {routes}.")
+
+
+@app.command()
+def run(
+    file: Annotated[Path, typer.Argument(help="Study file.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Results folder; results/NAME unless given.")
+    ] = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Replace what an earlier run left in the folder.")
+    ] = False,
+) -> None:
+    """Run a study: equilibrium set, equilibria, routes, figures, schedules, report."""
+    from equimorph.cli.show import run_and_show
+
+    run_and_show(file, out or Path("results") / file.stem, fresh=fresh)
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"

@@ -1,0 +1,77 @@
+"""Run a study and show its answers on the screen."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from equimorph.cli.progress import ScreenProgress
+from equimorph.model import Descriptor
+from equimorph.structures import States
+from equimorph.study import Outcome, RouteOutcome, run_study
+
+
+def run_and_show(file: Path, out: Path, *, fresh: bool) -> None:
+    """Run a study with progress on stderr, then print its answers.
+
+    Parameters
+    ----------
+    file
+        Study file.
+    out
+        Results folder.
+    fresh
+        Replace what an earlier run left there.
+    """
+    screen = Console(highlight=False)
+    if not _kernels_are_cached():
+        screen.print("The first run compiles the kernels: a minute, and only once.")
+    with ScreenProgress() as progress:
+        outcome = run_study(file, out, fresh=fresh, progress=progress)
+    _show(outcome, screen)
+    screen.print(f"Report: {out / 'index.html'}", soft_wrap=True)
+
+
+def _show(outcome: Outcome, screen: Console) -> None:
+    eset, heights = outcome.equilibrium_set, outcome.problem.height
+    audit = "clean" if eset.audit.clean else "NOT CLEAN, see the report"
+    origin = "read from an earlier run" if outcome.reused else "computed"
+    pieces = "1 component" if len(eset.components) == 1 else f"{len(eset.components)} components"
+    screen.print(
+        f"Equilibrium set {origin}: {len(eset.points)} vertices, {pieces}, audit {audit}.",
+        soft_wrap=True,
+    )
+    for point, states in zip(outcome.problem.points, outcome.points, strict=True):
+        where = ", ".join(f"{name} = {value:g}" for name, value in point.items())
+        screen.print(f"Equilibria at {where}:", soft_wrap=True)
+        screen.print(_table(heights, states))
+    for each in outcome.routes:
+        screen.print(_verdict(each), soft_wrap=True)
+
+
+def _table(heights: Descriptor, states: States) -> Table:
+    table = Table(box=None, header_style="bold")
+    for title in (heights.name, "index", "margin", "energy"):
+        table.add_column(title, justify="right")
+    values = zip(heights(states), states.index, states.margin, states.energy, strict=True)
+    for height, index, margin, energy in values:
+        table.add_row(f"{height:.5f}", str(index), f"{margin:.4f}", f"{energy:.5f}")
+    return table
+
+
+def _verdict(each: RouteOutcome) -> str:
+    if not each.arrived:
+        return f"Route {each.name}: [bold red]refused[/]. {escape(each.route.why)}"
+    return (
+        f"Route {each.name}: [bold green]arrived[/] without a snap, smallest margin "
+        f"{each.route.margin:.3f}, length {each.route.length:.3f}."
+    )
+
+
+def _kernels_are_cached() -> bool:
+    """Whether numba left compiled kernels beside their source."""
+    spec = find_spec("equimorph.linalg")
+    folders = (spec.submodule_search_locations or []) if spec else []
+    return any(any(Path(folder).glob("__pycache__/*.nbi")) for folder in folders)

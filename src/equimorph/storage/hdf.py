@@ -1,0 +1,131 @@
+"""HDF5 pieces that h5netcdf (and so xarray) understands: named dimensions, text as JSON.
+
+Every array carries a checksum of its own, so that damage is found when it is read.
+"""
+
+import json
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from jaxtyping import Shaped
+
+from equimorph.errors import InputError
+
+# What netCDF-4 calls a dimension that has no coordinates of its own.
+_BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable. %9d"
+
+
+def put(
+    group: h5py.Group,
+    name: str,
+    values: Shaped[np.ndarray, "..."],
+    dimensions: Sequence[str],
+    meaning: str = "",
+) -> h5py.Dataset:
+    """Store an array with the names of its dimensions.
+
+    Parameters
+    ----------
+    group
+        Where it goes.
+    name
+        Of the array.
+    values
+        Numbers or texts.
+    dimensions
+        One name per axis; made in `group` unless it or a group above has it.
+    meaning
+        What it is, with its unit, for people.
+    """
+    array = np.asarray(values)
+    plain = array.size == 0 or array.dtype.kind in "OU"
+    filters = {} if plain else {"fletcher32": True, "compression": "gzip", "shuffle": True}
+    kind = h5py.string_dtype() if array.dtype.kind in "OU" else array.dtype
+    dataset = group.create_dataset(name, data=array.astype(kind), dtype=kind, **filters)
+    if meaning:
+        dataset.attrs["long_name"] = meaning
+    for axis, (dimension, size) in enumerate(zip(dimensions, array.shape, strict=True)):
+        dataset.dims[axis].attach_scale(_dimension(group, dimension, size))
+    return dataset
+
+
+def put_json(group: h5py.Group, name: str, content: Any) -> None:
+    """Store plain data as one text; a dataset, because attributes end at 64 KiB."""
+    group.create_dataset(name, data=json.dumps(content, ensure_ascii=False))
+
+
+def get(group: h5py.Group, name: str) -> Shaped[np.ndarray, "..."]:
+    """Read an array; texts as Python strings."""
+    dataset = group[name]
+    return np.asarray(
+        dataset.asstr()[...] if h5py.check_string_dtype(dataset.dtype) else dataset[...]
+    )
+
+
+def get_json(group: h5py.Group, name: str) -> Any:
+    """Read plain data."""
+    return json.loads(group[name].asstr()[()])
+
+
+@contextmanager
+def opened(path: Path, kind: str, version: int) -> Generator[h5py.File]:
+    """Open a file of ours for reading.
+
+    Parameters
+    ----------
+    path
+        Name of the file.
+    kind
+        What its attribute ``format`` must say.
+    version
+        The newest version that can be read.
+
+    Raises
+    ------
+    InputError
+        If it is missing, no HDF5 file, of another kind, newer, truncated or damaged.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            _check_kind(file, path, kind, version)
+            yield file
+    except FileNotFoundError as error:
+        raise InputError(f"`{path}` must be a file; got none.") from error
+    except (OSError, RuntimeError, KeyError, json.JSONDecodeError) as error:
+        raise InputError(
+            f"`{path}` must be a whole HDF5 file; got a damaged or truncated one, or no HDF5 file "
+            "at all. Compute it again."
+        ) from error
+
+
+def _check_kind(file: h5py.File, path: Path, kind: str, version: int) -> None:
+    if file.attrs.get("format") != kind:
+        raise InputError(f"`{path}` must hold {kind}; got another HDF5 file.")
+    if not 1 <= file.attrs["version"] <= version:
+        raise InputError(
+            f"`{path}` must have a version up to {version}; got {file.attrs['version']}. "
+            "Read it with the equimorph that wrote it, or a newer one."
+        )
+
+
+def add_dimension(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
+    """Name a dimension, visible in `group` and in all groups below it."""
+    # A dimension without coordinates stores nothing.
+    dimension = group.create_dataset(name, shape=(size,), dtype=">f4")
+    dimension.make_scale(_BARE_DIMENSION % size)
+    return dimension
+
+
+def _dimension(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
+    """Nearest dimension of this name and size, in the group or above it, else a new one."""
+    place = group
+    while True:
+        if name in place and place[name].is_scale and place[name].shape == (size,):
+            return place[name]
+        if place.name == "/":
+            return add_dimension(group, name, size)
+        place = place.parent

@@ -1,0 +1,105 @@
+"""A route as an HDF5 group: its path, its events, its schedule or the reason of its refusal."""
+
+from typing import Any
+
+import h5py
+import numpy as np
+
+from equimorph.equilibria import Event, Path
+from equimorph.model import Schedule
+from equimorph.storage.hdf import get, get_json, put, put_json
+from equimorph.structures import State, States, Structure
+from equimorph.tasks import Route
+
+ABOUT, EVENTS, SCHEDULE = "about", "events", "schedule"
+
+
+def write(group: h5py.Group, route: Route) -> None:
+    """Write a route into an empty group."""
+    put_json(group, ABOUT, _about(route))
+    if route.path is not None:
+        _write_path(group, route.path)
+    if route.schedule is not None:
+        _write_schedule(group.create_group(SCHEDULE), route.schedule)
+
+
+def read(group: h5py.Group, structure: Structure) -> Route:
+    """Read what `write` wrote."""
+    return Route(
+        path=_read_path(group, structure) if "z" in group else None,
+        schedule=_read_schedule(group[SCHEDULE]) if SCHEDULE in group else None,
+        **get_json(group, ABOUT),
+    )
+
+
+def _about(route: Route) -> dict[str, Any]:
+    return {
+        "status": route.status,
+        "why": route.why,
+        "margin": route.margin,
+        "length": route.length,
+        "way_points": route.way_points,
+    }
+
+
+def _write_path(group: h5py.Group, path: Path) -> None:
+    put(group, "z", path.states.z, ["point", "unknown"], "unknowns and multipliers")
+    put(group, "p", path.states.p, ["point", "parameter"], "parameters")
+    put(group, "at", path.at, ["point"], "segment + share of it")
+    put(group, "length", path.length, ["point"], "length from the start")
+    put(group, "index", path.index, ["point"], "negative eigenvalues; 0 is stable")
+    states = [event.state for event in path.events]
+    put(group, "event_z", np.array([s.z for s in states]), ["event", "unknown"])
+    put(group, "event_p", np.array([s.p for s in states]), ["event", "parameter"])
+    words = [[e.kind, e.at, e.criticality, e.detail] for e in path.events]
+    put_json(group, EVENTS, words)
+
+
+def _read_path(group: h5py.Group, structure: Structure) -> Path:
+    states = zip(get(group, "event_z"), get(group, "event_p"), strict=True)
+    events = [
+        Event(kind, State(structure, z, p), at, criticality, detail)
+        for (z, p), (kind, at, criticality, detail) in zip(
+            states, get_json(group, EVENTS), strict=True
+        )
+    ]
+    return Path(
+        states=States(structure, get(group, "z"), get(group, "p")),
+        at=get(group, "at"),
+        length=get(group, "length"),
+        index=get(group, "index"),
+        events=tuple(events),
+    )
+
+
+def _write_schedule(group: h5py.Group, schedule: Schedule) -> None:
+    put(group, "values", schedule.values, ["step", "parameter"], "parameters")
+    put(group, "progress", schedule.progress, ["step"], "share of the length")
+    put(group, "margins", schedule.margins, ["step"], "stability margin")
+    put(group, "way_points", schedule.way_points, ["corner"], "steps at the corners")
+    table = list(schedule.descriptors.values())
+    table_array = np.array(table).reshape(len(table), len(schedule.progress))
+    put(group, "descriptors", table_array, ["descriptor", "step"], "see about")
+    about = {
+        "names": schedule.names,
+        "roles": schedule.roles,
+        "units": schedule.units,
+        "descriptors": list(schedule.descriptors),
+        "start": schedule.start,
+    }
+    put_json(group, ABOUT, about)
+
+
+def _read_schedule(group: h5py.Group) -> Schedule:
+    about = get_json(group, ABOUT)
+    return Schedule(
+        names=tuple(about["names"]),
+        roles=tuple(about["roles"]),
+        units=tuple(about["units"]),
+        values=get(group, "values"),
+        progress=get(group, "progress"),
+        margins=get(group, "margins"),
+        descriptors=dict(zip(about["descriptors"], get(group, "descriptors"), strict=True)),
+        start=about["start"],
+        way_points=get(group, "way_points"),
+    )

@@ -1,0 +1,17 @@
+"""Studies: a problem file in, results and a report out."""
+
+from equimorph.study.outcome import Outcome, RouteOutcome
+from equimorph.study.prepare import Problem, prepare
+from equimorph.study.problem import Study, parse_study, read_study_text
+from equimorph.study.run import run_study
+
+__all__ = [
+    "Outcome",
+    "Problem",
+    "RouteOutcome",
+    "Study",
+    "parse_study",
+    "prepare",
+    "read_study_text",
+    "run_study",
+]

@@ -1,0 +1,139 @@
+"""One line for a wrong study file: which key, which value, what is allowed."""
+
+import difflib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from equimorph.errors import InputError
+
+# Requirement for each kind of finding that pydantic names; {braces} are filled from its context.
+_REQUIREMENTS = {
+    "missing": "be given",
+    "float_type": "be a number",
+    "int_type": "be a whole number",
+    "string_type": "be text in quotes",
+    "list_type": "be a list",
+    "dict_type": "be a table of keys and values",
+    "model_type": "be a table of keys and values",
+    "model_attributes_type": "be a table of keys and values",
+    "finite_number": "be finite",
+    "greater_than": "be greater than {gt}",
+    "greater_than_equal": "be at least {ge}",
+    "less_than": "be less than {lt}",
+    "literal_error": "be {expected}",
+    "too_short": "have at least {min_length} entries",
+    "too_long": "have at most {max_length} entries",
+    "string_pattern_mismatch": "be made of letters, digits, - and _",
+}
+
+
+def complaint(error: ValidationError, model: type[BaseModel], file: str) -> InputError:
+    """Say in one line what is wrong first in a study file, and how much more there is.
+
+    Parameters
+    ----------
+    error
+        What pydantic found.
+    model
+        The model of the whole file, which knows the allowed keys.
+    file
+        Name of the file, to begin the line with.
+    """
+    findings = error.errors(include_url=False)
+    # A misspelt key is also a missing one: name the misspelling.
+    first = min(findings, key=lambda finding: finding["type"] != "extra_forbidden")
+    line = _sentence(first, model)
+    more = f" ({len(findings) - 1} more after this.)" if len(findings) > 1 else ""
+    return InputError(f"{file}: {line}{more}")
+
+
+def short(value: object) -> str:
+    """Value as it would stand in the file, cut to a readable length."""
+    try:
+        text = json.dumps(value, ensure_ascii=False)
+    except (TypeError, ValueError):
+        text = str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def key_path(location: tuple[int | str, ...]) -> str:
+    """Join a location as it is said: ``route[0].start.at``.
+
+    Examples
+    --------
+    >>> key_path(("route", 0, "start"))
+    'route[0].start'
+    """
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return path.removeprefix(".")
+
+
+def _sentence(finding: ErrorDetails, model: type[BaseModel]) -> str:
+    location = tuple(part for part in finding["loc"] if part not in ("rod", "spring"))
+    kind = finding["type"]
+    if kind == "extra_forbidden":
+        return _unknown_key(finding["loc"], location, model)
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        return _unknown_kind(finding, location)
+    name = f"`{key_path(location)}`" if location else "the study"
+    requirement = _REQUIREMENTS.get(kind, finding["msg"])
+    requirement = requirement.format_map(_Forgiving(finding.get("ctx", {})))
+    got = "nothing" if kind == "missing" else short(finding["input"])
+    return f"{name} must {requirement}; got {got}."
+
+
+def _unknown_kind(finding: ErrorDetails, location: tuple[int | str, ...]) -> str:
+    context = finding.get("ctx", {})
+    allowed = str(context.get("expected_tags", "'rod', 'spring'")).replace("'", '"')
+    got = short(context["tag"]) if "tag" in context else "nothing"
+    return f"`{key_path((*location, 'kind'))}` must be one of {allowed}; got {got}."
+
+
+def _unknown_key(
+    loc: tuple[int | str, ...], location: tuple[int | str, ...], model: type[BaseModel]
+) -> str:
+    allowed = sorted(_keys_at(loc[:-1], model))
+    place = key_path(location[:-1])
+    where = f"a key of `{place}`" if place else "a section of a study"
+    close = difflib.get_close_matches(str(loc[-1]), allowed, n=1)
+    remedy = f" Did you mean {close[0]}?" if close else ""
+    return f"`{key_path(location)}` must be {where} ({', '.join(allowed)}); got {loc[-1]}.{remedy}"
+
+
+def _keys_at(loc: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
+    """Keys that a model allows at a location of the file."""
+    schema = model.model_json_schema(by_alias=True)
+    node: dict[str, Any] = schema
+    for part in loc:
+        node = _step(node, part, schema)
+    return list(node.get("properties", {}))
+
+
+def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict[str, Any]:
+    """One part of a location further down in a JSON schema."""
+    if isinstance(part, int):
+        inner = node["items"]
+    elif "discriminator" in node:
+        inner = {"$ref": node["discriminator"]["mapping"][part]}
+    else:
+        inner = node["properties"][part]
+    for option in inner.get("anyOf", []):
+        inner = option if "$ref" in option or "items" in option else inner
+    if "$ref" in inner:
+        inner = schema["$defs"][inner["$ref"].rpartition("/")[2]]
+    return dict(inner)
+
+
+class _Forgiving(dict[str, Any]):
+    """Mapping for texts whose braces may have no value."""
+
+    def __init__(self, context: Mapping[str, Any]) -> None:
+        short = {name: f"{x:g}" for name, x in context.items() if isinstance(x, float)}
+        super().__init__({**context, **short})
+
+    def __missing__(self, key: str) -> str:
+        return "{" + key + "}"

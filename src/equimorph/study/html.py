@@ -1,0 +1,111 @@
+"""Pieces of a page that needs nothing but itself."""
+
+import base64
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+_MEDIA = {".png": "image/png", ".gif": "image/gif"}
+
+
+def page(title: str, body: Sequence[str]) -> str:
+    """Return a whole page with the style sheet inside.
+
+    Parameters
+    ----------
+    title
+        Plain text.
+    body
+        Pieces of HTML.
+    """
+    style = files("equimorph.study").joinpath("report.css").read_text(encoding="utf-8")
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n"
+        + "\n".join(body)
+        + "\n</main>\n</body>\n</html>\n"
+    )
+
+
+def figure(file: Path, caption: str, *, larger: str = "", wide: bool = False) -> str:
+    """Return a picture with its caption; the picture itself goes into the page.
+
+    Parameters
+    ----------
+    file
+        A PNG or GIF.
+    caption
+        Plain text, also what is read aloud.
+    larger
+        File name beside the page that the picture links to.
+    wide
+        Whether it takes a row of its own.
+    """
+    data = base64.b64encode(file.read_bytes()).decode("ascii")
+    words = escape(caption)
+    image = f'<img src="data:{_MEDIA[file.suffix]};base64,{data}" alt="{words}">'
+    linked = f'<a href="{escape(larger)}">{image}</a>' if larger else image
+    kind = ' class="wide"' if wide else ""
+    return f"<figure{kind}>{linked}<figcaption>{words}</figcaption></figure>"
+
+
+def table(
+    head: Sequence[str], rows: Sequence[Sequence[str]], classes: Sequence[str] | str = ""
+) -> str:
+    """Return a table of ready pieces of HTML.
+
+    Parameters
+    ----------
+    head
+        Column titles; none for a table without a head.
+    rows
+        Cells, row by row.
+    classes
+        Class of the table, or one for each row.
+    """
+    whole = classes if isinstance(classes, str) else ""
+    each = [""] * len(rows) if isinstance(classes, str) else classes
+    titles = "".join(f'<th scope="col">{cell}</th>' for cell in head)
+    lines = [
+        f'<tr class="{kind}">' + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>"
+        for kind, row in zip(each, rows, strict=True)
+    ]
+    top = f"<thead><tr>{titles}</tr></thead>" if head else ""
+    return (
+        f'<div class="scroll"><table class="{whole}">{top}<tbody>'
+        + "\n".join(lines)
+        + "</tbody></table></div>"
+    )
+
+
+def sketch(shape: Float[np.ndarray, "points 2"], box: Float[np.ndarray, "2 2"]) -> str:
+    """Return a small drawing of a shape.
+
+    Parameters
+    ----------
+    shape
+        Coordinates, y upward.
+    box
+        Lower and upper corner of what is drawn, so that several sketches share their scale.
+    """
+    (left, low), (right, high) = box
+    points = " ".join(f"{x:.4f},{-y:.4f}" for x, y in shape)
+    view = f"{left:.4f} {-high:.4f} {right - left:.4f} {high - low:.4f}"
+    return f'<svg viewBox="{view}" aria-hidden="true"><polyline points="{points}"/></svg>'
+
+
+def number(value: float, digits: int = 4) -> str:
+    """Return a number for reading; minus signs are proper ones.
+
+    Examples
+    --------
+    >>> number(-0.149633)
+    '−0.1496'
+    """
+    rounded = f"{value:.{digits}g}"
+    return "0" if float(rounded) == 0 else rounded.replace("-", "−")

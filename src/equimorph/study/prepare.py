@@ -1,0 +1,149 @@
+"""From a study file to the objects of the library, with the key of whatever does not fit."""
+
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from equimorph.errors import InputError
+from equimorph.model import Box, Constraint, Descriptor, parameter_vector, position
+from equimorph.structures import Rod, Spring, Structure
+from equimorph.study.expressions import parse_comparison
+from equimorph.study.problem import RodSection, RouteSection, SpringSection, StateSection, Study
+
+
+@dataclass(frozen=True)
+class Task:
+    """A route that is wanted, with its constraints as objects."""
+
+    key: str
+    section: RouteSection
+    constraints: tuple[Constraint, ...]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A study whose names all mean something."""
+
+    structure: Structure
+    box: Box
+    fixed: dict[str, float]
+    constraints: tuple[Constraint, ...]
+    points: tuple[dict[str, float], ...]
+    tasks: tuple[Task, ...]
+    height: Descriptor
+    """Descriptor that figures use as the height of the surface."""
+
+
+def prepare(study: Study) -> Problem:
+    """Build the structure of a study and look up all its names.
+
+    Parameters
+    ----------
+    study
+        A study whose keys and types are right.
+
+    Raises
+    ------
+    InputError
+        For a parameter or descriptor that the structure does not have, a value without meaning, or
+        a point outside the box; the line names the key.
+    """
+    wanted = study.equilibrium_set
+    with at_key("structure"):
+        structure = build_structure(study.structure)
+    with at_key("set.box"):
+        box = Box(**{name: (bounds[0], bounds[1]) for name, bounds in wanted.box.items()})
+        for name, corner in zip(box.names * 2, [*box.lower, *box.upper], strict=True):
+            structure.parameters[position(structure.parameters, name)].check(corner)
+    _check_fixed(structure, box, wanted.fixed)
+    for i, point in enumerate(study.equilibria):
+        check_point(box, point.at, f"equilibria[{i}].at")
+    return Problem(
+        structure=structure,
+        box=box,
+        fixed=wanted.fixed,
+        constraints=_constraints(structure, wanted.within, "set.within"),
+        points=tuple(point.at for point in study.equilibria),
+        tasks=tuple(_task(structure, box, route, i) for i, route in enumerate(study.routes)),
+        height=structure.descriptor("height(0.5)" if structure.kind == "rod" else "angle"),
+    )
+
+
+def build_structure(section: RodSection | SpringSection) -> Structure:
+    """Structure that a section describes; what it leaves out takes the structure's default."""
+    given = section.model_dump(exclude={"kind"}, exclude_none=True)
+    return Rod(**given) if isinstance(section, RodSection) else Spring(**given)
+
+
+@contextmanager
+def at_key(key: str) -> Generator[None]:
+    """Put the key of the study file before the message of an `InputError`."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"in `{key}`: {error}") from error
+
+
+def check_point(box: Box, point: Mapping[str, float], key: str, *, whole: bool = True) -> None:
+    """Refuse a point that names other parameters than the box, or lies outside it.
+
+    Parameters
+    ----------
+    box
+        The box of the study.
+    point
+        Values by name.
+    key
+        Key of the study file, for the message.
+    whole
+        Whether all parameters of the box must be named.
+    """
+    names = ", ".join(box.names)
+    if not set(point) <= set(box.names) or (whole and len(point) < len(box.names)):
+        need = f"name the free parameters {names}" if whole else f"name some of {names}"
+        raise InputError(f"`{key}` must {need}; got {', '.join(point)}.")
+    for name, value in point.items():
+        i = box.names.index(name)
+        if not box.lower[i] <= value <= box.upper[i]:
+            raise InputError(
+                f"`{key}.{name}` must lie in the box, {box.lower[i]:g} to {box.upper[i]:g}; "
+                f"got {value:g}. Widen `set.box`, or move the point."
+            )
+
+
+def _check_fixed(structure: Structure, box: Box, fixed: Mapping[str, float]) -> None:
+    both = sorted(set(box.names) & set(fixed))
+    if both:
+        raise InputError(f"`set.fixed` must not name what `set.box` frees; got {', '.join(both)}.")
+    with at_key("set.fixed"):
+        middle = dict(zip(box.names, 0.5 * (box.lower + box.upper), strict=True))
+        vector = parameter_vector(structure.parameters, {**middle, **fixed})
+    assert np.isfinite(vector).all()
+
+
+def _constraints(structure: Structure, texts: Sequence[str], key: str) -> tuple[Constraint, ...]:
+    constraints = []
+    for i, text in enumerate(texts):
+        with at_key(f"{key}[{i}]"):
+            constraints.append(parse_comparison(text).on(structure))
+    return tuple(constraints)
+
+
+def _task(structure: Structure, box: Box, route: RouteSection, number: int) -> Task:
+    key = f"route[{number}]"
+    for end, section in (("start", route.start), ("goal", route.goal)):
+        check_point(box, section.at, f"{key}.{end}.at")
+        _check_choice(structure, section, f"{key}.{end}")
+    for i, corner in enumerate(route.via or ()):
+        check_point(box, corner, f"{key}.via[{i}]", whole=False)
+    return Task(key, route, _constraints(structure, route.within, f"{key}.within"))
+
+
+def _check_choice(structure: Structure, section: StateSection, key: str) -> None:
+    choices = (section.highest, section.lowest, *(section.near or ()))
+    for text in choices:
+        if text is not None:
+            with at_key(key):
+                structure.descriptor(text)

@@ -1,0 +1,188 @@
+"""Study files: what a user may write, checked before anything is computed.
+
+A study is data only. It names a structure, a part of its equilibrium set, points whose equilibria
+are wanted, and routes between states. Types are strict and unknown keys are refused.
+"""
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from equimorph.errors import InputError
+from equimorph.study.complaint import complaint
+from equimorph.study.expressions import parse_comparison
+
+
+def _requirement(text: str) -> PydanticCustomError:
+    """Refuse a value; `text` completes the sentence "`key` must ..."."""
+    return PydanticCustomError("requirement", text.replace("{", "{{").replace("}", "}}"))
+
+
+def _increasing(bounds: list[float]) -> list[float]:
+    if not bounds[0] < bounds[1]:
+        raise _requirement("be [lower, upper] with lower < upper")
+    return bounds
+
+
+def _two(table: dict[str, Any]) -> dict[str, Any]:
+    if len(table) != 2:
+        raise _requirement("span exactly two free parameters")
+    return table
+
+
+def _one(table: dict[str, Any]) -> dict[str, Any]:
+    if len(table) != 1:
+        raise _requirement("hold exactly one descriptor with its value")
+    return table
+
+
+def _comparison(text: str) -> str:
+    try:
+        parse_comparison(text)
+    except InputError as error:
+        raise _requirement("read like max_curvature <= 20 or height(0.5) >= 0") from error
+    return text
+
+
+def _load(shape: Any) -> Any:
+    """Check a load shape; one requirement for all forms makes one readable line."""
+    rows = shape if isinstance(shape, list) else []
+    table = len(rows) >= 2 and all(
+        isinstance(row, list)
+        and len(row) == 2
+        and all(type(x) in (int, float) and math.isfinite(x) for x in row)
+        for row in rows
+    )
+    if shape not in ("uniform", "left-half") and not table:
+        raise _requirement('be "uniform", "left-half" or a table [[s, Q], ...] of finite numbers')
+    return shape
+
+
+Interval = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
+Point = dict[str, float]
+ComparisonText = Annotated[str, AfterValidator(_comparison)]
+
+
+class _Section(BaseModel):
+    """A table of the file: strict types, finite numbers, no unknown keys."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class RodSection(_Section):
+    """A curved rod between two rotary actuators."""
+
+    kind: Literal["rod"]
+    load: Annotated[Any, AfterValidator(_load)] = "uniform"
+    span: float | None = Field(default=None, gt=0, lt=1)
+    elements: int | None = Field(default=None, gt=0)
+    degree: int | None = Field(default=None, gt=0)
+
+
+class SpringSection(_Section):
+    """The constrained spring."""
+
+    kind: Literal["spring"]
+    stiffness: float = Field(default=1.0, gt=0)
+
+
+class SetSection(_Section):
+    """The part of the equilibrium set that is wanted."""
+
+    box: Annotated[dict[str, Interval], AfterValidator(_two)]
+    fixed: Point = Field(default_factory=dict)
+    within: list[ComparisonText] = Field(default_factory=list)
+    intervals: list[Annotated[int, Field(gt=0)]] | None = Field(
+        default=None, min_length=2, max_length=2
+    )
+
+
+class PointSection(_Section):
+    """A point of the parameter space whose equilibria are wanted."""
+
+    at: Point = Field(min_length=1)
+
+
+class StateSection(_Section):
+    """One stable equilibrium over a point, chosen by a descriptor where there are several."""
+
+    at: Point = Field(min_length=1)
+    highest: str | None = None
+    lowest: str | None = None
+    near: Annotated[dict[str, float], AfterValidator(_one)] | None = None
+
+    @model_validator(mode="after")
+    def _one_choice(self) -> "StateSection":
+        if sum(choice is not None for choice in (self.highest, self.lowest, self.near)) > 1:
+            raise _requirement("choose by one of highest, lowest, near")
+        return self
+
+
+class RouteSection(_Section):
+    """A route between two states, along way-points or planned freely."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+    start: StateSection
+    goal: StateSection
+    via: list[Annotated[Point, Field(min_length=1)]] | None = Field(default=None, min_length=1)
+    within: list[ComparisonText] = Field(default_factory=list)
+    margin: float = Field(default=0.0, ge=0)
+
+
+class Study(_Section):
+    """A whole study file."""
+
+    title: str | None = None
+    structure: Annotated[RodSection | SpringSection, Field(discriminator="kind")]
+    equilibrium_set: SetSection = Field(alias="set")
+    equilibria: list[PointSection] = Field(default_factory=list)
+    routes: list[RouteSection] = Field(default_factory=list, alias="route")
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> "Study":
+        names = [route.name for route in self.routes]
+        if len(set(names)) < len(names):
+            raise _requirement("give every route a name of its own")
+        return self
+
+
+def read_study_text(path: Path) -> str:
+    """Read a study file, unchecked.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or no text.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise InputError(f"`study file` must be a readable file; got {path}: {reason}.") from error
+
+
+def parse_study(text: str, name: str) -> Study:
+    """Check the text of a study file.
+
+    Parameters
+    ----------
+    text
+        Content of the file.
+    name
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        If `text` is no TOML or holds a key or value that is not allowed.
+    """
+    try:
+        return Study.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"`{name}` must be valid TOML; got an error: {error}.") from error
+    except ValidationError as error:
+        raise complaint(error, Study, name) from error

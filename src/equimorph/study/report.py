@@ -1,0 +1,156 @@
+"""The page that shows a study's answers: offline, in one file."""
+
+from html import escape
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.model import Descriptor
+from equimorph.structures import States
+from equimorph.study import figures, html
+from equimorph.study.outcome import Outcome, RouteOutcome
+from equimorph.study.prepare import Problem
+
+ROOM = 0.03
+"""Empty border of a sketch, so that its line is not cut."""
+
+
+def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    outcome
+        What was found.
+    folder
+        Where the figures are; the page will lie beside them.
+    text
+        The study file as it was written.
+    title
+        Heading.
+    """
+    body = [f"<h1>{escape(title)}</h1>", _question(outcome.problem)]
+    for each in outcome.routes:
+        body += _route(each, folder)
+    for point, states in zip(outcome.problem.points, outcome.points, strict=True):
+        body += _equilibria(point, states, _shown_descriptors(outcome.problem))
+    body += _set(outcome, folder)
+    body += ["<h2>Study</h2>", f"<pre>{escape(text.strip())}</pre>", _colophon(outcome)]
+    return html.page(title, body)
+
+
+def _question(problem: Problem) -> str:
+    box = problem.box
+    ranges = [
+        f"{name} ∈ [{html.number(low)}, {html.number(high)}]"
+        for name, low, high in zip(box.names, box.lower, box.upper, strict=True)
+    ]
+    caps = [str(cap).replace("<=", "≤").replace(">=", "≥") for cap in problem.constraints]
+    fixed = [f"{name} = {html.number(value)}" for name, value in problem.fixed.items()]
+    caps = [
+        str(constraint).replace("<=", "≤").replace(">=", "≥") for constraint in problem.constraints
+    ]
+    words = escape(" · ".join([problem.structure.kind, *ranges, *fixed, *caps]))
+    return f'<p class="lead">{words}</p>'
+
+
+def _route(each: RouteOutcome, folder: Path) -> list[str]:
+    names = figures.route_figures(each.name)
+    heading = f"<h2>Route {escape(each.name)}</h2>"
+    plane = _still(folder, names.plane, "The route on the plane of the free parameters.")
+    if not each.arrived:
+        verdict = (
+            f'<p class="verdict refused"><strong>Refused.</strong> {escape(each.route.why)}</p>'
+        )
+        return [heading, verdict, f'<div class="figures">{plane}</div>']
+    pictures = [
+        html.figure(folder / names.film, "The structure along the route.", wide=True),
+        plane,
+        _still(folder, names.shapes, "Shapes at equal steps along the route, start to goal."),
+        _still(folder, names.margins, "How far each state is from instability along the route."),
+    ]
+    return [
+        heading,
+        '<p class="verdict"><strong>Arrived.</strong> Every state on the way is stable: smallest '
+        f"margin {html.number(each.route.margin)}, length {html.number(each.route.length)}.</p>",
+        _schedule_links(each.name),
+        f'<div class="figures">{"".join(pictures)}</div>',
+    ]
+
+
+def _schedule_links(name: str) -> str:
+    table, sidecar = f"{name}-schedule.csv", f"{name}-schedule.json"
+    return (
+        f'<p>Actuator schedule: <a href="{table}">{table}</a>, with the structure, the first state '
+        f'and the loads in <a href="{sidecar}">{sidecar}</a>.</p>'
+    )
+
+
+def _still(folder: Path, name: str, caption: str) -> str:
+    return html.figure(folder / f"{name}.png", caption, larger=f"{name}.svg")
+
+
+def _shown_descriptors(problem: Problem) -> list[Descriptor]:
+    """Descriptors that the study speaks of, each once."""
+    bounded = [constraint.descriptor for constraint in problem.constraints]
+    return list({each.name: each for each in [problem.height, *bounded]}.values())
+
+
+def _equilibria(
+    point: dict[str, float], states: States, descriptors: list[Descriptor]
+) -> list[str]:
+    where = ", ".join(f"{name} = {html.number(value)}" for name, value in point.items())
+    heading = f"<h2>Equilibria at {escape(where)}</h2>"
+    if not len(states):
+        return [heading, "<p>None within the constraints.</p>"]
+    # Leading with what a reader looks for: the highest first.
+    states = states[np.argsort(-descriptors[0](states))]
+    shapes = states.shape()
+    box = np.stack([shapes.min(axis=(0, 1)) - ROOM, shapes.max(axis=(0, 1)) + ROOM])
+    columns = [_numbers(each(states)) for each in descriptors]
+    stability = ["stable" if index == 0 else f"index {index}" for index in states.index]
+    numbers = zip(
+        stability, *columns, _numbers(states.margin), _numbers(states.energy), strict=True
+    )
+    rows = [[html.sketch(shape, box), *cells] for shape, cells in zip(shapes, numbers, strict=True)]
+    head = ["shape", "", *(escape(each.name) for each in descriptors), "margin", "energy"]
+    kinds = ["" if index == 0 else "unstable" for index in states.index]
+    return [
+        heading,
+        f"<p>{len(states)} found, {len(states.stable)} of them stable.</p>",
+        html.table(head, rows, kinds),
+    ]
+
+
+def _numbers(values: Float[np.ndarray, " lanes"]) -> list[str]:
+    return [html.number(value) for value in values]
+
+
+def _set(outcome: Outcome, folder: Path) -> list[str]:
+    audit = outcome.equilibrium_set.audit
+    word = "clean" if audit.clean else "not clean: do not rely on the set where it says so"
+    pictures = [
+        _still(folder, figures.SURFACE, "The equilibrium set, coloured by index, with its folds."),
+        _still(folder, figures.PLANE, "Number of equilibria over the free parameters."),
+        _still(folder, figures.STABLE_PLANE, "Number of stable equilibria."),
+    ]
+    rows = [[escape(what), escape(value)] for what, value in audit.rows()]
+    return [
+        "<h2>Equilibrium set</h2>",
+        f'<div class="figures">{"".join(pictures)}</div>',
+        f"<h3>Audit: {word}</h3>",
+        html.table([], rows, "words"),
+        '<p>All of it is in <a href="results.h5">results.h5</a>, for ParaView '
+        "(<code>/VTKHDF</code>) and xarray (engine h5netcdf, group <code>set</code>).</p>",
+    ]
+
+
+def _colophon(outcome: Outcome) -> str:
+    stages = ", ".join(f"{name} {value:.1f} s" for name, value in outcome.seconds.items())
+    reused = " The set was read from an earlier run." if outcome.reused else ""
+    return (
+        f'<p class="faint">equimorph {escape(version("equimorph"))}. Wall time: '
+        f"{escape(stages)}.{reused}</p>"
+    )

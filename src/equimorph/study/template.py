@@ -1,0 +1,42 @@
+"""Studies to begin with: the examples, as they are shipped."""
+
+from importlib.resources import files
+from pathlib import Path
+
+from equimorph.errors import InputError
+
+KINDS = ("arch", "spring")
+
+
+def template(kind: str) -> str:
+    """Return the text of an example study.
+
+    Raises
+    ------
+    InputError
+        If there is none of this kind.
+    """
+    if kind not in KINDS:
+        raise InputError(f"`kind` must be one of {', '.join(KINDS)}; got {kind!r}.")
+    return files("equimorph.study").joinpath(f"templates/{kind}.toml").read_text(encoding="utf-8")
+
+
+def write_template(path: Path, kind: str) -> None:
+    """Write an example study to a file that does not exist yet.
+
+    Raises
+    ------
+    InputError
+        If the file exists or cannot be written, or its name does not end in ``.toml``.
+    """
+    if path.suffix != ".toml":
+        raise InputError(f"`study file` must end in .toml; got {path.name!r}.")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(template(kind))
+    except FileExistsError as error:
+        raise InputError(f"`study file` must not exist yet; got {path}.") from error
+    except OSError as error:
+        raise InputError(
+            f"`study file` must be a place that can be written; got {path}: {error.strerror}."
+        ) from error

@@ -1,0 +1,31 @@
+from pathlib import Path
+
+import pytest
+
+from equimorph.errors import InputError
+from equimorph.storage.files import replacing, write_text
+
+
+def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path: Path):
+    target = write_text(tmp_path / "a.txt", "old")
+
+    def write_half() -> None:
+        with replacing(target) as partial:
+            partial.write_text("half of the ne")
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        write_half()
+    assert target.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_new_file_has_the_permissions_of_any_new_file(tmp_path: Path):
+    plain = tmp_path / "plain"
+    plain.touch()
+    assert write_text(tmp_path / "a.txt", "").stat().st_mode == plain.stat().st_mode
+
+
+def test_a_missing_folder_is_an_input_error(tmp_path: Path):
+    with pytest.raises(InputError, match="No such file or directory"):
+        write_text(tmp_path / "none" / "a.txt", "")

@@ -1,0 +1,61 @@
+"""Small studies, and dots in place of figures, for the tests of the outer layers."""
+
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from equimorph import plotting
+
+SPRING = """\
+[structure]
+kind = "spring"
+
+[set]
+box = { x_l = [0.5, 1.3], F = [-0.2, 0.2] }
+within = ["angle <= 1.4"]
+intervals = [11, 11]
+
+[[equilibria]]
+at = { x_l = 0.8, F = 0.0 }
+
+[[route]]
+name = "over"
+start = { at = { x_l = 0.8, F = 0.0 }, highest = "angle" }
+goal = { at = { x_l = 0.8, F = 0.0 }, lowest = "angle" }
+"""
+
+ARCH = """\
+[structure]
+kind = "rod"
+load = "uniform"
+
+[set]
+box = { Theta = [0.2, 2.5], Delta = [-2.0, 2.0] }
+fixed = { q = 2.5 }
+within = ["max_curvature <= 20"]
+intervals = [5, 9]
+
+[[equilibria]]
+at = { Theta = 1.0, Delta = 0.0 }
+
+[[route]]
+name = "inside-out"
+start = { at = { Theta = 1.0, Delta = 0.0 }, highest = "height(0.5)" }
+goal = { at = { Theta = 1.0, Delta = 0.0 }, lowest = "height(0.5)" }
+via = [{ Theta = 1.3 }, { Delta = 1.3 }]
+within = ["max_curvature <= 20"]
+margin = 0.1
+"""
+
+
+def draw_dots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put dots in place of figures, which take seconds and are tested once, where all are drawn."""
+    for name in ("surface", "parameter_plane", "shapes", "margins"):
+        monkeypatch.setattr(plotting, name, lambda *_, **__: None)
+    monkeypatch.setattr(plotting, "save", lambda _, folder, name: _dot(folder / f"{name}.png"))
+    monkeypatch.setattr(plotting, "film", lambda _, path, **__: _dot(path))
+
+
+def _dot(path: Path) -> None:
+    Image.new("L", (1, 1)).save(path)

@@ -1,0 +1,41 @@
+from pathlib import Path
+
+import pytest
+
+from equimorph.errors import InputError
+from equimorph.study import parse_study, prepare
+from equimorph.study.template import KINDS, template, write_template
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_template_is_a_sound_study(kind: str):
+    assert prepare(parse_study(template(kind), kind)).tasks
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_examples_are_the_templates(kind: str):
+    assert (EXAMPLES / f"{kind}.toml").read_text() == template(kind)
+
+
+def test_a_file_that_exists_is_kept(tmp_path: Path):
+    (tmp_path / "a.toml").write_text("mine")
+    with pytest.raises(InputError, match="must not exist yet"):
+        write_template(tmp_path / "a.toml", "arch")
+    assert (tmp_path / "a.toml").read_text() == "mine"
+
+
+def test_another_ending_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match=r"must end in \.toml"):
+        write_template(tmp_path / "a.txt", "arch")
+
+
+def test_a_missing_folder_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="No such file or directory"):
+        write_template(tmp_path / "none" / "a.toml", "arch")
+
+
+def test_an_unknown_kind_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="must be one of arch, spring; got 'truss'"):
+        write_template(tmp_path / "a.toml", "truss")
