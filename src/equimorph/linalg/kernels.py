@@ -18,7 +18,6 @@ from numba import njit
 from equimorph.linalg.simd import (
     LANES,
     absolute,
-    larger,
     load,
     load2,
     load4,
@@ -26,9 +25,8 @@ from equimorph.linalg.simd import (
     repeat2,
     repeat4,
     repeat8,
-    row_of,
-    smaller,
     spread,
+    stack2,
     store,
     where_less,
     work_rows,
@@ -36,11 +34,17 @@ from equimorph.linalg.simd import (
 
 TILE = 8
 TIES = 2
-GROUP = 4
+GROUP = 2
 FLAGS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+INNER = {**FLAGS, "_nrt": False}
+"""Flags of kernels that are called by kernels and allocate nothing.
+
+They need not count references to their arrays: atomic operations that, element by element, cost as
+much as the arithmetic.
+"""
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def lower_row(e, inner):
     """Row of L₀₀ of element `e`; entry (i, j) lies ``(i·inner + j)·GROUP`` rows further."""
     return (e // GROUP) * inner * inner * GROUP + e % GROUP
@@ -48,49 +52,46 @@ def lower_row(e, inner):
 
 @njit(**FLAGS)
 def work_arrays(elements, inner, tiles):
-    """Work arrays ``lower, vertices, columns, extremes`` of `reduce_block`; columns are zero."""
+    """Work arrays ``lower, vertices, columns, extremes`` of `reduce_group`; columns are zero."""
     groups = (elements + GROUP - 1) // GROUP
     columns = work_rows(tiles * (elements * (inner + 1) + 1) * TILE)
     columns[:] = 0.0
     lower, vertices = work_rows(groups * inner * inner * GROUP), work_rows(2 * (elements + 1))
-    return lower, vertices, columns, work_rows(3)
+    return lower, vertices, columns, work_rows(4)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _factor_group(stiffness, group, diagonal, lower):
-    """LDLᵀ of the inner blocks of `GROUP` elements side by side, reciprocal pivots on the diagonal.
+    """LDLᵀ of the inner blocks of two elements at once: one alone would wait for its divisions.
 
-    Column by column: one element alone would wait for its divisions.
+    Below the diagonal L, above it D·Lᵀ, on it the reciprocal pivots.
     """
     elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
-    base = group * inner * inner * GROUP
-    for member in range(GROUP):
-        e = min(group * GROUP + member, elements - 1)  # spare members repeat the last element
-        for i in range(inner):
-            at = base + i * inner * GROUP + member
-            for j in range(i):
-                store(lower, at + j * GROUP, spread(stiffness[e, i + 1, j + 1]))
-            own = load(diagonal, e * (inner + 1) + 1 + i)
-            store(lower, at + i * GROUP, spread(stiffness[e, i + 1, i + 1]) + own)
-    one = repeat4(spread(1.0))
+    base, e = group * inner * inner * GROUP, group * GROUP
+    other = min(e + 1, elements - 1)  # a spare member repeats the last element
+    inverse = stack2(spread(1.0), spread(1.0))
     for j in range(inner):
-        at_pivot = base + (j * inner + j) * GROUP
-        inverse = one / load4(lower, at_pivot)
-        store(lower, at_pivot, inverse)
-        for i in range(j + 1, inner):
-            row = base + i * inner * GROUP
-            value = load4(lower, row + j * GROUP)
-            factor = value * inverse
-            for c in range(j + 1, i):
-                other = load4(lower, base + (c * inner + j) * GROUP)  # already divided
-                at = row + c * GROUP
-                store(lower, at, load4(lower, at) - value * other)
-            at = row + i * GROUP
-            store(lower, at, load4(lower, at) - value * factor)
-            store(lower, row + j * GROUP, factor)
+        row_j = base + j * inner * GROUP
+        for i in range(j, inner):
+            row_i = base + i * inner * GROUP
+            first = spread(stiffness[e, i + 1, j + 1])
+            second = spread(stiffness[other, i + 1, j + 1])
+            if i == j:
+                first = first + load(diagonal, e * (inner + 1) + 1 + i)
+                second = second + load(diagonal, other * (inner + 1) + 1 + i)
+            value = stack2(first, second)
+            for k in range(j):
+                above = load2(lower, base + (k * inner + i) * GROUP)
+                value = value - above * load2(lower, row_j + k * GROUP)
+            if i == j:
+                inverse = repeat2(spread(1.0)) / value
+                store(lower, row_j + j * GROUP, inverse)
+            else:
+                store(lower, row_j + i * GROUP, value)
+                store(lower, row_i + j * GROUP, value * inverse)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _set_ties(stiffness, e, columns):
     """Write the ties of element `e` into the first two slots of its nodes."""
     order = stiffness.shape[1]
@@ -101,7 +102,7 @@ def _set_ties(stiffness, e, columns):
         store(columns, at + i * TILE + 1, spread(stiffness[e, i, order - 1] if inside else 0.0))
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _reduce_tile(lower, base, inner, columns, ties, first):
     """Forward-substitute a tile in an element's inner nodes, and take them out of its vertices."""
     left, right = load8(columns, first - TILE), load8(columns, first + inner * TILE)
@@ -119,22 +120,26 @@ def _reduce_tile(lower, base, inner, columns, ties, first):
     store(columns, first + inner * TILE, right)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _note_pivots(lower, base, inner, extremes):
-    """Count negative pivots of an element; note the smallest and largest reciprocal."""
+    """Count negative pivots of an element; note smallest, largest and sum of the reciprocals."""
     count, small, large = load(extremes, 0), load(extremes, 1), load(extremes, 2)
+    total, zero, one = load(extremes, 3), spread(0.0), spread(1.0)
     for i in range(inner):
         value = load(lower, base + (i * inner + i) * GROUP)
-        count = count + where_less(value, spread(0.0), spread(1.0), spread(0.0))
-        small, large = smaller(small, absolute(value)), larger(large, absolute(value))
+        size = absolute(value)
+        count = count + where_less(value, zero, one, zero)
+        small, large = where_less(size, small, size, small), where_less(large, size, size, large)
+        total = total + value
     store(extremes, 0, count)
     store(extremes, 1, small)
     store(extremes, 2, large)
+    store(extremes, 3, total)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _eliminate_vertex(e, last, degree, vertices, columns, tiles, extremes):
-    """Invert the pivot of vertex `e` and take the vertex out of the next one, if that is unknown."""
+    """Invert the pivot of vertex `e` and take the vertex out of the next one, if unknown."""
     inverse = spread(1.0) / load(vertices, 2 * e)
     store(vertices, 2 * e, inverse)
     _note_pivots(vertices, 2 * e, 1, extremes)
@@ -151,24 +156,29 @@ def _eliminate_vertex(e, last, degree, vertices, columns, tiles, extremes):
             store(columns, following, value)
 
 
-@njit(**FLAGS)
-def reduce_block(stiffness, diagonal, ends, tiles, lower, vertices, columns, extremes):
-    """Factor one block of lanes and forward-reduce its columns in place.
+@njit(**INNER)
+def start_block(diagonal, vertices, extremes):
+    """Prepare the reduction of one block of lanes."""
+    store(extremes, 0, spread(0.0))
+    store(extremes, 1, spread(np.inf))
+    store(extremes, 2, spread(0.0))
+    store(extremes, 3, spread(0.0))
+    store(vertices, 0, load(diagonal, 0))
+
+
+@njit(**INNER)
+def reduce_group(stiffness, group, diagonal, ends, tiles, lower, vertices, columns, extremes):
+    """Factor the elements of a group and forward-reduce their columns in place.
 
     stiffness (elements, degree + 1, degree + 1); diagonal (nodes, 8); ends: first and last vertex
     that is unknown; columns (tiles, nodes, TILE, 8), ties left to this function. Filled: lower
     (see `lower_row`); vertices (elements + 1, 2, 8), reciprocal pivot and factor to the next;
-    extremes (3, 8): negative pivots, smallest and largest |reciprocal|.
+    extremes (4, 8): see `_note_pivots`.
     """
     elements, degree = stiffness.shape[0], stiffness.shape[1] - 1
     inner, rows = degree - 1, columns.shape[0] // tiles
-    store(extremes, 0, spread(0.0))
-    store(extremes, 1, spread(np.inf))
-    store(extremes, 2, spread(0.0))
-    store(vertices, 0, load(diagonal, 0))
-    for e in range(elements):
-        if e % GROUP == 0:
-            _factor_group(stiffness, e // GROUP, diagonal, lower)
+    _factor_group(stiffness, group, diagonal, lower)
+    for e in range(group * GROUP, min(group * GROUP + GROUP, elements)):
         _set_ties(stiffness, e, columns)
         base, start = lower_row(e, inner), e * degree * TILE
         stop = start + degree * TILE
@@ -182,37 +192,31 @@ def reduce_block(stiffness, diagonal, ends, tiles, lower, vertices, columns, ext
         store(vertices, 2 * e + 2, own + load(columns, stop + 1))
         if ends[0] <= e <= ends[1]:
             _eliminate_vertex(e, ends[1], degree, vertices, columns, tiles, extremes)
-    if ends[1] == elements:
-        _eliminate_vertex(elements, elements, degree, vertices, columns, tiles, extremes)
+        if e + 1 == elements == ends[1]:
+            _eliminate_vertex(e + 1, ends[1], degree, vertices, columns, tiles, extremes)
 
 
-@njit(**FLAGS)
-def restore_block(elements, inner, ends, lower, vertices, columns, values, at, step):
-    """Back-substitute two forward-reduced columns in place: H⁻¹ times the columns.
+@njit(**INNER)
+def restore_element(e, elements, inner, ends, lower, vertices, columns, values, at, step):
+    """Back-substitute two forward-reduced columns in vertex `e` and the element right of it.
 
-    They are rows at, at + 1 of `values` for the first node, and `step` rows further for each
-    following one; `columns` holds the reduced ties.
+    Called from the last vertex down. The columns are rows at, at + 1 of `values` for the first node
+    and `step` rows further for each following one; `columns` holds the reduced ties.
     """
-    degree = inner + 1
-    zero = repeat2(spread(0.0))
-    if ends[0] > 0:
-        store(values, at, zero)
-    if ends[1] < elements:
-        store(values, at + elements * degree * step, zero)
-    for e in range(elements, -1, -1):
-        start = at + e * degree * step
-        stop = start + degree * step
-        if ends[0] <= e <= ends[1]:
-            value = load2(values, start) * repeat2(load(vertices, 2 * e))
-            if e < ends[1]:
-                value = value - repeat2(load(vertices, 2 * e + 1)) * load2(values, stop)
-            store(values, start, value)
-        if e < elements:
-            ties = (e * degree + 1) * TILE
-            _restore_inner(lower, lower_row(e, inner), inner, columns, ties, values, start, step)
+    start = at + e * (inner + 1) * step
+    stop = start + (inner + 1) * step
+    value = repeat2(spread(0.0))
+    if ends[0] <= e <= ends[1]:
+        value = load2(values, start) * repeat2(load(vertices, 2 * e))
+        if e < ends[1]:
+            value = value - repeat2(load(vertices, 2 * e + 1)) * load2(values, stop)
+    store(values, start, value)
+    if e < elements:
+        ties = (e * (inner + 1) + 1) * TILE
+        _restore_inner(lower, lower_row(e, inner), inner, columns, ties, values, start, step)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _restore_inner(lower, base, inner, columns, ties, values, start, step):
     """Back-substitute two columns in the inner nodes of an element whose vertices are known."""
     v_start, v_stop = load2(values, start), load2(values, start + (inner + 1) * step)
@@ -227,35 +231,38 @@ def _restore_inner(lower, base, inner, columns, ties, values, start, step):
         store(values, at, value)
 
 
-@njit(**FLAGS)
-def pivot_products(elements, inner, ends, lower, vertices, columns, products):
-    """Products aᵀH⁻¹b of forward-reduced columns of one tile: Σ aᵢ bᵢ / dᵢ.
+@njit(**INNER)
+def add_products(e, inner, ends, lower, vertices, columns, products):
+    """Add vertex `e` and its element to aᵀH⁻¹b = Σ aᵢ bᵢ / dᵢ of forward-reduced columns.
 
-    a: slots 4, 5 and 2; b: slots 4 to 7. products (12, 8), a by a.
+    a: slots 4, 5 and 2; b: slots 4 to 7 of the first tile. products (12, 8), a by a.
     """
-    zero = repeat4(spread(0.0))
-    first, second, third = zero, zero, zero
-    for e in range(elements + 1):
-        base = lower_row(min(e, elements - 1), inner)
-        for i in range(inner + 1 if e < elements else 1):
-            if i == 0 and not ends[0] <= e <= ends[1]:
-                continue
-            at = (e * (inner + 1) + i) * TILE
-            pivot = load(vertices, 2 * e)
-            if i > 0:
-                pivot = load(lower, base + (i - 1) * (inner + 1) * GROUP)
-            many = load4(columns, at + 4)
-            first = first + repeat4(load(columns, at + 4) * pivot) * many
-            second = second + repeat4(load(columns, at + 5) * pivot) * many
-            third = third + repeat4(load(columns, at + 2) * pivot) * many
+    first, second, third = load4(products, 0), load4(products, 4), load4(products, 8)
+    base, start = lower_row(e, inner), e * (inner + 1) * TILE
+    for i in range(0 if ends[0] <= e <= ends[1] else 1, inner + 1):
+        at = start + i * TILE
+        pivot = load(vertices, 2 * e)
+        if i > 0:
+            pivot = load(lower, base + (i - 1) * (inner + 1) * GROUP)
+        many = load4(columns, at + 4)
+        first = first + repeat4(load(columns, at + 4) * pivot) * many
+        second = second + repeat4(load(columns, at + 5) * pivot) * many
+        third = third + repeat4(load(columns, at + 2) * pivot) * many
     store(products, 0, first)
     store(products, 4, second)
     store(products, 8, third)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
+def pivot_ratio(extremes, lane):
+    """Smallest over largest |pivot| of a lane; not a number if a pivot is not."""
+    total = extremes[3, lane]
+    return extremes[1, lane] / extremes[2, lane] if total == total else np.nan  # noqa: PLR0124
+
+
+@njit(**INNER)
 def solve_lanes(a, size, width):
-    """Gauss with partial pivoting on eight systems at once: a (size, width, 8), right sides last."""
+    """Gauss with partial pivoting on eight systems: a (size, width, 8), right sides last."""
     for k in range(size):
         for i in range(k + 1, size):
             here, there = absolute(load(a, k * width + k)), absolute(load(a, i * width + k))
@@ -330,7 +337,7 @@ def factor_symmetric(a):
     return negative
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _swap(a, i, j):
     """Exchange rows and columns i and j of a symmetric matrix."""
     if i != j:
@@ -406,10 +413,15 @@ def solve_condensed(
                         work[_row(c, first + i, nodes), lane] = columns[at, c - m, i]
                     else:
                         work[_row(c, first + i, nodes), lane] = rhs[at, c - m - k, i]
-        reduce_block(stiffness, block, ends, tiles, lower, vertices, work, extremes)
+        start_block(block, vertices, extremes)
+        for group in range((elements + GROUP - 1) // GROUP):
+            reduce_group(stiffness, group, block, ends, tiles, lower, vertices, work, extremes)
         for c in range(0, total, 2):
             at = _row(c, 0, nodes)
-            restore_block(elements, degree - 1, ends, lower, vertices, work, work, at, TILE)
+            for e in range(elements, -1, -1):
+                restore_element(
+                    e, elements, degree - 1, ends, lower, vertices, work, work, at, TILE
+                )
         for c in range(total):
             for i in range(nodes):
                 plain[c, i] = work[_row(c, i, nodes)]
@@ -418,10 +430,10 @@ def solve_condensed(
             negative[at] = np.int64(extremes[0, lane]) + _close_border(
                 border[at], columns[at], rows[at], corner[at], rhs[at], plain, lane, first, x[at]
             )
-            ratio[at] = extremes[1, lane] / extremes[2, lane]
+            ratio[at] = pivot_ratio(extremes, lane)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _row(c, node, nodes):
     """Row of column c (ties not counted) at a node."""
     slot = TIES + c

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ def over_lanes(
     cuts = [(lanes * i // shares + 7) // 8 * 8 for i in range(shares)] + [lanes]
     jobs = [
         _pool().submit(kernel, *shared, *[batch[a:b] for batch in (*inputs, *outputs)])
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True)
+        for a, b in pairwise(cuts)
     ]
     for job in jobs:
         job.result()

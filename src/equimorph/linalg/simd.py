@@ -280,7 +280,7 @@ def _quarter(typing_context, shifted, sine, cosine):
     return sig, generate
 
 
-@njit(nogil=True, cache=True, fastmath={"contract"})
+@njit(nogil=True, cache=True, fastmath={"contract"}, _nrt=False)
 def sincos(angle):
     """Sine and cosine of eight angles, |angle| < 1e5, to about one unit in the last place.
 

@@ -83,10 +83,10 @@ def _polish(
         near = (value > low) & (value < high + 0.5 * (high - low))
         closer = value - 1e-3 * (high - low)
         shift = np.where(near & (sweep > 2), np.maximum(closer, low), low)
-    return value
+    return np.asarray(value)
 
 
 def _settled(
     value: Float[np.ndarray, " lanes"], previous: Float[np.ndarray, " lanes"]
 ) -> Bool[np.ndarray, " lanes"]:
-    return np.abs(value - previous) <= RELATIVE * np.maximum(np.abs(value), 1e-3)
+    return np.asarray(np.abs(value - previous) <= RELATIVE * np.maximum(np.abs(value), 1e-3))

@@ -63,7 +63,7 @@ class Spring(Structure):
     def energy(self, z: Lanes, p: Parameters) -> Values:
         """½ k (1 − x_l/cos δ)² + F x_l tan δ."""
         delta, x, force, k = self._split(z, p)
-        return 0.5 * k * (1 - x / np.cos(delta)) ** 2 + force * x * np.tan(delta)
+        return np.asarray(0.5 * k * (1 - x / np.cos(delta)) ** 2 + force * x * np.tan(delta))
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:
         """∂E/∂δ."""
@@ -138,7 +138,8 @@ class Spring(Structure):
         if border is None:
             nothing = np.zeros((lanes, 0, 1))
             border = (nothing, nothing, np.zeros((lanes, 0, 0)))
-        return solve_bordered(hessian[:, None, None], *border, rhs)
+        columns, rows, corner = border
+        return solve_bordered(hessian[:, None, None], columns, rows, corner, rhs)
 
     def natural(self, p: Parameters) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
         """Unloaded: the stress-free spring δ = arccos x_l for x_l < 1, else δ = 0."""
@@ -161,7 +162,7 @@ class Spring(Structure):
 
     def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
         """|δ| < π/2: beyond, B would lie on the other side of infinity."""
-        return np.abs(z[:, 0]) < 0.5 * np.pi
+        return np.asarray(np.abs(z[:, 0]) < 0.5 * np.pi)
 
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -86,7 +87,7 @@ class Mesh:
     @cached_property
     def element_weights(self) -> Float[np.ndarray, "elements order"]:
         """Quadrature weights of each element."""
-        return self.lengths[:, None] * self.reference.weights
+        return np.asarray(self.lengths[:, None] * self.reference.weights)
 
     @cached_property
     def weights(self) -> Float[np.ndarray, " nodes"]:
@@ -99,7 +100,7 @@ class Mesh:
         ref = self.reference
         unit = ref.derivative.T @ (ref.weights[:, None] * ref.derivative)
         unit = 0.5 * (unit + unit.T)
-        return unit / self.lengths[:, None, None]
+        return np.asarray(unit / self.lengths[:, None, None])
 
     def assemble(self, values: Float[np.ndarray, "elements order"]) -> Float[np.ndarray, " nodes"]:
         """Sum quadrature weight times `values`, given element by element, at the nodes."""
@@ -149,7 +150,7 @@ def mesh_with_kinks(kinks: Float[np.ndarray, " kinks"], elements: int, degree: i
     if all(np.abs(equal - kink).min() < 1e-14 for kink in kinks):
         return Mesh(equal, reference_element(degree))
     breaks = [np.zeros(1)]
-    for start, stop in zip(pieces[:-1], pieces[1:], strict=True):
+    for start, stop in pairwise(pieces):
         count = max(1, int(np.ceil((stop - start) * elements - 1e-9)))
         breaks.append(np.linspace(start, stop, count + 1)[1:])
     return Mesh(np.concatenate(breaks), reference_element(degree))

@@ -10,11 +10,15 @@ from numba import njit
 
 from equimorph.linalg.kernels import (
     FLAGS,
+    GROUP,
+    INNER,
     TILE,
-    pivot_products,
-    reduce_block,
-    restore_block,
+    add_products,
+    pivot_ratio,
+    reduce_group,
+    restore_element,
     solve_lanes,
+    start_block,
     work_arrays,
 )
 from equimorph.linalg.simd import (
@@ -34,16 +38,19 @@ from equimorph.linalg.simd import (
 
 ROW, FIRST, SECOND, COLUMN, FORCE = 2, 4, 5, 6, 7
 """Slots of a node: closing row; border −m sin θ and m cos θ; F_p·dp; −∂L/∂θ."""
+LAMBDA, MU, Q, NU = range(4)
+"""Rows of the scalars of a state."""
 START, STOP, LOAD, SPAN, ROW_LAMBDA, ROW_MU, CORNER, DEFECT = range(8)
-"""Rows of the closing data: the parameters' velocity, then the row's other entries."""
-LAMBDA, MU = 0, 1
-ACROSS = 4.0 * np.pi**2
+"""Rows of the closing data: velocity of θ(0), θ(1), q, ν, then the row's other entries."""
+ALONG, ACROSS, CLOSE_ALONG, CLOSE_ACROSS, BALANCE, WORST = range(6)
+"""Rows of the sums: constraints, their change by dp, residual at the last vertex, largest."""
+FOUR_PI_SQUARED = 4.0 * np.pi**2
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _read(source, start, count, target, row, step):
     """Read the first entries of lanes of a lanes-first array into rows `step` apart."""
-    flat, out, width = source.reshape(-1), target.reshape(-1), source.shape[1]
+    width = source.shape[1]
     if count < LANES:
         for i in range(count):
             for k in range(LANES):
@@ -52,13 +59,13 @@ def _read(source, start, count, target, row, step):
         for block in range(0, count, LANES):
             i = min(block, count - LANES)
             at = (row + i * step) * LANES
-            transpose(flat, start * width + i, width, out, at, step * LANES)
+            transpose(source, start * width + i, width, target, at, step * LANES)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _write(source, row, step, target, start):
     """Write rows `step` apart into lanes of a lanes-first array."""
-    flat, out, width = source.reshape(-1), target.reshape(-1), target.shape[1]
+    width = target.shape[1]
     if width < LANES:
         for i in range(width):
             for k in range(LANES):
@@ -67,25 +74,25 @@ def _write(source, row, step, target, start):
         for block in range(0, width, LANES):
             i = min(block, width - LANES)
             at = (row + i * step) * LANES
-            transpose(flat, at, step * LANES, out, start * width + i, width)
+            transpose(source, at, step * LANES, target, start * width + i, width)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _read_state(z, p, start, n, theta, scalars):
     """Fill a block with the nodal angles and (λ, μ, q, ν) of lanes; theta has n + 3 rows."""
     _read(z, start, n + 2, theta, 1, 1)
-    store(scalars, 0, load(theta, n + 1))
-    store(scalars, 1, load(theta, n + 2))
+    store(scalars, LAMBDA, load(theta, n + 1))
+    store(scalars, MU, load(theta, n + 2))
     for k in range(LANES):
         theta[0, k] = p[start + k, 1] + p[start + k, 0]
         theta[n + 1, k] = p[start + k, 1] - p[start + k, 0]
-        scalars[2, k], scalars[3, k] = p[start + k, 2], p[start + k, 3]
+        scalars[Q, k], scalars[NU, k] = p[start + k, 2], p[start + k, 3]
 
 
-@njit(**FLAGS)
-def _read_closing(dp, row, corner, defect, start, n, columns, closing):
+@njit(**INNER)
+def _read_closing(dp, row, corner, defect, start, n, closing_row, closing):
     """Fill a block with the closing row and the data named by START … DEFECT."""
-    _read(row, start, n, columns, TILE + ROW, TILE)
+    _read(row, start, n, closing_row, 1, 1)
     for k in range(LANES):
         at = start + k
         closing[START, k], closing[STOP, k] = dp[at, 1] + dp[at, 0], dp[at, 1] - dp[at, 0]
@@ -94,80 +101,114 @@ def _read_closing(dp, row, corner, defect, start, n, columns, closing):
         closing[CORNER, k], closing[DEFECT, k] = corner[at], defect[at]
 
 
-@njit(**FLAGS)
-def _assemble(weights, loads, theta, scalars, velocity, diagonal, columns, sums):
-    """Diagonal of the Hessian, border, load part of F_p·dp, gradient without stiffness."""
-    lam, mu, q = load(scalars, 0), load(scalars, 1), load(scalars, 2)
-    along, across = spread(0.0), spread(0.0)
-    for i in range(weights.shape[0]):
+@njit(**INNER)
+def _assemble(
+    weights, loads, nodes, theta, scalars, closing_row, velocity, diagonal, columns, sums
+):
+    """Diagonal of the Hessian and columns of the nodes, without the stiffness."""
+    lam, mu, q = load(scalars, LAMBDA), load(scalars, MU), load(scalars, Q)
+    along, across, zero = load(sums, ALONG), load(sums, ACROSS), spread(0.0)
+    for i in range(nodes[0], nodes[1]):
         sine, cosine = sincos(load(theta, i))
-        m, r = spread(weights[i]), spread(loads[i])
+        m, r, at = spread(weights[i]), spread(loads[i]), i * TILE
         a, b = mu * m - q * r, lam * m
-        first, second = spread(0.0) - m * sine, m * cosine
-        store(diagonal, i, spread(0.0) - a * sine - b * cosine)
-        store(columns, i * TILE + FIRST, first)
-        store(columns, i * TILE + SECOND, second)
-        store(columns, i * TILE + COLUMN, spread(0.0) - velocity * r * cosine)
-        store(columns, i * TILE + FORCE, b * sine - a * cosine)
+        first, second = zero - m * sine, m * cosine
+        store(diagonal, i, zero - a * sine - b * cosine)
+        store(columns, at + ROW, load(closing_row, i))
+        store(columns, at + FIRST, first)
+        store(columns, at + SECOND, second)
+        store(columns, at + COLUMN, zero - velocity * r * cosine)
+        store(columns, at + FORCE, b * sine - a * cosine)
         along, across = along + second, across - first
-    store(sums, 0, along - load(scalars, 3))
-    store(sums, 1, across)
+    store(sums, ALONG, along)
+    store(sums, ACROSS, across)
 
 
-@njit(**FLAGS)
-def _subtract_stiffness(stiffness, theta, columns):
-    """Subtract K θ from the force, two rows of an element at a time."""
-    order = stiffness.shape[1]
-    for e in range(stiffness.shape[0]):
-        base = e * (order - 1)
-        for i in range(0, order, 2):
-            other = min(i + 1, order - 1)
-            first, second = spread(0.0), spread(0.0)
-            for j in range(order):
-                angle = load(theta, base + j)
-                first = first + spread(stiffness[e, i, j]) * angle
-                second = second + spread(stiffness[e, other, j]) * angle
-            at = (base + i) * TILE + FORCE
+@njit(**INNER)
+def _subtract_stiffness(stiffness, e, theta, columns, sums):
+    """Subtract K θ of an element from the force, two rows at a time; note the largest residual."""
+    order, base = stiffness.shape[1], e * (stiffness.shape[1] - 1)
+    worst = load(sums, WORST)
+    for i in range(0, order, 2):
+        other = min(i + 1, order - 1)
+        first, second = spread(0.0), spread(0.0)
+        for j in range(order):
+            angle = load(theta, base + j)
+            first = first + spread(stiffness[e, i, j]) * angle
+            second = second + spread(stiffness[e, other, j]) * angle
+        at, to = (base + i) * TILE + FORCE, (base + other) * TILE + FORCE
+        if i == 0:  # the other element at this vertex may be condensed already
+            balance = load(sums, BALANCE) - first
+            worst = larger(worst, absolute(balance)) if e > 0 else worst
             store(columns, at, load(columns, at) - first)
-            if other > i:
-                store(columns, at + TILE, load(columns, at + TILE) - second)
+        elif i < order - 1:
+            first = load(columns, at) - first
+            worst = larger(worst, absolute(first))
+            store(columns, at, first)
+        second = load(columns, to) - second
+        store(columns, to, second)
+        if other < order - 1:
+            worst = larger(worst, absolute(second))
+        else:
+            store(sums, BALANCE, second)
+    store(sums, WORST, worst)
 
 
-@njit(**FLAGS)
-def _close_column(stiffness, columns, closing, sums):
-    """Ends' part of F_p·dp: through the stiffness in its slot, through the constraints in `sums`."""
-    elements, order = stiffness.shape[0], stiffness.shape[1]
-    start, stop = load(closing, START), load(closing, STOP)
-    last = elements * (order - 1) * TILE
+@njit(**INNER)
+def _add_end(stiffness, e, end, velocity, columns, sums):
+    """Part of F_p·dp by the velocity of a prescribed end of element `e`: 0 left, 1 right."""
+    order = stiffness.shape[1]
+    base = e * (order - 1) * TILE
     for i in range(order):
-        at, to = i * TILE + COLUMN, last + (i + 1 - order) * TILE + COLUMN
-        store(columns, at, load(columns, at) + spread(stiffness[0, i, 0]) * start)
-        by_stop = spread(stiffness[elements - 1, i, order - 1]) * stop
-        store(columns, to, load(columns, to) + by_stop)
-    first = load(columns, FIRST) * start + load(columns, last + FIRST) * stop
-    second = load(columns, SECOND) * start + load(columns, last + SECOND) * stop
-    store(sums, 2, first - load(closing, SPAN))
-    store(sums, 3, second)
+        at = base + i * TILE + COLUMN
+        factor = spread(stiffness[e, i, end * (order - 1)])
+        store(columns, at, load(columns, at) + factor * velocity)
+    at = base + end * (order - 1) * TILE
+    store(sums, CLOSE_ALONG, load(sums, CLOSE_ALONG) + load(columns, at + FIRST) * velocity)
+    store(sums, CLOSE_ACROSS, load(sums, CLOSE_ACROSS) + load(columns, at + SECOND) * velocity)
 
 
-@njit(**FLAGS)
-def _largest_residual(columns, sums, n):
-    """Largest absolute entry of F; not a number if one of them is not."""
-    worst = larger(absolute(load(sums, 0)), absolute(load(sums, 1)))
-    for i in range(1, n + 1):
-        worst = larger(worst, absolute(load(columns, i * TILE + FORCE)))
-    return worst
+@njit(**INNER)
+def _assemble_group(
+    stiffness, group, weights, loads, theta, scalars, closing_row, closing, diagonal, columns, sums
+):
+    """Everything that the elements of a group need before they are reduced."""
+    elements, degree = stiffness.shape[0], stiffness.shape[1] - 1
+    begin, end = group * GROUP, min(group * GROUP + GROUP, elements)
+    nodes = (begin * degree + (begin > 0), end * degree + 1)
+    velocity = load(closing, LOAD)
+    _assemble(weights, loads, nodes, theta, scalars, closing_row, velocity, diagonal, columns, sums)
+    for e in range(begin, end):
+        _subtract_stiffness(stiffness, e, theta, columns, sums)
+    if begin == 0:
+        _add_end(stiffness, 0, 0, load(closing, START), columns, sums)
+    if end == elements:
+        _add_end(stiffness, elements - 1, 1, load(closing, STOP), columns, sums)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
+def _start_sums(scalars, closing, sums, products):
+    """Reset the sums over nodes of a block."""
+    zero = spread(0.0)
+    store(sums, ALONG, zero - load(scalars, NU))
+    store(sums, ACROSS, zero)
+    store(sums, CLOSE_ALONG, zero - load(closing, SPAN))
+    store(sums, CLOSE_ACROSS, zero)
+    store(sums, BALANCE, zero)
+    store(sums, WORST, zero)
+    for i in range(12):
+        store(products, i, zero)
+
+
+@njit(**INNER)
 def _small_system(products, sums, closing, small):
     """Schur system of (λ, μ, t) with the two right-hand sides, in rows of five."""
     zero, one = spread(0.0), spread(1.0)
     for a in range(2):
         store(small, 5 * a, zero - load(products, 4 * a))
         store(small, 5 * a + 1, zero - load(products, 4 * a + 1))
-        store(small, 5 * a + 2, load(sums, 2 + a) - load(products, 4 * a + 2))
-        store(small, 5 * a + 3, zero - load(sums, a) - load(products, 4 * a + 3))
+        store(small, 5 * a + 2, load(sums, CLOSE_ALONG + a) - load(products, 4 * a + 2))
+        store(small, 5 * a + 3, zero - load(sums, ALONG + a) - load(products, 4 * a + 3))
         store(small, 5 * a + 4, zero)
         store(small, 10 + a, load(closing, ROW_LAMBDA + a) - load(products, 8 + a))
     store(small, 12, load(closing, CORNER) - load(products, 10))
@@ -175,7 +216,7 @@ def _small_system(products, sums, closing, small):
     store(small, 14, one)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _negative_of_two(small):
     """Negative eigenvalues of the leading 2 × 2 block, by its determinant and trace."""
     zero, one = spread(0.0), spread(1.0)
@@ -185,12 +226,12 @@ def _negative_of_two(small):
     return where_less(determinant, zero, one, definite)
 
 
-@njit(**FLAGS)
-def _combine(columns, small, n, solution):
+@njit(**INNER)
+def _combine(columns, small, nodes, solution):
     """Reduced columns of the step and of the tangent, side by side."""
     step0, step1, step2 = load(small, 3), load(small, 8), load(small, 13)
     turn0, turn1, turn2 = load(small, 4), load(small, 9), load(small, 14)
-    for i in range(1, n + 1):
+    for i in range(nodes[0], nodes[1]):
         at = i * TILE
         first, second = load(columns, at + FIRST), load(columns, at + SECOND)
         column = load(columns, at + COLUMN)
@@ -211,37 +252,47 @@ def advance_lanes(
     """
     elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
     lanes, n = z.shape[0], z.shape[1] - 2
-    theta, diagonal = work_rows(n + 3), work_rows(n + 2)
-    scalars, closing, sums = work_rows(4), work_rows(8), work_rows(4)
+    theta, closing_row, diagonal = work_rows(n + 3), work_rows(n + 2), work_rows(n + 2)
+    scalars, closing, sums = work_rows(4), work_rows(8), work_rows(6)
     products, small, solution = work_rows(12), work_rows(15), work_rows(2 * (n + 3))
     lower, vertices, columns, extremes = work_arrays(elements, inner, 1)
+    closing_row[:] = 0.0
     for block in range(0, lanes, LANES):
         start = min(block, lanes - LANES)
         _read_state(z, p, start, n, theta, scalars)
-        _read_closing(dp, row, corner, defect, start, n, columns, closing)
-        _assemble(weights, loads, theta, scalars, load(closing, LOAD), diagonal, columns, sums)
-        _subtract_stiffness(stiffness, theta, columns)
-        _close_column(stiffness, columns, closing, sums)
-        store(scalars, 0, _largest_residual(columns, sums, n))
-        reduce_block(stiffness, diagonal, ends, 1, lower, vertices, columns, extremes)
-        pivot_products(elements, inner, ends, lower, vertices, columns, products)
+        _read_closing(dp, row, corner, defect, start, n, closing_row, closing)
+        _start_sums(scalars, closing, sums, products)
+        for group in range((elements + GROUP - 1) // GROUP):
+            _assemble_group(
+                stiffness, group, weights, loads, theta, scalars, closing_row, closing,
+                diagonal, columns, sums,
+            )  # fmt: skip
+            if group == 0:
+                start_block(diagonal, vertices, extremes)
+            reduce_group(stiffness, group, diagonal, ends, 1, lower, vertices, columns, extremes)
+            for e in range(group * GROUP, min(group * GROUP + GROUP, elements)):
+                add_products(e, inner, ends, lower, vertices, columns, products)
         _small_system(products, sums, closing, small)
         store(extremes, 0, load(extremes, 0) + _negative_of_two(small))
         solve_lanes(small, 3, 5)
-        _combine(columns, small, n, solution)
-        restore_block(elements, inner, ends, lower, vertices, columns, solution, 0, 2)
+        for e in range(elements, -1, -1):
+            node = e * (inner + 1)
+            _combine(columns, small, (node, min(node + inner, n + 1) + 1), solution)
+            restore_element(e, elements, inner, ends, lower, vertices, columns, solution, 0, 2)
         store(solution, 2 * (n + 1), stack2(load(small, 3), load(small, 4)))
         store(solution, 2 * (n + 2), stack2(load(small, 8), load(small, 9)))
         _write(solution, 2, 2, dz, start)
         _write(solution, 3, 2, tangent_z, start)
+        worst = larger(absolute(load(sums, ALONG)), absolute(load(sums, ACROSS)))
+        store(sums, WORST, larger(load(sums, WORST), worst))
         for k in range(LANES):
             at = start + k
             dt[at], tangent_t[at] = small[13, k], small[14, k]
-            residual[at], index[at] = scalars[0, k], np.int64(extremes[0, k]) - 2
-            ratio[at] = extremes[1, k] / extremes[2, k]
+            residual[at], index[at] = sums[WORST, k], np.int64(extremes[0, k]) - 2
+            ratio[at] = pivot_ratio(extremes, k)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _curvature_block(stiffness, lengths, nodal_weights, integral, rho, theta, scalars, waves, out):
     """Curvature by moment balance, and its derivative over 4π², at the nodes of every element.
 
@@ -270,8 +321,10 @@ def _curvature_block(stiffness, lengths, nodal_weights, integral, rho, theta, sc
                 own = load(out, force + j)
                 first = first + spread(integral[i, j]) * own
                 second = second + spread(integral[other, j]) * own
-            store(out, kappa + i, spread(ACROSS) * (spread(lengths[e]) * first - moment))
-            store(out, kappa + other, spread(ACROSS) * (spread(lengths[e]) * second - moment))
+            store(out, kappa + i, spread(FOUR_PI_SQUARED) * (spread(lengths[e]) * first - moment))
+            store(
+                out, kappa + other, spread(FOUR_PI_SQUARED) * (spread(lengths[e]) * second - moment)
+            )
 
 
 @njit(**FLAGS)
@@ -320,7 +373,7 @@ def largest_lanes(
             largest[start + k], place[start + k] = best[0, k], best[1, k]
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _nodal_maximum(out, elements, nodes, best):
     """Largest nodal |κ| in row 0 and its element + local coordinate in row 1 of best."""
     order = nodes.shape[0]
@@ -334,7 +387,7 @@ def _nodal_maximum(out, elements, nodes, best):
     store(best, 1, where)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _may_exceed(out, at, forces, width, best):
     """Lanes (bits) where κ' changes sign between two nodes and |κ| may rise above the best there.
 
@@ -346,11 +399,11 @@ def _may_exceed(out, at, forces, width, best):
     if turning == 0:
         return turning
     mean = spread(0.5) * (absolute(load(out, at)) + absolute(load(out, at + 1)))
-    rise = spread(ACROSS * width) * larger(absolute(left), absolute(right))
+    rise = spread(FOUR_PI_SQUARED * width) * larger(absolute(left), absolute(right))
     return turning & lanes_less(load(best, 0), mean + rise)
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _refine(out, e, i, k, length, nodes, to_legendre, series, best):
     """Take the extremum of κ between nodes i and i + 1 of an element into the best of lane k."""
     order = nodes.shape[0]
@@ -361,12 +414,12 @@ def _refine(out, e, i, k, length, nodes, to_legendre, series, best):
             total += to_legendre[a, b] * out[forces + b, k]
         series[a] = total
     t = _root(series, nodes[i], nodes[i + 1], out[forces + i, k], out[forces + i + 1, k])
-    value = abs(out[e * order, k] + ACROSS * length * _integral(series, t))
+    value = abs(out[e * order, k] + FOUR_PI_SQUARED * length * _integral(series, t))
     if value > best[0, k]:
         best[0, k], best[1, k] = value, e + t
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _value(coefficients, t):
     """Legendre series on [0, 1] and its derivative at t."""
     x = 2.0 * t - 1.0
@@ -382,7 +435,7 @@ def _value(coefficients, t):
     return total, 2.0 * slope
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _integral(coefficients, t):
     """Integral of a Legendre series on [0, 1] from 0 to t."""
     x = 2.0 * t - 1.0
@@ -394,7 +447,7 @@ def _integral(coefficients, t):
     return 0.5 * total
 
 
-@njit(**FLAGS)
+@njit(**INNER)
 def _root(coefficients, low, high, f_low, f_high):
     """Root of a Legendre series between two points of opposite sign: Newton kept in its bracket.
 

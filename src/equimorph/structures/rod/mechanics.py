@@ -26,8 +26,8 @@ def _contiguous(*arrays: np.ndarray) -> list[np.ndarray]:
 class RodMechanics(Structure):
     """Everything about the rod that needs no continuation and no names: see `Rod`.
 
-    L = Σ ½ θᵀKθ + Σᵢ (μ mᵢ − q Rᵢ) sin θᵢ + λ mᵢ cos θᵢ − λν with quadrature weights m, load weights
-    R = m ρ and K the stiffness over 4π². Parameters (Θ, Δ, q, ν), multipliers (λ, μ).
+    L = Σ ½ θᵀKθ + Σᵢ (μ mᵢ − q Rᵢ) sin θᵢ + λ mᵢ cos θᵢ − λν with quadrature weights m, load
+    weights R = m ρ and K the stiffness over 4π². Parameters (Θ, Δ, q, ν), multipliers (λ, μ).
     """
 
     kind: ClassVar[str] = "rod"
@@ -87,7 +87,7 @@ class RodMechanics(Structure):
         """∂L/∂θ at all nodes, the prescribed ends included."""
         theta = self.nodal_angles(z, p)
         a, b = self._coefficients(z, p)
-        return theta @ self.layout.assembled + a * np.cos(theta) - b * np.sin(theta)
+        return np.asarray(theta @ self.layout.assembled + a * np.cos(theta) - b * np.sin(theta))
 
     def _border(self, theta: Nodal) -> Float[np.ndarray, "lanes 2 nodes"]:
         weights = self.mesh.weights
@@ -99,7 +99,7 @@ class RodMechanics(Structure):
         """∫ θ'²/(8π²) − q ∫ ρ sin θ."""
         theta = self.nodal_angles(z, p)
         bending = 0.5 * np.einsum("li,li->l", theta @ self.layout.assembled, theta)
-        return bending - p[:, 2] * (np.sin(theta) @ self.loads)
+        return np.asarray(bending - p[:, 2] * (np.sin(theta) @ self.loads))
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:
         """(∂L/∂θ at the inner nodes, ∫cos θ − ν, ∫ sin θ)."""
@@ -162,7 +162,8 @@ class RodMechanics(Structure):
         if border is None:
             nothing = np.zeros((lanes, 0, self.size))
             border = (nothing, nothing, np.zeros((lanes, 0, 0)))
-        return self.layout.solve(diagonal, self._border(theta), *border, rhs)
+        columns, rows, corner = border
+        return self.layout.solve(diagonal, self._border(theta), columns, rows, corner, rhs)
 
     def advance(
         self,

@@ -25,10 +25,11 @@ DEFAULT_SPAN = float(np.sin(1.0))
 class Rod(RodMechanics):
     """Planar, inextensible, unshearable elastic rod of length 1 with clamped ends.
 
-    Energy ``E = ∫ θ'²/(8π²) ds − q ∫ ρ sin θ ds`` with ``ρ = ∫₀ˢ Q``; constraints ``∫ cos θ = ν`` and
-    ``∫ sin θ = 0``; end angles θ(0) = Δ + Θ, θ(1) = Δ − Θ. Gauss–Lobatto elements with quadrature at
-    the nodes, so that energy, residual and Hessian agree exactly; element ends meet the kinks of
-    the load. Scales: lengths by L, forces by 4π²B/L², energies by 4π²B/L, curvature by 1/L.
+    Energy ``E = ∫ θ'²/(8π²) ds − q ∫ ρ sin θ ds`` with ``ρ = ∫₀ˢ Q``; constraints ``∫ cos θ = ν``
+    and ``∫ sin θ = 0``; end angles θ(0) = Δ + Θ, θ(1) = Δ − Θ. Gauss–Lobatto elements with
+    quadrature at the nodes, so that energy, residual and Hessian agree exactly; element ends meet
+    the kinks of the load. Scales: lengths by L, forces by 4π²B/L², energies by 4π²B/L, curvature
+    by 1/L.
 
     Parameters
     ----------
