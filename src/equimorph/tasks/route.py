@@ -1,0 +1,120 @@
+"""Routes between states, and the schedule that executes one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria import Path, TraceOptions, lift
+from equimorph.model import Constraint, Descriptor, Schedule, names_of
+from equimorph.structures import State
+
+FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=20000)
+"""Step control of the final check of every route."""
+
+Corners = list[dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Route:
+    """Answer to "how do I get from here to there without a snap".
+
+    status: "arrived", or "refused" with the reason in `why`. A route that arrived was lifted again
+    at a finer step: `path`, its smallest stability `margin`, its `length` in the structure's metric
+    and scaled parameters, and the `schedule` for the actuators. A refused one carries the path as
+    far as it went, if there is one.
+    """
+
+    status: Literal["arrived", "refused"]
+    why: str
+    way_points: Corners
+    path: Path | None = None
+    margin: float = np.nan
+    length: float = np.nan
+    schedule: Schedule | None = None
+
+    @property
+    def arrived(self) -> bool:
+        """Whether there is a verified route."""
+        return self.status == "arrived"
+
+
+def refused(why: str, way_points: Corners | None = None, path: Path | None = None) -> Route:
+    """Route that does not exist, and why."""
+    return Route("refused", why, way_points or [], path)
+
+
+def place(state: State, names: Sequence[str]) -> str:
+    """Parameters of a state in words: ``Theta = 1, Delta = 0.418136``."""
+    return ", ".join(f"{name} = {state[name]:.6g}" for name in names)
+
+
+def verified(
+    start: State,
+    goal: State,
+    way_points: Corners,
+    within: tuple[Constraint, ...],
+    monitor: Sequence[Descriptor] = (),
+) -> Route:
+    """Lift the way-points once more, finely; the route if it ends in the goal, else the reason."""
+    path = lift(start, way_points, within=within, options=FINE)
+    names = _moved(way_points)
+    end = path.end
+    if end.kind != "arrived":
+        return refused(_reason(path, names, len(way_points)), way_points, path)
+    if distance(end.state, goal) > 1e-6:
+        return refused(
+            f"the way-points lead to another equilibrium over the goal's parameters, "
+            f"{distance(end.state, goal):.3g} away in the metric",
+            way_points,
+            path,
+        )
+    margins = path.states.margin
+    if not (margins > 0.0).all():
+        k = int(np.argmin(margins))
+        return refused(f"unstable at {place(path.states[k], names)}", way_points, path)
+    schedule = _schedule(path, margins, (*(c.descriptor for c in within), *monitor))
+    length = float(path.length[-1])
+    return Route("arrived", "", way_points, path, float(margins.min()), length, schedule)
+
+
+def _moved(way_points: Corners) -> list[str]:
+    return list(dict.fromkeys(name for corner in way_points for name in corner))
+
+
+def _reason(path: Path, names: Sequence[str], segments: int) -> str:
+    end = path.end
+    what = {
+        "fold": "a fold: stability is lost and the structure would snap",
+        "branch point": f"a {end.criticality} branch point: stability is lost",
+        "constraint": f"the constraint {end.detail}",
+    }.get(end.kind, f"a numerical failure ({end.detail})")
+    segment = min(int(end.at) + 1, segments)
+    return f"segment {segment} of {segments} meets {what}, at {place(end.state, names)}"
+
+
+def distance(a: State, b: State) -> float:
+    """Distance of two configurations in the structure's metric."""
+    n = a.structure.unknowns
+    return float(np.sqrt((a.z[:n] - b.z[:n]) ** 2 @ a.structure.mass))
+
+
+def _schedule(
+    path: Path, margins: Float[np.ndarray, " steps"], descriptors: Sequence[Descriptor]
+) -> Schedule:
+    structure, states = path.states.structure, path.states
+    parameters = structure.parameters
+    corners = np.flatnonzero(np.isclose(path.at, np.round(path.at), rtol=0, atol=1e-12))
+    return Schedule(
+        names=names_of(parameters),
+        roles=tuple(parameter.role for parameter in parameters),
+        units=tuple(parameter.unit for parameter in parameters),
+        values=states.p.copy(),
+        progress=path.length / path.length[-1],
+        margins=margins,
+        descriptors={d.name: d(states) for d in descriptors},
+        start={"structure": structure.identity(), "unknowns": states.z[0].tolist()},
+        way_points=corners,
+    )
