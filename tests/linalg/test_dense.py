@@ -1,0 +1,84 @@
+"""Dense factorisations: inertia, small solves, bordered solves."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from equimorph.linalg import negative_eigenvalues, solve_bordered
+from equimorph.linalg.kernels import solve_lanes, solve_small
+from equimorph.linalg.simd import work_rows
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    signs=st.lists(st.sampled_from([-1.0, 1.0]), min_size=1, max_size=12),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_inertia_is_that_of_the_congruent_diagonal(signs, seed):
+    """Sylvester: QDQᵀ has the inertia of D; sizes spread over six decades."""
+    generator = np.random.default_rng(seed)
+    n = len(signs)
+    q = np.linalg.qr(generator.normal(size=(n, n)))[0]
+    matrix = (q * (np.array(signs) * 10.0 ** generator.uniform(-3, 3, n))) @ q.T
+    counted = negative_eigenvalues(0.5 * (matrix + matrix.T)[None])
+    assert counted[0] == signs.count(-1.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(n=st.integers(1, 9), seed=st.integers(0, 2**32 - 1))
+def test_small_integer_matrices_agree_with_their_eigenvalues(n, seed):
+    """Zero diagonals force 2 × 2 pivots. Singular matrices are left out: no sign to round to."""
+    generator = np.random.default_rng(seed)
+    half = np.triu(generator.integers(-2, 3, size=(n, n)).astype(float), 1)
+    matrix = half + half.T
+    values = np.linalg.eigvalsh(matrix)
+    if np.abs(values).min() > 1e-8:
+        assert negative_eigenvalues(matrix[None])[0] == (values < 0).sum()
+
+
+def test_a_zero_matrix_has_no_negative_eigenvalue():
+    assert negative_eigenvalues(np.zeros((1, 5, 5)))[0] == 0
+
+
+def test_a_matrix_of_zero_diagonal_takes_two_by_two_pivots():
+    """[[0, 1], [1, 0]] repeated: one negative eigenvalue each."""
+    block = np.kron(np.eye(3), np.array([[0.0, 1.0], [1.0, 0.0]]))
+    assert negative_eigenvalues(block[None])[0] == 3
+
+
+def test_entries_that_are_not_finite_count_as_minus_one():
+    matrices = np.stack([np.eye(3), np.full((3, 3), np.nan), -np.eye(3)])
+    np.testing.assert_array_equal(negative_eigenvalues(matrices), [0, -1, 3])
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 6])
+def test_small_systems_are_solved_with_row_exchanges(size):
+    """Oracle: LAPACK; a zero in the corner needs the exchange. 1e-12: well conditioned."""
+    generator = np.random.default_rng(size)
+    a, b = generator.normal(size=(size, size)) + 2 * np.eye(size)[::-1], np.eye(size)
+    a[0, 0] = 0.0 if size > 1 else 2.0
+    x = b.copy()
+    solve_small(a.copy(), x)
+    np.testing.assert_allclose(x, np.linalg.solve(a, b), rtol=1e-12, atol=1e-12)
+
+
+def test_eight_small_systems_at_once_equal_eight_single_ones():
+    """Each lane exchanges its own rows. 1e-12: well conditioned."""
+    generator = np.random.default_rng(1)
+    a, b = generator.normal(size=(8, 3, 3)), generator.normal(size=(8, 3, 2))
+    a[::2, 0, 0] = 0.0
+    rows = work_rows(15)
+    rows[:] = np.concatenate([a, b], axis=2).transpose(1, 2, 0).reshape(15, 8)
+    solve_lanes(rows, 3, 5)
+    found = rows.reshape(3, 5, 8)[:, 3:].transpose(2, 0, 1)
+    np.testing.assert_allclose(found, np.linalg.solve(a, b), rtol=1e-11, atol=1e-12)
+
+
+def test_one_singular_lane_is_not_a_number_and_leaves_the_others():
+    """Oracle: LAPACK lane by lane. 1e-14: identity matrices."""
+    matrix = np.stack([np.eye(2), np.zeros((2, 2)), 2 * np.eye(2)])
+    nothing = np.zeros((3, 0, 2))
+    found = solve_bordered(matrix, nothing, nothing, np.zeros((3, 0, 0)), np.ones((3, 1, 2)))
+    np.testing.assert_allclose(found.x[[0, 2], 0], [[1, 1], [0.5, 0.5]], rtol=1e-14)
+    assert np.isnan(found.x[1]).all()

@@ -1,0 +1,219 @@
+"""Derivatives of energies, and the promises that every structure makes, for Rod and Spring."""
+
+import numpy as np
+import pytest
+
+from equimorph.errors import InputError
+from equimorph.structures import Rod, Spring, Structure, from_identity
+
+STEP = 1e-30
+
+
+def some_states(structure, lanes=5, seed=0):
+    """Random states far from equilibrium, and directions (dz, dp)."""
+    generator = np.random.default_rng(seed)
+    if isinstance(structure, Rod):
+        p = np.array([1.0, 0.2, 1.5, 0.8]) + 0.2 * generator.normal(size=(lanes, 4))
+    else:
+        p = np.array([0.9, 0.1, 1.3]) + 0.1 * generator.normal(size=(lanes, 3))
+    z = structure.sample(p, generator)
+    return z, p, generator.normal(size=z.shape), generator.normal(size=p.shape)
+
+
+@pytest.fixture(
+    params=["uniform", "left-half", "spring"],
+    ids=["rod under uniform load", "rod loaded on the left half", "spring"],
+)
+def structure(request):
+    if request.param == "spring":
+        return Spring(1.3)
+    return Rod(request.param, elements=4, degree=5)
+
+
+def lagrangian(structure, z, p):
+    """L = E + λ·c, complex arguments allowed."""
+    if isinstance(structure, Spring):
+        delta, (x, force, k) = z[:, 0], p.T
+        return 0.5 * k * (1 - x / np.cos(delta)) ** 2 + force * x * np.tan(delta)
+    theta = np.concatenate([p[:, 1:2] + p[:, :1], z[:, :-2], p[:, 1:2] - p[:, :1]], axis=1)
+    energy = 0.5 * np.einsum("li,ij,lj->l", theta, structure.layout.assembled, theta)
+    energy = energy - p[:, 2] * (np.sin(theta) @ structure.loads)
+    along = np.cos(theta) @ structure.mesh.weights - p[:, 3]
+    return energy + z[:, -2] * along + z[:, -1] * (np.sin(theta) @ structure.mesh.weights)
+
+
+def gradient(function, x):
+    """Complex-step derivatives: exact to round-off [Squire and Trapp 1998]."""
+    columns = []
+    for i in range(x.shape[1]):
+        moved = x.astype(complex)
+        moved[:, i] += 1j * STEP
+        columns.append(function(moved).imag / STEP)
+    return np.stack(columns, axis=-1)
+
+
+def differenced(function, step):
+    """Central differences of fourth order in `step`."""
+    return (8 * (function(step) - function(-step)) - (function(2 * step) - function(-2 * step))) / (
+        12 * step
+    )
+
+
+def full_matrix(structure, z, p):
+    """F_z by solving with unit vectors."""
+    lanes, size = z.shape
+    unit = np.broadcast_to(np.eye(size), (lanes, size, size)).copy()
+    return np.linalg.inv(structure.solve(z, p, unit).x.transpose(0, 2, 1))
+
+
+def test_residual_is_the_gradient_of_the_lagrangian(structure):
+    """Complex step of an independent L. 1e-12: sums of a hundred terms of order one."""
+    z, p, _, _ = some_states(structure)
+    exact = gradient(lambda at: lagrangian(structure, at, p), z)
+    np.testing.assert_allclose(structure.residual(z, p), exact, rtol=1e-11, atol=1e-12)
+
+
+def test_effort_is_the_derivative_by_the_parameters(structure):
+    """Complex step of an independent L. 1e-12 as above."""
+    z, p, _, _ = some_states(structure)
+    exact = gradient(lambda at: lagrangian(structure, z, at), p)
+    np.testing.assert_allclose(structure.effort(z, p), exact, rtol=1e-11, atol=1e-12)
+
+
+def test_energy_is_the_lagrangian_without_its_constraints(structure):
+    """1e-13: round-off."""
+    z, p, _, _ = some_states(structure)
+    if isinstance(structure, Rod):
+        z[:, -2:] = 0.0
+    np.testing.assert_allclose(structure.energy(z, p), lagrangian(structure, z, p), rtol=1e-13)
+
+
+def test_matrix_is_symmetric_and_the_derivative_of_the_residual(structure):
+    """Central differences, step 1e-3: error 1e-12 of the fifth derivative, 1e-13 of round-off."""
+    z, p, v, _ = some_states(structure)
+    matrix = full_matrix(structure, z, p)
+    scale = np.abs(matrix).max()
+    np.testing.assert_allclose(matrix, matrix.transpose(0, 2, 1), atol=1e-9 * scale)
+    slope = differenced(lambda t: structure.residual(z + t * v, p), 1e-3)
+    product = np.einsum("lij,lj->li", matrix, v)
+    np.testing.assert_allclose(product, slope, rtol=1e-7, atol=1e-8 * np.abs(product).max())
+
+
+def test_parameter_derivative_is_that_of_the_residual(structure):
+    """Central differences as above."""
+    z, p, _, dp = some_states(structure)
+    slope = differenced(lambda t: structure.residual(z, p + t * dp), 1e-3)
+    found = structure.parameter_derivative(z, p, dp)
+    np.testing.assert_allclose(found, slope, rtol=1e-8, atol=1e-9 * np.abs(slope).max())
+
+
+def test_second_derivative_is_that_of_the_residual_along_a_line(structure):
+    """Second differences, step 1e-3, of fourth order: 1e-6 from round-off over step squared."""
+    z, p, dz, dp = some_states(structure)
+
+    def along(t):
+        return structure.residual(z + t * dz, p + t * dp)
+
+    h = 1e-3
+    second = 16 * (along(h) + along(-h)) - (along(2 * h) + along(-2 * h)) - 30 * along(0.0)
+    second /= 12 * h * h
+    found = structure.second_derivative(z, p, (dz, dp), (dz, dp))
+    np.testing.assert_allclose(found, second, rtol=1e-6, atol=1e-6 * np.abs(second).max())
+
+
+def test_second_derivative_is_bilinear_and_symmetric(structure):
+    """Polarisation: 4 B(v, w) = B(v+w, v+w) − B(v−w, v−w). 1e-12: round-off."""
+    z, p, dz, dp = some_states(structure)
+    _, _, ez, ep = some_states(structure, seed=1)
+
+    def square(sign):
+        both = (dz + sign * ez, dp + sign * ep)
+        return structure.second_derivative(z, p, both, both)
+
+    mixed = structure.second_derivative(z, p, (dz, dp), (ez, ep))
+    swapped = structure.second_derivative(z, p, (ez, ep), (dz, dp))
+    scale = np.abs(mixed).max()
+    np.testing.assert_allclose(mixed, swapped, atol=1e-13 * scale)
+    np.testing.assert_allclose(4 * mixed, square(1.0) - square(-1.0), atol=1e-12 * scale)
+
+
+def test_fused_step_equals_the_plain_route(structure):
+    """`Structure.advance` by the general bordered solve. 1e-10: conditioning of random states."""
+    for lanes in (1, 5, 8, 21):
+        z, p, row, dp = some_states(structure, lanes)
+        generator = np.random.default_rng(2)
+        corner, defect = generator.normal(size=lanes), generator.normal(size=lanes)
+        fused = structure.advance(z, p, dp, row, corner, defect)
+        plain = Structure.advance(structure, z, p, dp, row, corner, defect)
+        np.testing.assert_array_equal(fused.index, plain.index)
+        for name in ("dz", "dt", "tangent_z", "tangent_t", "residual"):
+            exact = getattr(plain, name)
+            bound = 1e-10 * max(1.0, np.abs(exact).max())
+            np.testing.assert_allclose(getattr(fused, name), exact, rtol=1e-9, atol=bound)
+
+
+def test_a_lane_that_is_no_number_leaves_the_other_steps_alone(structure):
+    z, p, row, dp = some_states(structure, 9)
+    one, none = np.ones(9), np.zeros(9)
+    clean = structure.advance(z, p, dp, row, one, none)
+    z = z.copy()
+    z[4] = np.nan
+    dirty = structure.advance(z, p, dp, row, one, none)
+    others = np.arange(9) != 4
+    np.testing.assert_array_equal(dirty.dz[others], clean.dz[others])
+    np.testing.assert_array_equal(dirty.index[others], clean.index[others])
+    assert np.isnan(dirty.dz[4]).all()
+    assert np.isnan(dirty.residual[4])
+
+
+def test_symmetries_map_residuals_to_residuals(structure):
+    """|F| is the same at the image, and the symmetry is an involution. 1e-12: round-off."""
+    z, p, _, _ = some_states(structure)
+    for symmetry in structure.symmetries():
+        image_z, image_p = symmetry.apply(z, p)
+        np.testing.assert_allclose(image_p, p * symmetry.signs, rtol=1e-15)
+        here = np.abs(structure.residual(z, p))
+        there = np.abs(structure.residual(image_z, image_p))
+        if isinstance(structure, Rod):
+            here[:, :-2] = here[:, :-2][:, ::-1]
+        np.testing.assert_allclose(there, here, atol=1e-12)
+        back_z, back_p = symmetry.apply(image_z, image_p)
+        np.testing.assert_allclose(back_z, z, atol=1e-14)
+        np.testing.assert_allclose(back_p, p, atol=1e-15)
+
+
+def test_only_a_symmetric_load_has_the_mirror():
+    assert [s.name for s in Rod("uniform").symmetries()] == ["mirror"]
+    assert Rod("left-half").symmetries() == ()
+    assert [s.name for s in Spring().symmetries()] == ["mirror"]
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        Rod(),
+        Rod("left-half", 0.7, elements=6, degree=5),
+        Rod([[0.0, 1.0], [0.3, 1.0], [0.3, 0.0], [1.0, 2.0]]),
+        Spring(2.0),
+    ],
+    ids=["default", "resolution", "table", "spring"],
+)
+def test_a_structure_is_rebuilt_from_its_identity(made):
+    """Bit for bit: the identity is data."""
+    again = from_identity(made.identity())
+    z, p, _, _ = some_states(made)
+    np.testing.assert_array_equal(again.residual(z, p), made.residual(z, p))
+    assert again.identity() == made.identity()
+
+
+@pytest.mark.parametrize(
+    ("identity", "text"),
+    [
+        ({"kind": "plate"}, "`kind` must be one of rod, spring; got 'plate'"),
+        ({}, "`kind` must be one of rod, spring; got None"),
+        ({"kind": "rod", "colour": "red"}, "`structure` must have the data of a rod"),
+    ],
+)
+def test_a_wrong_identity_is_refused(identity, text):
+    with pytest.raises(InputError, match=text):
+        from_identity(identity)
