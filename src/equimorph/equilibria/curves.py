@@ -1,7 +1,7 @@
 """Curves that the tracer follows: a path in parameter space, or a homotopy."""
 
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -15,21 +15,26 @@ MULTIPLIER_WEIGHT = 1e-2
 """Weight of the multipliers' squares in the norm of corrections (they are not in the metric)."""
 
 
+@runtime_checkable
 class Curve(Protocol):
     """One curve F(z, t) = 0 per lane, t the share of the way from start (0) to goal (1)."""
 
     @property
-    def structure(self) -> Structure: ...
+    def structure(self) -> Structure:
+        """The structure whose equilibria are followed."""
+
     @property
     def weight(self) -> Values:
         """Length of the curve's own part of the metric: dt counts as weight·dt."""
-        ...
 
-    def take(self, lanes: Int[np.ndarray, " some"]) -> Self: ...
-    def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]: ...
-    def advance(
-        self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values
-    ) -> Advance: ...
+    def take(self, lanes: Int[np.ndarray, " some"]) -> "Curve":
+        """Return some of the lanes."""
+
+    def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """p(t)."""
+
+    def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
+        """Newton step and tangent; see `Advance`."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ class ParameterLine:
 
     def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
         """p(t)."""
-        return self.start + t[:, None] * self.velocity
+        return np.asarray(self.start + t[:, None] * self.velocity)
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent; see `Advance`."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -135,7 +136,7 @@ def lift(
     corners = way_points(state.structure, state.p, to)
     pieces: list[_Segment] = []
     here = state
-    for number, (start, stop) in enumerate(zip(corners[:-1], corners[1:], strict=True)):
+    for number, (start, stop) in enumerate(pairwise(corners)):
         if np.array_equal(start, stop):
             continue
         piece = _segment(here, stop - start, number, tuple(within), options)

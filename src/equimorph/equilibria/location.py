@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.equilibria.curves import Curve, ParameterLine, correction_size, squared_length
-from equimorph.equilibria.tracing import Bracket, Front, step_along
+from equimorph.equilibria.fronts import Bracket, step_along
 
 Lanes = Float[np.ndarray, "lanes size"]
 Values = Float[np.ndarray, " lanes"]
@@ -82,9 +82,7 @@ def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:
 
 def _inside(curve: Curve, bracket: Bracket, z: Lanes, t: Values) -> Flags:
     """Whether points lie within the reach of their step: a guard against jumps."""
-    gap = squared_length(
-        curve.structure, curve.weight, z - bracket.before.z, t - bracket.before.t
-    )
+    gap = squared_length(curve.structure, curve.weight, z - bracket.before.z, t - bracket.before.t)
     return np.asarray(np.sqrt(gap) <= 1.3 * bracket.step + 1e-9)
 
 
@@ -200,7 +198,9 @@ def _arclength(curve: Curve, bracket: Bracket, z: Lanes, t: Values, share: Value
     dz, n = z - old.z, curve.structure.unknowns
     along = (dz[:, :n] * curve.structure.mass * old.tangent_z[:, :n]).sum(axis=1)
     along = along + curve.weight**2 * (t - old.t) * old.tangent_t
-    return np.where(np.isfinite(along), np.clip(along, 0.0, bracket.step), share * bracket.step)
+    return np.asarray(
+        np.where(np.isfinite(along), np.clip(along, 0.0, bracket.step), share * bracket.step)
+    )
 
 
 def locate_root(
@@ -212,7 +212,8 @@ def locate_root(
     """
     front, lanes = bracket.before, len(bracket.lanes)
     low, high = np.zeros(lanes), bracket.step.copy()
-    f_low = function(front.z, front.t)
+    # a start on the bound may exceed it by round-off: then it is itself the root
+    f_low = np.minimum(function(front.z, front.t), 0.0)
     f_high = function(bracket.after.z, bracket.after.t)
     flat = np.zeros_like(front.z)
     here, found = front, np.ones(lanes, bool)
@@ -221,10 +222,7 @@ def locate_root(
         at = np.clip((low * f_high - high * f_low) / (f_high - f_low), low, high)
         here, _, good = step_along(curve, front, at, flat)
         tiny = at < 1e-12
-        here = Front(*(
-            np.where(tiny[:, None] if x.ndim == 2 else tiny, x, y)
-            for x, y in zip(vars(front).values(), vars(here).values(), strict=True)
-        ))  # fmt: skip
+        here = here.updated(front, tiny)
         value = function(here.z, here.t)
         found = good | tiny
         same = np.sign(value) == np.sign(f_high)

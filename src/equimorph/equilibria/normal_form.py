@@ -58,4 +58,4 @@ def _null_vector(curve: ParameterLine, z: Lanes, t: Values) -> Lanes:
         rhs[:, 0, -1] = 1.0
         border = (b[:, None], b[:, None], np.zeros((len(z), 1, 1)))
         b = np.ascontiguousarray(structure.solve(z, p, rhs, border).x[:, 0, :-1])
-    return b / np.linalg.norm(b, axis=1, keepdims=True)
+    return np.asarray(b / np.linalg.norm(b, axis=1, keepdims=True))

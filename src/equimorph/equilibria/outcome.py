@@ -57,6 +57,10 @@ class Happenings:
     index: Int[np.ndarray, "events 2"]
     found: Bool[np.ndarray, " events"]
 
+    def take(self, events: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"]) -> "Happenings":
+        """Return some of the events."""
+        return Happenings(*(column[events] for column in vars(self).values()))
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -83,21 +87,21 @@ def follow(
     Of the events in the last step of a lane the first along the curve is its end.
     """
     options = options or TraceOptions()
-    lanes = len(z)
-    start = initial_front(curve, z, np.zeros(lanes))
+    start = initial_front(curve, z, np.zeros(len(z)))
     traces = trace(curve, start, constraints, options)
     bits = [FOLD, BRANCH, ARRIVAL, RETURN, CONSTRAINT]
     if not options.locate_passed:
-        bits = [bit for bit in bits if bit & _stops(options)]
+        bits = [bit for bit in bits if bit & options.stops]
     events = _locate_all(curve, traces.brackets, bits, constraints)
+    finer = options
+    while finer.retries and not events.found.all():
+        again, finer = np.unique(events.lanes[~events.found]), finer.finer()
+        retraced = trace(curve.take(again), start.take(again), constraints, finer).renamed(again)
+        traces = traces.without(again)
+        located = _locate_all(curve, retraced.brackets, bits, constraints)
+        events = _merged([events.take(~np.isin(events.lanes, again)), located])
+        traces.extend(retraced)
     return _settle(start, traces, events, options)
-
-
-def _stops(options: TraceOptions) -> int:
-    """Events that end a lane."""
-    stop = ARRIVAL | RETURN | CONSTRAINT
-    stop |= 0 if options.through_folds else FOLD
-    return stop | (0 if options.through_branch_points else BRANCH)
 
 
 def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
@@ -121,7 +125,9 @@ def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
     )
 
 
-def _locate(curve: Curve, bracket: Bracket, bit: int, constraints: tuple[Constraint, ...]) -> Located:
+def _locate(
+    curve: Curve, bracket: Bracket, bit: int, constraints: tuple[Constraint, ...]
+) -> Located:
     here = curve.take(bracket.lanes)
     if bit == FOLD:
         return locate_fold(here, bracket)
@@ -140,34 +146,42 @@ def _locate(curve: Curve, bracket: Bracket, bit: int, constraints: tuple[Constra
 def _locate_all(
     curve: Curve, brackets: list[Bracket], bits: list[int], constraints: tuple[Constraint, ...]
 ) -> Happenings:
-    size = curve.structure.size
-    rows: list[tuple[np.ndarray, ...]] = []
+    size, none = curve.structure.size, np.zeros(0, int)
+    nothing = Happenings(
+        none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
+        np.zeros((0, 2), int), np.zeros(0, bool),
+    )  # fmt: skip
+    parts = [nothing]
     for bit in bits:
         bracket = _join(brackets, bit)
         if bracket is None:
             continue
         place = _locate(curve, bracket, bit, constraints)
-        count = len(bracket.lanes)
-        rows.append((
-            bracket.lanes, np.full(count, bit), place.z, place.t,
-            bracket.travelled + place.step,
-            np.stack([bracket.before.index, bracket.after.index], 1), place.found,
-        ))  # fmt: skip
-    if not rows:
-        none = np.zeros(0, int)
-        return Happenings(none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
-                          np.zeros((0, 2), int), np.zeros(0, bool))  # fmt: skip
-    columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
-    order = np.lexsort((columns[4], columns[0]))
-    return Happenings(*(column[order] for column in columns))
+        parts.append(
+            Happenings(
+                bracket.lanes,
+                np.full(len(bracket.lanes), bit),
+                place.z,
+                place.t,
+                bracket.travelled + place.step,
+                np.stack([bracket.before.index, bracket.after.index], 1),
+                place.found,
+            )
+        )
+    return _merged(parts)
 
 
-def _settle(
-    start: Front, traces: Traces, events: Happenings, options: TraceOptions
-) -> Outcome:
+def _merged(parts: list[Happenings]) -> Happenings:
+    """All events, sorted by lane and then by arclength."""
+    columns = zip(*(vars(part).values() for part in parts), strict=True)
+    whole = Happenings(*(np.concatenate(column) for column in columns))
+    return whole.take(np.lexsort((whole.travelled, whole.lanes)))
+
+
+def _settle(start: Front, traces: Traces, events: Happenings, options: TraceOptions) -> Outcome:
     """Choose each lane's end: its first terminal event; lanes without one are lost."""
     lanes = len(start.t)
-    stop = _stops(options)
+    stop = options.stops
     terminal = np.flatnonzero(events.code & stop)
     first = terminal[np.unique(events.lanes[terminal], return_index=True)[1]]
     code, z, t = np.zeros(lanes, int), start.z.copy(), start.t.copy()
@@ -190,6 +204,4 @@ def _settle(
         lane = int(events.lanes[i])
         code[lane] = LOST
         why[lane] = f"a {KINDS[int(events.code[i])]} on the way could not be located"
-    keep = np.flatnonzero(passing)
-    passed = Happenings(*(column[keep] for column in vars(events).values()))
-    return Outcome(code, z, t, index, travelled, why, passed, traces)
+    return Outcome(code, z, t, index, travelled, why, events.take(passing), traces)

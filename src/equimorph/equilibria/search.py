@@ -52,7 +52,9 @@ def find_equilibria(
     p = np.tile(vector, (starts, 1))
     guesses = structure.sample(p, np.random.default_rng(seed))
     z, found = newton(structure, guesses, p)
-    more = _by_homotopy(structure, guesses[~found][: starts // 4], p[: (~found).sum()])
+    more = _by_homotopy(
+        structure, guesses[~found][: starts // 4], p[: int((~found).sum())][: starts // 4]
+    )
     pool = np.concatenate([z[found], more])
     pool = pool[_admissible(structure, pool, vector, within)]
     pool = _with_images(structure, pool[distinct(structure, pool)], vector)
@@ -73,7 +75,7 @@ def distinct(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
 
 def _by_homotopy(
     structure: Structure, guesses: Lanes, p: Float[np.ndarray, "lanes parameters"]
-) -> Lanes:
+) -> Float[np.ndarray, "found size"]:
     if len(guesses) == 0:
         return guesses
     p = p[: len(guesses)]
@@ -84,7 +86,7 @@ def _by_homotopy(
     outcome = follow(curve, guesses, (), options)
     arrived = outcome.code == ARRIVAL
     z, found = newton(structure, outcome.z[arrived], p[arrived], iterations=10)
-    return z[found]
+    return np.asarray(z[found])
 
 
 def _admissible(
@@ -102,7 +104,7 @@ def _admissible(
 
 def _with_images(
     structure: Structure, z: Lanes, vector: Float[np.ndarray, " parameters"]
-) -> Lanes:
+) -> Float[np.ndarray, "more size"]:
     p = np.tile(vector, (len(z), 1))
     images = [
         symmetry.apply(z, p)[0]

@@ -5,15 +5,44 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.curves import Curve, correction_size, dual, squared_length
+from equimorph.equilibria.curves import Curve
+from equimorph.equilibria.fronts import (
+    ARRIVAL,
+    BRANCH,
+    CONSTRAINT,
+    FOLD,
+    RETURN,
+    Bracket,
+    Front,
+    initial_front,
+    step_along,
+)
+from equimorph.equilibria.location import locate_branch_point
 from equimorph.model import Constraint
+
+__all__ = [
+    "ARRIVAL",
+    "BRANCH",
+    "CONSTRAINT",
+    "FOLD",
+    "RETURN",
+    "Bracket",
+    "Front",
+    "March",
+    "TraceOptions",
+    "Traces",
+    "init",
+    "initial_front",
+    "step",
+    "trace",
+]
 
 Lanes = Float[np.ndarray, "lanes size"]
 Values = Float[np.ndarray, " lanes"]
 Flags = Bool[np.ndarray, " lanes"]
 
-ACCEPTED = 1e-7
-"""Size of the last correction: Newton is quadratic, so the point itself is good to its square."""
+LEVEL = 1e-6
+"""Slope dt/ds of a start that counts as zero: it lies on a fold, and leads nowhere in t."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +51,8 @@ class TraceOptions:
 
     first_step, largest_step, smallest_step: lengths in the metric. turning: angle between
     tangents that the step control aims at, radians. steps: limit per lane. locate_passed: whether
-    folds and branch points that do not end a lane are located.
+    folds and branch points that do not end a lane are located. retries: how often lanes whose
+    events could not be located are traced again, each time with steps four times shorter.
     """
 
     through_folds: bool = False
@@ -34,45 +64,30 @@ class TraceOptions:
     steps: int = 2000
     record: bool = True
     locate_passed: bool = True
+    retries: int = 2
 
+    @property
+    def stops(self) -> int:
+        """Bits of the events that end a lane."""
+        stop = ARRIVAL | RETURN | CONSTRAINT
+        stop |= 0 if self.through_folds else FOLD
+        return stop | (0 if self.through_branch_points else BRANCH)
 
-@dataclass(frozen=True)
-class Front:
-    """Points on the curves with unit tangents: where each lane is now."""
+    @property
+    def locates_branch_points(self) -> bool:
+        """Whether branch points have to be located."""
+        return self.locate_passed or not self.through_branch_points
 
-    z: Lanes
-    t: Values
-    tangent_z: Lanes
-    tangent_t: Values
-    index: Int[np.ndarray, " lanes"]
-
-    def take(self, lanes: Int[np.ndarray, " some"] | Flags) -> "Front":
-        """Return some of the lanes."""
-        return Front(
-            self.z[lanes],
-            self.t[lanes],
-            self.tangent_z[lanes],
-            self.tangent_t[lanes],
-            self.index[lanes],
+    def finer(self) -> "TraceOptions":
+        """Return the options of a retry."""
+        return replace(
+            self,
+            first_step=self.first_step / 4,
+            largest_step=self.largest_step / 4,
+            turning=self.turning / 2,
+            steps=self.steps * 4,
+            retries=self.retries - 1,
         )
-
-
-@dataclass(frozen=True)
-class Bracket:
-    """Steps in which something happened: lane numbers, both ends, step lengths, arclength before.
-
-    what: bits of `ARRIVAL`, `RETURN`, `FOLD`, `BRANCH`, `CONSTRAINT`.
-    """
-
-    lanes: Int[np.ndarray, " some"]
-    before: Front
-    after: Front
-    step: Float[np.ndarray, " some"]
-    travelled: Float[np.ndarray, " some"]
-    what: Int[np.ndarray, " some"]
-
-
-ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT = 1, 2, 4, 8, 16
 
 
 @dataclass
@@ -82,65 +97,55 @@ class Traces:
     brackets: list[Bracket] = field(default_factory=list)
     lost: dict[int, tuple[str, Front]] = field(default_factory=dict)
     points: list[tuple[Int[np.ndarray, " some"], Values, Front]] = field(default_factory=list)
-    ended: dict[int, int] = field(default_factory=dict)
+
+    def extend(self, more: "Traces") -> None:
+        """Take up what another trace left."""
+        self.brackets.extend(more.brackets)
+        self.lost.update(more.lost)
+        self.points.extend(more.points)
+
+    def renamed(self, lanes: Int[np.ndarray, " lanes"]) -> "Traces":
+        """Return the same with lane i called ``lanes[i]``."""
+        return Traces(
+            [replace(bracket, lanes=lanes[bracket.lanes]) for bracket in self.brackets],
+            {int(lanes[lane]): entry for lane, entry in self.lost.items()},
+            [(lanes[names], travelled, front) for names, travelled, front in self.points],
+        )
+
+    def without(self, lanes: Int[np.ndarray, " some"]) -> "Traces":
+        """Return the same without some of the lanes."""
+        brackets = [b.take(np.flatnonzero(~np.isin(b.lanes, lanes))) for b in self.brackets]
+        kept = [(point, np.flatnonzero(~np.isin(point[0], lanes))) for point in self.points]
+        return Traces(
+            [bracket for bracket in brackets if len(bracket.lanes)],
+            {lane: entry for lane, entry in self.lost.items() if lane not in lanes},
+            [(names[at], travelled[at], front.take(at)) for (names, travelled, front), at in kept],
+        )
 
 
-def initial_front(curve: Curve, z: Lanes, t: Values) -> Front:
-    """Unit tangents at known points, pointing towards growing t."""
-    still = np.zeros_like(z)
-    one, none = np.ones(len(z)), np.zeros(len(z))
-    step = curve.advance(z, t, still, one, none)
-    return _unit(curve, Front(z + step.dz, t, step.tangent_z, step.tangent_t, step.index))
+@dataclass(frozen=True)
+class March:
+    """Lanes on their way: where they are, and the step that each tries next."""
 
+    lanes: Int[np.ndarray, " lanes"]
+    curve: Curve
+    front: Front
+    length: Values
+    travelled: Values
+    steps: Int[np.ndarray, " lanes"]
+    bend: Lanes
 
-def _unit(curve: Curve, front: Front) -> Front:
-    length = squared_length(curve.structure, curve.weight, front.tangent_z, front.tangent_t)
-    norm = np.sqrt(length)
-    return replace(
-        front, tangent_z=front.tangent_z / norm[:, None], tangent_t=front.tangent_t / norm
-    )
-
-
-def step_along(curve: Curve, front: Front, length: Values, bend: Lanes) -> tuple[Front, Values, Flags]:
-    """Go `length` along each curve: predict, correct, and tell the turning and the success.
-
-    The predictor adds ½ length² times the curvature estimate `bend` (dT/ds); the corrector is
-    Newton on the curve and the pseudo-arclength condition. A step counts only if the first
-    correction is below a quarter of its length and the tangents stay within acos 0.9.
-    """
-    structure, weight = curve.structure, curve.weight
-    row, corner = dual(structure, weight, front.tangent_z, front.tangent_t)
-    dz = length[:, None] * front.tangent_z + 0.5 * (length**2)[:, None] * bend
-    dt = length * front.tangent_t
-    out = Front(front.z + dz, front.t + dt, front.tangent_z.copy(), front.tangent_t.copy(),
-                front.index.copy())  # fmt: skip
-    todo, good = np.arange(len(length)), np.zeros(len(length), bool)
-    turning = np.full(len(length), np.pi)
-    last = np.full(len(length), np.inf)
-    for iteration in range(6):
-        here = curve.take(todo)
-        defect = np.einsum("li,li->l", row[todo], out.z[todo] - front.z[todo])
-        defect += corner[todo] * (out.t[todo] - front.t[todo]) - length[todo]
-        move = here.advance(out.z[todo], out.t[todo], row[todo], corner[todo], defect)
-        size = correction_size(structure, here.weight, move.dz, move.dt)
-        limit = 0.25 * length[todo] if iteration == 0 else 0.5 * last[todo]
-        alive = size <= np.maximum(limit, ACCEPTED)
-        out.z[todo[alive]] += move.dz[alive]
-        out.t[todo[alive]] += move.dt[alive]
-        last[todo] = size
-        done = alive & (size <= ACCEPTED)
-        ready = todo[done]
-        out.tangent_z[ready], out.tangent_t[ready] = move.tangent_z[done], move.tangent_t[done]
-        out.index[ready], good[ready] = move.index[done], True
-        todo = todo[alive & ~done]
-        if len(todo) == 0:
-            break
-    # row·tangent = 1 by construction, so the cosine of the turning is 1 over the new length
-    norm = np.sqrt(squared_length(structure, weight, out.tangent_z, out.tangent_t))
-    cosine = np.where(good, 1.0 / norm, -1.0)
-    turning = np.arccos(np.clip(cosine, -1.0, 1.0))
-    good &= cosine >= 0.9
-    return _unit(curve, out), turning, good
+    def take(self, keep: Int[np.ndarray, " some"]) -> "March":
+        """Return some of the lanes."""
+        return March(
+            self.lanes[keep],
+            self.curve.take(keep),
+            self.front.take(keep),
+            self.length[keep],
+            self.travelled[keep],
+            self.steps[keep],
+            self.bend[keep],
+        )
 
 
 @dataclass(frozen=True)
@@ -153,31 +158,53 @@ class _Step:
     what: Int[np.ndarray, " lanes"]
 
 
-def _attempt(
-    curve: Curve,
-    front: Front,
-    length: Values,
-    bend: Lanes,
-    constraints: tuple[Constraint, ...],
-) -> _Step:
-    after, turning, good = step_along(curve, front, length, bend)
-    flipped = np.sign(after.tangent_t) != np.sign(front.tangent_t)
-    changed = np.abs(after.index - front.index)
-    fold, branch = flipped & (changed == 1), ~flipped & (changed == 1)
-    what = np.where(fold, FOLD, 0) | np.where(branch, BRANCH, 0)
-    what |= np.where(after.t >= 1.0, ARRIVAL, 0) | np.where(after.t < 0.0, RETURN, 0)
-    good &= (changed <= 1) & (flipped == fold)
-    # a fold hides an arrival if t went beyond 1 (or below 0) and came back within the step
-    reach = front.t + front.tangent_t * length
-    hidden = np.where(front.tangent_t > 0.0, reach >= 1.0, reach <= 0.0)
-    good &= ~(fold & (hidden | (what > FOLD)))
-    if constraints and good.any():
-        lanes = np.flatnonzero(good)
-        z, p = after.z[lanes], curve.take(lanes).parameters(after.t[lanes])
-        for constraint in constraints:
-            violated = constraint.excess(z, p) > 0.0
-            what[lanes[violated]] |= CONSTRAINT
-    return _Step(after, turning, good, what)
+def init(curve: Curve, front: Front, options: TraceOptions) -> tuple[March, Traces]:
+    """Start the lanes that can start; singular starts are lost at once."""
+    count = len(front.z)
+    march = March(
+        np.arange(count),
+        curve,
+        front,
+        np.full(count, options.first_step),
+        np.zeros(count),
+        np.zeros(count, int),
+        np.zeros_like(front.z),
+    )
+    able = np.isfinite(front.tangent_z).all(axis=1) & (front.tangent_t > LEVEL)
+    why = "the start is singular: it lies on a fold or a branch point"
+    stuck = np.flatnonzero(~able)
+    lost = {int(lane): (why, front.take(np.array([lane]))) for lane in stuck}
+    return march.take(np.flatnonzero(able)), Traces(lost=lost)
+
+
+def step(
+    march: March, constraints: tuple[Constraint, ...], options: TraceOptions
+) -> tuple[March, Traces]:
+    """Attempt one step of every lane; return the lanes that go on, and what was learnt."""
+    tried = _attempt(march, constraints, options)
+    good, front, after = tried.good, march.front, tried.after
+    ended = good & ((tried.what & options.stops) != 0)
+    moved = good & ~ended
+    travelled = march.travelled + np.where(good, march.length, 0.0)
+    bend = (after.tangent_z - front.tangent_z) / march.length[:, None]
+    growth = np.clip(options.turning / np.maximum(tried.turning, 1e-3), 0.5, 2.0)
+    longer = np.minimum(march.length * growth, options.largest_step)
+    following = March(
+        march.lanes,
+        march.curve,
+        front.updated(after, moved),
+        np.where(good, longer, 0.4 * march.length),
+        travelled,
+        march.steps + 1,
+        np.where(good[:, None], bend, march.bend),
+    )
+    happened = np.flatnonzero(good & (tried.what != 0))
+    news = Traces(brackets=[_bracket(march, tried, happened)] if len(happened) else [])
+    if options.record and moved.any():
+        at = np.flatnonzero(moved)
+        news.points.append((march.lanes[at], travelled[at], after.take(at)))
+    given_up = _given_up(following, ended, options, news)
+    return following.take(np.flatnonzero(~ended & ~given_up)), news
 
 
 def trace(
@@ -192,66 +219,66 @@ def trace(
     afterwards (`location`), all of a kind at once.
     """
     options = options or TraceOptions()
-    traces = Traces()
-    lanes = np.arange(len(front.z))
-    length = np.full(len(lanes), options.first_step)
-    travelled, steps = np.zeros(len(lanes)), np.zeros(len(lanes), int)
-    bend = np.zeros_like(front.z)
-    broken = ~np.isfinite(front.tangent_z).all(axis=1)
-    for lane in np.flatnonzero(broken):
-        traces.lost[int(lane)] = ("the start is singular", front.take(np.array([lane])))
-    keep = np.flatnonzero(~broken)
-    stop = ARRIVAL | RETURN | CONSTRAINT
-    stop |= 0 if options.through_folds else FOLD
-    stop |= 0 if options.through_branch_points else BRANCH
-    whole = curve
-    curve, front, lanes = whole.take(keep), front.take(keep), lanes[keep]
-    length, travelled, steps, bend = length[keep], travelled[keep], steps[keep], bend[keep]
-    while len(lanes):
-        step = _attempt(curve, front, length, bend, constraints)
-        good = step.good
-        happened = good & (step.what != 0)
-        if happened.any():
-            traces.brackets.append(
-                Bracket(
-                    lanes[happened],
-                    front.take(happened),
-                    step.after.take(happened),
-                    length[happened],
-                    travelled[happened],
-                    step.what[happened],
-                )
-            )
-        ended = good & ((step.what & stop) != 0)
-        moved = good & ~ended
-        if options.record and moved.any():
-            at = np.flatnonzero(moved)
-            traces.points.append(
-                (lanes[at], travelled[at] + length[at], step.after.take(at))
-            )
-        steps += 1
-        travelled = travelled + np.where(good, length, 0.0)
-        bend = np.where(
-            good[:, None], (step.after.tangent_z - front.tangent_z) / length[:, None], bend
-        )
-        front = Front(*(
-            np.where(moved[:, None] if new.ndim == 2 else moved, new, old)
-            for new, old in (
-                (step.after.z, front.z),
-                (step.after.t, front.t),
-                (step.after.tangent_z, front.tangent_z),
-                (step.after.tangent_t, front.tangent_t),
-                (step.after.index, front.index),
-            )
-        ))  # fmt: skip
-        growth = np.clip(options.turning / np.maximum(step.turning, 1e-3), 0.5, 2.0)
-        length = np.where(good, np.minimum(length * growth, options.largest_step), 0.4 * length)
-        short, long = length < options.smallest_step, steps >= options.steps
-        for i in np.flatnonzero((short | long) & ~ended):
-            why = "the step became too small" if short[i] else f"no end in {options.steps} steps"
-            traces.lost[int(lanes[i])] = (why, front.take(np.array([i])))
-        keep = np.flatnonzero(~ended & ~short & ~long)
-        if len(keep) < len(lanes):
-            curve, front, lanes = curve.take(keep), front.take(keep), lanes[keep]
-            length, travelled, steps, bend = length[keep], travelled[keep], steps[keep], bend[keep]
+    march, traces = init(curve, front, options)
+    while len(march.lanes):
+        march, news = step(march, constraints, options)
+        traces.extend(news)
     return traces
+
+
+def _attempt(march: March, constraints: tuple[Constraint, ...], options: TraceOptions) -> _Step:
+    front, length = march.front, march.length
+    after, turning, good = step_along(march.curve, front, length, march.bend)
+    flipped = np.sign(after.tangent_t) != np.sign(front.tangent_t)
+    changed = np.abs(after.index - front.index)
+    fold, branch = flipped & (changed == 1), ~flipped & (changed == 1)
+    what = np.where(fold, FOLD, 0) | np.where(branch, BRANCH, 0)
+    what = what | np.where(after.t >= 1.0, ARRIVAL, 0) | np.where(after.t < 0.0, RETURN, 0)
+    good = good & (changed <= 1) & (flipped == fold)
+    # a fold hides an arrival if t went beyond 1 (or below 0) and came back within the step
+    reach = front.t + front.tangent_t * length
+    hidden = np.where(front.tangent_t > 0.0, reach >= 1.0, reach <= 0.0)
+    good = good & ~(fold & (hidden | (what > FOLD)))
+    if constraints and good.any():
+        lanes = np.flatnonzero(good)
+        z, p = after.z[lanes], march.curve.take(lanes).parameters(after.t[lanes])
+        for constraint in constraints:
+            violated = lanes[constraint.excess(z, p) > 0.0]
+            what[violated] = what[violated] | CONSTRAINT
+    tried = _Step(after, turning, good, what)
+    if options.locates_branch_points and (good & branch).any():
+        return replace(tried, good=good & _genuine(march, tried, branch))
+    return tried
+
+
+def _genuine(march: March, tried: _Step, branch: Flags) -> Flags:
+    """Whether a change of index without a fold has a branch point in the step.
+
+    If not, the step jumped to another branch, as it does past the narrow gap of a slightly
+    imperfect pitchfork: a shorter one will not.
+    """
+    at = np.flatnonzero(tried.good & branch)
+    genuine = np.ones(len(march.lanes), bool)
+    genuine[at] = locate_branch_point(march.curve.take(at), _bracket(march, tried, at)).found
+    return genuine
+
+
+def _bracket(march: March, tried: _Step, at: Int[np.ndarray, " some"]) -> Bracket:
+    return Bracket(
+        march.lanes[at],
+        march.front.take(at),
+        tried.after.take(at),
+        march.length[at],
+        march.travelled[at],
+        tried.what[at],
+    )
+
+
+def _given_up(march: March, ended: Flags, options: TraceOptions, news: Traces) -> Flags:
+    """Lanes whose step is too short or that took too many; noted as lost."""
+    short, long = march.length < options.smallest_step, march.steps >= options.steps
+    given_up = np.asarray((short | long) & ~ended)
+    for i in np.flatnonzero(given_up):
+        why = "the step became too small" if short[i] else f"no end in {options.steps} steps"
+        news.lost[int(march.lanes[i])] = (why, march.front.take(np.array([i])))
+    return given_up

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, overload
+from typing import Any, Literal, Protocol, overload, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -15,23 +15,33 @@ Evaluate = Callable[
 ]
 
 
+@runtime_checkable
 class OneState(Protocol):
     """What a descriptor needs of a single state."""
 
     @property
-    def z(self) -> Float[np.ndarray, " size"]: ...
+    def z(self) -> Float[np.ndarray, " size"]:
+        """Unknowns and multipliers."""
+
     @property
-    def p(self) -> Float[np.ndarray, " parameters"]: ...
+    def p(self) -> Float[np.ndarray, " parameters"]:
+        """All parameters."""
 
 
+@runtime_checkable
 class ManyStates(Protocol):
     """What a descriptor needs of a batch of states."""
 
     @property
-    def z(self) -> Float[np.ndarray, "lanes size"]: ...
+    def z(self) -> Float[np.ndarray, "lanes size"]:
+        """Unknowns and multipliers."""
+
     @property
-    def p(self) -> Float[np.ndarray, "lanes parameters"]: ...
-    def __len__(self) -> int: ...
+    def p(self) -> Float[np.ndarray, "lanes parameters"]:
+        """All parameters."""
+
+    def __len__(self) -> int:
+        """Return the number of states."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +57,11 @@ class Descriptor:
     function: Evaluate
     symbol: str = ""
 
+    # one and many states differ by the number of axes only, which static types do not see
     @overload
-    def __call__(self, states: ManyStates) -> Float[np.ndarray, " lanes"]: ...
+    def __call__(  # type: ignore[overload-overlap]
+        self, states: ManyStates
+    ) -> Float[np.ndarray, " lanes"]: ...
     @overload
     def __call__(self, states: OneState) -> float: ...
     def __call__(self, states: Any) -> Any:

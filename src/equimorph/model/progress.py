@@ -1,8 +1,9 @@
 """Progress sinks: passed into long computations, which never print by themselves."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
+@runtime_checkable
 class Progress(Protocol):
     """Receives how far a computation is."""
 

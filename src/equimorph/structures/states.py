@@ -30,7 +30,7 @@ class States:
         return (State(self.structure, z, p) for z, p in zip(self.z, self.p, strict=True))
 
     @overload
-    def __getitem__(self, key: int | np.integer[Any]) -> "State": ...
+    def __getitem__(self, key: int | np.int64) -> "State": ...
     @overload
     def __getitem__(self, key: str) -> Float[np.ndarray, " lanes"]: ...
     @overload
@@ -51,7 +51,8 @@ class States:
     @property
     def stable(self) -> "States":
         """The stable ones."""
-        return self[self.index == 0]
+        keep = self.index == 0
+        return States(self.structure, self.z[keep], self.p[keep])
 
     @cached_property
     def margin(self) -> Float[np.ndarray, " lanes"]:
@@ -66,12 +67,12 @@ class States:
     @property
     def multipliers(self) -> Float[np.ndarray, "lanes constraints"]:
         """Multipliers λ of the constraints: the supports' forces on a rod."""
-        return self.z[:, self.structure.unknowns :]
+        return np.asarray(self.z[:, self.structure.unknowns :])
 
     @cached_property
     def residual(self) -> Float[np.ndarray, " lanes"]:
         """Largest absolute entry of F."""
-        return np.abs(self.structure.residual(self.z, self.p)).max(axis=1)
+        return np.asarray(np.abs(self.structure.residual(self.z, self.p)).max(axis=1))
 
     @cached_property
     def error_estimate(self) -> Float[np.ndarray, " lanes"]:
@@ -136,7 +137,7 @@ class State:
     @property
     def multipliers(self) -> Float[np.ndarray, " constraints"]:
         """Multipliers λ of the constraints: the support's force on a rod."""
-        return self.batch.multipliers[0]
+        return np.asarray(self.batch.multipliers[0])
 
     @property
     def residual(self) -> float:
@@ -150,4 +151,4 @@ class State:
 
     def shape(self, s: Float[np.ndarray, " points"] | None = None) -> Float[np.ndarray, "points 2"]:
         """Coordinates to draw, in the structure's unit of length."""
-        return self.batch.shape(s)[0]
+        return np.asarray(self.batch.shape(s)[0])
