@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
 from types import ModuleType
 
 from jaxtyping import install_import_hook
@@ -22,5 +23,7 @@ class PlainCompiledModules(MetaPathFinder):
         return None
 
 
-install_import_hook("equimorph", "beartype.beartype")
+# whichever way pytest is started, `typecheck` and `oracles` are found beside this file
+sys.path.insert(0, str(Path(__file__).parent))
+install_import_hook("equimorph", "typecheck.check")
 sys.meta_path.insert(0, PlainCompiledModules())
