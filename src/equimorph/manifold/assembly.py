@@ -12,7 +12,6 @@ from equimorph.manifold.pins import pin
 from equimorph.manifold.points import CAP, CORNER, FOLD
 from equimorph.manifold.polygons import Loops, Polygon
 
-
 SAME_SIDE = 0.3
 """Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
 
@@ -124,10 +123,7 @@ def _continuous(pairing: Pairing, ways: list[list[Chord]]) -> list[list[Chord]]:
 def _split_chords(pairing: Pairing, plans: list[_Plan], cells: Cells) -> None:
     """Put an exact fold point on chords whose ends lie on one grid edge."""
     wanted = [
-        (plan, chord)
-        for plan in plans
-        for chord in plan.chords
-        if _same_edge(pairing, *chord)
+        (plan, chord) for plan in plans for chord in plan.chords if _same_edge(pairing, *chord)
     ]
     extra = _pinned(pairing, [chord for _, chord in wanted], [FOLD] * len(wanted))
     for (plan, chord), point in zip(wanted, extra, strict=True):
@@ -179,9 +175,7 @@ def _triangles(pairing: Pairing, piece: Piece) -> list[tuple[int, int, int]] | N
     return triangulate(piece, [_sides(pairing, point) for point in piece], place)
 
 
-def embedding(
-    pairing: Pairing, points: Int[np.ndarray, " n"]
-) -> Float[np.ndarray, "n dims"]:
+def embedding(pairing: Pairing, points: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n dims"]:
     """Configuration in the metric and scaled free parameters: Euclidean distances measure."""
     structure, free = pairing.setting.structure, pairing.setting.free
     u = pairing.points.z[points, : structure.unknowns] * np.sqrt(structure.mass)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 Piece = tuple[int, ...]
 Chord = tuple[int, int]
@@ -47,7 +47,7 @@ def _matchings(folds: list[int], arcs: list[int]) -> list[list[Chord]]:
     if len(folds) == 2:
         low, high = sorted(folds)
         return [[(low, high)]] if arcs[0] != arcs[1] else []
-    found = []
+    found: list[list[Chord]] = []
     count = len(folds)
     for k in range(count):
         after, before = (k + 1) % count, (k - 1) % count
@@ -90,31 +90,48 @@ def triangulate(
     count = len(corners)
     if count == 3:
         return [(corners[0], corners[1], corners[2])]
+    allowed = np.array([[not (a & b) for b in sides] for a in sides])
     gap = ((place[:, None] - place[None]) ** 2).sum(axis=2)
+    diagonal = np.where(allowed, gap, np.inf)
+    around = np.arange(count)
+    # the polygon's own sides cost nothing
+    diagonal[around, around - 1] = diagonal[around - 1, around] = 0.0
+    apex = _cheapest_apexes(diagonal)
+    return None if apex is None else [_named(corners, triple) for triple in _fan_out(apex)]
+
+
+def _cheapest_apexes(
+    diagonal: Float[np.ndarray, "corners corners"],
+) -> Int[np.ndarray, "corners corners"] | None:
+    """Corner k that completes the triangle on each chord (i, j), by dynamic programming.
+
+    ``cost(i, j) = diagonal(i, j) + min_k (cost(i, k) + cost(k, j))``, i < k < j.
+    """
+    count = len(diagonal)
     cost = np.full((count, count), np.inf)
-    choice = np.full((count, count), -1)
-
-    def allowed(i: int, j: int) -> bool:
-        return j - i == 1 or (i == 0 and j == count - 1) or not (sides[i] & sides[j])
-
-    for i in range(count - 1):
-        cost[i, i + 1] = 0.0
+    apex = np.full((count, count), -1)
+    cost[np.arange(count - 1), np.arange(1, count)] = 0.0
     for width in range(2, count):
         for i in range(count - width):
             j = i + width
-            if not allowed(i, j):
-                continue
-            for k in range(i + 1, j):
-                total = cost[i, k] + cost[k, j] + (gap[i, j] if width < count - 1 else 0.0)
-                if total < cost[i, j]:
-                    cost[i, j], choice[i, j] = total, k
-    if not np.isfinite(cost[0, count - 1]):
-        return None
-    triangles, todo = [], [(0, count - 1)]
+            ways = cost[i, i + 1 : j] + cost[i + 1 : j, j]
+            best = int(ways.argmin())
+            cost[i, j], apex[i, j] = ways[best] + diagonal[i, j], i + 1 + best
+    return apex if np.isfinite(cost[0, count - 1]) else None
+
+
+def _fan_out(apex: Int[np.ndarray, "corners corners"]) -> list[tuple[int, int, int]]:
+    """Places of the triangles' corners, from the triangle on the last side inwards."""
+    triangles, todo = [], [(0, len(apex) - 1)]
     while todo:
         i, j = todo.pop()
         if j - i >= 2:
-            k = int(choice[i, j])
-            triangles.append((corners[i], corners[k], corners[j]))
+            k = int(apex[i, j])
+            triangles.append((i, k, j))
             todo += [(i, k), (k, j)]
     return triangles
+
+
+def _named(corners: Piece, places: tuple[int, int, int]) -> tuple[int, int, int]:
+    i, k, j = places
+    return corners[i], corners[k], corners[j]

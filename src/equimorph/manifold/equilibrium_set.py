@@ -38,7 +38,7 @@ class Stratum:
 
 @dataclass(frozen=True)
 class Boundary:
-    """A boundary loop: vertices in order (the first repeated), on the box, a constraint, or both."""
+    """A boundary loop on the box, a constraint, or both: vertices in order, the first repeated."""
 
     vertices: Int[np.ndarray, " n"]
     kind: str

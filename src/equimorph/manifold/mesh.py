@@ -29,13 +29,13 @@ class BaseMesh:
         return int(np.argmax(np.minimum(np.minimum(u, v), 1.0 - u - v)))
 
 
-def _cross(a: Float[np.ndarray, "... 2"], b: Float[np.ndarray, "... 2"]) -> Float[np.ndarray, "..."]:
+def _cross(
+    a: Float[np.ndarray, "... 2"], b: Float[np.ndarray, "... 2"]
+) -> Float[np.ndarray, "..."]:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _lines(
-    low: float, high: float, count: int, mirrored: bool
-) -> Float[np.ndarray, " lines"]:
+def _lines(low: float, high: float, count: int, mirrored: bool) -> Float[np.ndarray, " lines"]:
     """Equidistant grid lines; one that would lie on the symmetry line 0 is moved off it.
 
     Edges along a line of symmetry run through pitchforks, which no generic set has.
@@ -50,9 +50,7 @@ def _lines(
 
 def grid_mesh(box: Box, intervals: tuple[int, int], mirrored: tuple[bool, bool]) -> BaseMesh:
     """Kuhn triangulation of a regular grid: every rectangle cut by its rising diagonal."""
-    axes = [
-        _lines(box.lower[k], box.upper[k], intervals[k], mirrored[k]) for k in range(2)
-    ]
+    axes = [_lines(box.lower[k], box.upper[k], intervals[k], mirrored[k]) for k in range(2)]
     first, second = np.meshgrid(*axes, indexing="ij")
     vertices = np.stack([first.ravel(), second.ravel()], axis=1)
     i, j = (x.ravel() for x in np.meshgrid(*map(np.arange, intervals), indexing="ij"))

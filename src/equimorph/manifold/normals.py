@@ -19,16 +19,14 @@ def existence_normals(
     z, p = points.z[folds], points.p[folds]
     phi = _null_vectors(setting, z, p)
     none = np.zeros_like(p)
-    bend = np.einsum(
-        "li,li->l", phi, structure.second_derivative(z, p, (phi, none), (phi, none))
-    )
+    bend = np.einsum("li,li->l", phi, structure.second_derivative(z, p, (phi, none), (phi, none)))
     slope = np.empty((len(folds), 2))
     for k in range(2):
         dp = np.zeros_like(p)
         dp[:, free[k]] = setting.scales[k]
         slope[:, k] = np.einsum("li,li->l", phi, structure.parameter_derivative(z, p, dp))
     normal = -slope * np.sign(bend)[:, None]
-    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
 
 
 def _null_vectors(
@@ -42,4 +40,4 @@ def _null_vectors(
         b = b / np.linalg.norm(b, axis=1, keepdims=True)
         border = (b[:, None], b[:, None], np.zeros((len(z), 1, 1)))
         b = np.ascontiguousarray(setting.structure.solve(z, p, rhs, border).x[:, 0, :-1])
-    return b / np.linalg.norm(b, axis=1, keepdims=True)
+    return np.asarray(b / np.linalg.norm(b, axis=1, keepdims=True))

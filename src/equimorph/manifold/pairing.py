@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import Outcome, follow
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN, Front
 from equimorph.manifold.directly import lift_directly
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.points import BETWEEN, CAP, Points
@@ -43,7 +43,7 @@ class Setting:
     @property
     def scales(self) -> Float[np.ndarray, " 2"]:
         """Scales of the free parameters."""
-        return self.structure.scales[self.free]
+        return np.asarray(self.structure.scales[self.free])
 
 
 @dataclass
@@ -217,26 +217,27 @@ def _round(
         direct.index[direct.good],
     )
     pairing.fit()
-    for point, edge, end in zip(points[done].tolist(), edges[done].tolist(), ids.tolist(), strict=True):
-        _enter(pairing, point, edge, end, [])
+    for point, edge, end in zip(points[done], edges[done], ids, strict=True):
+        _enter(pairing, int(point), int(edge), int(end), [])
     left = np.ones(len(points), bool)
     left[done] = False
     for effort in range(EFFORTS):
         lanes = np.flatnonzero(left & (np.maximum(pairing.effort[edges], 0) == effort))
         if len(lanes):
-            _trace_rays(pairing, points[lanes], edges[lanes], sides[lanes], line.take(lanes), effort)
+            some = (points[lanes], edges[lanes], sides[lanes])
+            _trace_rays(pairing, some, line.take(lanes), effort)
     for lane in np.flatnonzero(left & (pairing.effort[edges] >= EFFORTS)):
         pairing.set_ray(int(points[lane]), int(edges[lane]), ABANDONED)
 
 
 def _trace_rays(
     pairing: Pairing,
-    points: Int[np.ndarray, " n"],
-    edges: Int[np.ndarray, " n"],
-    sides: Int[np.ndarray, " n"],
+    rays: tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]],
     line: ParameterLine,
     effort: int,
 ) -> None:
+    """Lift rays (points, edges, sides) by pseudo-arclength; failures ask for a higher effort."""
+    points, edges, sides = rays
     finer = 0.35**effort
     options = TraceOptions(
         through_folds=True,
@@ -330,15 +331,15 @@ def _between(
 ) -> tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"], int, int]:
     """Recorded point of a lane nearest to the middle of an interval of its length."""
     middle = 0.5 * (span[0] + span[1])
-    best = None
+    best: tuple[float, Front, int] | None = None
     for lanes, travelled, front in outcome.traces.points:
         for k in np.flatnonzero((lanes == lane) & (travelled >= span[0]) & (travelled <= span[1])):
             if best is None or abs(travelled[k] - middle) < abs(best[0] - middle):
-                best = (travelled[k], front, int(k))
+                best = (float(travelled[k]), front, int(k))
     assert best is not None, "two folds in one step are refused by the tracer"
-    _, front, k = best
-    p = line.start[lane] + front.t[k] * line.velocity[lane]
-    return front.z[k], p, int(front.index[k]), BETWEEN
+    _, front, at = best
+    p = line.start[lane] + front.t[at] * line.velocity[lane]
+    return front.z[at], p, int(front.index[at]), BETWEEN
 
 
 def abandoned(pairing: Pairing) -> list[tuple[int, int]]:

@@ -84,7 +84,8 @@ def _trusted(
     def gap(a: tuple[Lanes, Lanes], b: tuple[Lanes, Lanes]) -> Values:
         n = setting.structure.unknowns
         square = (a[0] - b[0])[:, :n] ** 2 @ setting.structure.mass
-        return np.sqrt(square + (((a[1] - b[1]) / setting.structure.scales) ** 2).sum(axis=1))
+        by_scale = (a[1] - b[1]) / setting.structure.scales
+        return np.asarray(np.sqrt(square + (by_scale**2).sum(axis=1)))
 
     near = gap(found, middle) <= 3.0 * gap(end, middle) + 1e-3
     return np.asarray((size < 1e-8) & near)
@@ -92,7 +93,7 @@ def _trusted(
 
 def _difference(first: Lanes, second: Lanes) -> Lanes:
     b = first - second
-    return b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-300)
+    return np.asarray(b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-300))
 
 
 def _choose(which: Bool[np.ndarray, " lanes"], yes: _Condition, no: _Condition) -> _Condition:

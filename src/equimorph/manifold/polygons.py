@@ -113,9 +113,8 @@ def _across(
 
 def _around(pairing: Pairing, triangle: int) -> Iterator[Polygon | None]:
     """Polygons over one triangle; None where curves are missing or go around twice."""
-    mesh, points = pairing.mesh, pairing.points
-    corners, sides = mesh.triangles[triangle].tolist(), mesh.sides[triangle].tolist()
-    edges_at = {corners[k]: (sides[k], sides[(k + 2) % 3]) for k in range(3)}
+    points, edges_at = pairing.points, _edges_at(pairing, triangle)
+    corners = pairing.mesh.triangles[triangle].tolist()
     todo = {point for corner in corners for point in points.over(corner)}
     ends = [
         (point, edge)
@@ -135,16 +134,13 @@ def _walk(
     pairing: Pairing, triangle: int, point: int, came_by: int | None, todo: set[int]
 ) -> Polygon | None:
     """Follow curves from a point; from an exit if `came_by` names the edge that leads to it."""
-    mesh, points, curves = pairing.mesh, pairing.points, pairing.curves
-    corners, sides = mesh.triangles[triangle].tolist(), mesh.sides[triangle].tolist()
-    edges_at = {corners[k]: (sides[k], sides[(k + 2) % 3]) for k in range(3)}
+    points, curves, edges_at = pairing.points, pairing.curves, _edges_at(pairing, triangle)
     path: list[int] = []
     if came_by is not None:
         path.extend(reversed(curves.inner[pairing.ray(point, came_by)]))
     first, visited = point, []
-    edge = edges_at[int(points.vertex[point])][0] if came_by is None else _other(
-        edges_at[int(points.vertex[point])], came_by
-    )  # fmt: skip
+    here = edges_at[int(points.vertex[point])]
+    edge = here[0] if came_by is None else _other(here, came_by)
     while True:
         path.append(point)
         visited.append(point)
@@ -164,13 +160,29 @@ def _walk(
             return None
         point = following
         edge = _other(edges_at[int(points.vertex[point])], edge)
-    twice = len({int(points.vertex[p]) for p in visited}) < len(visited) and not any(
-        curves.inner.get(pairing.ray(p, e)) for p in visited for e in edges_at[int(points.vertex[p])]
+    return None if _twice(pairing, triangle, visited) else Polygon(triangle, tuple(path), False)
+
+
+def _edges_at(pairing: Pairing, triangle: int) -> dict[int, tuple[int, int]]:
+    """Return the two sides of a triangle that meet at each of its corners."""
+    mesh = pairing.mesh
+    corners, sides = mesh.triangles[triangle].tolist(), mesh.sides[triangle].tolist()
+    return {corners[k]: (sides[k], sides[(k + 2) % 3]) for k in range(3)}
+
+
+def _twice(pairing: Pairing, triangle: int, visited: list[int]) -> bool:
+    """Whether a loop without folds or exits passes over a corner more than once."""
+    vertices = [int(pairing.points.vertex[point]) for point in visited]
+    if len(set(vertices)) == len(vertices):
+        return False
+    edges_at = _edges_at(pairing, triangle)
+    curves = (
+        pairing.ray(point, edge)
+        for point, vertex in zip(visited, vertices, strict=True)
+        for edge in edges_at[vertex]
     )
-    return None if twice else Polygon(triangle, tuple(path), False)
+    return not any(pairing.curves.inner.get(curve) for curve in curves)
 
 
 def _other(pair: tuple[int, int], edge: int) -> int:
     return pair[1] if pair[0] == edge else pair[0]
-
-

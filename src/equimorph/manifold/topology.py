@@ -41,9 +41,7 @@ def surface(cells: Int[np.ndarray, "C 3"]) -> Surface:
     return Surface(edges, counts, inverse.reshape(-1, 3), neighbours, twice)
 
 
-def flags_of(
-    edges: Int[np.ndarray, "E 2"], chosen: set[tuple[int, int]]
-) -> Bool[np.ndarray, " E"]:
+def flags_of(edges: Int[np.ndarray, "E 2"], chosen: set[tuple[int, int]]) -> Bool[np.ndarray, " E"]:
     """Which of the edges are among the chosen pairs (low, high)."""
     if not chosen:
         return np.zeros(len(edges), bool)
@@ -72,7 +70,7 @@ def euler_characteristic(cells: Int[np.ndarray, "C 3"]) -> int:
 
 
 def chains(pairs: Pairs) -> list[Int[np.ndarray, " n"]]:
-    """Polylines along edges: split where other than two edges meet; closed ones repeat the start."""
+    """Polylines along edges, split where other than two meet; closed ones repeat the start."""
     if len(pairs) == 0:
         return []
     around: dict[int, list[int]] = {}
@@ -100,9 +98,7 @@ def chains(pairs: Pairs) -> list[Int[np.ndarray, " n"]]:
     return out
 
 
-def orientation(
-    cells: Int[np.ndarray, "C 3"], whole: Surface
-) -> tuple[Int[np.ndarray, " C"], int]:
+def orientation(cells: Int[np.ndarray, "C 3"], whole: Surface) -> tuple[Int[np.ndarray, " C"], int]:
     """Signs that orient all cells coherently, and the number of contradictions."""
     count = len(cells)
     a, b = whole.neighbours.T
@@ -131,6 +127,4 @@ def projected_area(
 ) -> Float[np.ndarray, " C"]:
     """Signed areas of the cells over the plane of the free parameters."""
     a, b, c = (coordinates[cells[:, k]] for k in range(3))
-    return np.asarray(
-        0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    )
+    return np.asarray(0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]))

@@ -126,9 +126,7 @@ def _neighbours(
         eset.mesh.triangles[np.isin(eset.mesh.triangles, eset.mesh.triangles[triangle]).any(axis=1)]
     )
     near = np.flatnonzero(allowed & np.isin(eset.grid_vertex, around))
-    source = States(
-        eset.structure, np.tile(end.z, (len(near), 1)), np.tile(end.p, (len(near), 1))
-    )
+    source = States(eset.structure, np.tile(end.z, (len(near), 1)), np.tile(end.p, (len(near), 1)))
     linked, length = _link(source, eset.points[near], constraints, margin)
     return near[linked], length[linked]
 
@@ -213,9 +211,7 @@ def _shortest(network: _Network, start: int, goal: int) -> Int[np.ndarray, " n"]
     return np.array(path[::-1])
 
 
-def _straightened(
-    states: States, constraints: tuple[Constraint, ...], margin: float
-) -> States:
+def _straightened(states: States, constraints: tuple[Constraint, ...], margin: float) -> States:
     """Corners of the shortest chain of straight lifts between any two states of a path.
 
     A path along edges of a mesh is some per cent too long; every pair of its states that a straight
@@ -247,6 +243,4 @@ def _no_route(
         return "start and goal lie on different stable components of the set"
     demands = [str(constraint) for constraint in constraints]
     demands += [f"margin >= {margin:g}"] if margin > 0 else []
-    return (
-        f"start and goal are connected by stable states, but not within {' and '.join(demands)}"
-    )
+    return f"start and goal are connected by stable states, but not within {' and '.join(demands)}"

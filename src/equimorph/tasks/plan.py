@@ -12,12 +12,11 @@ from equimorph.structures import State
 from equimorph.tasks.network import free_route
 from equimorph.tasks.route import Corners, Route, refused, verified
 
-
 RESERVES = (1.0, 1.02, 1.1)
-"""Factors on the demanded margin: a dip between the points that were watched needs a little more."""
+"""Factors on the demanded margin: dips between the points that are watched need a reserve."""
 
 
-def plan(
+def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
     eset: EquilibriumSet,
     start: State,
     goal: State,
@@ -59,15 +58,28 @@ def plan(
     if not margin >= 0.0:
         raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
     constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
-    for name, state in (("start", start), ("goal", goal)):
+    ends = {"start": start, "goal": goal}
+    for name, state in ends.items():
         _check_belongs(eset, name, state)
-    corners = _checked_corners(eset, start, goal, via)
-    for name, state in (("start", start), ("goal", goal)):
-        why = _violation(name, state, constraints, margin)
-        if why:
-            return refused(why, corners or [])
-    if via is not None:
-        return _kept(verified(start, goal, corners or [], constraints, monitor), margin)
+    corners = None if via is None else _checked_corners(eset, start, goal, via)
+    faults = [_violation(name, state, constraints, margin) for name, state in ends.items()]
+    why = next((fault for fault in faults if fault), None)
+    if why:
+        return refused(why, corners)
+    if corners is not None:
+        return _kept(verified(start, goal, corners, constraints, monitor), margin)
+    return _free(eset, (start, goal), constraints, margin, monitor)
+
+
+def _free(
+    eset: EquilibriumSet,
+    ends: tuple[State, State],
+    constraints: tuple[Constraint, ...],
+    margin: float,
+    monitor: Sequence[Descriptor],
+) -> Route:
+    """Return the shortest route found, searched with a growing reserve of margin."""
+    start, goal = ends
     for reserve in RESERVES:
         found = free_route(eset, start, goal, constraints, margin * reserve)
         if isinstance(found, str):
@@ -107,11 +119,9 @@ def _checked_corners(
     eset: EquilibriumSet,
     start: State,
     goal: State,
-    via: Sequence[Mapping[str, float]] | None,
-) -> Corners | None:
+    via: Sequence[Mapping[str, float]],
+) -> Corners:
     """Way-points with the goal's parameters appended if they do not end there."""
-    if via is None:
-        return None
     corners: Corners = [{name: float(value) for name, value in step.items()} for step in via]
     for step in corners:
         for name in step:
