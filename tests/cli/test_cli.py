@@ -172,7 +172,7 @@ def test_the_folder_of_another_study_is_kept(shell: Shell):
     assert shell("run", "two.toml", "--out", "out") == 2
     assert "results of another study" in shell.err
     assert {file.name: file.read_bytes() for file in Path("out").iterdir()} == before
-    assert shell("run", "two.toml", "--out", "out", "--fresh") == 0
+    assert shell("run", "two.toml", "--out", "out", "--replace") == 0
 
 
 @pytest.mark.parametrize("words", [[], ["run"], ["run", "--sideways", "x.toml"], ["fly"]])

@@ -77,10 +77,14 @@ def test_a_route_comes_back(spring_route: Route, back: Results):
 
 
 def test_a_refused_route_comes_back_with_its_reason(spring_set: EquilibriumSet, tmp_path: Path):
-    route = Route("refused", "no way around the fold", None, 0.0, 0.0, None, [])
+    route = Route("refused", "no way around the fold", [{"x_l": 1.2}])
     angle = spring_set.structure.descriptor("angle")
     path = write_results(tmp_path / "results.h5", spring_set, angle, {"over": route})
-    assert read_results(path).routes["over"] == route
+    back = read_results(path).routes["over"]
+    assert (back.status, back.why, back.way_points) == (route.status, route.why, route.way_points)
+    assert back.path is None
+    assert back.schedule is None
+    assert np.isnan(back.margin)
 
 
 def test_xarray_opens_every_group_with_named_dimensions(spring_set: EquilibriumSet, written: Path):

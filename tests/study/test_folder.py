@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from equimorph.errors import InputError
-from equimorph.study.folder import MANIFEST, open_results_folder, study_digest
+from equimorph.study.folder import MANIFEST, RESULTS, open_results_folder, study_digests
 from equimorph.study.problem import Study, parse_study
 
 
@@ -58,20 +58,31 @@ def test_another_study_is_refused_and_nothing_changes(study: Study, other: Study
     assert (tmp_path / MANIFEST).read_bytes() == before
 
 
-def test_fresh_replaces_another_study_but_not_foreign_files(
+def test_replacing_takes_another_study_but_not_foreign_files(
     study: Study, other: Study, tmp_path: Path
 ):
     open_results_folder(tmp_path, study).add_text("x.txt", "x")
     (tmp_path / "mine.txt").write_text("mine")
-    folder = open_results_folder(tmp_path, other, fresh=True)
+    folder = open_results_folder(tmp_path, other, replace=True)
     assert folder.files() == []
     assert sorted(file.name for file in tmp_path.iterdir()) == [MANIFEST, "mine.txt"]
 
 
-def test_fresh_does_not_take_a_folder_that_was_never_ours(study: Study, tmp_path: Path):
+def test_replacing_keeps_the_set_that_both_studies_ask_for(
+    study: Study, other: Study, spring_text: str, tmp_path: Path
+):
+    another_set = parse_study(spring_text.replace("1.3]", "1.4]"), "spring.toml")
+    first = open_results_folder(tmp_path, study)
+    first.add_text(RESULTS, "a set")
+    first.add_text("x.txt", "x")
+    assert open_results_folder(tmp_path, other, replace=True).files() == [RESULTS]
+    assert open_results_folder(tmp_path, another_set, replace=True).files() == []
+
+
+def test_replacing_does_not_take_a_folder_that_was_never_ours(study: Study, tmp_path: Path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match="with other files"):
-        open_results_folder(tmp_path, study, fresh=True)
+        open_results_folder(tmp_path, study, replace=True)
     assert [file.name for file in tmp_path.iterdir()] == ["mine.txt"]
 
 
@@ -99,7 +110,7 @@ def test_a_place_below_a_file_is_refused(study: Study, tmp_path: Path):
 def test_a_manifest_that_is_not_understood_is_refused(content: str, study: Study, tmp_path: Path):
     (tmp_path / MANIFEST).write_text(content)
     with pytest.raises(InputError, match="damaged or newer"):
-        open_results_folder(tmp_path, study, fresh=True)
+        open_results_folder(tmp_path, study, replace=True)
     assert (tmp_path / MANIFEST).read_text() == content
 
 
@@ -110,11 +121,11 @@ def test_a_manifest_never_reaches_out_of_the_folder(study: Study, tmp_path: Path
     manifest = json.loads((inner / MANIFEST).read_text())
     (inner / MANIFEST).write_text(json.dumps({**manifest, "files": ["../mine.txt"]}))
     with pytest.raises(InputError, match="damaged or newer"):
-        open_results_folder(inner, study, fresh=True)
+        open_results_folder(inner, study, replace=True)
     assert (tmp_path / "mine.txt").exists()
 
 
 def test_comments_and_title_do_not_make_another_study(spring_text: str):
     plain = parse_study(spring_text, "a.toml")
     titled = parse_study('title = "T" # why\n' + spring_text, "b.toml")
-    assert study_digest(plain) == study_digest(titled)
+    assert study_digests(plain) == study_digests(titled)

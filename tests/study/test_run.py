@@ -128,6 +128,19 @@ def test_running_again_reads_the_set_of_the_first_run(
 
 
 @pytest.mark.usefixtures("plain_figures")
+def test_an_edited_study_takes_over_the_set_but_not_the_routes(
+    finished: tuple[Outcome, Path], spring_text: str, tmp_path: Path
+):
+    out = tmp_path / "out"
+    shutil.copytree(finished[1], out)
+    (tmp_path / "edited.toml").write_text(spring_text[: spring_text.index("[[route]]")])
+    edited = run_study(tmp_path / "edited.toml", out, replace=True)
+    assert edited.reused
+    assert read_results(out / "results.h5").routes == {}
+    assert not list(out.glob("over-*"))
+
+
+@pytest.mark.usefixtures("plain_figures")
 def test_a_damaged_earlier_set_is_computed_again(
     finished: tuple[Outcome, Path], spring_file: Path, tmp_path: Path
 ):

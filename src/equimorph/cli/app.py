@@ -88,14 +88,14 @@ def run(
     out: Annotated[
         Path | None, typer.Option(help="Results folder; results/NAME unless given.")
     ] = None,
-    fresh: Annotated[
-        bool, typer.Option("--fresh", help="Replace what an earlier run left in the folder.")
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Replace the results of another study there.")
     ] = False,
 ) -> None:
     """Run a study: equilibrium set, equilibria, routes, figures, schedules, report."""
     from equimorph.cli.show import run_and_show
 
-    run_and_show(file, out or Path("results") / file.stem, fresh=fresh)
+    run_and_show(file, out or Path("results") / file.stem, replace=replace)
 
 
 def _count(number: int, word: str) -> str:

@@ -13,7 +13,7 @@ from equimorph.structures import States
 from equimorph.study import Outcome, RouteOutcome, run_study
 
 
-def run_and_show(file: Path, out: Path, *, fresh: bool) -> None:
+def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
     """Run a study with progress on stderr, then print its answers.
 
     Parameters
@@ -22,14 +22,14 @@ def run_and_show(file: Path, out: Path, *, fresh: bool) -> None:
         Study file.
     out
         Results folder.
-    fresh
-        Replace what an earlier run left there.
+    replace
+        Replace the results of another study there.
     """
     screen = Console(highlight=False)
     if not _kernels_are_cached():
         screen.print("The first run compiles the kernels: a minute, and only once.")
     with ScreenProgress() as progress:
-        outcome = run_study(file, out, fresh=fresh, progress=progress)
+        outcome = run_study(file, out, replace=replace, progress=progress)
     _show(outcome, screen)
     screen.print(f"Report: {out / 'index.html'}", soft_wrap=True)
 

@@ -1,7 +1,5 @@
 """A route as an HDF5 group: its path, its events, its schedule or the reason of its refusal."""
 
-from typing import Any
-
 import h5py
 import numpy as np
 
@@ -16,7 +14,10 @@ ABOUT, EVENTS, SCHEDULE = "about", "events", "schedule"
 
 def write(group: h5py.Group, route: Route) -> None:
     """Write a route into an empty group."""
-    put_json(group, ABOUT, _about(route))
+    words = {"status": route.status, "why": route.why, "way_points": route.way_points}
+    put_json(group, ABOUT, words)
+    # Attributes, because a refused route has none of them and JSON knows no NaN.
+    group.attrs.update(margin=route.margin, length=route.length)
     if route.path is not None:
         _write_path(group, route.path)
     if route.schedule is not None:
@@ -26,20 +27,12 @@ def write(group: h5py.Group, route: Route) -> None:
 def read(group: h5py.Group, structure: Structure) -> Route:
     """Read what `write` wrote."""
     return Route(
+        margin=float(group.attrs["margin"]),
+        length=float(group.attrs["length"]),
         path=_read_path(group, structure) if "z" in group else None,
         schedule=_read_schedule(group[SCHEDULE]) if SCHEDULE in group else None,
         **get_json(group, ABOUT),
     )
-
-
-def _about(route: Route) -> dict[str, Any]:
-    return {
-        "status": route.status,
-        "why": route.why,
-        "margin": route.margin,
-        "length": route.length,
-        "way_points": route.way_points,
-    }
 
 
 def _write_path(group: h5py.Group, path: Path) -> None:

@@ -1,7 +1,7 @@
 """The results folder of a study: ours alone, never half-written, never someone else's.
 
-A manifest lists the study and every file that was put there. Files are made in a hidden staging
-folder and moved when complete; a file that the manifest does not list is never touched.
+A manifest names the study and lists every file that was put there. Files are made in a hidden
+staging folder and moved when complete; a file that the manifest does not list is never touched.
 """
 
 import hashlib
@@ -20,6 +20,7 @@ from equimorph.storage.files import write_text
 from equimorph.study.problem import Study
 
 MANIFEST = "equimorph.json"
+RESULTS = "results.h5"
 FORMAT = "equimorph results folder"
 VERSION = 1
 _STAGING = ".partial-"
@@ -34,11 +35,11 @@ class ResultsFolder:
     path
         Where it is.
     study
-        Digest of the study whose results it holds.
+        Digests of the study whose results it holds.
     """
 
     path: Path
-    study: str
+    study: dict[str, str]
 
     @contextmanager
     def adding(self) -> Generator[Path]:
@@ -86,7 +87,7 @@ class ResultsFolder:
             file.replace(self.path / file.name)
 
 
-def open_results_folder(path: Path, study: Study, *, fresh: bool = False) -> ResultsFolder:
+def open_results_folder(path: Path, study: Study, *, replace: bool = False) -> ResultsFolder:
     """Make a results folder, or open the one that an earlier run of the same study left.
 
     Parameters
@@ -95,31 +96,39 @@ def open_results_folder(path: Path, study: Study, *, fresh: bool = False) -> Res
         Where it is or shall be.
     study
         The study to be run.
-    fresh
-        Remove what an earlier run of any study left there; other files stay.
+    replace
+        Take over a folder with the results of another study: its files are removed, except the
+        equilibrium set if both studies ask for the same one. Files of others stay.
 
     Raises
     ------
     InputError
         If `path` cannot be a folder or be written, or holds other files or another study's results.
     """
-    folder = ResultsFolder(path, study_digest(study))
+    folder = ResultsFolder(path, study_digests(study))
     with _writable(path):
         path.mkdir(parents=True, exist_ok=True)
         manifest = _read_manifest(path)
-        if fresh and manifest:
-            _clear(path, manifest)
-            manifest = {"study": folder.study, "files": []}
+        if replace and manifest:
+            manifest = _cleared(path, manifest, folder.study)
         _check_owner(path, manifest, folder.study)
         _write_manifest(path, folder.study, manifest.get("files", []))
     return folder
 
 
-def study_digest(study: Study) -> str:
-    """Fingerprint of what a study asks for; comments, order of keys and title do not count."""
-    content = study.model_dump(mode="json", by_alias=True, exclude={"title"})
-    words = json.dumps({**content, "version": version("equimorph")}, sort_keys=True)
-    return hashlib.sha256(words.encode()).hexdigest()
+def study_digests(study: Study) -> dict[str, str]:
+    """Fingerprints of what a study asks for, as a whole and of its set.
+
+    Comments, the order of keys and the title do not count.
+    """
+    whole = study.model_dump(mode="json", by_alias=True, exclude={"title"})
+    whole["version"] = version("equimorph")
+    part = {key: whole[key] for key in ("structure", "set", "version")}
+    return {"study": _digest(whole), "set": _digest(part)}
+
+
+def _digest(content: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 @contextmanager
@@ -133,26 +142,29 @@ def _writable(path: Path) -> Generator[None]:
         ) from error
 
 
-def _check_owner(path: Path, manifest: dict[str, Any], study: str) -> None:
+def _check_owner(path: Path, manifest: dict[str, Any], study: dict[str, str]) -> None:
     if not manifest and any(not file.name.startswith(_STAGING) for file in path.iterdir()):
         raise InputError(
             f"`results folder` must be empty or hold earlier results of this study; got {path} "
             "with other files. Choose another one with --out."
         )
-    if manifest and manifest.get("study") != study:
+    if manifest and manifest["study"] != study:
         raise InputError(
             f"`results folder` must be empty or hold earlier results of this study; got {path} "
-            "with the results of another study, another version of this one, or another release. "
-            "Choose another one with --out, or replace them with --fresh."
+            "with the results of another study, or of another version of this one. "
+            "Choose another one with --out, or replace them with --replace."
         )
 
 
-def _clear(path: Path, manifest: dict[str, Any]) -> None:
-    for name in manifest["files"]:
+def _cleared(path: Path, manifest: dict[str, Any], study: dict[str, str]) -> dict[str, Any]:
+    """Remove what does not belong to a study; the manifest of what is left."""
+    same_set = manifest["study"].get("set") == study["set"]
+    kept = [name for name in manifest["files"] if same_set and name == RESULTS]
+    for name in set(manifest["files"]) - set(kept):
         (path / name).unlink(missing_ok=True)
     for staging in path.glob(f"{_STAGING}*"):
         shutil.rmtree(staging, ignore_errors=True)
-    (path / MANIFEST).unlink()
+    return {"study": study, "files": kept}
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
@@ -166,6 +178,7 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     try:
         manifest = json.loads(file.read_text(encoding="utf-8"))
         sound = manifest["format"] == FORMAT and manifest["version"] <= VERSION
+        sound = sound and isinstance(manifest["study"], dict)
         sound = sound and all(Path(name).name == name for name in manifest["files"])
     except (ValueError, KeyError, TypeError):
         sound = False
@@ -177,6 +190,6 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     return dict(manifest)
 
 
-def _write_manifest(path: Path, study: str, files: list[str]) -> None:
+def _write_manifest(path: Path, study: dict[str, str], files: list[str]) -> None:
     manifest = {"format": FORMAT, "version": VERSION, "study": study, "files": files}
     write_text(path / MANIFEST, json.dumps(manifest, indent=2) + "\n")

@@ -26,7 +26,7 @@ class RouteOutcome:
     @property
     def arrived(self) -> bool:
         """Whether there is a route."""
-        return self.route.status == "arrived"
+        return self.route.arrived
 
 
 @dataclass(frozen=True)

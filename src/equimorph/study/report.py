@@ -5,7 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from equimorph.model import Descriptor
 from equimorph.structures import States
@@ -106,7 +106,8 @@ def _equilibria(
     if not len(states):
         return [heading, "<p>None within the constraints.</p>"]
     # Leading with what a reader looks for: the highest first.
-    states = states[np.argsort(-descriptors[0](states))]
+    order: Int[np.ndarray, " lanes"] = np.argsort(-descriptors[0](states))
+    states = states[order]
     shapes = states.shape()
     box = np.stack([shapes.min(axis=(0, 1)) - ROOM, shapes.max(axis=(0, 1)) + ROOM])
     columns = [_numbers(each(states)) for each in descriptors]
@@ -132,7 +133,12 @@ def _set(outcome: Outcome, folder: Path) -> list[str]:
     audit = outcome.equilibrium_set.audit
     word = "clean" if audit.clean else "not clean: do not rely on the set where it says so"
     pictures = [
-        _still(folder, figures.SURFACE, "The equilibrium set, coloured by index, with its folds."),
+        html.figure(
+            folder / f"{figures.SURFACE}.png",
+            "The equilibrium set, coloured by index, with its folds.",
+            larger=f"{figures.SURFACE}.svg",
+            wide=True,
+        ),
         _still(folder, figures.PLANE, "Number of equilibria over the free parameters."),
         _still(folder, figures.STABLE_PLANE, "Number of stable equilibria."),
     ]

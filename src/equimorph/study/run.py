@@ -4,6 +4,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
@@ -11,26 +12,25 @@ from equimorph.model import Progress, Silent
 from equimorph.storage import read_results, write_results, write_schedule
 from equimorph.study.choose import choose_state
 from equimorph.study.figures import draw_figures
-from equimorph.study.folder import ResultsFolder, open_results_folder
+from equimorph.study.folder import RESULTS, ResultsFolder, open_results_folder
 from equimorph.study.outcome import Outcome, RouteOutcome
 from equimorph.study.prepare import Problem, Task, at_key, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
 from equimorph.study.report import report
 from equimorph.tasks import plan
 
-RESULTS = "results.h5"
 INPUT_COPY = "study.toml"
 REPORT = "index.html"
 FIGURE_SECONDS = "figures"
 
 
 def run_study(
-    path: Path, out: Path, *, fresh: bool = False, progress: Progress | None = None
+    path: Path, out: Path, *, replace: bool = False, progress: Progress | None = None
 ) -> Outcome:
     """Run a study file into a results folder.
 
-    Everything is stored as soon as it is known. A set that an earlier run of the same study left
-    in the folder is read instead of computed.
+    Everything is stored as soon as it is known. A set that an earlier run left in the folder is
+    read instead of computed, if it was asked for in the same words.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def run_study(
         The study file.
     out
         The results folder; made if it does not exist.
-    fresh
-        Remove what an earlier run left in the folder, also one of another study.
+    replace
+        Replace the results of another study, or of an earlier version of this one.
     progress
         Told how far the run is.
 
@@ -57,7 +57,7 @@ def run_study(
     text = read_study_text(path)
     study = parse_study(text, path.name)
     problem = prepare(study)
-    folder = open_results_folder(out, study, fresh=fresh)
+    folder = open_results_folder(out, study, replace=replace)
     folder.add_text(INPUT_COPY, text)
     outcome = solve(study, problem, folder, sink)
     with _timed(outcome.seconds, FIGURE_SECONDS), folder.adding() as staging:
@@ -89,10 +89,9 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
     for i, task in enumerate(problem.tasks):
         progress.report("routes", i, len(problem.tasks))
         with _timed(seconds, f"route {task.section.name}"):
-            routes.append(_route(eset, task))
-    if routes:
-        progress.report("routes", len(routes), len(routes))
-        _store_routes(eset, problem, routes, folder)
+            routes.append(_route(eset, problem, task))
+    progress.report("routes", len(routes), len(routes))
+    _store_routes(eset, problem, routes, folder)
     return Outcome(study, problem, eset, points, tuple(routes), reused, seconds)
 
 
@@ -106,9 +105,9 @@ def _equilibrium_set(
         except InputError:
             # A damaged file of ours is no loss: the set is computed again and replaces it.
             pass
-    options = {}
-    if study.equilibrium_set.intervals is not None:
-        options["intervals"] = tuple(study.equilibrium_set.intervals)
+    # What the study leaves out takes the library's default.
+    intervals = study.equilibrium_set.intervals
+    options: dict[str, Any] = {} if intervals is None else {"intervals": tuple(intervals)}
     with at_key("set"):
         eset = equilibrium_set(
             problem.structure,
@@ -123,13 +122,19 @@ def _equilibrium_set(
     return eset, False
 
 
-def _route(eset: EquilibriumSet, task: Task) -> RouteOutcome:
+def _route(eset: EquilibriumSet, problem: Problem, task: Task) -> RouteOutcome:
     section = task.section
     start = choose_state(eset, section.start, f"{task.key}.start")
     goal = choose_state(eset, section.goal, f"{task.key}.goal")
     with at_key(task.key):
         route = plan(
-            eset, start, goal, via=section.via, within=task.constraints, margin=section.margin
+            eset,
+            start,
+            goal,
+            via=section.via,
+            within=task.constraints,
+            margin=section.margin,
+            monitor=[problem.height],
         )
     return RouteOutcome(task, start, goal, route)
 
