@@ -13,7 +13,7 @@ from equimorph.errors import InputError
 from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, run_study
 
-FIGURES = ["surface", "parameter-plane", "stable-plane", "over-plane", "over-shapes"]
+FIGURES = ["surface", "stable-plane", "over-plane", "over-shapes"]
 
 
 class Recorder:
@@ -138,6 +138,7 @@ def test_an_edited_study_takes_over_the_set_but_not_the_routes(
     assert edited.reused
     assert read_results(out / "results.h5").routes == {}
     assert not list(out.glob("over-*"))
+    assert (out / "parameter-plane.png").is_file()
 
 
 @pytest.mark.usefixtures("plain_figures")

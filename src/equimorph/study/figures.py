@@ -63,9 +63,11 @@ def _drawings(outcome: Outcome) -> dict[str, Callable[[], Axes]]:
     first = arrived[0].route if arrived else None
     drawings: dict[str, Callable[[], Axes]] = {
         SURFACE: partial(plotting.surface, eset, outcome.problem.height, route=first),
-        PLANE: partial(plotting.parameter_plane, eset),
         STABLE_PLANE: partial(plotting.parameter_plane, eset, count="stable"),
     }
+    # With routes, each of them is shown on this plane; once more without it would say nothing new.
+    if not outcome.routes:
+        drawings[PLANE] = partial(plotting.parameter_plane, eset)
     for each in outcome.routes:
         drawings |= _drawings_of_route(outcome, each)
     return drawings

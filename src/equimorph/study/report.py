@@ -139,9 +139,11 @@ def _set(outcome: Outcome, folder: Path) -> list[str]:
             larger=f"{figures.SURFACE}.svg",
             wide=True,
         ),
-        _still(folder, figures.PLANE, "Number of equilibria over the free parameters."),
         _still(folder, figures.STABLE_PLANE, "Number of stable equilibria."),
     ]
+    if not outcome.routes:
+        caption = "Number of equilibria over the free parameters."
+        pictures.append(_still(folder, figures.PLANE, caption))
     rows = [[escape(what), escape(value)] for what, value in audit.rows()]
     return [
         "<h2>Equilibrium set</h2>",
