@@ -1,6 +1,7 @@
 """A results folder is never half-written and never takes what is not ours."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,19 @@ def test_nothing_arrives_when_the_block_fails(study: Study, tmp_path: Path):
     with pytest.raises(KeyError):
         add_half()
     assert [file.name for file in folder.path.iterdir()] == [MANIFEST]
+
+
+def test_what_a_killed_run_left_is_swept_away_but_not_what_a_living_one_makes(
+    study: Study, tmp_path: Path
+):
+    folder = open_results_folder(tmp_path, study)
+    left = tmp_path / ".partial-left"
+    left.mkdir()
+    os.utime(left, (0, 0))
+    with folder.adding() as living:
+        open_results_folder(tmp_path, study)
+        assert living.is_dir()
+    assert not left.exists()
 
 
 def test_the_same_study_may_come_back_and_replace_its_files(study: Study, tmp_path: Path):

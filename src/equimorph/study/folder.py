@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from time import time
 from typing import Any
 
 from equimorph.errors import InputError
@@ -24,6 +25,8 @@ RESULTS = "results.h5"
 FORMAT = "equimorph results folder"
 VERSION = 1
 _STAGING = ".partial-"
+_ABANDONED = 3600.0
+"""Age in seconds after which a staging folder is taken for one of a killed run."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,7 @@ def open_results_folder(path: Path, study: Study, *, replace: bool = False) -> R
         if replace and manifest:
             manifest = _cleared(path, manifest, folder.study)
         _check_owner(path, manifest, folder.study)
+        _sweep(path)
         _write_manifest(path, folder.study, manifest.get("files", []))
     return folder
 
@@ -162,9 +166,14 @@ def _cleared(path: Path, manifest: dict[str, Any], study: dict[str, str]) -> dic
     kept = [name for name in manifest["files"] if same_set and name == RESULTS]
     for name in set(manifest["files"]) - set(kept):
         (path / name).unlink(missing_ok=True)
-    for staging in path.glob(f"{_STAGING}*"):
-        shutil.rmtree(staging, ignore_errors=True)
     return {"study": study, "files": kept}
+
+
+def _sweep(path: Path) -> None:
+    """Remove staging folders of runs that were killed; living ones are seconds old."""
+    for staging in path.glob(f"{_STAGING}*"):
+        if time() - staging.stat().st_mtime > _ABANDONED:
+            shutil.rmtree(staging, ignore_errors=True)
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
