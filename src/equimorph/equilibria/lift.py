@@ -17,6 +17,9 @@ from equimorph.structures import State, States, Structure
 
 Waypoint = Mapping[str, float]
 
+ON_BOUND = 1e-9
+"""Relative excess up to which a start counts as on a bound: an earlier lift may end there."""
+
 
 @dataclass(frozen=True)
 class Event:
@@ -147,6 +150,10 @@ def lift(
     return _joined(state, pieces)
 
 
+def _size(constraint: Constraint) -> float:
+    return max(1.0, abs(constraint.bound))
+
+
 def check_start(state: State, within: Sequence[Constraint] = ()) -> None:
     """Raise `InputError` unless `state` is an equilibrium that obeys the constraints."""
     if not state.residual < 1e-8:
@@ -155,7 +162,7 @@ def check_start(state: State, within: Sequence[Constraint] = ()) -> None:
             f"got a residual of {state.residual:.2g}."
         )
     for constraint in within:
-        if not constraint.holds(state.batch)[0]:
+        if constraint.excess(state.z[None], state.p[None])[0] > ON_BOUND * _size(constraint):
             value = constraint.descriptor(state)
             raise InputError(
                 f"`state` must obey {constraint}; got {constraint.descriptor.name} = {value:.6g}."

@@ -231,14 +231,19 @@ def _attempt(march: March, constraints: tuple[Constraint, ...], options: TraceOp
     after, turning, good = step_along(march.curve, front, length, march.bend)
     flipped = np.sign(after.tangent_t) != np.sign(front.tangent_t)
     changed = np.abs(after.index - front.index)
-    fold, branch = flipped & (changed == 1), ~flipped & (changed == 1)
+    # at a fold the path turns and the index changes; at a branch point one without the other
+    fold, branch = flipped & (changed == 1), flipped ^ (changed == 1)
     what = np.where(fold, FOLD, 0) | np.where(branch, BRANCH, 0)
     what = what | np.where(after.t >= 1.0, ARRIVAL, 0) | np.where(after.t < 0.0, RETURN, 0)
-    good = good & (changed <= 1) & (flipped == fold)
-    # a fold hides an arrival if t went beyond 1 (or below 0) and came back within the step
+    good = good & (changed <= 1)
+    if not options.locates_branch_points:
+        good = good & (flipped == fold)
+    # a turn hides an arrival if t went beyond 1 (or below 0) and came back within the step;
+    # a step this short cannot go beyond by more than round-off
     reach = front.t + front.tangent_t * length
     hidden = np.where(front.tangent_t > 0.0, reach >= 1.0, reach <= 0.0)
-    good = good & ~(fold & (hidden | (what > FOLD)))
+    hidden = (hidden | ((what & (ARRIVAL | RETURN)) != 0)) & (length > 10 * options.smallest_step)
+    good = good & ~(flipped & hidden)
     if constraints and good.any():
         lanes = np.flatnonzero(good)
         z, p = after.z[lanes], march.curve.take(lanes).parameters(after.t[lanes])
@@ -252,10 +257,10 @@ def _attempt(march: March, constraints: tuple[Constraint, ...], options: TraceOp
 
 
 def _genuine(march: March, tried: _Step, branch: Flags) -> Flags:
-    """Whether a change of index without a fold has a branch point in the step.
+    """Whether a change of index or direction without a fold has a branch point in the step.
 
     If not, the step jumped to another branch, as it does past the narrow gap of a slightly
-    imperfect pitchfork: a shorter one will not.
+    imperfect pitchfork, or passed two folds: a shorter one will not.
     """
     at = np.flatnonzero(tried.good & branch)
     genuine = np.ones(len(march.lanes), bool)

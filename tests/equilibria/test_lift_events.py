@@ -1,0 +1,180 @@
+"""Events of lifts on normal forms whose branches are known in closed form [Seydel2010]_."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import equimorph as em
+from oracles.polynomial import (
+    bead_on_a_circle,
+    fold_form,
+    pitchfork_form,
+    slaved,
+    transcritical_form,
+)
+
+factors = st.floats(0.1, 10.0)
+starts = st.floats(0.1, 2.0)
+stiff = st.floats(0.5, 4.0)
+slopes = st.floats(-1.5, 1.5)
+QUICK = settings(max_examples=15, deadline=None, derandomize=True)
+
+
+@QUICK
+@given(c=factors, a=starts, below=starts)
+def test_fold_is_where_the_discriminant_vanishes(c, a, below):
+    """x² = a ends at (0, 0). Tolerance: the augmented system is solved to round-off."""
+    path = em.lift(fold_form(c).state(np.sqrt(a), a=a), {"a": -below})
+    assert path.end.kind == "fold"
+    assert path.end.state.z[0] == pytest.approx(0.0, abs=1e-10)
+    assert path.end.state["a"] == pytest.approx(0.0, abs=1e-12)
+    assert path.end.at == pytest.approx(a / (a + below), rel=1e-9)
+    assert (path.index == 0).all()
+
+
+@QUICK
+@given(c=factors, a=starts, k=stiff, m=slopes)
+def test_path_through_a_fold_returns_on_the_other_branch(c, a, k, m):
+    """x = −√a with index 1 is met back at the start's parameters."""
+    form = slaved(fold_form(c), k, m)
+    path = em.lift(form.state(np.sqrt(a), m * a, a=a), {"a": -1.0}, through_folds=True)
+    assert [event.kind for event in path.events] == ["fold", "returned"]
+    assert path.end.state.z == pytest.approx([-np.sqrt(a), m * a], rel=1e-9, abs=1e-9)
+    assert path.end.state.index == 1
+    assert path.events[0].state["a"] == pytest.approx(0.0, abs=1e-11)
+
+
+@QUICK
+@given(sign=st.sampled_from([1.0, -1.0]), c=factors, a=starts, k=stiff, m=slopes)
+def test_pitchfork_is_located_and_classified(sign, c, a, k, m):
+    """±x³ = a x loses stability at a = 0; a slaved unknown changes nothing."""
+    form = slaved(pitchfork_form(sign, c), k, m)
+    end = em.lift(form.state(0.0, 0.0, a=-a), {"a": 1.3}).end
+    assert (end.kind, end.criticality) == (
+        "branch point",
+        "supercritical" if sign > 0 else "subcritical",
+    )
+    assert end.state["a"] == pytest.approx(0.0, abs=1e-11)
+    assert end.state.z == pytest.approx([0.0, 0.0], abs=1e-10)
+
+
+@QUICK
+@given(c=factors, a=starts, k=stiff, m=slopes)
+def test_transcritical_point_is_located_and_classified(c, a, k, m):
+    """x (x − a) = 0: the branches x = 0 and x = a exchange stability at a = 0."""
+    form = slaved(transcritical_form(c), k, m)
+    for start in (form.state(0.0, 0.0, a=-a), form.state(a, m * a**2, a=a)):
+        end = em.lift(start, {"a": -1.7 * start["a"]}).end
+        assert (end.kind, end.criticality) == ("branch point", "transcritical")
+        assert end.state["a"] == pytest.approx(0.0, abs=1e-11)
+
+
+@QUICK
+@given(sign=st.sampled_from([1.0, -1.0]), power=st.floats(-8.0, -1.0), c=factors)
+def test_imperfect_pitchfork_is_never_taken_for_a_perfect_one(sign, power, c):
+    """±x³ − a x = b, b > 0: no event if supercritical; else a fold at a = −3 (b/2)^⅔.
+
+    Tolerances: 1e-9 relative to the unfolding's own size.
+    """
+    b = 10.0**power
+    form = pitchfork_form(sign, c)
+    roots = np.roots([sign, 0.0, 1.0, -b])
+    x = float(roots[np.argmin(np.abs(roots))].real)
+    path = em.lift(form.state(x, a=-1.0, b=b), {"a": 1.0})
+    if sign > 0:
+        assert path.arrived
+        assert (path.index == 0).all()
+        assert path.end.state.z[0] > 1.0
+    else:
+        assert path.end.kind == "fold"
+        assert path.end.state["a"] == pytest.approx(-3 * (b / 2) ** (2 / 3), rel=1e-9)
+        assert path.end.state.z[0] == pytest.approx((b / 2) ** (1 / 3), rel=1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_side_branch_of_a_pitchfork_ends_at_the_branch_point(side):
+    """x = ±√a of x³ = a x leads into (0, 0), where the paths cross."""
+    end = em.lift(pitchfork_form(1.0).state(side, a=1.0), {"a": -1.0}).end
+    assert (end.kind, end.criticality) == ("branch point", "supercritical")
+    assert end.state["a"] == pytest.approx(0.0, abs=1e-11)
+    assert end.state.z[0] == pytest.approx(0.0, abs=1e-10)
+
+
+def test_through_folds_means_through_branch_points_too():
+    """The straight branch is followed across, with its index on either side."""
+    path = em.lift(pitchfork_form(1.0).state(0.0, a=-1.0), {"a": 1.0}, through_folds=True)
+    assert [event.kind for event in path.events] == ["branch point", "arrived"]
+    assert path.end.state.z[0] == pytest.approx(0.0, abs=1e-12)
+    assert path.end.state.index == 1
+
+
+@QUICK
+@given(h=st.floats(0.001, 0.95))
+def test_constrained_bead_folds_on_the_astroid(h):
+    """[StonerWohlfarth1948]_: |h|^⅔ + |g|^⅔ = 1; the multiplier is part of the state."""
+    bead = bead_on_a_circle()
+    upright = bead.state(0.0, 1.0, 1.0, g=1.0)
+    assert upright.residual < 1e-15
+    assert upright.index == 0
+    leaning = em.lift(upright, {"h": h}).end.state
+    end = em.lift(leaning, {"g": -2.0}).end
+    assert end.kind == "fold"
+    assert end.state["g"] == pytest.approx(-((1 - h ** (2 / 3)) ** 1.5), rel=1e-10, abs=1e-12)
+    assert end.state.z[0] == pytest.approx(h ** (1 / 3), rel=1e-9)
+
+
+def test_constrained_bead_without_side_load_meets_a_subcritical_pitchfork():
+    """Reduced energy ½ sin²φ − g cos φ = −φ⁴/8 + … at g = −1."""
+    end = em.lift(bead_on_a_circle().state(0.0, 1.0, 1.0, g=1.0), {"g": -2.0}).end
+    assert (end.kind, end.criticality) == ("branch point", "subcritical")
+    assert end.state["g"] == pytest.approx(-1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-13, 1e-10, 1e-6, -1e-13, -1e-10, -1e-6])
+def test_goal_at_a_fold_is_reached_or_missed_by_its_offset(offset):
+    """The goal a = offset: inside the range (≥ 0) it is reached, outside the fold ends the lift.
+
+    Within 1e-12 of the fold either answer is right, and both are the same state.
+    """
+    end = em.lift(fold_form().state(1.0, a=1.0), {"a": offset}).end
+    allowed = (
+        {"arrived"} if offset > 1e-12 else {"fold"} if offset < -1e-12 else {"arrived", "fold"}
+    )
+    assert end.kind in allowed
+    assert end.state["a"] == pytest.approx(max(offset, 0.0), abs=1e-12)
+    assert end.state.z[0] == pytest.approx(np.sqrt(max(offset, 0.0)), abs=2e-6)
+
+
+@pytest.mark.parametrize("offset", [1e-12, 1e-9, 1e-3, -1e-12, -1e-9, -1e-3])
+def test_goal_near_a_branch_point_is_reached_or_missed_by_its_offset(offset):
+    end = em.lift(pitchfork_form(1.0).state(0.0, a=-1.0), {"a": offset}).end
+    assert end.kind == ("arrived" if offset < 0 else "branch point") or abs(offset) < 1e-11
+    assert end.state["a"] == pytest.approx(min(offset, 0.0), abs=2e-12)
+
+
+@pytest.mark.parametrize("goal", [1.0, -1.0])
+def test_critical_states_are_refused_as_starts_by_name(goal):
+    """From a fold or a branch point no direction is distinguished."""
+    fold = em.lift(fold_form().state(1.0, a=1.0), {"a": -1.0}).end.state
+    branch = em.lift(pitchfork_form(1.0).state(0.0, a=-1.0), {"a": 1.0}).end.state
+    for state in (fold, branch):
+        end = em.lift(state, {"a": goal}).end
+        assert end.kind == "lost"
+        assert "singular" in end.detail
+        assert end.at == 0.0
+
+
+def test_fold_and_constraint_in_one_step_end_at_the_first():
+    """x² = a falling: x ≥ 0.1 is violated before the fold, x ≥ −0.1 after it."""
+    form = fold_form()
+    x = form.descriptor("0")
+    start = form.state(1.0, a=1.0)
+    before = em.lift(start, {"a": -1.0}, within=[x >= 0.1])
+    assert (before.end.kind, before.end.detail) == ("constraint", "u0 >= 0.1")
+    assert before.end.state["a"] == pytest.approx(0.01, rel=1e-10)
+    after = em.lift(start, {"a": -1.0}, within=[x >= -0.1])
+    assert after.end.kind == "fold"
+    through = em.lift(start, {"a": -1.0}, within=[x >= -0.1], through_folds=True)
+    assert [event.kind for event in through.events] == ["fold", "constraint"]
+    assert through.end.state.z[0] == pytest.approx(-0.1, rel=1e-10)

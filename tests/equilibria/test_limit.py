@@ -1,0 +1,77 @@
+"""Limit loads: each kind of end, on structures where it is known."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.errors import InputError
+from oracles.polynomial import fold_form, pitchfork_form
+
+
+@pytest.fixture(scope="module")
+def arch():
+    return em.Rod()
+
+
+def test_fold_ends_a_rising_load():
+    """Spring at x_l = 0.5: F = (1 − 0.5^⅔)^{3/2}."""
+    found = em.limit_load(em.Spring().natural_state(x_l=0.5), "F")
+    assert (found.kind, found.criticality) == ("fold", None)
+    assert found.value == pytest.approx((1 - 0.5 ** (2 / 3)) ** 1.5, rel=1e-12)
+    assert found.path.states["F"].max() == found.value
+    assert found.state["F"] == found.value
+
+
+@pytest.mark.parametrize(("sign", "word"), [(1.0, "supercritical"), (-1.0, "subcritical")])
+def test_branch_point_ends_a_rising_load_and_tells_its_criticality(sign, word):
+    found = em.limit_load(pitchfork_form(sign).state(0.0, a=-1.0), "a")
+    assert (found.kind, found.criticality) == ("branch point", word)
+    assert found.value == pytest.approx(0.0, abs=1e-12)
+
+
+def test_constraint_ends_a_rising_load_and_is_named():
+    form = fold_form()
+    x = form.descriptor("0")
+    found = em.limit_load(form.state(1.0, a=1.0), "a", within=[x <= 3.0])
+    assert (found.kind, found.detail) == ("constraint", "u0 <= 3")
+    assert found.value == pytest.approx(9.0, rel=1e-11)
+
+
+def test_load_without_limit_is_followed_to_the_bound():
+    found = em.limit_load(fold_form().state(1.0, a=1.0), "a", bound=5.0)
+    assert found.kind == "none below the bound"
+    assert found.value == 5.0
+
+
+def test_constraint_that_fails_unloaded_leaves_the_limit_undefined(arch):
+    rest = arch.natural_state(Theta=0.66, Delta=1.36)
+    found = em.limit_load(rest, "q", within=[arch.max_curvature <= 10.0])
+    assert (found.kind, found.detail) == ("undefined unloaded", "max_curvature <= 10")
+    assert np.isnan(found.value)
+    assert found.path is None
+
+
+def test_limit_is_the_largest_load_met_when_the_path_cannot_go_on(arch):
+    """A lost path has no limit: its value is NaN, its cause is named."""
+    rest = arch.natural_state(Theta=0.9)
+    found = em.limit_load(rest, "q", options=em.TraceOptions(steps=2))
+    assert (found.kind, found.detail) == ("lost", "no end in 2 steps")
+    assert np.isnan(found.value)
+
+
+def test_bound_below_the_present_load_is_refused(arch):
+    rest = arch.natural_state(Theta=0.9)
+    for bound in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match=r"`bound` must exceed q = 0; got"):
+            em.limit_load(rest, "q", bound=bound)
+
+
+def test_unstable_start_is_refused():
+    unstable = fold_form().state(-1.0, a=1.0)
+    with pytest.raises(InputError, match="`state` must be stable; got index 1"):
+        em.limit_load(unstable, "a")
+
+
+def test_unknown_load_is_refused(arch):
+    with pytest.raises(InputError, match=r"`Q` must be a parameter \(Theta, Delta, q, nu\)"):
+        em.limit_load(arch.natural_state(Theta=0.9), "Q")

@@ -1,0 +1,101 @@
+"""All equilibria at given parameters."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import equimorph as em
+from equimorph.equilibria import distinct, newton
+from equimorph.errors import InputError
+from oracles.polynomial import Polynomial, pitchfork_form
+
+QUICK = settings(max_examples=10, deadline=None, derandomize=True)
+AT = {"Theta": 1.0, "Delta": 0.0, "q": 2.5}
+
+
+@pytest.fixture(scope="module")
+def arch():
+    return em.Rod(elements=6, degree=6)
+
+
+@QUICK
+@given(a=st.floats(0.5, 2.0), b=st.floats(-0.1, 0.1), sign=st.sampled_from([1.0, -1.0]))
+def test_all_roots_of_a_cubic_are_found(a, b, sign):
+    """±x³ − a x = b: as many states as `numpy.roots` has real roots, sorted by energy."""
+    found = em.find_equilibria(pitchfork_form(sign), {"a": sign * a, "b": sign * b}, starts=40)
+    roots = np.roots([1.0, 0.0, -a, -b])
+    assert sorted(found.z[:, 0]) == pytest.approx(sorted(roots.real), abs=1e-9)
+    assert (np.diff(found.energy) >= 0).all()
+    assert (found.residual < 1e-10).all()
+
+
+def test_equilibria_of_a_plane_lattice_are_counted_with_their_indices():
+    """E = Σ (x⁴/4 − x²/2) over two unknowns: nine states, indices 0, 1, 2 as 4, 4, 1."""
+    plane = Polynomial(
+        lambda x, y, a: (x**4 + y**4) * 0.25 - (x**2 + y**2) * 0.5 + a * 0.0, 2, ("a",)
+    )
+    found = em.find_equilibria(plane, {}, starts=200)
+    assert np.bincount(found.index).tolist() == [4, 4, 1]
+    assert found.z[found.index == 2] == pytest.approx(np.zeros((1, 2)), abs=1e-9)
+
+
+def test_same_seed_finds_the_same_states_in_the_same_order(arch):
+    first = em.find_equilibria(arch, AT, within=[arch.max_curvature <= 20], starts=120, seed=3)
+    again = em.find_equilibria(arch, AT, within=[arch.max_curvature <= 20], starts=120, seed=3)
+    assert np.array_equal(first.z, again.z)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_every_seed_finds_the_five_states_of_the_arch(arch, seed):
+    """PHYSICS §5. The mirror completes pairs, so that heights come in equal pairs."""
+    found = em.find_equilibria(arch, AT, within=[arch.max_curvature <= 20], seed=seed)
+    assert sorted(found.index) == [0, 0, 1, 1, 2]
+    assert (np.diff(found.energy) > -1e-12).all()
+
+
+def test_mirror_images_are_states_too(arch):
+    found = em.find_equilibria(arch, AT, within=[arch.max_curvature <= 40], starts=150)
+    z, p = arch.symmetries()[0].apply(found.z, found.p)
+    images = em.States(arch, z, p)
+    assert (images.residual < 1e-9).all()
+    assert len(distinct(arch, np.concatenate([found.z, z]))) == len(found)
+
+
+def test_nothing_outside_the_constraints_is_returned(arch):
+    wide = em.find_equilibria(arch, AT, within=[arch.max_curvature <= 20])
+    narrow = em.find_equilibria(
+        arch, AT, within=[arch.max_curvature <= 8, arch.height(0.5) >= 0.06]
+    )
+    kept = (arch.max_curvature(wide) <= 8) & (arch.height(0.5)(wide) >= 0.06)
+    assert 0 < len(narrow) == kept.sum() < len(wide)
+    assert np.allclose(narrow.energy, wide.energy[kept], rtol=1e-10)
+
+
+def test_no_equilibrium_is_an_answer():
+    """x² = a < 0 has none."""
+    empty = em.find_equilibria(
+        Polynomial(lambda x, a: x**3 * (1 / 3) - a * x, 1, ("a",)), {"a": -1.0}, starts=20
+    )
+    assert len(empty) == 0
+
+
+@pytest.mark.parametrize(
+    ("at", "message"),
+    [
+        ({"Theta": 1.0, "theta": 1.0}, "`theta` must be a parameter"),
+        ({"Delta": 0.0}, "`Theta` must be given; got no value"),
+        ({"Theta": 1.0, "nu": 1.2}, "`nu` must be a finite number between 0 and 1"),
+    ],
+)
+def test_parameters_without_meaning_are_refused(arch, at, message):
+    with pytest.raises(InputError, match=message):
+        em.find_equilibria(arch, at)
+
+
+def test_newton_reports_lanes_without_root_and_keeps_the_others():
+    """x² = a: the lane with a < 0 has no root, and does not spoil the lane with a > 0."""
+    form = Polynomial(lambda x, a: x**3 * (1 / 3) - a * x, 1, ("a",))
+    z, found = newton(form, np.array([[3.0], [3.0]]), np.array([[4.0], [-1.0]]))
+    assert found.tolist() == [True, False]
+    assert z[0, 0] == pytest.approx(2.0, rel=1e-14)

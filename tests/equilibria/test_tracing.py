@@ -1,0 +1,94 @@
+"""The marching of many lanes."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.equilibria import ParameterLine, TraceOptions, follow
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, FOLD, init, initial_front, step
+from oracles.polynomial import fold_form, pitchfork_form
+
+
+def lines(structure, z, start, stop):
+    start, stop = np.array(start, float), np.array(stop, float)
+    return ParameterLine(structure, start, stop - start), np.array(z, float)
+
+
+def test_tangents_point_towards_growing_t_and_have_unit_length():
+    """x² = a: dx/da = 1/(2x); metric |dx|² + |da|²."""
+    curve, z = lines(fold_form(), [[1.0], [-2.0]], [[1.0], [4.0]], [[0.0], [6.0]])
+    front = initial_front(curve, z, np.zeros(2))
+    assert (front.tangent_t > 0).all()
+    slope = np.array([-1.0, 2.0])
+    assert front.tangent_z[:, 0] / front.tangent_t == pytest.approx(slope / (2 * z[:, 0]))
+    length = front.tangent_z[:, 0] ** 2 + (slope * front.tangent_t) ** 2
+    assert length == pytest.approx(np.ones(2), rel=1e-14)
+    assert front.index.tolist() == [0, 1]
+
+
+def test_a_branch_can_be_walked_with_for():
+    """`step` is pure: the march it is given stays as it was."""
+    curve, z = lines(fold_form(), [[1.0]], [[1.0]], [[4.0]])
+    options = TraceOptions()
+    march, news = init(curve, initial_front(curve, z, np.zeros(1)), options)
+    assert not news.lost
+    x = [float(march.front.z[0, 0])]
+    for _ in range(50):
+        before = march
+        march, _ = step(before, (), options)
+        assert before.front.z[0, 0] == x[-1]
+        if len(march.lanes) == 0:
+            break
+        x.append(float(march.front.z[0, 0]))
+    assert len(march.lanes) == 0
+    assert (np.diff(x) > 0).all()
+    assert x[-1] < 2.0
+
+
+def test_lanes_do_not_influence_each_other():
+    """Six lanes together end as each of them alone: arrivals, a fold, a branch point."""
+    arch = em.Rod(elements=6, degree=6)
+    rest = [arch.natural_state(Theta=T, Delta=D) for T, D in ((0.9, 0), (0.9, 0.02), (1.2, 0.3))]
+    z = np.array([state.z for state in rest] * 2)
+    start = np.array([state.p for state in rest] * 2)
+    velocity = np.zeros_like(start)
+    velocity[:3, 2], velocity[3:, 2] = 8.0, 1.0
+    whole = follow(ParameterLine(arch, start, velocity), z)
+    assert whole.code.tolist() == [BRANCH, FOLD, FOLD, ARRIVAL, ARRIVAL, ARRIVAL]
+    for i in range(6):
+        alone = follow(ParameterLine(arch, start[i : i + 1], velocity[i : i + 1]), z[i : i + 1])
+        assert alone.code[0] == whole.code[i]
+        assert np.abs(alone.z[0] - whole.z[i]).max() < 1e-12
+        assert alone.t[0] == pytest.approx(whole.t[i], rel=1e-13)
+
+
+def test_one_lost_lane_does_not_sink_the_batch():
+    """The second lane starts at a fold, where nothing leads on."""
+    curve, z = lines(fold_form(), [[1.0], [0.0]], [[1.0], [0.0]], [[4.0], [1.0]])
+    outcome = follow(curve, z)
+    assert outcome.code.tolist() == [ARRIVAL, 0]
+    assert "singular" in outcome.why[1]
+    assert outcome.z[0, 0] == pytest.approx(2.0, rel=1e-14)
+
+
+def test_recorded_points_keep_the_names_of_their_lanes():
+    curve, z = lines(pitchfork_form(1.0), [[0.0], [1.0]], [[-1.0, 0], [1, 0]], [[1.0, 0], [4, 0]])
+    outcome = follow(curve, z)
+    assert outcome.code.tolist() == [BRANCH, ARRIVAL]
+    for lanes, travelled, front in outcome.traces.points:
+        assert len(lanes) == len(travelled) == len(front.t)
+        assert front.z[lanes == 0] == pytest.approx(0.0, abs=1e-14)
+        assert (front.z[lanes == 1] >= 1.0).all()
+
+
+def test_length_of_a_path_is_its_length_in_the_metric():
+    """Straight branch x = 0: |da| = 2. Curved: x² = a from 1 to 4, by elliptic-free quadrature.
+
+    Tolerance: chords of steps ≤ 0.02 miss the arc by their square.
+    """
+    form = fold_form()
+    path = em.lift(form.state(1.0, a=1.0), {"a": 4.0}, options=TraceOptions(largest_step=0.02))
+    x, w = np.polynomial.legendre.leggauss(30)
+    x = 1.5 + 0.5 * x
+    exact = 0.5 * w @ np.sqrt(1 + 4 * x**2)
+    assert path.length[-1] == pytest.approx(exact, rel=1e-4)

@@ -1,0 +1,110 @@
+"""What must hold on every equilibrium set, whatever the structure."""
+
+import numpy as np
+
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.topology import orientation, projected_area, surface
+
+REGULAR = (0, 3)
+FOLDED = (1, 4)
+CAPPED = (2, 4)
+
+
+def assert_faithful(eset: EquilibriumSet) -> None:
+    """Clean audit; exact vertices; folds singular; one index per cell, which orients it."""
+    assert eset.audit.clean, eset.audit
+    assert eset.audit.missing == 0
+    assert_exact(eset)
+    assert_index_of_cells(eset)
+    assert_orientation_alternates(eset)
+    assert_folds_part_indices(eset)
+    assert_boundaries(eset)
+
+
+def assert_exact(eset: EquilibriumSet) -> None:
+    """Round-off residuals, the given fixed parameters, all vertices in the box."""
+    assert eset.points.residual.max() < 1e-10
+    for name, value in eset.fixed.items():
+        assert np.array_equal(eset.points[name], np.full(len(eset.points), value))
+    assert eset.box.contains(eset.coordinates, slack=1e-9).all()
+    for constraint in eset.constraints:
+        assert constraint.excess(eset.points.z, eset.points.p).max() < 1e-8
+
+
+def assert_folds_are_singular(eset: EquilibriumSet, tolerance: float) -> None:
+    """det F_z = 0 at fold vertices: an eigenvalue of the constrained Hessian vanishes."""
+    folded = np.flatnonzero(np.isin(eset.kinds, FOLDED))
+    if len(folded) == 0:
+        return
+    shift = np.full(len(folded), tolerance)
+    nothing = np.zeros((len(folded), 0, eset.structure.size))
+    z, p = eset.points.z[folded], eset.points.p[folded]
+    above = eset.structure.solve(z, p, nothing, shift=shift).negative
+    below = eset.structure.solve(z, p, nothing, shift=-shift).negative
+    # exactly one eigenvalue lies between −tolerance and +tolerance
+    assert (above - below == 1).all()
+
+
+def assert_index_of_cells(eset: EquilibriumSet) -> None:
+    """The index of a cell is that of its regular vertices, counted anew."""
+    index = eset.structure.index(eset.points.z, eset.points.p)
+    regular = ~np.isin(eset.kinds, FOLDED)
+    assert np.array_equal(index[regular], eset.index[regular])
+    for k in range(3):
+        corner = eset.cells[:, k]
+        own = regular[corner]
+        assert np.array_equal(index[corner[own]], eset.cell_index[own])
+    # and on folds the lower of both sides
+    folded = np.flatnonzero(~regular)
+    low = np.full(len(eset.points), 99)
+    np.minimum.at(low, eset.cells.ravel(), np.repeat(eset.cell_index, 3))
+    assert np.array_equal(low[folded], eset.index[folded])
+
+
+def assert_orientation_alternates(eset: EquilibriumSet) -> None:
+    """Oriented coherently, the projected area of a cell changes sign with the parity of its index.
+
+    Slivers at folds, where straight cells cut the corners of a curved fold, may be overturned.
+    """
+    signs, contradictions = orientation(eset.cells, surface(eset.cells))
+    assert contradictions == 0
+    area = projected_area(eset.coordinates, eset.cells) * signs * (-1) ** eset.cell_index
+    for k in range(eset.audit.components):
+        own = area[eset.component == k] * np.sign(area[eset.component == k].sum())
+        assert -own[own < 0].sum() < 0.01 * own.sum()
+        assert (own < 0).sum() < 0.05 * len(own)
+
+
+def assert_folds_part_indices(eset: EquilibriumSet) -> None:
+    """Cells on both sides of an edge differ in index by one on folds, and nowhere else."""
+    whole = surface(eset.cells)
+    a, b = whole.neighbours.T
+    jump = np.abs(eset.cell_index[a] - eset.cell_index[b])
+    on_fold = {
+        tuple(sorted(pair))
+        for fold in eset.folds
+        for pair in zip(fold[:-1].tolist(), fold[1:].tolist(), strict=True)
+    }
+    assert jump.max(initial=0) <= 1
+    for edge, differs in zip(whole.edges[whole.shared].tolist(), jump, strict=True):
+        assert (tuple(edge) in on_fold) == bool(differs)
+    assert np.isin(eset.kinds[[v for fold in eset.folds for v in fold]], FOLDED).all()
+
+
+def assert_boundaries(eset: EquilibriumSet) -> None:
+    """Loops are closed and simple; the vertices lie on the box or on a constraint."""
+    size = eset.box.upper - eset.box.lower
+    x = eset.coordinates
+    on_box = (np.abs(x - eset.box.lower) < 1e-9 * size) | (np.abs(x - eset.box.upper) < 1e-9 * size)
+    on_box = on_box.any(axis=1)
+    excess = np.full(len(x), -np.inf)
+    for constraint in eset.constraints:
+        excess = np.maximum(excess, constraint.excess(eset.points.z, eset.points.p))
+    for loop in eset.boundaries:
+        assert loop.vertices[0] == loop.vertices[-1]
+        assert len(set(loop.vertices.tolist())) == len(loop.vertices) - 1
+        capped = np.abs(excess[loop.vertices]) < 1e-8
+        assert (on_box[loop.vertices] | capped).all()
+        assert loop.kind in {"box", "cap", "mixed"}
+        assert loop.kind != "box" or on_box[loop.vertices].all()
+        assert loop.kind != "cap" or capped.all()

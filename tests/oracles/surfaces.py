@@ -1,0 +1,59 @@
+"""Polynomial structures whose equilibrium sets over two parameters are surfaces known by name.
+
+Each energy is given through its force F = ∂E/∂x.
+"""
+
+import numpy as np
+
+from equimorph.structures import Symmetry
+from oracles.polynomial import Polynomial, Sum
+
+
+class Mirrored(Polynomial):
+    """Structure with F(−x; a, −b) = −F(x; a, b), which it declares."""
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        signs = np.array([1.0, -1.0])
+        return (Symmetry("mirror", lambda z, p: (-z, p * signs), signs),)
+
+
+def integral(force: Sum) -> Sum:
+    """Energy of a force, integrated over the first variable."""
+    return Sum({(e[0] + 1, *e[1:]): factor / (e[0] + 1) for e, factor in force.terms.items()})
+
+
+def cusp() -> Polynomial:
+    """x³ + a x + b: the graph b(x, a), a disc; folds a = −3x², b = 2x³, one curve with a cusp."""
+    return Mirrored(lambda x, a, b: integral(x**3 + a * x + b), 1, ("a", "b"))
+
+
+def swallowtail() -> Polynomial:
+    """x⁴ + a x² + b x + c: for fixed a < 0 the graph c(x, b); one fold curve with two cusps."""
+    return Polynomial(lambda x, a, b, c: integral(x**4 + a * x**2 + b * x + c), 1, ("a", "b", "c"))
+
+
+def three_sheets() -> Polynomial:
+    """x³ − 9x + (a + b)/2: three sheets that never meet for |a|, |b| < 10."""
+    return Polynomial(lambda x, a, b: integral(x**3 - 9.0 * x + 0.5 * a + 0.5 * b), 1, ("a", "b"))
+
+
+def sphere() -> Polynomial:
+    """x² + a² + b² = 1: closed, folded along its equator."""
+    return Polynomial(lambda x, a, b: integral(x**2 + a**2 + b**2 - 1.0), 1, ("a", "b"))
+
+
+def torus(tilt: float = 0.0) -> Polynomial:
+    """(r² + R² − ρ²)² = 4R²(a² + b²), R = 1, ρ = 0.4, turned about the b axis by `tilt`."""
+    cosine, sine = float(np.cos(tilt)), float(np.sin(tilt))
+
+    def energy(x: Sum, a: Sum, b: Sum) -> Sum:
+        flat = (sine * x + cosine * a) ** 2 + b**2
+        height = cosine * x - sine * a
+        return integral((flat + height**2 + 1.0 - 0.4**2) ** 2 - 4.0 * flat)
+
+    return Polynomial(energy, 1, ("a", "b"))
+
+
+def crossing_sheets() -> Polynomial:
+    """x (x² + b x + a): the sheet x = 0 crosses another along a = 0, where the set is singular."""
+    return Polynomial(lambda x, a, b: integral(x**3 + b * x**2 + a * x), 1, ("a", "b"))
