@@ -131,3 +131,10 @@ def test_count_of_any_triangles_equals_counting_them_one_by_one(seed):
     counted = sum(k * area for k, area in regions.areas().items())
     assert counted == pytest.approx(total, rel=1e-6)
     assert all(area > -1e-6 * total for area in regions.areas().values())
+
+
+def test_raster_equals_counting_place_by_place():
+    regions = count_regions(*cusp_surface())
+    x, y = np.linspace(-0.99, 1.49, 23), np.linspace(-0.98, 0.97, 31)
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    assert regions.raster(x, y).ravel().tolist() == regions.count(places).tolist()

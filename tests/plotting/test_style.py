@@ -8,6 +8,8 @@ from PIL import Image
 
 from equimorph.plotting import style
 
+ROOM = (0.4, 0.3, 0.1, 0.1)
+
 
 def lightness(colour):
     """CIE L* of a colour: what remains of it in greyscale (IEC 61966-2-1, CIE 15)."""
@@ -48,7 +50,7 @@ def test_indices_are_named(index, label):
 
 
 def test_saved_figure_has_column_width_at_two_hundred_dots_per_inch(tmp_path):
-    axes = style.new_axes(style.SINGLE_COLUMN, 2.0)
+    axes = style.new_axes(style.SINGLE_COLUMN, 2.0, ROOM)
     png, svg = style.save(axes, tmp_path / "new", "figure")
     with Image.open(png) as image:
         assert image.size == (int(89 / 25.4 * 200), 400)
@@ -57,7 +59,7 @@ def test_saved_figure_has_column_width_at_two_hundred_dots_per_inch(tmp_path):
 
 def test_the_same_drawing_gives_the_same_file(tmp_path):
     for name in ("first", "second"):
-        axes = style.new_axes(style.SINGLE_COLUMN, 1.0)
+        axes = style.new_axes(style.SINGLE_COLUMN, 1.0, ROOM)
         axes.plot([0, 1], [0, 1])
         style.save(axes, tmp_path, name)
     for extension in ("png", "svg"):

@@ -119,6 +119,25 @@ def winding(
     return count
 
 
+def winding_raster(
+    x: Float[np.ndarray, " columns"],
+    y: Float[np.ndarray, " rows"],
+    ends: Float[np.ndarray, "edges 2 2"],
+    jump: Jumps,
+) -> Int[np.ndarray, "rows columns"]:
+    """`winding` at all crossings of grid lines x (rising) and y, a whole row at a time."""
+    (xa, ya), (xb, yb) = ends[:, 0].T, ends[:, 1].T
+    slope = (xb - xa) / np.where(yb == ya, 1.0, yb - ya)
+    level = y[:, None]
+    sign = ((ya <= level) & (level < yb)).astype(np.int64) - ((yb <= level) & (level < ya))
+    row, edge = np.nonzero(sign)
+    meets = xa[edge] + (y[row] - ya[edge]) * slope[edge]
+    # What a ray meets beyond column k counts for all columns up to k.
+    steps = np.zeros((len(y), len(x) + 1), int)
+    np.add.at(steps, (row, np.searchsorted(x, meets)), (sign * jump)[row, edge])
+    return np.asarray(steps[:, :0:-1].cumsum(axis=1)[:, ::-1])
+
+
 def cross(a: Float[np.ndarray, "*n 2"], b: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
     """Signed area of the parallelogram of two plane vectors."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

@@ -31,7 +31,7 @@ def fold_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]
     return pieces
 
 
-def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[Int[np.ndarray, " _"]]:
+def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[tuple[Int[np.ndarray, " _"], int]]:
     """Boundary curves, either those on the box or those on a cap, where a constraint cuts the set.
 
     Parameters
@@ -43,13 +43,16 @@ def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[Int[np.ndarray, 
 
     Returns
     -------
-    Vertices of each piece in order.
+    Vertices of each piece in order, and the index of the cells beside it.
     """
     pieces = []
     for boundary in eset.boundaries:
         vertices = boundary.vertices
-        on_box = _runs_along_box(eset, vertices)
-        pieces += [vertices[a : b + 1] for a, b in _runs(on_box) if bool(on_box[a]) is box]
+        on_box = _along_box(eset, vertices)
+        index = _lowest_index_beside(eset, vertices)
+        for a, b in _runs(2 * index + on_box):
+            if bool(on_box[a]) is box:
+                pieces.append((vertices[a : b + 1], int(index[a])))
     return pieces
 
 
@@ -67,6 +70,16 @@ def way_points(eset: EquilibriumSet, route: Route) -> Float[np.ndarray, "corners
         return track(eset, route.path.states)[[0, -1]]
     columns = [route.schedule.names.index(name) for name in eset.names]
     return np.asarray(route.schedule.values[corner_steps(route)][:, columns])
+
+
+def intended(eset: EquilibriumSet, route: Route) -> Float[np.ndarray, "corners 2"]:
+    """Free parameters at the corners that a route was asked to pass, reached or not."""
+    if route.path is None:
+        return np.empty((0, 2))
+    corners = [dict(zip(eset.names, track(eset, route.path.states)[0].tolist(), strict=True))]
+    for corner in route.way_points:  # each changes some parameters and keeps the others
+        corners.append(corners[-1] | corner)
+    return np.array([[corner[name] for name in eset.names] for corner in corners])
 
 
 def corner_steps(route: Route) -> Int[np.ndarray, " corners"]:
@@ -114,6 +127,7 @@ def states_along(path: Path, count: int) -> States:
     solved, found = newton(structure, z, p)
     shift = (solved - z)[:, : structure.unknowns]
     found &= np.sqrt(shift**2 @ structure.mass) <= 0.5 * width
+    found &= (share > 0) & (share < 1)  # known states stay as they are
     nearest = np.where(share < 0.5, after - 1, after)
     z = np.where(found[:, None], solved, known.z[nearest])
     p = np.where(found[:, None], p, known.p[nearest])
@@ -145,7 +159,7 @@ def _edge_keys(
     return np.asarray(np.minimum(a, b).astype(np.int64) * count + np.maximum(a, b))
 
 
-def _runs_along_box(
+def _along_box(
     eset: EquilibriumSet, vertices: Int[np.ndarray, " vertices"]
 ) -> Bool[np.ndarray, " edges"]:
     """Whether each edge of a polyline lies on one side of the box."""

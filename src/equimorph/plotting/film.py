@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image
 
+from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.plotting import style
@@ -27,6 +28,9 @@ from equimorph.tasks import Route
 _WIDTH, _HEIGHT, _DOTS = 6.4, 3.1, 120
 _LARGER = {"font.size": 9, "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8}
 _CURVATURE = "max_curvature"
+# Right ends of the numbers: the free parameters above each other, margin and curvature beside them.
+_READING_PLACES = ((0.14, 0.085), (0.14, 0.025), (0.48, 0.085), (0.48, 0.025))
+_NUMBER_WIDTH = 0.085
 _COLOURS = 64
 _PAUSE_FIRST, _PAUSE_LAST = 0.8, 1.6  # seconds
 _HUNDREDTHS = 10  # GIF counts time in hundredths of a second: milliseconds in tens
@@ -73,7 +77,7 @@ def film(
     states = states_along(path_of(route), frames)
     with style.house_style(_LARGER):
         stage = _set_stage(states, route, eset)
-        pictures = _pictures(stage, states, eset, route)
+        pictures = _pictures(stage, states, eset, path_of(route))
     file = FilePath(path)
     _write(pictures, file, _durations(frames, fps))
     return file
@@ -89,7 +93,8 @@ class _Stage:
     parts: MovingParts
     travelled: Line2D
     point: Line2D
-    reading: Text
+    texts: tuple[Text, ...]
+    numbers: list[tuple[str, ...]]
 
     def picture(self) -> Image.Image:
         """Return the background with the moving artists as they are now, from back to front."""
@@ -100,7 +105,7 @@ class _Stage:
         return Image.fromarray(np.array(self.canvas.buffer_rgba())[..., :3])
 
     def _moving(self) -> tuple[Artist, ...]:
-        return (self.shape, *self.parts.artists(), self.travelled, self.point, self.reading)
+        return (self.shape, *self.parts.artists(), self.travelled, self.point, *self.texts)
 
 
 def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
@@ -123,49 +128,65 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
     (travelled,) = right.plot([], [], color=style.INK, linewidth=2.0, zorder=8)
     (point,) = right.plot([], [], "o", color=style.INK, markeredgecolor="white", ms=7, zorder=9)
     parts = moving_parts(left, states)
-    reading = figure.text(0.03, 0.03, "", va="bottom", linespacing=1.5)
+    texts, numbers = _place_readings(figure, _readings(states, eset, route))
     # Animated artists are left out of the background.
-    stage = _Stage(canvas, None, shape, parts, travelled, point, reading)
+    stage = _Stage(canvas, None, shape, parts, travelled, point, texts, numbers)
     for artist in stage._moving():
         artist.set_animated(True)
     canvas.draw()
     return replace(stage, background=canvas.copy_from_bbox(figure.bbox))
 
 
-def _pictures(
-    stage: _Stage, states: States, eset: EquilibriumSet, route: Route
-) -> list[Image.Image]:
+def _pictures(stage: _Stage, states: States, eset: EquilibriumSet, path: Path) -> list[Image.Image]:
     """One picture per state."""
-    outlines, places, readings = states.shape(), track(eset, states), _readings(states, eset, route)
+    outlines, places = states.shape(), track(eset, states)
+    ways = _ways(path, places, eset)
     pictures = []
     for k in range(len(states)):
         stage.shape.set_data(*outlines[k].T)
         stage.parts.follow(k)
-        stage.travelled.set_data(*places[: k + 1].T)
+        stage.travelled.set_data(*ways[k].T)
         stage.point.set_data(*places[k : k + 1].T)
-        stage.reading.set_text(readings[k])
+        for text, number in zip(stage.texts, stage.numbers[k], strict=True):
+            text.set_text(number)
         pictures.append(stage.picture())
     return pictures
 
 
-def _readings(states: States, eset: EquilibriumSet, route: Route) -> list[str]:
-    """Numbers under each picture: parameters, then stability margin and curvature."""
-    first = [(symbol(name), states[name], "5.2f") for name in eset.names]
-    second = [("stability margin", states.margin, "5.2f")]
-    if route.schedule is not None and _CURVATURE in route.schedule.descriptors:
-        curvature = states.structure.descriptor(_CURVATURE)
-        second.append((curvature.symbol, curvature(states), "4.1f"))
+def _ways(
+    path: Path, places: Float[np.ndarray, "frames 2"], eset: EquilibriumSet
+) -> list[Float[np.ndarray, "_ 2"]]:
+    """Way to each place through all corners passed before it."""
+    length = np.linspace(path.length[0], path.length[-1], len(places))
+    passed, corners = np.searchsorted(path.length, length), track(eset, path.states)
     return [
-        "\n".join("    ".join(_number(entry, k) for entry in line) for line in (first, second))
-        for k in range(len(states))
+        np.concatenate([corners[:count], place[None]])
+        for count, place in zip(passed, places, strict=True)
     ]
 
 
-def _number(entry: tuple[str, Float[np.ndarray, " lanes"], str], k: int) -> str:
-    """One reading, padded with spaces as wide as digits so that nothing jumps."""
-    label, values, form = entry
-    digits = format(float(values[k]), form).replace("-", "−").replace(" ", "\u2007")
-    return f"{label} = {digits}"
+def _readings(
+    states: States, eset: EquilibriumSet, route: Route
+) -> list[tuple[str, str, Float[np.ndarray, " lanes"]]]:
+    """Numbers under each picture: label, format and values."""
+    readings = [(symbol(name), "{:.2f}", states[name]) for name in eset.names]
+    readings.append(("stability margin", "{:.2f}", states.margin))
+    if route.schedule is not None and _CURVATURE in route.schedule.descriptors:
+        curvature = states.structure.descriptor(_CURVATURE)
+        readings.append((curvature.symbol, "{:.1f}", curvature(states)))
+    return readings
+
+
+def _place_readings(
+    figure: Figure, readings: list[tuple[str, str, Float[np.ndarray, " lanes"]]]
+) -> tuple[tuple[Text, ...], list[tuple[str, ...]]]:
+    """Write labels in two rows; return the texts for the numbers, and the numbers of each state."""
+    texts = []
+    for (label, _, _), (x, y) in zip(readings, _READING_PLACES, strict=False):
+        figure.text(x - _NUMBER_WIDTH, y, label, ha="right")
+        texts.append(figure.text(x, y, "", ha="right", weight="bold"))
+    printed = [[form.format(value).replace("-", "−") for value in v] for _, form, v in readings]
+    return tuple(texts), list(zip(*printed, strict=True))
 
 
 def _durations(frames: int, fps: int) -> list[int]:

@@ -1,17 +1,18 @@
 """What stands around a structure in a picture: supports and loads."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Polygon
+from matplotlib.patches import Circle
 from matplotlib.quiver import Quiver
 
 from equimorph.plotting import style
-from equimorph.structures import Rod, States, Structure
+from equimorph.structures import Rod, Spring, States, Structure
 
 _HUB = 0.026  # radius of a rotary actuator, in lengths of the rod
 _STATIONS = np.linspace(0.05, 0.95, 13)
@@ -34,7 +35,7 @@ def draw_supports(ax: Axes, states: States) -> None:
     """Supports of a structure, where they stay on the way through the states."""
     if isinstance(states.structure, Rod):
         _draw_rotary_actuators(ax, states)
-    else:
+    elif isinstance(states.structure, Spring):
         _draw_guides(ax, states)
 
 
@@ -50,7 +51,8 @@ class MovingParts:
     Attributes
     ----------
     pointers, pointer_lines
-        Lines that turn with the actuators, and their ends for every state.
+        Marks that move with the actuators (pointers on the hubs of a rod, the ends of a spring),
+        and the two points of each for every state.
     arrows, tails, heads
         Arrows of the load, and for every state where they start and how far they reach.
     """
@@ -77,16 +79,23 @@ class MovingParts:
 def moving_parts(ax: Axes, states: States) -> MovingParts:
     """Prepare the moving parts for the way through the states; `follow` places them."""
     structure = states.structure
-    rod = structure if isinstance(structure, Rod) else None
-    lines = np.empty((0, len(states), 2, 2)) if rod is None else _pointer_lines(states)
-    pointers = tuple(ax.plot([], [], color=style.INK, lw=1.2, zorder=6)[0] for _ in lines)
-    tails, heads = _tip_arrow(states) if rod is None else _rod_arrows(rod, states)
-    longest = float(np.abs(heads).max())
+    look: dict[str, Any] = {"color": style.INK, "linewidth": 1.2, "zorder": 6}
+    lines = np.empty((0, len(states), 2, 2))
+    tails = heads = np.empty((len(states), 0, 2))
+    if isinstance(structure, Rod):
+        lines = _pointer_lines(states)
+        tails, heads = _rod_arrows(structure, states)
+    elif isinstance(structure, Spring):
+        look |= {"linestyle": "none", "marker": "o", "markersize": 5, "markerfacecolor": "white"}
+        lines = states.shape()[None]
+        tails, heads = _tip_arrow(states)
+    pointers = tuple(ax.plot([], [], **look)[0] for _ in lines)
+    longest = float(np.abs(heads).max(initial=0.0))
     if longest == 0.0:
         return MovingParts(pointers, lines, None, tails, heads)
     # As long as reads well, whatever the unit of the load.
     heads = heads * (_LONGEST_ARROW * np.ptp(ax.get_xlim()) / longest)
-    if rod is not None:  # the arrows end on the rod, the force starts at the free end
+    if isinstance(structure, Rod):  # the line load presses on the rod, the force pulls its point
         tails = tails - np.minimum(heads, 0.0) + [0.0, _CLEARANCE]
     arrows = ax.quiver(
         *tails[0].T, *heads[0].T, angles="xy", scale_units="xy", scale=1.0, color=style.FAINT,
@@ -137,6 +146,5 @@ def _draw_guides(ax: Axes, states: States) -> None:
     room = 0.12 * max(reach, high - low)
     for x, y in (([0, 0], [low - room, high + room]), ([0, reach + room], [0, 0])):
         ax.plot(x, y, color=_GROUND, linewidth=3.0, solid_capstyle="butt", zorder=0)
-    for foot in (outlines[0, 0], outlines[-1, 0]):
-        corners = foot + 0.3 * room * np.array([[0.0, 0.0], [-0.6, -1.0], [0.6, -1.0]])
-        ax.add_patch(Polygon(corners, facecolor="white", edgecolor=style.INK, lw=0.6, zorder=5))
+    ends = np.concatenate(outlines[[0, -1]])
+    ax.plot(*ends.T, "o", color=style.FAINT, markersize=4, markerfacecolor="white", zorder=3)

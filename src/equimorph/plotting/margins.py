@@ -3,7 +3,6 @@
 import numpy as np
 from jaxtyping import Float, Int
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.errors import InputError
@@ -16,7 +15,8 @@ from equimorph.tasks import Route
 _CURVATURE = "max_curvature"
 _MARGIN_COLOUR = style.INDEX_COLOURS[0]
 _CURVATURE_COLOUR = "#a1561a"
-_GAP = 0.1
+_GAP = 0.1  # inches
+_ROOM = (0.46, 0.38, 0.1, 0.2)
 _MOST_NUMBERS = 12
 
 
@@ -46,12 +46,13 @@ def margins(route: Route, ax: Axes | None = None) -> Axes:
     curvature = schedule.descriptors.get(_CURVATURE)
     with style.house_style():
         if ax is None:
-            ax = _new_axes(two=curvature is not None)
+            height = (0.5 if curvature is None else 0.8) * style.SINGLE_COLUMN
+            ax = style.new_axes(style.SINGLE_COLUMN, height, _ROOM)
         lowest = ax
         _draw(ax, schedule, schedule.margins, _MARGIN_COLOUR)
         ax.set_ylabel("stability margin")
         ax.set_ylim(0.0, 1.15 * schedule.margins.max())
-        _mark(ax, schedule, int(np.argmin(schedule.margins)), schedule.margins, above=False)
+        _mark(ax, schedule, int(np.argmin(schedule.margins)), schedule.margins)
         if curvature is not None:
             # Both share the room that the axes had, whatever laid it out.
             divider = make_axes_locatable(ax)
@@ -61,20 +62,10 @@ def margins(route: Route, ax: Axes | None = None) -> Axes:
             descriptor = path_of(route).states.structure.descriptor(_CURVATURE)
             lowest.set_ylabel(descriptor_label(descriptor))
             lowest.set_ylim(0.0, 1.25 * curvature.max())
-            _mark(lowest, schedule, int(np.argmax(curvature)), curvature, above=True)
+            _mark(lowest, schedule, int(np.argmax(curvature)), curvature)
         lowest.set_xlabel("share of the length of the route")
         _number_way_points(ax, schedule, corner_steps(route))
     return ax
-
-
-def _new_axes(*, two: bool) -> Axes:
-    """Axes on a figure one column wide, with room around for labels."""
-    width, height = style.SINGLE_COLUMN, (0.8 if two else 0.5) * style.SINGLE_COLUMN
-    figure = style.attach_canvas(Figure(figsize=(width, height)))
-    left, bottom, top = 0.46, 0.38, 0.2  # inches
-    return figure.add_axes(
-        (left / width, bottom / height, 0.97 - left / width, 1 - (bottom + top) / height)
-    )
 
 
 def _draw(ax: Axes, schedule: Schedule, values: Float[np.ndarray, " steps"], colour: str) -> None:
@@ -95,12 +86,12 @@ def _mark(
     schedule: Schedule,
     step: int,
     values: Float[np.ndarray, " steps"],
-    *,
-    above: bool,
 ) -> None:
-    """Mark the worst step with its value."""
+    """Mark the worst step with its value, on the side of the curve where there is room."""
+    is_low = values[step] <= values.mean()
+    above = not is_low or values[step] < 0.15 * ax.get_ylim()[1]
     place = (float(schedule.progress[step]), float(values[step]))
-    ax.plot(*place, "o", markersize=3.5, color=style.INK, zorder=4)
+    ax.plot(*place, "o", markersize=3.5, color=style.INK, zorder=4, clip_on=False)
     # Text near the end of the route is set to the left of its mark, to stay inside the frame.
     side = "right" if place[0] > 0.8 else "left" if place[0] < 0.2 else "center"
     ax.annotate(

@@ -61,9 +61,9 @@ class PaintedPieces(PolyCollection):
         corners: Any = np.stack([np.asarray(x), np.asarray(y)], axis=-1).reshape(-1, 3, 2)
         depth = np.asarray(depth).reshape(-1, 3)
         faces = self._lift == 0
-        typical = float(np.quantile(np.ptp(depth[faces], axis=1), 0.9)) if faces.any() else 0.0
+        typical = float(np.quantile(np.ptp(depth[faces], axis=1), 0.5)) if faces.any() else 0.0
         order = np.argsort(depth.mean(axis=1) - self._lift * typical, kind="stable")[::-1]
-        self.set_verts(corners[order], closed=False)
+        self.set_verts(corners[order], closed=True)
         colours: Any = self._colours[order]
         widths: Any = self._widths[order]
         self.set_facecolor(colours)

@@ -12,13 +12,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import AbstractPathEffect, withStroke
+from mpl_toolkits.axes_grid1 import make_axes_locatable
 from scipy import ndimage
 
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.plotting import style
-from equimorph.plotting.curves import boundary_pieces, fold_pieces, track, way_points
+from equimorph.plotting.curves import boundary_pieces, fold_pieces, intended, track, way_points
 from equimorph.plotting.regions import Regions, count_regions
 from equimorph.plotting.symbols import constraint_label, parameter_label
 from equimorph.tasks import Route
@@ -33,13 +34,13 @@ _CAP: dict[str, Any] = {
 }
 _ROUTE: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.6, "zorder": 6}
 
+_MARGINS = (0.5, 0.78, 0.4, 0.08)  # inches around the frame: left, bottom, right, top
 # Slivers of the mesh smaller than this share of the picture are no region of their own.
-_INVISIBLE = 2e-5
+_INVISIBLE = 1e-4
 _RASTER = 160
 # A number needs this much room around it, as a share of the picture.
 _ROOM = 0.03
-# A route planned over the set may have a corner at every cell: number way-points, not those.
-_MOST_NUMBERS = 12
+_BADGE = 0.07  # size of the badge of a way-point, as a share of the picture
 # Legs shorter than this share of the picture get no arrow head.
 _LONG_LEG = 0.12
 
@@ -79,13 +80,13 @@ def parameter_plane(
         raise InputError(f'`count` must be "all" or "stable"; got {count!r}.')
     with style.house_style():
         if ax is None:
-            ax = style.new_axes(style.SINGLE_COLUMN, 0.86 * style.SINGLE_COLUMN)
+            ax = style.new_axes(style.SINGLE_COLUMN, 0.86 * style.SINGLE_COLUMN, _MARGINS)
         regions = count_regions(
             eset.coordinates, eset.cells if count == "all" else eset.cells[eset.cell_index == 0]
         )
         frame_plane(ax, eset)
         largest = shade_regions(ax, eset, regions)
-        lines = draw_folds(ax, eset)
+        lines = draw_folds(ax, eset, stable_only=count == "stable")
         corners = np.empty((0, 2))
         if route is not None and route.path is not None:
             lines.append(draw_track(ax, eset, route, route.path))
@@ -95,7 +96,7 @@ def parameter_plane(
         _write_counts(ax, regions, largest, _taken(eset, route, corners))
         _count_bar(ax, largest, "equilibria" if count == "all" else "stable equilibria")
         if lines:
-            ax.figure.legend(handles=lines, loc="outside lower center", ncols=2)
+            ax.legend(handles=lines, loc="upper center", bbox_to_anchor=(0.54, -0.17), ncols=2)
     return ax
 
 
@@ -118,25 +119,34 @@ def shade_regions(ax: Axes, eset: EquilibriumSet, regions: Regions) -> int:
     return largest
 
 
-def draw_folds(ax: Axes, eset: EquilibriumSet) -> list[Line2D]:
+def draw_folds(ax: Axes, eset: EquilibriumSet, *, stable_only: bool = False) -> list[Line2D]:
     """Draw the stability boundary, the other folds and the caps.
+
+    Parameters
+    ----------
+    ax
+        Where to draw.
+    eset
+        Equilibrium set over two free parameters.
+    stable_only
+        Leave out what bounds no stable equilibria.
 
     Returns
     -------
     One labelled line of every kind drawn, for a legend.
     """
     cap = constraint_label(eset.constraints)
+    looks = {"stability boundary": _STABILITY_BOUNDARY, "other folds": _OTHER_FOLD, cap: _CAP}
     pieces = [
-        ("stability boundary", _STABILITY_BOUNDARY, line)
-        if low == 0
-        else ("other folds", _OTHER_FOLD, line)
+        ("stability boundary" if low == 0 else "other folds", line, low)
         for line, low in fold_pieces(eset)
     ]
-    pieces += [(cap, _CAP, line) for line in boundary_pieces(eset, box=False)]
+    pieces += [(cap, line, index) for line, index in boundary_pieces(eset, box=False)]
     kinds: dict[str, Line2D] = {}
-    for label, look, vertices in pieces:
-        (kinds[label],) = ax.plot(*eset.coordinates[vertices].T, **look, label=label)
-    return [kinds[label] for label in ("stability boundary", "other folds", cap) if label in kinds]
+    for label, vertices, low in pieces:
+        if low == 0 or not stable_only:
+            (kinds[label],) = ax.plot(*eset.coordinates[vertices].T, **looks[label], label=label)
+    return [kinds[label] for label in looks if label in kinds]
 
 
 def draw_track(ax: Axes, eset: EquilibriumSet, route: Route, path: Path) -> Line2D:
@@ -152,6 +162,7 @@ def draw_track(ax: Axes, eset: EquilibriumSet, route: Route, path: Path) -> Line
     line.set_path_effects(rim)
     if route.status != "arrived":
         line.set_label(f"route, refused (× {path.end.kind})")
+        ax.plot(*intended(eset, route).T, **_ROUTE | {"linewidth": 0.9, "linestyle": ":"})
         (cross,) = ax.plot(*places[-1:].T, "x", color=style.ROUTE_COLOUR, ms=6, mew=1.6, zorder=8)
         cross.set_path_effects(rim)
     return line
@@ -173,11 +184,16 @@ def _draw_directions(ax: Axes, corners: Float[np.ndarray, "corners 2"]) -> None:
 
 def _number_way_points(ax: Axes, corners: Float[np.ndarray, "corners 2"]) -> None:
     """Number the way-points; those at one place share a badge."""
-    chosen = range(len(corners)) if len(corners) <= _MOST_NUMBERS else (0, len(corners) - 1)
+    size = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
     badges: dict[tuple[float, float], list[int]] = {}
-    for k in chosen:
-        place = (round(float(corners[k, 0]), 9), round(float(corners[k, 1]), 9))
-        badges.setdefault(place, []).append(k + 1)
+    # First the ends, then the others as far as there is room: badges must not hide each other.
+    last = len(corners) - 1
+    for k in sorted(range(len(corners)), key=lambda k: k not in (0, last)):
+        near = [place for place in badges if np.hypot(*((corners[k] - place) / size)) < _BADGE]
+        if not near:
+            badges[tuple(corners[k].tolist())] = [k + 1]
+        elif np.allclose(near[0], corners[k], rtol=0, atol=1e-9):
+            badges[near[0]].append(k + 1)
     box = {"boxstyle": "round,pad=0.2,rounding_size=0.6", "fc": "white", "ec": style.ROUTE_COLOUR}
     for place, numbers in badges.items():
         text = ", ".join(map(str, numbers))
@@ -202,20 +218,21 @@ def _write_counts(
     low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
     step = (high - low) / _RASTER
     x, y = (low[i] + step[i] * (np.arange(_RASTER) + 0.5) for i in (0, 1))
-    count = regions.count(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
-    count = np.minimum(count, largest).reshape(_RASTER, _RASTER)
+    count = np.minimum(regions.raster(x, y), largest)
     column, row = np.clip(((taken - low) / step).astype(int), 0, _RASTER - 1).T
     free = np.ones_like(count, dtype=bool)
-    free[column, row] = False
+    free[row, column] = False
     shades = style.count_shades(largest)
     for number in np.unique(count).tolist():
         pieces, many = ndimage.label(count == number)
         for piece in range(1, many + 1):
             # A rim of zeros: the frame of the picture is an edge, too.
             inside = np.pad((pieces == piece) & free, 1)
+            if inside.sum() < np.pi * (_ROOM * _RASTER) ** 2:
+                continue
             room = ndimage.distance_transform_edt(inside)[1:-1, 1:-1]
-            i, j = np.unravel_index(room.argmax(), room.shape)
-            if room[i, j] > _ROOM * _RASTER:
+            j, i = np.unravel_index(room.argmax(), room.shape)
+            if room[j, i] > _ROOM * _RASTER:
                 text = ax.text(x[i], y[j], str(number), ha="center", va="center", zorder=5)
                 text.set_path_effects([withStroke(linewidth=1.5, foreground=shades[number])])
 
@@ -224,7 +241,8 @@ def _count_bar(ax: Axes, largest: int, what: str) -> None:
     """Colour bar with one shade per count."""
     shades = ListedColormap(style.count_shades(largest))
     norm = BoundaryNorm(np.arange(largest + 2) - 0.5, largest + 1)
-    bar = ax.figure.colorbar(ScalarMappable(norm, shades), ax=ax, aspect=30, pad=0.02)
+    beside = make_axes_locatable(ax).append_axes("right", size=0.08, pad=0.06)
+    bar = ax.figure.colorbar(ScalarMappable(norm, shades), cax=beside)
     bar.set_ticks(list(range(largest + 1)), labels=[str(k) for k in range(largest + 1)])
     bar.ax.tick_params(length=0)
     bar.set_label(f"number of {what}")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.plotting.arrangement import arrange, cross, outline, sides, winding
+from equimorph.plotting.arrangement import arrange, cross, outline, sides, winding, winding_raster
 
 # Spacing of the grid to which the cuts are rounded, relative to the extent of the set. The
 # coarser ones are for edges so crowded (cells squeezed flat at a cusp) that rounding tangles them.
@@ -48,6 +48,12 @@ class Regions:
     def count(self, places: Float[np.ndarray, "places 2"]) -> Int[np.ndarray, " places"]:
         """Number of cells over each of the places; exact off the edges themselves."""
         return winding(places, self.ends, self.jump)
+
+    def raster(
+        self, x: Float[np.ndarray, " columns"], y: Float[np.ndarray, " rows"]
+    ) -> Int[np.ndarray, "rows columns"]:
+        """`count` on a grid with columns at rising x and rows at y."""
+        return winding_raster(x, y, self.ends, self.jump)
 
     def areas(self) -> dict[int, float]:
         """Area of the parameters with exactly k equilibria, for every k ≥ 1."""

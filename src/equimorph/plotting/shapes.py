@@ -6,6 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
+from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
@@ -16,6 +17,8 @@ from equimorph.plotting.symbols import with_unit
 from equimorph.tasks import Route
 
 _ROOM = 0.085
+_MARGINS = (0.54, 0.36, 0.14, 0.06)  # inches around the frame: left, bottom, right, top
+_BAR = 0.5  # inches for the colour bar and the labels above it
 
 
 def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None) -> Axes:
@@ -45,11 +48,13 @@ def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None)
     outlines = states.shape()
     with style.house_style():
         if ax is None:
-            ax = style.new_axes(style.SINGLE_COLUMN, _height(outlines))
+            ax = style.new_axes(style.SINGLE_COLUMN, _height(outlines), _MARGINS)
         frame_shapes(ax, outlines, room=_ROOM)
         unit = length_unit(states.structure)
         ax.set_xlabel(with_unit("$x$", unit))
         ax.set_ylabel(with_unit("$y$", unit))
+        ax.xaxis.set_major_locator(style.few_ticks())
+        ax.yaxis.set_major_locator(style.few_ticks())
         draw_supports(ax, states)
         progress = np.linspace(0.0, 1.0, count)
         colours = style.progress_map()(progress)
@@ -59,20 +64,20 @@ def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None)
             LineCollection(list(outlines), colors=colours, linewidths=widths, zorder=2)
         )
         _name_ends(ax, outlines[0], outlines[-1])
-        bar = ax.figure.colorbar(
-            ScalarMappable(Normalize(0, 1), style.progress_map()),
-            ax=ax, orientation="horizontal", aspect=40, pad=0.03, shrink=0.8,
-        )  # fmt: skip
+        below = make_axes_locatable(ax).append_axes("bottom", size=0.08, pad=_BAR - 0.08)
+        scale = ScalarMappable(Normalize(0, 1), style.progress_map())
+        bar = ax.figure.colorbar(scale, cax=below, orientation="horizontal")
         bar.set_label("progress along the route")
     return ax
 
 
 def _height(outlines: Float[np.ndarray, "shapes points 2"]) -> float:
     """Height of a figure one column wide whose drawing keeps its aspect without empty bands."""
-    width, height = np.ptp(outlines.reshape(-1, 2), axis=0) + _ROOM * 2 * np.ptp(outlines)
-    around, beside = 0.85, 0.6  # inches for labels and colour bar
-    drawing = (style.SINGLE_COLUMN - beside) * float(height / width)
-    return around + float(np.clip(drawing, 0.25, 1.4 * style.SINGLE_COLUMN))
+    low, high = outlines.min(axis=(0, 1)), outlines.max(axis=(0, 1))
+    width, height = high - low + 2 * _ROOM * float(max(high - low))
+    left, bottom, right, top = _MARGINS
+    drawing = (style.SINGLE_COLUMN - left - right) * float(height / width)
+    return bottom + top + _BAR + min(drawing, 1.4 * style.SINGLE_COLUMN)
 
 
 def _name_ends(

@@ -1,0 +1,91 @@
+"""The parameter plane of the spring: regions and folds in closed form, and the route on it."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.integrate import quad
+
+from equimorph import plotting
+from equimorph.errors import InputError
+from equimorph.plotting.regions import count_regions
+from equimorph.tasks import Route
+
+
+def fold_load(x_l):
+    """PHYSICS §2: F/k at the folds."""
+    return np.maximum(1 - np.abs(x_l) ** (2 / 3), 0.0) ** 1.5
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.texts]
+
+
+def line_labelled(ax, label):
+    (line,) = [line for line in ax.lines if line.get_label() == label]
+    return line
+
+
+def test_the_spring_has_three_equilibria_inside_the_cusp_and_one_outside(spring_set):
+    """Area inside by quadrature. Chords between exact fold points, one per grid line, lose 1 %."""
+    areas = count_regions(spring_set.coordinates, spring_set.cells).areas()
+    inside = quad(lambda x: 2 * min(fold_load(x), 0.3), 0.3, 1.0, points=[0.41])[0]
+    assert areas[3] == pytest.approx(inside, rel=0.02)
+    assert sum(areas.values()) == pytest.approx(1.1 * 0.6, rel=1e-6)
+    assert areas[2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_every_place_counts_as_many_equilibria_as_the_set_has_there(spring_set):
+    regions = count_regions(spring_set.coordinates, spring_set.cells)
+    for x_l, force in ((0.5, 0.1), (0.7, -0.02), (0.9, 0.15), (1.2, -0.2)):
+        expected = len(spring_set.at(x_l=x_l, F=force))
+        assert regions.count(np.array([[x_l, force]])).tolist() == [expected]
+
+
+def test_drawn_stability_boundary_is_the_closed_form(spring_set):
+    """Fold vertices are exact: 1e-9 is a hundred times their residual over the smallest slope."""
+    ax = plotting.parameter_plane(spring_set)
+    x_l, force = line_labelled(ax, "stability boundary").get_data()
+    np.testing.assert_allclose(np.abs(force), fold_load(x_l), rtol=0, atol=1e-9)
+
+
+def test_counts_are_written_into_their_regions(spring_set):
+    assert sorted(texts(plotting.parameter_plane(spring_set))) == ["1", "3"]
+    assert sorted(texts(plotting.parameter_plane(spring_set, count="stable"))) == ["1", "2"]
+
+
+def test_axes_carry_symbols_units_and_the_box(spring_set):
+    ax = plotting.parameter_plane(spring_set)
+    assert ax.get_xlabel() == "$x_l$ (natural length)"
+    assert ax.get_xlim() == (0.3, 1.4)
+    assert ax.get_ylim() == (-0.3, 0.3)
+
+
+def test_way_points_are_numbered_and_those_at_one_place_share_a_badge(spring_set, route):
+    ax = plotting.parameter_plane(spring_set, route)
+    assert {"1, 6", "2", "3", "4", "5"} <= set(texts(ax))
+
+
+def test_a_refused_route_ends_in_a_cross_at_the_fold(spring_set, refused):
+    ax = plotting.parameter_plane(spring_set, refused)
+    line = line_labelled(ax, "route, refused (× fold)")
+    (cross,) = [each for each in ax.lines if each.get_marker() == "x"]
+    x_l, force = (float(values[0]) for values in cross.get_data())
+    assert x_l == pytest.approx(0.8, abs=1e-12)
+    assert force == pytest.approx(fold_load(0.8), abs=1e-9)
+    assert line.get_xdata()[-1] == x_l
+
+
+def test_a_route_without_path_is_left_out(spring_set):
+    nothing = Route("refused", "the goal is unstable", [])
+    ax = plotting.parameter_plane(spring_set, nothing)
+    assert not [line for line in ax.lines if str(line.get_label()).startswith("route")]
+
+
+def test_drawing_into_given_axes_makes_no_other_figure(spring_set):
+    ax = Figure().add_subplot()
+    assert plotting.parameter_plane(spring_set, ax=ax) is ax
+
+
+def test_an_unknown_count_is_named(spring_set):
+    with pytest.raises(InputError, match='`count` must be "all" or "stable"; got \'some\''):
+        plotting.parameter_plane(spring_set, count="some")

@@ -1,0 +1,148 @@
+"""Shapes, margins and film of a route."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from PIL import Image
+
+from equimorph import plotting
+from equimorph.equilibria import lift
+from equimorph.errors import InputError
+from equimorph.model import Schedule, names_of
+from equimorph.plotting.curves import states_along
+from equimorph.plotting.furniture import moving_parts
+from equimorph.structures import Rod
+from equimorph.tasks import Route
+
+NOWHERE = Route("refused", "the goal is unstable", [])
+
+
+def test_states_along_a_path_are_equilibria_from_its_start_to_its_end(route):
+    states = states_along(route.path, 50)
+    assert states.residual.max() < 1e-10
+    assert (states.index == 0).all()
+    np.testing.assert_allclose(states.z[[0, -1]], route.path.states.z[[0, -1]], atol=1e-10)
+
+
+def test_states_along_a_path_that_ends_in_a_fold_stay_on_its_side(refused):
+    """At the fold Newton's method may not converge or cross over; then a known state is taken."""
+    angle = refused.path.states.structure.angle
+    states = states_along(refused.path, 40)
+    assert states.residual.max() < 1e-8
+    assert (np.diff(angle(states)) <= 1e-12).all()
+    assert angle(states)[-1] == pytest.approx(angle(refused.path.end.state), abs=1e-9)
+
+
+def test_shapes_are_drawn_from_start_to_goal(route):
+    ax = plotting.shapes(route, count=7)
+    (drawn,) = [each for each in ax.collections if isinstance(each, LineCollection)]
+    outlines = drawn.get_segments()
+    assert len(outlines) == 7
+    np.testing.assert_allclose(outlines[0], route.path.states[0].shape(), atol=1e-12)
+    assert ax.get_aspect() == 1.0
+    assert [text.get_text() for text in ax.texts] == ["start", "goal"]
+
+
+def test_shapes_take_a_bare_path(route):
+    assert plotting.shapes(route.path).get_xlabel() == "$x$ (natural length)"
+
+
+def test_margins_mark_the_smallest_with_its_value(route):
+    ax = plotting.margins(route)
+    assert f"{route.margin:.3g}" in [text.get_text() for text in ax.texts]
+    assert ax.get_ylim()[0] == 0.0
+
+
+def test_margins_show_the_curvature_of_an_arch():
+    arch = Rod()
+    path = lift(arch.natural_state(Theta=1.0), {"Theta": 1.2})
+    route = _route_of(path, {"max_curvature": arch.max_curvature(path.states)})
+    ax = plotting.margins(route)
+    lower = [other for other in ax.figure.axes if other is not ax]
+    assert [other.get_ylabel() for other in lower] == ["max |κ| (1/L)"]
+
+
+def test_film_has_the_frames_asked_for_and_stays_small(spring_set, route, tmp_path):
+    file = plotting.film(route, tmp_path / "film.gif", spring_set, frames=12, fps=20)
+    assert file.stat().st_size < 300_000
+    with Image.open(file) as film:
+        assert film.n_frames == 12
+        assert film.info["loop"] == 0
+        durations = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            durations.append(film.info["duration"])
+    assert durations == [800, *[50] * 10, 1600]
+
+
+def test_pictures_of_a_film_differ(spring_set, route, tmp_path):
+    file = plotting.film(route, tmp_path / "film.gif", spring_set, frames=3)
+    with Image.open(file) as film:
+        pictures = []
+        for k in range(3):
+            film.seek(k)
+            pictures.append(np.asarray(film.convert("RGB")).astype(int))
+    assert all(np.abs(a - b).max() > 100 for a, b in pairwise(pictures))
+    assert (pictures[0][0, 0] == 255).all()
+
+
+def test_a_route_without_path_is_refused_with_its_reason(spring_set, tmp_path):
+    with pytest.raises(InputError, match="the goal is unstable"):
+        plotting.shapes(NOWHERE)
+    with pytest.raises(InputError, match="the goal is unstable"):
+        plotting.margins(NOWHERE)
+    with pytest.raises(InputError, match="the goal is unstable"):
+        plotting.film(NOWHERE, tmp_path / "film.gif", spring_set)
+
+
+@pytest.mark.parametrize("wrong", [{"frames": 1}, {"fps": 0}])
+def test_a_film_needs_frames_and_speed(spring_set, route, tmp_path, wrong):
+    with pytest.raises(InputError, match="`frames` must be at least 2"):
+        plotting.film(route, tmp_path / "film.gif", spring_set, **wrong)
+
+
+def test_one_shape_is_too_few(route):
+    with pytest.raises(InputError, match="`count` must be at least 2; got 1"):
+        plotting.shapes(route, count=1)
+
+
+def test_pointers_of_an_arch_lie_along_its_end_tangents():
+    """θ(0) = Δ + Θ, θ(1) = Δ − Θ."""
+    states = lift(Rod().natural_state(Theta=0.9), {"Delta": 0.3}).states
+    parts = moving_parts(Figure().add_subplot(), states)
+    along = parts.pointer_lines[:, -1, 1] - parts.pointer_lines[:, -1, 0]
+    np.testing.assert_allclose(np.arctan2(along[:, 1], along[:, 0]), [1.2, -0.6], atol=1e-12)
+
+
+def test_load_arrows_point_down_where_there_is_load():
+    path = lift(Rod("left-half").natural_state(Theta=0.9), {"q": 1.0})
+    parts = moving_parts(Figure().add_subplot(), path.states)
+    heads = parts.heads[-1]
+    assert (heads[:, 0] == 0).all()
+    assert (heads[:6, 1] < 0).all()
+    assert (heads[7:, 1] == 0).all()
+    assert np.abs(parts.heads[0]).max() == 0.0
+
+
+def test_an_unloaded_arch_has_no_arrows():
+    states = lift(Rod().natural_state(Theta=0.9), {"Theta": 1.0}).states
+    assert moving_parts(Figure().add_subplot(), states).arrows is None
+
+
+def _route_of(path, descriptors):
+    parameters = path.states.structure.parameters
+    schedule = Schedule(
+        names=names_of(parameters),
+        roles=tuple(parameter.role for parameter in parameters),
+        units=tuple(parameter.unit for parameter in parameters),
+        values=path.states.p,
+        progress=path.length / path.length[-1],
+        margins=path.states.margin,
+        descriptors=descriptors,
+        start={},
+        way_points=np.array([0, len(path.at) - 1]),
+    )
+    return Route("arrived", "", [], path, 1.0, 1.0, schedule)
