@@ -95,8 +95,8 @@ def assert_boundaries(eset: EquilibriumSet) -> None:
     """Loops are closed and simple; the vertices lie on the box or on a constraint."""
     size = eset.box.upper - eset.box.lower
     x = eset.coordinates
-    on_box = (np.abs(x - eset.box.lower) < 1e-9 * size) | (np.abs(x - eset.box.upper) < 1e-9 * size)
-    on_box = on_box.any(axis=1)
+    low, high = np.abs(x - eset.box.lower), np.abs(x - eset.box.upper)
+    on_box = (np.minimum(low, high) < 1e-9 * size).any(axis=1)
     excess = np.full(len(x), -np.inf)
     for constraint in eset.constraints:
         excess = np.maximum(excess, constraint.excess(eset.points.z, eset.points.p))

@@ -53,11 +53,23 @@ class Sum:
                 terms[lower] = factor * exponents[i]
         return Sum(terms)
 
-    def __call__(self, x: np.ndarray) -> np.ndarray:
-        total = np.zeros(len(x))
-        for exponents, factor in self.terms.items():
-            total += factor * np.prod(x ** np.array(exponents), axis=1)
-        return total
+
+class Table:
+    """Many polynomials in the same variables, evaluated together."""
+
+    def __init__(self, sums: list[Sum], *shape: int) -> None:
+        exponents = sorted({exponents for each in sums for exponents in each.terms})
+        self.exponents = np.array(exponents or [(0,) * 1])
+        self.factors = np.zeros((len(self.exponents), len(sums)))
+        for i, each in enumerate(sums):
+            for term, factor in each.terms.items():
+                self.factors[exponents.index(term), i] = factor
+        self.shape = shape
+
+    def __call__(self, z: np.ndarray, p: np.ndarray) -> np.ndarray:
+        x = np.concatenate([z, p], axis=1)
+        monomials = np.prod(x[:, None] ** self.exponents, axis=2)
+        return (monomials @ self.factors).reshape(len(x), *self.shape)
 
 
 class Polynomial(Structure):
@@ -85,39 +97,35 @@ class Polynomial(Structure):
         self.lagrangian = self.potential
         if constraint is not None:
             self.lagrangian = self.potential + x[unknowns] * constraint(*given)
-        self.first = [self.lagrangian.slope(i) for i in range(count)]
-        self.second = [[f.slope(j) for j in range(count)] for f in self.first]
-        self.third = [[[g.slope(k) for k in range(count)] for g in f] for f in self.second]
+        n = self.size
+        first = [self.lagrangian.slope(i) for i in range(count)]
+        second = [f.slope(j) for f in first[:n] for j in range(count)]
+        third = [g.slope(k) for g in second for k in range(count)]
+        self.first, self.second = Table(first, count), Table(second, n, count)
+        self.third, self.value = Table(third, n, count, count), Table([self.potential])
 
     def identity(self) -> dict[str, Any]:
         return {"kind": self.kind}
 
     def energy(self, z, p):
-        return self.potential(np.concatenate([z, p], axis=1))
+        return self.value(z, p)
 
     def residual(self, z, p):
-        x = np.concatenate([z, p], axis=1)
-        return np.stack([f(x) for f in self.first[: self.size]], axis=1)
+        return self.first(z, p)[:, : self.size].copy()
 
     def parameter_derivative(self, z, p, dp):
-        x, n = np.concatenate([z, p], axis=1), self.size
-        columns = [[g(x) for g in f[n:]] for f in self.second[:n]]
-        return np.einsum("ijl,lj->li", np.array(columns), dp)
+        return np.einsum("lij,lj->li", self.second(z, p)[:, :, self.size :], dp)
 
     def second_derivative(self, z, p, v, w):
-        x, n = np.concatenate([z, p], axis=1), self.size
         v, w = np.concatenate(v, axis=1), np.concatenate(w, axis=1)
-        cubes = np.array([[[h(x) for h in g] for g in f] for f in self.third[:n]])
-        return np.einsum("ijkl,lj,lk->li", cubes, v, w)
+        return np.einsum("lijk,lj,lk->li", self.third(z, p), v, w)
 
     def effort(self, z, p):
-        x = np.concatenate([z, p], axis=1)
-        return np.stack([f(x) for f in self.first[self.size :]], axis=1)
+        return self.first(z, p)[:, self.size :].copy()
 
     def solve(self, z, p, rhs, border=None, shift=None):
-        x, n = np.concatenate([z, p], axis=1), self.size
-        matrix = np.array([[g(x) for g in f[:n]] for f in self.second[:n]]).transpose(2, 0, 1)
-        matrix = matrix.copy()
+        n = self.size
+        matrix = self.second(z, p)[:, :, :n].copy()
         if shift is not None:
             at = np.arange(self.unknowns)
             matrix[:, at, at] -= shift[:, None]
