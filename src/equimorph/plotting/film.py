@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +16,7 @@ from PIL import Image
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
+from equimorph.model import position
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along, track
 from equimorph.plotting.furniture import MovingParts, draw_supports, frame_shapes, moving_parts
@@ -29,8 +30,9 @@ _WIDTH, _HEIGHT, _DOTS = 6.4, 3.1, 120
 _LARGER = {"font.size": 9, "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8}
 _CURVATURE = "max_curvature"
 # Right ends of the numbers: the free parameters above each other, margin and curvature beside them.
-_READING_PLACES = ((0.14, 0.085), (0.14, 0.025), (0.48, 0.085), (0.48, 0.025))
+_READING_PLACES = ((0.13, 0.085), (0.13, 0.025), (0.46, 0.085), (0.46, 0.025))
 _NUMBER_WIDTH = 0.085
+_LONGEST_UNIT = 4
 _COLOURS = 64
 _PAUSE_FIRST, _PAUSE_LAST = 0.8, 1.6  # seconds
 _HUNDREDTHS = 10  # GIF counts time in hundredths of a second: milliseconds in tens
@@ -123,9 +125,9 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
     frame_plane(right, eset)
     shade_regions(right, eset, count_regions(eset.coordinates, eset.cells))
     draw_folds(right, eset)
-    draw_track(right, eset, route, path_of(route))
+    draw_track(right, eset, route, path_of(route)).set_linewidth(0.8)
     (shape,) = left.plot([], [], color=style.INDEX_COLOURS[0], linewidth=3.0, zorder=4)
-    (travelled,) = right.plot([], [], color=style.INK, linewidth=2.0, zorder=8)
+    (travelled,) = right.plot([], [], color=style.ROUTE_COLOUR, linewidth=2.4, zorder=8)
     (point,) = right.plot([], [], "o", color=style.INK, markeredgecolor="white", ms=7, zorder=9)
     parts = moving_parts(left, states)
     texts, numbers = _place_readings(figure, _readings(states, eset, route))
@@ -165,27 +167,38 @@ def _ways(
     ]
 
 
-def _readings(
-    states: States, eset: EquilibriumSet, route: Route
-) -> list[tuple[str, str, Float[np.ndarray, " lanes"]]]:
-    """Numbers under each picture: label, format and values."""
-    readings = [(symbol(name), "{:.2f}", states[name]) for name in eset.names]
-    readings.append(("stability margin", "{:.2f}", states.margin))
+class _Reading(NamedTuple):
+    """A number under the pictures."""
+
+    label: str
+    unit: str
+    form: str
+    values: Float[np.ndarray, " lanes"]
+
+
+def _readings(states: States, eset: EquilibriumSet, route: Route) -> list[_Reading]:
+    """Free parameters, stability margin, and curvature if the schedule has it."""
+    parameters = states.structure.parameters
+    free = [parameters[position(parameters, name)] for name in eset.names]
+    readings = [_Reading(symbol(p.name), p.unit, "{:.2f}", states[p.name]) for p in free]
+    readings.append(_Reading("stability margin", "", "{:.2f}", states.margin))
     if route.schedule is not None and _CURVATURE in route.schedule.descriptors:
-        curvature = states.structure.descriptor(_CURVATURE)
-        readings.append((curvature.symbol, "{:.1f}", curvature(states)))
+        kappa = states.structure.descriptor(_CURVATURE)
+        readings.append(_Reading(kappa.symbol, kappa.unit, "{:.1f}", kappa(states)))
     return readings
 
 
 def _place_readings(
-    figure: Figure, readings: list[tuple[str, str, Float[np.ndarray, " lanes"]]]
+    figure: Figure, readings: list[_Reading]
 ) -> tuple[tuple[Text, ...], list[tuple[str, ...]]]:
     """Write labels in two rows; return the texts for the numbers, and the numbers of each state."""
     texts = []
-    for (label, _, _), (x, y) in zip(readings, _READING_PLACES, strict=False):
-        figure.text(x - _NUMBER_WIDTH, y, label, ha="right")
+    for reading, (x, y) in zip(readings, _READING_PLACES, strict=False):
+        figure.text(x - _NUMBER_WIDTH, y, reading.label, ha="right")
         texts.append(figure.text(x, y, "", ha="right", weight="bold"))
-    printed = [[form.format(value).replace("-", "−") for value in v] for _, form, v in readings]
+        if len(reading.unit) <= _LONGEST_UNIT:
+            figure.text(x + 0.008, y, reading.unit, ha="left")
+    printed = [[r.form.format(x).replace("-", "−") for x in r.values] for r in readings]
     return tuple(texts), list(zip(*printed, strict=True))
 
 
