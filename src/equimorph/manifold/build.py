@@ -27,6 +27,8 @@ from equimorph.model import (
 from equimorph.structures import States, Structure
 
 BISECTIONS = 12
+HOPELESS = 50
+"""Doubtful triangles, and four times what there were at first, beyond which bisection ends."""
 
 
 def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by keyword
@@ -118,14 +120,16 @@ def _mirrored(setting: Setting) -> tuple[bool, bool]:
 
 def _lifted(pairing: Pairing, progress: Progress) -> tuple[Cells, int]:
     """Flood, close, assemble; bisect what is not certain and go on."""
-    bisected = 0
-    for _ in range(BISECTIONS):
+    bisected = first = 0
+    for number in range(BISECTIONS):
         flood(pairing, progress)
         progress.report("closing loops", 0, 1)
         loops = find_loops(pairing)
         cells = assemble(pairing, loops)
         doubtful = sorted({*loops.ambiguous, *loops.broken, *cells.undecided})
-        if not doubtful:
+        first = len(doubtful) if number == 0 else first
+        # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
+        if not doubtful or len(doubtful) > max(HOPELESS, 4 * first):
             break
         bisected += len(doubtful)
         longest = _longest_sides(pairing, np.array(doubtful))

@@ -150,7 +150,7 @@ def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
         mesh,
         Points.empty(setting.structure, len(mesh.vertices)),
         Curves(),
-        np.full((0, 0), UNTRACED),
+        np.full((0, incident.shape[1]), UNTRACED),
         slots,
         incident,
         np.zeros(len(mesh.edges), int),

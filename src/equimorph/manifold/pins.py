@@ -9,6 +9,8 @@ from equimorph.manifold.pairing import Setting
 from equimorph.manifold.points import CAP, CORNER, FOLD, Points
 
 Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Place = tuple[Lanes, Parameters]
 Values = Float[np.ndarray, " lanes"]
 
 NEWTON_STEPS = 15
@@ -20,7 +22,7 @@ class Pinned:
     """Points found between pairs of points, with their parameters, and which can be trusted."""
 
     z: Lanes
-    p: Float[np.ndarray, "lanes parameters"]
+    p: Parameters
     found: Bool[np.ndarray, " lanes"]
 
 
@@ -74,14 +76,14 @@ def pin(
 
 def _trusted(
     setting: Setting,
-    found: tuple[Lanes, Lanes],
-    middle: tuple[Lanes, Lanes],
-    end: tuple[Lanes, Lanes],
+    found: Place,
+    middle: Place,
+    end: Place,
     size: Values,
 ) -> Bool[np.ndarray, " lanes"]:
     """Converged, and not farther from the middle than three half-lengths of the pair."""
 
-    def gap(a: tuple[Lanes, Lanes], b: tuple[Lanes, Lanes]) -> Values:
+    def gap(a: Place, b: Place) -> Values:
         n = setting.structure.unknowns
         square = (a[0] - b[0])[:, :n] ** 2 @ setting.structure.mass
         by_scale = (a[1] - b[1]) / setting.structure.scales
@@ -110,11 +112,13 @@ def _unit_parameter(setting: Setting, lanes: int, k: int) -> Float[np.ndarray, "
     return dp
 
 
-def _by_parameter(setting: Setting, z: Lanes, p: Lanes, k: int) -> Lanes:
+def _by_parameter(setting: Setting, z: Lanes, p: Parameters, k: int) -> Lanes:
     return setting.structure.parameter_derivative(z, p, _unit_parameter(setting, len(z), k))
 
 
-def _fold_condition(setting: Setting, z: Lanes, p: Lanes, b: Lanes) -> tuple[_Condition, Lanes]:
+def _fold_condition(
+    setting: Setting, z: Lanes, p: Parameters, b: Lanes
+) -> tuple[_Condition, Lanes]:
     """Test function g of ``[F_z b; bᵀ 0] [v; g] = [0; 1]``, and v for the next round."""
     structure, lanes = setting.structure, len(z)
     rhs = np.zeros((lanes, 1, structure.size + 1))
@@ -133,11 +137,11 @@ def _fold_condition(setting: Setting, z: Lanes, p: Lanes, b: Lanes) -> tuple[_Co
     return _Condition(g, by_z, by_x), v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def _cap_condition(setting: Setting, z: Lanes, p: Lanes) -> _Condition:
+def _cap_condition(setting: Setting, z: Lanes, p: Parameters) -> _Condition:
     """Largest excess over the constraints, its gradients by central differences."""
     lanes, size = z.shape
 
-    def worst(z: Lanes, p: Lanes) -> Values:
+    def worst(z: Lanes, p: Parameters) -> Values:
         return np.asarray(np.max([c.excess(z, p) for c in setting.constraints], axis=0))
 
     if not setting.constraints:
@@ -156,9 +160,9 @@ def _cap_condition(setting: Setting, z: Lanes, p: Lanes) -> _Condition:
 
 def _middle_condition(
     setting: Setting,
-    at: tuple[Lanes, Lanes],
-    middle: tuple[Lanes, Lanes],
-    along: tuple[Lanes, Lanes],
+    at: Place,
+    middle: Place,
+    along: Place,
 ) -> _Condition:
     """Inner product of the pair's direction with the distance from its middle."""
     n, free = setting.structure.unknowns, setting.free

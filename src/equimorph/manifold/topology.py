@@ -69,7 +69,7 @@ def euler_characteristic(cells: Int[np.ndarray, "C 3"]) -> int:
     return len(np.unique(cells)) - len(whole.edges) + len(cells)
 
 
-def chains(pairs: Pairs) -> list[Int[np.ndarray, " n"]]:
+def chains(pairs: Pairs) -> list[Int[np.ndarray, " vertices"]]:
     """Polylines along edges, split where other than two meet; closed ones repeat the start."""
     if len(pairs) == 0:
         return []

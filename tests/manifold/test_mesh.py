@@ -1,0 +1,91 @@
+"""The triangulation of the parameter box: conforming, filling, off lines of symmetry."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from equimorph.manifold.mesh import SHIFT, BaseMesh, bisect, grid_mesh
+from equimorph.manifold.topology import euler_characteristic, projected_area, surface
+from equimorph.model import Box
+
+BOX = Box(a=(-1.0, 2.0), b=(-2.0, 2.0))
+
+
+def assert_conforming(mesh: BaseMesh) -> None:
+    """Positive areas that fill the box, every inner edge with two triangles, a disc."""
+    areas = projected_area(mesh.vertices, mesh.triangles)
+    assert areas.min() > 0
+    assert areas.sum() == pytest.approx(12.0, rel=1e-13)
+    whole = surface(mesh.triangles)
+    assert whole.counts.max() == 2
+    assert euler_characteristic(mesh.triangles) == 1
+    once = mesh.vertices[whole.edges[whole.counts == 1]]
+    on_side = (once == BOX.lower).all(axis=1) | (once == BOX.upper).all(axis=1)
+    assert on_side.any(axis=1).all()
+    for k in range(3):
+        ends = np.sort(mesh.triangles[:, [k, (k + 1) % 3]], axis=1)
+        assert np.array_equal(ends, np.sort(mesh.edges[mesh.sides[:, k]], axis=1))
+
+
+@given(st.integers(2, 9), st.integers(2, 9), st.booleans(), st.booleans())
+def test_grid_mesh_conforms(n, m, first, second):
+    mesh = grid_mesh(BOX, (n, m), (first, second))
+    assert len(mesh.triangles) == 2 * n * m
+    assert_conforming(mesh)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1))
+def test_bisected_mesh_conforms(seed):
+    """Also after many bisections of random edges."""
+    generator = np.random.default_rng(seed)
+    mesh = grid_mesh(BOX, (3, 4), (False, True))
+    for _ in range(5):
+        used = np.unique(mesh.sides)
+        mesh = bisect(mesh, generator.choice(used, 6, replace=False), (False, True))
+        assert_conforming(mesh)
+
+
+def test_bisected_edges_keep_the_numbers_of_the_others():
+    mesh = grid_mesh(BOX, (3, 4), (False, False))
+    finer = bisect(mesh, np.array([5]), (False, False))
+    assert np.array_equal(finer.edges[: len(mesh.edges)], mesh.edges)
+    assert np.array_equal(finer.vertices[: len(mesh.vertices)], mesh.vertices)
+    assert 5 not in finer.sides
+
+
+def test_grid_lines_keep_off_a_line_of_symmetry():
+    mesh = grid_mesh(BOX, (4, 8), (False, True))
+    assert np.abs(mesh.vertices[:, 1]).min() > 0.05
+
+
+def test_bisection_keeps_off_a_line_of_symmetry():
+    mesh = grid_mesh(BOX, (3, 3), (False, True))
+    ends = mesh.vertices[mesh.edges][:, :, 1]
+    across = np.flatnonzero(np.abs(ends.sum(axis=1)) < 1e-12)
+    assert len(across)
+    finer = bisect(mesh, across[:1], (False, True))
+    assert np.abs(finer.vertices[:, 1]).min() > 0.05
+
+
+def test_grid_lines_of_a_symmetric_range_are_mirror_images():
+    mesh = grid_mesh(BOX, (4, 9), (False, True))
+    lines = np.unique(mesh.vertices[:, 1])
+    assert np.abs(lines + lines[::-1]).max() < 1e-15
+
+
+def test_grid_lines_are_shifted_a_little_but_not_the_sides_of_the_box():
+    lines = np.unique(grid_mesh(BOX, (6, 9), (False, False)).vertices[:, 0])
+    regular = np.linspace(-1.0, 2.0, 7)
+    shift = np.abs(lines - regular)
+    assert shift[0] == shift[-1] == 0.0
+    assert 0.0 <= shift[1:-1].min() <= shift.max() <= SHIFT * 0.5
+
+
+@given(st.floats(-1.0, 2.0), st.floats(-2.0, 2.0))
+def test_locate_finds_the_triangle_around_a_point(a, b):
+    mesh = grid_mesh(BOX, (5, 6), (False, False))
+    corners = mesh.vertices[mesh.triangles[mesh.locate(np.array([a, b]))]]
+    weights = np.linalg.solve(np.vstack([corners.T, np.ones(3)]), np.array([a, b, 1.0]))
+    assert weights.min() > -1e-12

@@ -1,0 +1,131 @@
+"""Topology of triangulated surfaces that are known by name."""
+
+import numpy as np
+import pytest
+
+from equimorph.manifold.topology import (
+    chains,
+    euler_characteristic,
+    flags_of,
+    labels,
+    orientation,
+    projected_area,
+    surface,
+)
+
+OCTAHEDRON = np.array(
+    [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+)
+STRIP = np.array([[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]])
+
+
+def moebius(length=5):
+    """Triangles k, k + 1, k + 2 of a ring with an odd number of vertices."""
+    k = np.arange(length)
+    return np.stack([k, (k + 1) % length, (k + 2) % length], axis=1)
+
+
+def torus(n=5, m=6):
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
+
+    def at(i, j):
+        return (i % n) * m + j % m
+
+    one = np.stack([at(i, j), at(i + 1, j), at(i + 1, j + 1)], 1)
+    return np.concatenate([one, np.stack([at(i, j), at(i + 1, j + 1), at(i, j + 1)], 1)])
+
+
+@pytest.mark.parametrize(
+    ("cells", "chi"), [(OCTAHEDRON, 2), (STRIP, 1), (moebius(), 0), (torus(), 0)]
+)
+def test_euler_characteristic_of_known_surfaces(cells, chi):
+    assert euler_characteristic(cells) == chi
+
+
+@pytest.mark.parametrize("cells", [OCTAHEDRON, STRIP, torus()])
+def test_orientable_surface_is_oriented_without_contradiction(cells):
+    """However the cells are turned, the signs undo it."""
+    turned = cells.copy()
+    flipped = np.random.default_rng(3).random(len(cells)) < 0.5
+    turned[flipped] = turned[flipped][:, [0, 2, 1]]
+    signs, contradictions = orientation(turned, surface(turned))
+    assert contradictions == 0
+    want = np.where(flipped, -1, 1)
+    assert np.array_equal(signs, want) or np.array_equal(signs, -want)
+
+
+@pytest.mark.parametrize("length", [5, 7, 21])
+def test_moebius_strip_contradicts_every_orientation(length):
+    cells = moebius(length)
+    assert orientation(cells, surface(cells))[1] == 1
+
+
+def test_surface_counts_the_cells_of_every_edge():
+    whole = surface(STRIP)
+    assert len(whole.edges) == 9
+    assert sorted(whole.counts.tolist()) == [1] * 6 + [2] * 3
+    assert np.array_equal(np.sort(STRIP[:, [0, 1]], axis=1), whole.edges[whole.cell_edges[:, 0]])
+    for (a, b), edge in zip(whole.neighbours, whole.shared, strict=True):
+        assert set(whole.edges[edge]) <= set(STRIP[a]) & set(STRIP[b])
+
+
+def test_edge_of_three_cells_is_counted_but_joins_none():
+    book = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    whole = surface(book)
+    assert whole.counts.max() == 3
+    assert len(whole.neighbours) == 0
+
+
+def test_labels_number_the_pieces_by_size():
+    cells = np.concatenate([[[10, 11, 12]], STRIP])
+    assert labels(5, surface(cells).neighbours).tolist() == [1, 0, 0, 0, 0]
+
+
+def test_labels_stop_at_edges_that_are_not_to_be_crossed():
+    whole = surface(STRIP)
+    crossed = ~flags_of(whole.edges, {(2, 3)})[whole.shared]
+    assert labels(4, whole.neighbours, crossed).tolist() == [0, 0, 1, 1]
+
+
+def test_labels_of_nothing_are_empty():
+    none = np.zeros((0, 3), int)
+    assert len(labels(0, surface(none).neighbours)) == 0
+
+
+def test_flags_ignore_pairs_that_are_no_edges():
+    whole = surface(STRIP)
+    flags = flags_of(whole.edges, {(1, 2), (0, 5), (77, 99)})
+    assert whole.edges[flags].tolist() == [[1, 2]]
+
+
+def test_chains_join_edges_to_open_and_closed_lines():
+    pairs = np.array([[3, 4], [1, 2], [0, 1], [5, 6], [4, 5], [3, 6]])
+    lines = sorted((line.tolist() for line in chains(pairs)), key=len)
+    assert lines[0] in ([0, 1, 2], [2, 1, 0])
+    assert lines[1][0] == lines[1][-1]
+    assert sorted(lines[1][:-1]) == [3, 4, 5, 6]
+
+
+def test_chains_are_split_where_three_lines_meet():
+    lines = chains(np.array([[0, 1], [1, 2], [1, 3], [3, 4]]))
+    ends = sorted(sorted((int(line[0]), int(line[-1]))) for line in lines)
+    assert ends == [[0, 1], [1, 2], [1, 4]]
+
+
+def test_chains_use_every_edge_once():
+    generator = np.random.default_rng(0)
+    pairs = np.unique(np.sort(generator.integers(0, 25, (60, 2)), axis=1), axis=0)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    lines = chains(pairs)
+    used = np.concatenate([np.sort(np.stack([x[:-1], x[1:]], 1), axis=1) for x in lines])
+    assert sorted(used.tolist()) == pairs.tolist()
+
+
+def test_chains_of_nothing_are_none():
+    assert chains(np.zeros((0, 2), int)) == []
+
+
+def test_projected_area_is_signed():
+    corners = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 3.0]])
+    cells = np.array([[0, 1, 2], [0, 2, 1]])
+    assert projected_area(corners, cells).tolist() == [3.0, -3.0]
