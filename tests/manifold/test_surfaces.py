@@ -147,6 +147,22 @@ def test_constraint_cuts_a_set_off_along_itself():
     np.testing.assert_allclose(x(eset.points)[eset.boundaries[0].vertices], 0.4, atol=1e-10)
 
 
+def test_constraint_can_cut_folds():
+    """x + a ≤ 0.3 cuts the sphere obliquely: the fold ends on the constraint, in corners."""
+    ball = sphere()
+    slant = Descriptor("x + a", "1", lambda z, p: z[:, 0] + p[:, 0])
+    eset = equilibrium_set(
+        ball, Box(a=(-1.3, 1.2), b=(-1.5, 1.5)), within=[slant <= 0.3], intervals=(11, 13)
+    )
+    assert_faithful(eset)
+    assert topology(eset) == (1, 1, 1)
+    assert len(eset.folds) == 1
+    ends = eset.folds[0][[0, -1]]
+    assert (eset.kinds[ends] == 4).all()
+    np.testing.assert_allclose(eset.points["a"][ends], 0.3, atol=1e-8)
+    assert_folds_are_singular(eset, 1e-7)
+
+
 def test_constraint_that_is_never_active_changes_nothing():
     x = Descriptor("x", "1", lambda z, _: z[:, 0].copy())
     box = Box(a=(-1.3, 1.2), b=(-1.5, 1.5))

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria import ParameterLine, TraceOptions, distinct
+from equimorph.equilibria import ParameterLine, TraceOptions, distinct, newton
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.errors import InputError
@@ -15,6 +15,9 @@ from equimorph.manifold.audit import Audit
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.model import Box, Constraint, parameter_vector
 from equimorph.structures import States, Structure
+
+OVERHANG = 0.3
+"""How far beyond a cell, in barycentric coordinates, a point may lie to be tried from it."""
 
 
 @dataclass(frozen=True)
@@ -119,15 +122,52 @@ class EquilibriumSet:
         """Exact states over one point of the box, sorted by energy.
 
         Lifted from all known equilibria over the corners of the grid triangle around the point,
-        through folds; distinct ends are the states.
+        through folds, and corrected from the cells above it; distinct ends are the states.
         """
         p = self.parameters_at(at)
-        triangle = self.mesh.locate(np.array([float(at[name]) for name in self.names]))
+        point = np.array([float(at[name]) for name in self.names])
+        triangle = self.mesh.locate(point)
         starts = np.flatnonzero(np.isin(self.grid_vertex, self.mesh.triangles[triangle]))
-        z = lift_to(self.points[starts], p, self.constraints)
+        lifted = lift_to(self.points[starts], p, self.constraints)
+        # a sheet that a constraint or a curved fold hides from the corners is still under a cell
+        z = np.concatenate([lifted, self._corrected(point, p)])
         z = z[distinct(self.structure, z)]
         states = States(self.structure, z, np.tile(p, (len(z), 1)))
         return states[np.argsort(states.energy, kind="stable")]
+
+    def _corrected(
+        self, point: Float[np.ndarray, " 2"], p: Float[np.ndarray, " P"]
+    ) -> Float[np.ndarray, "n size"]:
+        """Unknowns of equilibria over a point, by Newton from the cells above it, nearby only."""
+        weights = barycentric(self.coordinates[self.cells], point)
+        above = np.flatnonzero(weights.min(axis=1) > -OVERHANG)
+        corners = self.points.z[self.cells[above]]
+        guess = np.einsum("ck,ckn->cn", weights[above], corners)
+        n, mass = self.structure.unknowns, self.structure.mass
+        reach = np.sqrt((corners - guess[:, None])[:, :, :n] ** 2 @ mass).max(axis=1)
+        everywhere = np.tile(p, (len(guess), 1))
+        z, good = newton(self.structure, guess, everywhere)
+        good &= np.sqrt((z - guess)[:, :n] ** 2 @ mass) <= 2.0 * reach
+        good &= self.structure.resolved(z, everywhere)
+        for constraint in self.constraints:
+            good &= constraint.excess(z, everywhere) <= 0.0
+        return np.asarray(z[good])
+
+
+def barycentric(
+    corners: Float[np.ndarray, "n 3 2"], point: Float[np.ndarray, " 2"]
+) -> Float[np.ndarray, "n 3"]:
+    """Barycentric coordinates of a point in triangles; −∞ in those without area."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+
+    def cross(v: Float[np.ndarray, "n 2"], w: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+        return np.asarray(v[:, 0] * w[:, 1] - v[:, 1] * w[:, 0])
+
+    area = cross(b - a, c - a)
+    parts = np.stack([cross(b - point, c - point), cross(c - point, a - point)], axis=1)
+    first_two = np.full_like(parts, -np.inf)
+    np.divide(parts, area[:, None], out=first_two, where=area[:, None] != 0.0)
+    return np.concatenate([first_two, 1.0 - first_two.sum(axis=1, keepdims=True)], axis=1)
 
 
 def lift_to(

@@ -274,7 +274,9 @@ def _trace_rays(
         numbers = [store.add(z, p, index, kind, edge) for z, p, index, kind in rows]
         if code == CONSTRAINT:
             z, p = outcome.z[lane], line.parameters(outcome.t)[lane]
-            numbers.append(store.add(z, p, int(outcome.index[lane]), CAP, edge))
+            # counted anew: a fold may lie between the last step and the constraint
+            index = int(setting.structure.index(z[None], p[None])[0])
+            numbers.append(store.add(z, p, index, CAP, edge))
         pairing.fit()
         _enter(pairing, point, edge, end, numbers)
 

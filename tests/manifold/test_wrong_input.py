@@ -1,0 +1,84 @@
+"""What a caller can do wrong with sets, and what the answer is."""
+
+import re
+
+import pytest
+
+from equimorph.errors import InputError
+from equimorph.manifold import equilibrium_set
+from equimorph.model import Box
+from equimorph.structures import Rod, Spring
+
+
+@pytest.mark.parametrize(
+    ("box", "options", "message"),
+    [
+        (Box(F=(-1, 1)), {}, "`box` must have two parameters; got 1 (F)."),
+        (
+            Box(F=(-1, 1), x_l=(0.5, 1), k=(1, 2)),
+            {},
+            "`box` must have two parameters; got 3 (F, x_l, k).",
+        ),
+        (
+            Box(F=(-1, 1), Theta=(0, 1)),
+            {},
+            "`Theta` must be a parameter (x_l, F, k); got 'Theta'.",
+        ),
+        (
+            Box(F=(-1, 1), x_l=(0.5, 1)),
+            {"fixed": {"x_l": 1.0}},
+            "`fixed` must not name a parameter of the box; got x_l.",
+        ),
+        (
+            Box(F=(-1, 1), x_l=(0.5, 1)),
+            {"fixed": {"q": 1.0}},
+            "`q` must be a parameter (x_l, F, k); got 'q'.",
+        ),
+        (
+            Box(F=(-1, 1), x_l=(0.5, 1)),
+            {"fixed": {"k": -1.0}},
+            "`k` must be a finite number greater than 0; got -1.0.",
+        ),
+        (
+            Box(F=(-1, 1), x_l=(-0.5, 1)),
+            {},
+            "`x_l` must be a finite number greater than 0; got -0.5.",
+        ),
+        (
+            Box(F=(-1, 1), x_l=(0.5, 1)),
+            {"intervals": (1, 5)},
+            "`intervals` must be two whole numbers >= 2; got (1, 5).",
+        ),
+    ],
+)
+def test_wrong_problem_is_refused_by_name(box, options, message):
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        equilibrium_set(Spring(), box, **options)
+
+
+def test_reversed_bounds_are_refused_by_name():
+    with pytest.raises(InputError, match=r"^`F` must have finite lower < upper; got \(1, -1\)\.$"):
+        Box(F=(1, -1), x_l=(0.5, 1))
+
+
+def test_parameter_without_a_default_must_be_fixed():
+    """Δ and the load of a rod have one, Θ has none."""
+    with pytest.raises(InputError, match="`Theta` must be given; got no value"):
+        equilibrium_set(Rod(), Box(Delta=(0.5, 1), q=(0, 1)))
+
+
+@pytest.mark.parametrize(
+    ("at", "message"),
+    [
+        ({"x_l": 0.8}, "`at` must give x_l and F; got x_l."),
+        ({}, "`at` must give x_l and F; got nothing."),
+        ({"x_l": 0.8, "Theta": 1.0}, "`at` must give x_l and F; got x_l, Theta."),
+        (
+            {"x_l": 0.8, "F": 0.6},
+            "`at` must lie in Box(x_l=(0.3, 1.3), F=(-0.5, 0.5)); got {'x_l': 0.8, 'F': 0.6}.",
+        ),
+    ],
+)
+def test_wrong_point_is_refused(spring_set, at, message):
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        spring_set.at(**at)
