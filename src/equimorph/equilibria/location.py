@@ -11,8 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from equimorph.equilibria.curves import Curve, ParameterLine, correction_size, squared_length
-from equimorph.equilibria.fronts import Bracket, step_along
+from equimorph.equilibria.curves import (
+    Curve,
+    ParameterLine,
+    correction_size,
+    dual,
+    squared_length,
+)
+from equimorph.equilibria.fronts import Bracket, Front, step_along
 
 Lanes = Float[np.ndarray, "lanes size"]
 Values = Float[np.ndarray, " lanes"]
@@ -81,9 +87,19 @@ def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:
 
 
 def _inside(curve: Curve, bracket: Bracket, z: Lanes, t: Values) -> Flags:
-    """Whether points lie within the reach of their step: a guard against jumps."""
-    gap = squared_length(curve.structure, curve.weight, z - bracket.before.z, t - bracket.before.t)
-    return np.asarray(np.sqrt(gap) <= 1.3 * bracket.step + 1e-9)
+    """Whether points lie between the ends of their step: a guard against jumps and neighbours."""
+    old, new = bracket.before, bracket.after
+    gap = squared_length(curve.structure, curve.weight, z - old.z, t - old.t)
+    slack = 1e-3 * bracket.step + 1e-9
+    along, whole = _along(curve, old, z, t), _along(curve, old, new.z, new.t)
+    between = (along >= -slack) & (along <= whole + slack)
+    return np.asarray(between & (np.sqrt(gap) <= bracket.step + slack))
+
+
+def _along(curve: Curve, front: Front, z: Lanes, t: Values) -> Values:
+    """Distance of points along the tangents of `front`."""
+    row, corner = dual(curve.structure, curve.weight, front.tangent_z, front.tangent_t)
+    return np.asarray(np.einsum("li,li->l", row, z - front.z) + corner * (t - front.t))
 
 
 def _velocity(curve: Curve, lanes: int) -> Float[np.ndarray, "lanes parameters"]:
@@ -194,13 +210,9 @@ def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
 
 def _arclength(curve: Curve, bracket: Bracket, z: Lanes, t: Values, share: Values) -> Values:
     """Arclength of a point of the curve from the bracket's start, by projection on the tangent."""
-    old = bracket.before
-    dz, n = z - old.z, curve.structure.unknowns
-    along = (dz[:, :n] * curve.structure.mass * old.tangent_z[:, :n]).sum(axis=1)
-    along = along + curve.weight**2 * (t - old.t) * old.tangent_t
-    return np.asarray(
-        np.where(np.isfinite(along), np.clip(along, 0.0, bracket.step), share * bracket.step)
-    )
+    along = _along(curve, bracket.before, z, t)
+    clipped = np.clip(along, 0.0, bracket.step)
+    return np.asarray(np.where(np.isfinite(along), clipped, share * bracket.step))
 
 
 def locate_root(

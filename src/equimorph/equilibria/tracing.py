@@ -96,7 +96,9 @@ class Traces:
 
     brackets: list[Bracket] = field(default_factory=list)
     lost: dict[int, tuple[str, Front]] = field(default_factory=dict)
-    points: list[tuple[Int[np.ndarray, " some"], Values, Front]] = field(default_factory=list)
+    points: list[tuple[Int[np.ndarray, "..."], Float[np.ndarray, "..."], Front]] = field(
+        default_factory=list
+    )
 
     def extend(self, more: "Traces") -> None:
         """Take up what another trace left."""
@@ -119,7 +121,11 @@ class Traces:
         return Traces(
             [bracket for bracket in brackets if len(bracket.lanes)],
             {lane: entry for lane, entry in self.lost.items() if lane not in lanes},
-            [(names[at], travelled[at], front.take(at)) for (names, travelled, front), at in kept],
+            [
+                (names[at], travelled[at], front.take(at))
+                for (names, travelled, front), at in kept
+                if len(at)
+            ],
         )
 
 
@@ -243,7 +249,7 @@ def _attempt(march: March, constraints: tuple[Constraint, ...], options: TraceOp
     reach = front.t + front.tangent_t * length
     hidden = np.where(front.tangent_t > 0.0, reach >= 1.0, reach <= 0.0)
     hidden = (hidden | ((what & (ARRIVAL | RETURN)) != 0)) & (length > 10 * options.smallest_step)
-    good = good & ~(flipped & hidden)
+    good = good & ~(flipped & hidden) & ~_turns_twice(front, after, length)
     if constraints and good.any():
         lanes = np.flatnonzero(good)
         z, p = after.z[lanes], march.curve.take(lanes).parameters(after.t[lanes])
@@ -254,6 +260,22 @@ def _attempt(march: March, constraints: tuple[Constraint, ...], options: TraceOp
     if options.locates_branch_points and (good & branch).any():
         return replace(tried, good=good & _genuine(march, tried, branch))
     return tried
+
+
+def _turns_twice(front: Front, after: Front, length: Values) -> Flags:
+    """Whether t runs back inside a step that leaves it rising, or falling, at both ends.
+
+    By the least slope of the cubic through both ends and slopes: near a cusp two folds lie close
+    together, with the same index before and behind.
+    """
+    old, new = front.tangent_t, after.tangent_t
+    rise = np.sign(old) * (after.t - front.t) / length
+    a, b = np.sign(old) * old, np.sign(old) * new
+    # slope at share s: a + 2 s (3 rise - 2 a - b) + 3 s² (a + b - 2 rise)
+    bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
+    share = np.clip(-bend / np.where(bow > 0.0, 3 * bow, np.inf), 0.0, 1.0)
+    least = a + 2 * share * bend + 3 * share**2 * bow
+    return np.asarray((b > 0.0) & (least < 0.0))
 
 
 def _genuine(march: March, tried: _Step, branch: Flags) -> Flags:
