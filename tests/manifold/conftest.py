@@ -38,7 +38,7 @@ def arch_set(request) -> EquilibriumSet:
 
 @pytest.fixture(scope="session")
 def even_arch_set() -> EquilibriumSet:
-    return lifted_arch((12, 22))
+    return lifted_arch((8, 14))
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from equimorph.manifold.cutting import cut, match_folds, triangulate
+from equimorph.manifold.cutting import can_be_triangulated, cut, match_folds, triangulate
 
 
 def matched(index_or_fold):
@@ -120,3 +120,11 @@ def test_triangulation_reports_that_all_diagonals_are_forbidden():
 
 def test_triangle_needs_no_diagonal():
     assert triangulate((3, 1, 2), [frozenset([0])] * 3, np.zeros((3, 2))) == [(3, 1, 2)]
+
+
+def test_band_over_one_corner_needs_a_point_on_its_fold():
+    """Both fold curves cross the sides 1 and 2 of one corner: all short diagonals lie on a side."""
+    corner, one, two = frozenset([1, 2]), frozenset([1]), frozenset([2])
+    band = [corner, one, two, corner, one, two]
+    assert not can_be_triangulated(band)
+    assert can_be_triangulated([*band[:2], frozenset(), *band[2:]])

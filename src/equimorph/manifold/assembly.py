@@ -5,7 +5,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.manifold.cutting import Chord, Piece, cut, match_folds, triangulate
+from equimorph.manifold.cutting import (
+    Chord,
+    Piece,
+    can_be_triangulated,
+    cut,
+    match_folds,
+    triangulate,
+)
 from equimorph.manifold.normals import existence_normals
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.pins import pin
@@ -121,16 +128,36 @@ def _continuous(pairing: Pairing, ways: list[list[Chord]]) -> list[list[Chord]]:
 
 
 def _split_chords(pairing: Pairing, plans: list[_Plan], cells: Cells) -> None:
-    """Put an exact fold point on chords whose ends lie on one grid edge."""
-    wanted = [
-        (plan, chord) for plan in plans for chord in plan.chords if _same_edge(pairing, *chord)
-    ]
+    """Put an exact fold point on chords that would lie on a grid edge, or block triangulation."""
+    wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(pairing, plan)]
     extra = _pinned(pairing, [chord for _, chord in wanted], [FOLD] * len(wanted))
     for (plan, chord), point in zip(wanted, extra, strict=True):
         if point is None:
             cells.undecided.append(plan.polygon.triangle)
         else:
             plan.middle[chord] = point
+
+
+def _chords_to_split(pairing: Pairing, plan: _Plan) -> list[Chord]:
+    """Chords between ends on one grid edge, and as many others as free all pieces for triangles.
+
+    Where a corner of the grid triangle sees two fold curves cross both its sides, one of them with
+    a cusp, the sheet between them lies over the corner twice, and has no allowed diagonal.
+    """
+    chosen = [chord for chord in plan.chords if _same_edge(pairing, *chord)]
+    for chord in plan.chords:
+        stand_in = {split: -1 - number for number, split in enumerate(chosen)}
+        pieces = cut(plan.points, plan.chords, stand_in)
+        if all(can_be_triangulated(_sides_of(pairing, piece)) for piece in pieces):
+            break
+        if chord not in chosen:
+            chosen.append(chord)
+    return chosen
+
+
+def _sides_of(pairing: Pairing, piece: Piece) -> list[frozenset[int]]:
+    """Grid edges on which the points of a piece lie; points still to be found lie on none."""
+    return [_sides(pairing, point) if point >= 0 else frozenset() for point in piece]
 
 
 def _pinned(pairing: Pairing, pairs: list[Chord], kinds: list[int]) -> list[int | None]:
@@ -172,7 +199,7 @@ def _triangles(pairing: Pairing, piece: Piece) -> list[tuple[int, int, int]] | N
     if len(piece) < 3:
         return None
     place = embedding(pairing, np.array(piece))
-    return triangulate(piece, [_sides(pairing, point) for point in piece], place)
+    return triangulate(piece, _sides_of(pairing, piece), place)
 
 
 def embedding(pairing: Pairing, points: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n dims"]:

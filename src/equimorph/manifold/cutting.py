@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 Piece = tuple[int, ...]
 Chord = tuple[int, int]
@@ -90,14 +90,23 @@ def triangulate(
     count = len(corners)
     if count == 3:
         return [(corners[0], corners[1], corners[2])]
-    allowed = np.array([[not (a & b) for b in sides] for a in sides])
     gap = ((place[:, None] - place[None]) ** 2).sum(axis=2)
-    diagonal = np.where(allowed, gap, np.inf)
+    diagonal = np.where(_allowed(sides), gap, np.inf)
     around = np.arange(count)
     # the polygon's own sides cost nothing
     diagonal[around, around - 1] = diagonal[around - 1, around] = 0.0
     apex = _cheapest_apexes(diagonal)
     return None if apex is None else [_named(corners, triple) for triple in _fan_out(apex)]
+
+
+def can_be_triangulated(sides: Sequence[frozenset[int]]) -> bool:
+    """Whether corners that lie on these sides of the grid triangle have enough diagonals."""
+    places = np.zeros((len(sides), 1))
+    return len(sides) >= 3 and triangulate(tuple(range(len(sides))), sides, places) is not None
+
+
+def _allowed(sides: Sequence[frozenset[int]]) -> Bool[np.ndarray, "corners corners"]:
+    return np.array([[not (a & b) for b in sides] for a in sides])
 
 
 def _cheapest_apexes(
