@@ -10,7 +10,7 @@ from equimorph.errors import InputError
 from oracles import shooting
 from oracles.polynomial import Polynomial, fold_form, pitchfork_form
 
-QUICK = settings(max_examples=6, deadline=None, derandomize=True)
+QUICK = settings(max_examples=4, deadline=None, derandomize=True)
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +175,7 @@ def test_curvature_bound_of_the_arch_is_met_exactly(arch):
     path = em.lift(rest, {"q": 8.0}, within=[kappa <= 10.0])
     assert path.end.kind == "constraint"
     assert kappa(path.end.state) == pytest.approx(10.0, abs=1e-10)
-    s = np.linspace(0.0, 1.0, 401)
+    s = np.linspace(0.0, 1.0, 101)
     assert max(abs(arch.curvature(at)(path.end.state)) for at in s) <= 10.0 + 1e-9
 
 

@@ -18,7 +18,7 @@ factors = st.floats(0.1, 10.0)
 starts = st.floats(0.1, 2.0)
 stiff = st.floats(0.5, 4.0)
 slopes = st.floats(-1.5, 1.5)
-QUICK = settings(max_examples=10, deadline=None, derandomize=True)
+QUICK = settings(max_examples=5, deadline=None, derandomize=True)
 
 
 @QUICK

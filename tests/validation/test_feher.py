@@ -134,7 +134,7 @@ def test_limit_load_jumps_at_a_cusp_between_two_folds(arch):
 def test_five_equilibria_at_one_setting_with_their_heights_and_indices(arch):
     """PHYSICS §5: indices 0, 0, 1, 1, 2; each state, its energy and its index by shooting too."""
     at = {"Theta": 1, "Delta": 0, "q": 2.5}
-    found = em.find_equilibria(arch, at, within=[arch.max_curvature <= 20])
+    found = em.find_equilibria(arch, at, within=[arch.max_curvature <= 20], starts=200)
     assert sorted(found.index) == [0, 0, 1, 1, 2]
     heights = sorted(arch.height(0.5)(found.stable))
     assert heights == pytest.approx([-0.1496, 0.2258], abs=5e-5)
@@ -237,9 +237,9 @@ def test_going_there_and_back_returns_to_the_start(upright):
 
 @pytest.mark.parametrize("load", ["uniform", "left-half"])
 def test_energy_grows_along_a_path_by_the_load_s_work(load):
-    """dE/dq = ∫ Q y ds. Gauss rules in q (12 points) and s (per piece) are exact to round-off."""
+    """dE/dq = ∫ Q y ds. Gauss rules in q (10 points) and s (per piece) are exact to round-off."""
     rod = em.Rod(load=load)
-    nodes, weights = np.polynomial.legendre.leggauss(12)
+    nodes, weights = np.polynomial.legendre.leggauss(10)
     loads = 1.0 + nodes
     rest = rod.natural_state(Theta=0.9, Delta=0.1)
     states = [em.lift(rest, {"q": q}).end.state for q in [*loads, 2.0]]
