@@ -1,0 +1,83 @@
+"""Equilibrium sets, states over a point, and routes: the arch at q = 2.5, max |κ| ≤ 20.
+
+Each benchmark records the size of the set, what the audit found and the largest residual, so that
+a fast answer that is wrong is seen.
+"""
+
+import platform
+
+import pytest
+
+from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.model import Box
+from equimorph.structures import Rod
+from equimorph.tasks import plan
+
+VIA = [{"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0}]
+
+
+def lifted(intervals: tuple[int, int], checks: int = 0) -> EquilibriumSet:
+    arch = Rod()
+    return equilibrium_set(
+        arch,
+        Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
+        fixed={"q": 2.5},
+        within=[arch.max_curvature <= 20],
+        intervals=intervals,
+        checks=checks,
+    )
+
+
+def note(benchmark, eset: EquilibriumSet) -> None:
+    audit = eset.audit
+    benchmark.extra_info.update(
+        machine=platform.processor() or platform.machine(),
+        unknowns=eset.structure.size,
+        vertices=audit.vertices,
+        cells=audit.cells,
+        clean=audit.clean,
+        euler_characteristic=audit.euler_characteristic,
+        retraced=audit.retraced,
+        bisected=audit.bisected,
+        largest_residual=audit.largest_residual,
+    )
+
+
+@pytest.fixture(scope="module")
+def arch_set() -> EquilibriumSet:
+    return lifted((24, 41))
+
+
+@pytest.mark.parametrize("intervals", [(24, 41), (47, 81), (93, 161)], ids="{0[0]}x{0[1]}".format)
+def bench_equilibrium_set(benchmark, intervals):
+    lifted((5, 9))  # compiles, or loads, the kernels
+    eset = benchmark.pedantic(lifted, (intervals,), rounds=3 if intervals[0] < 50 else 1)
+    note(benchmark, eset)
+
+
+def bench_completeness_checks(benchmark):
+    """Two random points below the set, searched independently: the difference to `checks=0`."""
+    lifted((5, 9), 1)
+    note(benchmark, benchmark.pedantic(lifted, ((24, 41), 2), rounds=3))
+
+
+def bench_states_over_a_point(benchmark, arch_set):
+    here = benchmark(arch_set.at, Theta=1.0, Delta=0.0)
+    benchmark.extra_info.update(states=len(here), largest_residual=float(here.residual.max()))
+
+
+@pytest.mark.parametrize("via", [VIA, None], ids=["by way-points", "free"])
+@pytest.mark.parametrize("margin", [0.0, 0.3])
+def bench_plan(benchmark, arch_set, via, margin):
+    here = arch_set.at(Theta=1.0, Delta=0.0).stable
+    rise = arch_set.structure.height(0.5)
+    ends = max(here, key=rise), min(here, key=rise)
+    route = benchmark.pedantic(
+        lambda: plan(arch_set, *ends, via=via, margin=margin), rounds=3, warmup_rounds=1
+    )
+    benchmark.extra_info.update(
+        status=route.status,
+        steps=len(route.schedule.progress),
+        length=route.length,
+        margin=route.margin,
+    )
