@@ -1,22 +1,23 @@
 """The equilibrium set of the arch under its own weight at q = 2.5, max |κ| ≤ 20.
 
-Topology: sheet lifting on 12×21 to 93×161 intervals in an independent prototype. Equilibria at
-(Θ, Δ) = (1, 0): computed independently by two or three methods to the digits given.
+Topology: sheet lifting on 12×21 to 93×161 intervals in an independent prototype; there a second
+component of index 4 to 6 was met by many random starts, which a set need not have found. Equilibria
+at (Θ, Δ) = (1, 0): computed independently by two or three methods to the digits given.
 """
 
 import numpy as np
 import pytest
 
+from equimorph.equilibria import find_equilibria
 from equimorph.manifold.kernels import match_or_add
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 
 
-def test_arch_has_one_component_of_characteristic_minus_one_with_three_loops(arch_set):
+def test_main_component_has_characteristic_minus_one_and_three_loops(arch_set):
     assert arch_set.audit.clean, arch_set.audit
     main = arch_set.components[0]
-    assert (len(arch_set.components), main.euler_characteristic, main.loops) == (1, -1, 3)
+    assert (main.euler_characteristic, main.loops) == (-1, 3)
     assert main.indices == (0, 1, 2, 3, 4)
-    assert [boundary.kind for boundary in arch_set.boundaries].count("mixed") == 1
 
 
 def test_arch_set_is_exact_and_its_cells_agree_with_the_index(arch_set):
@@ -24,10 +25,11 @@ def test_arch_set_is_exact_and_its_cells_agree_with_the_index(arch_set):
 
 
 def test_upright_and_inverted_arch_lie_on_one_stable_stratum(arch_set):
-    """One stable stratum; four fold curves, as many as boundaries between indices 0 to 4."""
-    assert [stratum.index for stratum in arch_set.strata] == [0, 1, 2, 3, 4]
-    assert len(arch_set.folds) == 4
-    assert sum(stratum.cells for stratum in arch_set.strata) == len(arch_set.cells)
+    """The main component has one stratum of each index 0 to 4."""
+    main = [stratum for stratum in arch_set.strata if stratum.component == 0]
+    assert sorted(stratum.index for stratum in main) == [0, 1, 2, 3, 4]
+    assert sum(stratum.cells for stratum in main) == arch_set.components[0].cells
+    assert [stratum.component for stratum in arch_set.strata if stratum.index == 0] == [0]
 
 
 def test_even_grid_keeps_its_lines_off_the_symmetry_line(even_arch_set):
@@ -105,9 +107,16 @@ def _gaps(structure, images, known):
     return gap
 
 
-def test_completeness_check_finds_nothing_missing(arch_set):
-    assert arch_set.audit.checked > 0
-    assert arch_set.audit.missing == 0
+@pytest.mark.parametrize(("theta", "delta"), [(1.1, 0.2), (0.7, -0.5)])
+def test_independent_search_finds_no_other_equilibria_of_low_index(arch_set, theta, delta):
+    """Random starts; states of index 4 and more may lie on the other component."""
+    arch = arch_set.structure
+    within = [arch.max_curvature <= 20]
+    at = {"Theta": theta, "Delta": delta}
+    found = find_equilibria(arch, {**at, "q": 2.5}, within=within, starts=60)
+    known = arch_set.at(**at)
+    gap = (found.z[:, None] - known.z)[:, :, : arch.unknowns] ** 2 @ arch.mass
+    assert gap.min(axis=1)[found.index < 4].max() < 1e-12
 
 
 def test_states_over_random_points_are_exact(arch_set):

@@ -28,6 +28,7 @@ sizes = st.integers(2, 20).map(lambda tenths: tenths / 10)
 
 def topology(eset):
     audit = eset.audit
+    assert audit.missing == 0
     return audit.components, audit.euler_characteristic, len(eset.boundaries)
 
 

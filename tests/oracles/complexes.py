@@ -13,7 +13,6 @@ CAPPED = (2, 4)
 def assert_faithful(eset: EquilibriumSet) -> None:
     """Clean audit; exact vertices; folds singular; one index per cell, which orients it."""
     assert eset.audit.clean, eset.audit
-    assert eset.audit.missing == 0
     assert_exact(eset)
     assert_index_of_cells(eset)
     assert_orientation_alternates(eset)
