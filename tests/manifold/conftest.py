@@ -5,19 +5,22 @@ import pytest
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Rod, Spring
+from typecheck import unchecked
 
 ARCH_BOX = Box(Theta=(0.2, 2.5), Delta=(-2, 2))
 
 
-def lifted_arch(intervals: tuple[int, int]) -> EquilibriumSet:
+def lifted_arch(intervals: tuple[int, int], checks: int = 2) -> EquilibriumSet:
     arch = Rod()
-    return equilibrium_set(
-        arch,
-        ARCH_BOX,
-        fixed={"q": 2.5},
-        within=[arch.max_curvature <= 20],
-        intervals=intervals,
-    )
+    with unchecked():  # shapes are checked on small surfaces
+        return equilibrium_set(
+            arch,
+            ARCH_BOX,
+            fixed={"q": 2.5},
+            within=[arch.max_curvature <= 20],
+            intervals=intervals,
+            checks=checks,
+        )
 
 
 @pytest.fixture(
@@ -38,9 +41,11 @@ def arch_set(request) -> EquilibriumSet:
 
 @pytest.fixture(scope="session")
 def even_arch_set() -> EquilibriumSet:
-    return lifted_arch((8, 14))
+    return lifted_arch((8, 14), checks=0)
 
 
 @pytest.fixture(scope="session")
 def spring_set() -> EquilibriumSet:
-    return equilibrium_set(Spring(), Box(x_l=(0.3, 1.3), F=(-0.5, 0.5)), intervals=(12, 12))
+    box = Box(x_l=(0.3, 1.3), F=(-0.5, 0.5))
+    with unchecked():
+        return equilibrium_set(Spring(), box, intervals=(12, 12))

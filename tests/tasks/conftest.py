@@ -5,19 +5,21 @@ import pytest
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Rod, Spring, State
+from typecheck import unchecked
 
 
 @pytest.fixture(scope="session")
 def arch_set() -> EquilibriumSet:
     arch = Rod()
-    return equilibrium_set(
-        arch,
-        Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-        fixed={"q": 2.5},
-        within=[arch.max_curvature <= 20],
-        intervals=(12, 21),
-        checks=0,
-    )
+    with unchecked():  # the tests of sets check
+        return equilibrium_set(
+            arch,
+            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
+            fixed={"q": 2.5},
+            within=[arch.max_curvature <= 20],
+            intervals=(12, 21),
+            checks=0,
+        )
 
 
 @pytest.fixture(scope="session")
@@ -31,11 +33,13 @@ def ends(arch_set) -> tuple[State, State]:
 @pytest.fixture(scope="session")
 def spring_set() -> EquilibriumSet:
     box = Box(x_l=(0.3, 1.3), F=(-0.5, 0.5))
-    return equilibrium_set(Spring(), box, intervals=(12, 12), checks=0)
+    with unchecked():
+        return equilibrium_set(Spring(), box, intervals=(12, 12), checks=0)
 
 
 @pytest.fixture(scope="session")
 def short_spring_set() -> EquilibriumSet:
     """Without the stretched states x_l > 1 around which the two stable components hang together."""
     box = Box(x_l=(0.3, 0.95), F=(-0.5, 0.5))
-    return equilibrium_set(Spring(), box, intervals=(12, 13), checks=0)
+    with unchecked():
+        return equilibrium_set(Spring(), box, intervals=(12, 13), checks=0)

@@ -64,10 +64,10 @@ def test_schedule_starts_at_the_start_and_ends_at_the_goal(ends, by_way_points):
     assert schedule.start["unknowns"] == start.z.tolist()
 
 
-def test_schedule_lifted_step_by_step_reproduces_the_goal(ends, by_way_points):
+def test_schedule_lifted_again_reproduces_the_goal(ends, by_way_points):
     schedule, (start, goal) = by_way_points.schedule, ends
     steps = [dict(zip(schedule.names, row.tolist(), strict=True)) for row in schedule.values[1:]]
-    path = lift(start, steps)
+    path = lift(start, steps[4::5] + steps[-1:])
     assert path.end.kind == "arrived"
     np.testing.assert_allclose(path.end.state.z, goal.z, rtol=0, atol=1e-7)
 

@@ -12,6 +12,7 @@ from equimorph.manifold import equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Spring, State
 from equimorph.tasks import plan
+from typecheck import unchecked
 
 LOAD = (1 - 0.8 / np.cos(0.62)) * np.sin(0.62)
 
@@ -88,7 +89,8 @@ def test_without_the_stretched_states_the_sides_are_different_components(
 def test_mirror_image_cannot_be_reached_near_the_load_of_the_start(start, below):
     """For F > 0 alone the two stable components stay apart, however long the spring."""
     box = Box(x_l=(0.3, 1.3), F=(0.5 * LOAD, 1.5 * LOAD))
-    eset = equilibrium_set(Spring(), box, intervals=(12, 3), checks=0)
+    with unchecked():
+        eset = equilibrium_set(Spring(), box, intervals=(12, 3), checks=0)
     assert eset.audit.clean
     route = plan(eset, start, below)
     assert route.status == "refused"
