@@ -61,7 +61,8 @@ def test_five_equilibria_at_theta_one_delta_zero(arch_set):
     third = arch_set.structure.height(1 / 3)(here)
     assert third[here.index == 0].max() == pytest.approx(0.20139, abs=5e-6)
     assert here.residual.max() < 1e-13
-    assert (np.diff(here.energy) >= 0).all()
+    # mirror images have equal energies, up to round-off
+    assert (np.diff(here.energy) >= -1e-12).all()
 
 
 def test_arch_over_delta_is_the_mirror_image_of_that_over_minus_delta(arch_set):
