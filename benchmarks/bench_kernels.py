@@ -8,7 +8,8 @@ import pytest
 
 from equimorph.linalg import solve_bordered
 from equimorph.structures import Rod
-from equimorph.structures.rod.kernels import advance_lanes, largest_lanes
+from equimorph.structures.rod.curvature.kernels import largest_lanes
+from equimorph.structures.rod.kernels import advance_lanes
 
 RESOLUTIONS = [(12, 8), (12, 6), (8, 6), (24, 8)]
 

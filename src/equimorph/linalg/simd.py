@@ -106,6 +106,31 @@ def store(typing_context, array, row, value):
     return sig, generate
 
 
+@intrinsic
+def entry(typing_context, array, position):
+    """Number at a flat position of a C-ordered array."""
+    sig = types.float64(array, types.intp)
+
+    def generate(context, builder, sig, args):
+        place = _pointer(context, builder, sig.args[0], args[0], args[1], ir.DoubleType())
+        return builder.load(place)
+
+    return sig, generate
+
+
+@intrinsic
+def set_entry(typing_context, array, position, number):
+    """Write a number at a flat position of a C-ordered array."""
+    sig = types.void(array, types.intp, types.float64)
+
+    def generate(context, builder, sig, args):
+        place = _pointer(context, builder, sig.args[0], args[0], args[1], ir.DoubleType())
+        builder.store(args[2], place)
+        return context.get_dummy_value()
+
+    return sig, generate
+
+
 @njit(nogil=True, cache=True)
 def work_rows(rows):
     """Uninitialised array (rows, 8) that starts on a cache line: no vector straddles two lines."""

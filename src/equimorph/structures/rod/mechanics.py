@@ -10,8 +10,9 @@ from equimorph.linalg import BorderedSolution, CondensedLayout
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Advance, Direction, Structure, Symmetry
+from equimorph.structures.rod.curvature.kernels import curvature_lanes, largest_lanes
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.kernels import advance_lanes, curvature_lanes, largest_lanes
+from equimorph.structures.rod.kernels import advance_lanes
 from equimorph.structures.rod.loads import LoadShape
 
 Lanes = Float[np.ndarray, "lanes size"]

@@ -6,8 +6,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.linalg.condensed.kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered
-from equimorph.linalg.kernels import solve_condensed
+from equimorph.linalg.lanes import over_lanes
 
 PIVOT_GUARD = 1e-6
 """Smallest pivot ratio that is trusted; below it a lane is factored again, dense and pivoted."""
@@ -88,7 +89,7 @@ class CondensedLayout:
         x, ratio = np.empty(rhs.shape), np.empty(lanes)
         negative = np.empty(lanes, dtype=np.int64)
         arrays = [np.ascontiguousarray(a) for a in (diagonal, border, columns, rows, corner, rhs)]
-        solve_condensed(self.stiffness, self.ends, *arrays, x, negative, ratio)
+        over_lanes(solve_condensed, (self.stiffness, self.ends), arrays, [x, negative, ratio])
         unsafe = ~(ratio >= PIVOT_GUARD)
         if unsafe.any():
             again = solve_bordered(

@@ -1,0 +1,1 @@
+"""Curvature of the rod by moment balance, and its largest value."""
