@@ -40,9 +40,8 @@ from equimorph.linalg.simd import (
     work_rows,
 )
 
-TILE = 8
-TIES = 2
-GROUP = 2
+# Plain integers: for a literal argument the compiler would make another copy of a kernel.
+TILE, TIES, GROUP = np.int64(8), np.int64(2), np.int64(2)
 
 
 @njit(**INNER)

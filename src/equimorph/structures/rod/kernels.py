@@ -46,6 +46,8 @@ START, STOP, LOAD, SPAN, ROW_LAMBDA, ROW_MU, CORNER, DEFECT = range(8)
 """Rows of the closing data: velocity of θ(0), θ(1), q, ν, then the row's other entries."""
 ALONG, ACROSS, CLOSE_ALONG, CLOSE_ACROSS, BALANCE, WORST = range(6)
 """Rows of the sums: constraints, their change by dp, residual at the last vertex, largest."""
+ONE_TILE, FIRST_ROW, SIDES = np.int64(1), np.int64(0), np.int64(2)
+"""Columns of a step fill one tile; step and tangent are solved side by side."""
 
 
 @njit(**INNER)
@@ -226,7 +228,7 @@ def advance_lanes(
     theta, closing_row, diagonal = work_rows(n + 3), work_rows(n + 2), work_rows(n + 2)
     scalars, closing, sums = work_rows(4), work_rows(8), work_rows(6)
     products, small, solution = work_rows(12), work_rows(15), work_rows(2 * (n + 3))
-    lower, vertices, columns, extremes = work_arrays(elements, inner, 1)
+    lower, vertices, columns, extremes = work_arrays(elements, inner, ONE_TILE)
     closing_row[:] = 0.0
     for block in range(0, lanes, LANES):
         start = min(block, lanes - LANES)
@@ -240,7 +242,9 @@ def advance_lanes(
             )  # fmt: skip
             if group == 0:
                 start_block(diagonal, vertices, extremes)
-            reduce_group(stiffness, group, diagonal, ends, 1, lower, vertices, columns, extremes)
+            reduce_group(
+                stiffness, group, diagonal, ends, ONE_TILE, lower, vertices, columns, extremes
+            )
             for e in range(group * GROUP, min(group * GROUP + GROUP, elements)):
                 add_products(e, inner, ends, lower, vertices, columns, products)
         _small_system(products, sums, closing, small)
@@ -249,7 +253,9 @@ def advance_lanes(
         for e in range(elements, -1, -1):
             node = e * (inner + 1)
             _combine(columns, small, (node, min(node + inner, n + 1) + 1), solution)
-            restore_element(e, elements, inner, ends, lower, vertices, columns, solution, 0, 2)
+            restore_element(
+                e, elements, inner, ends, lower, vertices, columns, solution, FIRST_ROW, SIDES
+            )
         store(solution, 2 * (n + 1), stack2(load(small, 3), load(small, 4)))
         store(solution, 2 * (n + 2), stack2(load(small, 8), load(small, 9)))
         write_lanes(solution, 2, 2, dz, start * (n + 2), n + 2, n + 2)
