@@ -25,6 +25,8 @@ Values = Float[np.ndarray, " lanes"]
 Flags = Bool[np.ndarray, " lanes"]
 
 NEWTON_STEPS = 12
+FAR = 1e6
+"""A larger correction, in any unknown, is no step towards an event near by: the lane has failed."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,7 @@ def locate_fold(curve: Curve, bracket: Bracket) -> Located:
         residual = curve.structure.residual(z, curve.parameters(t))
         rhs = np.concatenate([-residual, -test.g[:, None]], axis=1)[:, None]
         border = (_column(curve, z, t)[:, None], test.g_z[:, None], test.g_t[:, None, None])
-        step = curve.structure.solve(z, curve.parameters(t), rhs, border).x[:, 0]
+        step = _bounded(curve.structure.solve(z, curve.parameters(t), rhs, border).x[:, 0])
         z, t = z + step[:, :-1], t + step[:, -1]
         size = correction_size(curve.structure, curve.weight, step[:, :-1], step[:, -1])
         b = test.v / np.linalg.norm(test.v, axis=1, keepdims=True)
@@ -199,13 +201,19 @@ def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
         corner = np.zeros((lanes, 2, 2))
         corner[:, 0, 0], corner[:, 1, 0] = test.g_t, h_t
         border = (np.stack([column, b], 1), np.stack([test.g_z, h_z], 1), corner)
-        step = structure.solve(z, p, rhs, border).x[:, 0]
+        step = _bounded(structure.solve(z, p, rhs, border).x[:, 0])
         z, t, beta = z + step[:, :-2], t + step[:, -2], beta + step[:, -1]
         size = correction_size(structure, curve.weight, step[:, :-2], step[:, -2])
         if (size < 1e-13).all():
             break
     found = np.asarray((size < 1e-9) & (np.abs(beta) < 1e-9)) & _inside(curve, bracket, z, t)
     return Located(z, t, _arclength(curve, bracket, z, t, share), found)
+
+
+def _bounded(step: Lanes) -> Lanes:
+    """Corrections, with those that lead nowhere replaced by large ones that cannot overflow."""
+    near = (np.abs(step) < FAR).all(axis=1)
+    return np.asarray(np.where(near[:, None], step, FAR))
 
 
 def _arclength(curve: Curve, bracket: Bracket, z: Lanes, t: Values, share: Values) -> Values:
