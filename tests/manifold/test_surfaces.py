@@ -5,7 +5,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from equimorph.manifold import equilibrium_set
+from equimorph.manifold import build, equilibrium_set
+from equimorph.manifold.seeds import seeds
 from equimorph.model import Box, Descriptor
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 from oracles.polynomial import bead_on_a_circle
@@ -100,6 +101,19 @@ def test_three_sheets_that_never_meet_are_three_discs(grid):
     assert sorted(component.indices for component in eset.components) == [(0,), (0,), (1,)]
     assert {component.euler_characteristic for component in eset.components} == {1}
     assert {component.cells for component in eset.components} == {2 * grid[0] * grid[1]}
+
+
+def test_sheets_that_the_seeds_lack_are_found_by_the_checks(monkeypatch):
+    """Without seeds but one, the independent checks bring the other two sheets in."""
+
+    def first(*given):
+        return tuple(column[:1] for column in seeds(*given))
+
+    monkeypatch.setattr(build, "seeds", first)
+    eset = lifted(three_sheets(), Box(a=(-2, 1), b=(-1.5, 1.5)), intervals=(4, 5), checks=2)
+    assert topology(eset) == (3, 3, 3)
+    assert eset.audit.recovered >= 2
+    assert eset.audit.clean
 
 
 @few

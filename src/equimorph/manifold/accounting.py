@@ -156,6 +156,7 @@ def _audit(
         largest_residual=float(np.abs(residual[live]).max(initial=0.0)),
         checked=0,
         missing=0,
+        recovered=0,
     )
 
 

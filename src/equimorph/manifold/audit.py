@@ -11,7 +11,8 @@ class Audit:
     `parity_violations`, `undecided` triangles, `non_manifold` edges, orientation `contradictions`.
     `retraced` conflicts were resolved by finer steps, `bisected` triangles by subdivision.
     `overturned` cells project against the orientation that their index demands: slivers at folds.
-    `missing` of `checked` equilibria found by random search at random points lie off the set.
+    Of the equilibria found by random search at random points, `recovered` were missing and have
+    been added; in the last round, `missing` of `checked` were, which must be zero too.
     """
 
     vertices: int
@@ -31,6 +32,7 @@ class Audit:
     largest_residual: float
     checked: int
     missing: int
+    recovered: int
 
     @property
     def clean(self) -> bool:
@@ -42,6 +44,7 @@ class Audit:
             self.undecided,
             self.non_manifold,
             self.contradictions,
+            self.missing,
         )
         return not any(faults) and self.largest_residual < 1e-9
 
@@ -64,7 +67,8 @@ class Audit:
             ("largest residual", f"{self.largest_residual:.1e}"),
             (
                 "completeness check",
-                f"{self.missing} of {self.checked} equilibria found at random points are missing"
+                f"{self.missing} of {self.checked} equilibria found at random points are missing, "
+                f"{self.recovered} added before"
                 if self.checked
                 else "not made",
             ),

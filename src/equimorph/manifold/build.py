@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Int
 
-from equimorph.equilibria import find_equilibria
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import account
 from equimorph.manifold.assembly import Cells, assemble
+from equimorph.manifold.completeness import check, seeds_from
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.mesh import bisect, grid_mesh
 from equimorph.manifold.pairing import Pairing, Setting, flood, start_pairing
@@ -20,13 +20,14 @@ from equimorph.model import (
     Constraint,
     Progress,
     Silent,
-    names_of,
     parameter_vector,
     position,
 )
-from equimorph.structures import States, Structure
+from equimorph.structures import Structure
 
 BISECTIONS = 12
+SEARCHES = 4
+"""Rounds of independent checks; what one round finds missing is lifted before the next."""
 HOPELESS = 50
 """Doubtful triangles, and four times what there were at first, beyond which bisection ends."""
 
@@ -61,7 +62,9 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     seed
         Of the random generator; the result is deterministic.
     checks
-        Random points below the set at which an independent search looks for equilibria off it.
+        Random points, half of them below the set, half anywhere in the box, at which an independent
+        search looks for equilibria that the set lacks. They are added and lifted like seeds, and
+        other points are checked, until nothing is missing or four rounds are over.
     progress
         Sink for progress reports.
 
@@ -82,10 +85,19 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     progress.report("seeds", 0, 1)
     pairing = start_pairing(setting, mesh)
     pairing.points.over_vertices(*seeds(setting, mesh, seed))
-    pairing.fit()
-    cells, bisected = _lifted(pairing, progress)
-    eset = account(pairing, cells, (box, dict(fixed or {}), intervals), bisected)
-    return _checked(eset, seed, checks, progress)
+    generator = np.random.default_rng([seed, 1])
+    recovered = 0
+    for number in range(SEARCHES):
+        pairing.fit()
+        cells, bisected = _lifted(pairing, progress)
+        eset = account(pairing, cells, (box, dict(fixed or {}), intervals), bisected)
+        found = check(eset, generator, checks, progress)
+        if found.lacking == 0 or number == SEARCHES - 1:
+            break
+        recovered += found.lacking
+        pairing.points.over_vertices(*seeds_from(setting, pairing.mesh, found.missing))
+    completeness = {"checked": found.found, "missing": found.lacking, "recovered": recovered}
+    return replace(eset, audit=replace(eset.audit, **completeness))
 
 
 def _setting(
@@ -143,34 +155,3 @@ def _longest_sides(pairing: Pairing, triangles: Int[np.ndarray, " n"]) -> Int[np
     ends = mesh.vertices[mesh.edges[sides]] / pairing.setting.scales
     length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
     return np.unique(sides[np.arange(len(triangles)), length.argmax(axis=1)])
-
-
-def _checked(eset: EquilibriumSet, seed: int, checks: int, progress: Progress) -> EquilibriumSet:
-    """Look for equilibria that the set lacks, by random search at random points."""
-    generator = np.random.default_rng([seed, 1])
-    checks = checks if len(eset.cells) else 0
-    checked = missing = 0
-    names = names_of(eset.structure.parameters)
-    for number in range(checks):
-        progress.report("independent checks", number, checks)
-        cell = eset.cells[generator.integers(len(eset.cells))]
-        point = generator.dirichlet(np.ones(3)) @ eset.coordinates[cell]
-        values = dict(zip(eset.names, point.tolist(), strict=True))
-        p = eset.parameters_at(values)
-        found = find_equilibria(
-            eset.structure,
-            dict(zip(names, p.tolist(), strict=True)),
-            within=eset.constraints,
-            starts=200,
-            seed=seed + 7 * number + 1,
-        )
-        checked, missing = checked + len(found), missing + _lacking(found, eset.at(**values))
-    return replace(eset, audit=replace(eset.audit, checked=checked, missing=missing))
-
-
-def _lacking(found: States, known: States) -> int:
-    if len(known) == 0:
-        return len(found)
-    n, mass = found.structure.unknowns, found.structure.mass
-    gap = ((found.z[:, None, :n] - known.z[None, :, :n]) ** 2) @ mass
-    return int((np.sqrt(gap.min(axis=1)) > 1e-5).sum())

@@ -29,6 +29,16 @@ def seeds(setting: Setting, mesh: BaseMesh, seed: int) -> Seeds:
     vertices, z = _from_natural_states(setting, _spread(mesh))
     searched_v, searched_z = _from_search(setting, mesh, seed)
     vertices, z = np.concatenate([vertices, searched_v]), np.concatenate([z, searched_z])
+    return polished(setting, mesh, vertices, z)
+
+
+def polished(
+    setting: Setting,
+    mesh: BaseMesh,
+    vertices: Int[np.ndarray, " some"],
+    z: Float[np.ndarray, "some size"],
+) -> Seeds:
+    """Those of the states over vertices that are resolved equilibria, polished, with index."""
     p = setting.parameters(mesh.vertices[vertices])
     # a line of no length polishes the points and counts their index
     still = ParameterLine(setting.structure, p, np.zeros_like(p))

@@ -1,0 +1,98 @@
+"""Are there equilibria that a set lacks? Ask an independent search, and lift what it finds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria import find_equilibria
+from equimorph.manifold.equilibrium_set import EquilibriumSet, lift_to
+from equimorph.manifold.mesh import BaseMesh
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.seeds import Seeds, polished
+from equimorph.model import Progress, names_of
+from equimorph.structures import States
+
+APART = 1e-5
+"""Distance in the metric above which two equilibria are two."""
+STARTS = 200
+
+
+@dataclass(frozen=True)
+class Check:
+    """How many equilibria a search found, and those of them that the set lacks."""
+
+    found: int
+    missing: tuple[States, ...]
+
+    @property
+    def lacking(self) -> int:
+        """Number of missing equilibria."""
+        return sum(len(states) for states in self.missing)
+
+
+def check(
+    eset: EquilibriumSet, generator: np.random.Generator, points: int, progress: Progress
+) -> Check:
+    """Search at random points, half of them anywhere in the box, half below the set."""
+    found, missing = 0, []
+    for number in range(points):
+        progress.report("independent checks", number, points)
+        anywhere = number % 2 == 1 or len(eset.cells) == 0
+        point = _in_the_box(eset, generator) if anywhere else _below(eset, generator)
+        at = dict(zip(eset.names, point.tolist(), strict=True))
+        names = names_of(eset.structure.parameters)
+        states = find_equilibria(
+            eset.structure,
+            dict(zip(names, eset.parameters_at(at).tolist(), strict=True)),
+            within=eset.constraints,
+            starts=STARTS,
+            seed=int(generator.integers(2**31)),
+        )
+        found += len(states)
+        lacking = _lacking(states, eset.at(**at))
+        if len(lacking):
+            missing.append(lacking)
+    return Check(found, tuple(missing))
+
+
+def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " 2"]:
+    cell = eset.cells[generator.integers(len(eset.cells))]
+    return np.asarray(generator.dirichlet(np.ones(3)) @ eset.coordinates[cell])
+
+
+def _in_the_box(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " 2"]:
+    return np.asarray(generator.uniform(eset.box.lower, eset.box.upper))
+
+
+def _lacking(found: States, known: States) -> States:
+    if len(known) == 0:
+        return found
+    n, mass = found.structure.unknowns, found.structure.mass
+    gap = ((found.z[:, None, :n] - known.z[None, :, :n]) ** 2) @ mass
+    return found[np.flatnonzero(np.sqrt(gap.min(axis=1)) > APART)]
+
+
+def seeds_from(setting: Setting, mesh: BaseMesh, missing: tuple[States, ...]) -> Seeds:
+    """Equilibria over the corners of the triangles around states and around their mirror images."""
+    vertices, z = [np.zeros(0, int)], [np.zeros((0, setting.structure.size))]
+    for states in missing:
+        for image in (states, *_images(setting, states)):
+            for vertex in mesh.triangles[mesh.locate(image.p[0, setting.free])]:
+                lifted = lift_to(
+                    image, setting.parameters(mesh.vertices[[vertex]])[0], setting.constraints
+                )
+                vertices.append(np.full(len(lifted), vertex))
+                z.append(lifted)
+    return polished(setting, mesh, np.concatenate(vertices), np.concatenate(z))
+
+
+def _images(setting: Setting, states: States) -> list[States]:
+    """Mirror images at the same values of the parameters that are not free."""
+    images = []
+    for symmetry in setting.structure.symmetries():
+        z, p = symmetry.apply(states.z, states.p)
+        fixed = np.delete(p - setting.base, setting.free, axis=1)
+        if np.abs(fixed).max(initial=0.0) == 0.0:
+            images.append(States(states.structure, z, p))
+    return images
