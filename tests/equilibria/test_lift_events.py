@@ -179,3 +179,18 @@ def test_fold_and_constraint_in_one_step_end_at_the_first():
     through = em.lift(start, {"a": -1.0}, within=[x >= -0.1], through_folds=True)
     assert [event.kind for event in through.events] == ["fold", "constraint"]
     assert through.end.state.z[0] == pytest.approx(-0.1, rel=1e-10)
+
+
+@QUICK
+@given(beyond=st.floats(0.001, 0.05), k=stiff, m=slopes)
+def test_index_at_an_end_just_behind_a_fold_or_branch_point_is_that_of_its_state(beyond, k, m):
+    """Fold and bound, branch point and goal within one step: the index is one more behind."""
+    fold = slaved(fold_form(), k, m)
+    bound = fold.descriptor("0") >= -beyond
+    path = em.lift(fold.state(1.0, m, a=1.0), {"a": -1.0}, within=[bound], through_folds=True)
+    assert [event.kind for event in path.events] == ["fold", "constraint"]
+    assert path.index[-1] == path.end.state.index == 1
+    pitchfork = slaved(pitchfork_form(1.0), k, m)
+    path = em.lift(pitchfork.state(0.0, 0.0, a=-1.0), {"a": beyond}, through_folds=True)
+    assert [event.kind for event in path.events] == ["branch point", "arrived"]
+    assert path.index[-1] == path.end.state.index == 1

@@ -178,6 +178,13 @@ def _merged(parts: list[Happenings]) -> Happenings:
     return whole.take(np.lexsort((whole.travelled, whole.lanes)))
 
 
+def _near_side(events: Happenings, ends: Int[np.ndarray, " ends"]) -> Int[np.ndarray, " ends"]:
+    """Index just before some events: a fold or branch point may lie between step and event."""
+    before = np.maximum(ends - 1, 0)
+    passed = (ends > 0) & (events.lanes[before] == events.lanes[ends]) & events.found[before]
+    return np.where(passed, events.index[before, 1], events.index[ends, 0])
+
+
 def _settle(start: Front, traces: Traces, events: Happenings, options: TraceOptions) -> Outcome:
     """Choose each lane's end: its first terminal event; lanes without one are lost."""
     lanes = len(start.t)
@@ -191,7 +198,7 @@ def _settle(start: Front, traces: Traces, events: Happenings, options: TraceOpti
         z[lane], t[lane], index[lane], why[lane] = front.z[0], front.t[0], front.index[0], reason
     at = events.lanes[first]
     code[at], z[at], t[at] = events.code[first], events.z[first], events.t[first]
-    index[at], travelled[at] = events.index[first, 0], events.travelled[first]
+    index[at], travelled[at] = _near_side(events, first), events.travelled[first]
     for i in first[~events.found[first]]:
         lane = int(events.lanes[i])
         code[lane] = LOST
