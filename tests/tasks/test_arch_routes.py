@@ -7,9 +7,11 @@ so was the fold near |Δ| = 0.42 that the route meets the other way round.
 import numpy as np
 import pytest
 
+import equimorph as em
 from equimorph.equilibria import lift
 from equimorph.model import Descriptor
 from equimorph.tasks import plan
+from typecheck import unchecked
 
 VIA = [{"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0}]
 OTHER_WAY = [{"Delta": 1.3}, {"Theta": 1.3}, {"Delta": 0.0}, {"Theta": 1.0}]
@@ -161,3 +163,18 @@ def test_unstable_ends_are_refused_by_name(arch_set, ends):
     saddle = here[int(np.flatnonzero(here.index == 2)[0])]
     assert plan(arch_set, ends[0], saddle).why == "the goal is unstable (index 2)"
     assert plan(arch_set, saddle, ends[0]).why == "the start is unstable (index 2)"
+
+
+def test_route_under_a_load_given_as_a_function_has_a_schedule():
+    """No file can hold the load, but the actuators can be told where to go."""
+    rod = em.Rod(load=lambda s: 1.0 + s)
+    box = em.Box(Theta=(0.5, 1.2), Delta=(-0.3, 0.4))
+    with unchecked():
+        eset = em.equilibrium_set(rod, box, fixed={"q": 1.0}, intervals=(2, 2), checks=0)
+        start, goal = (
+            eset.at(Theta=1.0, Delta=0.1).stable[0],
+            eset.at(Theta=0.8, Delta=0.3).stable[0],
+        )
+        route = em.plan(eset, start, goal)
+    assert route.arrived
+    assert route.schedule.start["structure"] is None

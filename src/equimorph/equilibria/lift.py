@@ -62,6 +62,11 @@ class Path:
     index: Int[np.ndarray, " points"]
     events: tuple[Event, ...]
 
+    def __repr__(self) -> str:
+        """Number of states and how the lift ended."""
+        end = self.end.state
+        return f"Path({len(self.states)} states; {self.end.kind} at {end})"
+
     @property
     def end(self) -> Event:
         """How the lift ended."""

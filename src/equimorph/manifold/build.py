@@ -96,8 +96,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
             break
         recovered += found.lacking
         pairing.points.over_vertices(*seeds_from(setting, pairing.mesh, found.missing))
-    completeness = {"checked": found.found, "missing": found.lacking, "recovered": recovered}
-    return replace(eset, audit=replace(eset.audit, **completeness))
+    audit = replace(eset.audit, checked=found.found, missing=found.lacking, recovered=recovered)
+    return replace(eset, audit=audit)
 
 
 def _setting(

@@ -90,6 +90,11 @@ class EquilibriumSet:
     grid_vertex: Int[np.ndarray, " V"]
     """Vertex of `mesh` below each vertex of the complex, −1 for those not over the grid."""
 
+    def __repr__(self) -> str:
+        """Box, size and whether the audit is clean."""
+        state = "clean" if self.audit.clean else "NOT clean"
+        return f"EquilibriumSet({self.box}: {len(self.cells)} cells; audit {state})"
+
     @property
     def names(self) -> tuple[str, ...]:
         """Free parameters."""

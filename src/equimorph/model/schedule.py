@@ -25,7 +25,7 @@ class Schedule:
         Values of descriptors at each step, by name.
     start
         ``{"structure": identity, "unknowns": z}`` of the first state: the parameters alone do not
-        determine it.
+        determine it. The identity is None for a structure that no file can hold (a callable load).
     way_points
         Steps at the corners of the route.
     """
@@ -39,3 +39,10 @@ class Schedule:
     descriptors: dict[str, Float[np.ndarray, " steps"]]
     start: dict[str, Any]
     way_points: Int[np.ndarray, " corners"] = field(default_factory=lambda: np.zeros(0, int))
+
+    def __repr__(self) -> str:
+        """Parameters that change, number of steps and smallest margin."""
+        moving = np.ptp(self.values, axis=0) > 0
+        names = ", ".join(name for name, moves in zip(self.names, moving, strict=True) if moves)
+        smallest = self.margins.min(initial=np.inf)
+        return f"Schedule({names or 'at rest'}: {len(self.values)} steps; margin {smallest:.4g})"

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.linalg import BorderedSolution
-from equimorph.model import Descriptor, Parameter
+from equimorph.model import Descriptor, Parameter, names_of
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -66,6 +66,10 @@ class Structure(ABC):
     def scales(self) -> Float[np.ndarray, " parameters"]:
         """Change of each parameter that counts as one unit of length."""
         return np.array([parameter.scale for parameter in self.parameters])
+
+    def __repr__(self) -> str:
+        """Kind and parameters."""
+        return f"{type(self).__name__}({', '.join(names_of(self.parameters))})"
 
     @abstractmethod
     def identity(self) -> dict[str, Any]:

@@ -43,6 +43,10 @@ class States:
             return State(self.structure, self.z[key], self.p[key])
         return States(self.structure, self.z[key], self.p[key])
 
+    def __repr__(self) -> str:
+        """Kind and number."""
+        return f"States({self.structure.kind}: {len(self)})"
+
     @cached_property
     def index(self) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian; 0 is stable."""

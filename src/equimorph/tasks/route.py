@@ -2,14 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.equilibria import Path, TraceOptions, lift
+from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
-from equimorph.structures import State
+from equimorph.structures import State, Structure
 
 FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=20000)
 """Step control of the final check of every route."""
@@ -34,6 +35,12 @@ class Route:
     margin: float = np.nan
     length: float = np.nan
     schedule: Schedule | None = None
+
+    def __repr__(self) -> str:
+        """Length and margin, or why there is no route."""
+        if not self.arrived:
+            return f"Route(refused: {self.why})"
+        return f"Route(arrived: length {self.length:.4g}, margin {self.margin:.4g})"
 
     @property
     def arrived(self) -> bool:
@@ -101,6 +108,14 @@ def distance(a: State, b: State) -> float:
     return float(np.sqrt((a.z[:n] - b.z[:n]) ** 2 @ a.structure.mass))
 
 
+def _identity(structure: Structure) -> dict[str, Any] | None:
+    """Data of the structure; None if it lives in Python only, like one with a callable load."""
+    try:
+        return structure.identity()
+    except InputError:
+        return None
+
+
 def _schedule(
     path: Path, margins: Float[np.ndarray, " steps"], descriptors: Sequence[Descriptor]
 ) -> Schedule:
@@ -115,6 +130,6 @@ def _schedule(
         progress=path.length / path.length[-1],
         margins=margins,
         descriptors={d.name: d(states) for d in descriptors},
-        start={"structure": structure.identity(), "unknowns": states.z[0].tolist()},
+        start={"structure": _identity(structure), "unknowns": states.z[0].tolist()},
         way_points=corners,
     )
