@@ -182,7 +182,7 @@ def _near_side(events: Happenings, ends: Int[np.ndarray, " ends"]) -> Int[np.nda
     """Index just before some events: a fold or branch point may lie between step and event."""
     before = np.maximum(ends - 1, 0)
     passed = (ends > 0) & (events.lanes[before] == events.lanes[ends]) & events.found[before]
-    return np.where(passed, events.index[before, 1], events.index[ends, 0])
+    return np.asarray(np.where(passed, events.index[before, 1], events.index[ends, 0]))
 
 
 def _settle(start: Front, traces: Traces, events: Happenings, options: TraceOptions) -> Outcome:
