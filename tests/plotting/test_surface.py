@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 
 from equimorph import plotting
 from equimorph.errors import InputError
-from equimorph.plotting.painter import PaintedPieces
-from equimorph.plotting.shading import brightness, corner_normals, split_long
+from equimorph.plotting import style
+from equimorph.plotting.scene import Scene
+from equimorph.plotting.shading import corner_normals, lit
 
 
 def legend(ax):
@@ -23,11 +24,15 @@ def test_surface_of_the_spring_is_named_and_labelled(spring_set):
     assert low < angles.min() < angles.max() < high
 
 
+def curve_of(ax, colour):
+    (scene,) = [each for each in ax.get_children() if isinstance(each, Scene)]
+    return [each.points for each in scene.curves if each.seen["color"] == colour]
+
+
 def test_route_lies_on_the_surface_from_start_to_goal(spring_set, route, ends):
     angle = spring_set.structure.angle
     ax = plotting.surface(spring_set, angle, route=route)
-    (line,) = [each for each in ax.lines if str(each.get_label()).startswith("route")]
-    x_l, force, heights = (np.asarray(values) for values in line.get_data_3d())
+    ((x_l, force, heights),) = [each.T for each in curve_of(ax, style.ROUTE_COLOUR)]
     assert heights[0] == pytest.approx(angle(ends[0]), abs=1e-9)
     assert heights[-1] == pytest.approx(angle(ends[1]), abs=1e-6)
     # Every point is an equilibrium: PHYSICS §2.
@@ -35,11 +40,17 @@ def test_route_lies_on_the_surface_from_start_to_goal(spring_set, route, ends):
     np.testing.assert_allclose(residual, 0.0, rtol=0, atol=1e-9)
 
 
-def test_one_collection_holds_cells_and_curves(spring_set):
-    ax = plotting.surface(spring_set, spring_set.structure.angle)
-    (pieces,) = [each for each in ax.collections if isinstance(each, PaintedPieces)]
-    ax.figure.canvas.draw()
-    assert len(pieces.get_paths()) > len(spring_set.cells)
+def test_ends_of_a_route_are_marked(spring_set, route, ends):
+    angle = spring_set.structure.angle
+    ax = plotting.surface(spring_set, angle, route=route)
+    marks = [np.concatenate(line.get_data_3d()) for line in ax.lines]
+    expected = [[0.8, 0.0, angle(end)] for end in ends]
+    np.testing.assert_allclose(marks, expected, rtol=0, atol=1e-6)
+
+
+def test_a_refused_route_is_named_as_such(spring_set, refused):
+    ax = plotting.surface(spring_set, spring_set.structure.angle, route=refused)
+    assert legend(ax)[-1] == "route, refused (○ start, ● fold)"
 
 
 def test_flat_axes_are_refused(spring_set):
@@ -57,16 +68,9 @@ def test_normals_are_continuous_across_a_fold():
 
 
 def test_a_surface_is_lit_alike_from_both_sides():
-    normals = np.random.default_rng(0).normal(size=(20, 3, 3))
-    np.testing.assert_array_equal(brightness(normals, 20.0, 9.0), brightness(-normals, 20.0, 9.0))
-
-
-def test_long_triangles_are_split_without_changing_their_area():
-    corners = np.array([[[0, 0, 0], [4, 0, 0], [0, 3, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 1]]])
-    pieces, _, owner = split_long(corners.astype(float), np.ones((2, 3, 3)), longest=1.5)
-    area = np.linalg.norm(
-        np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0]), axis=1
-    )
-    edges = np.linalg.norm(pieces - np.roll(pieces, 1, axis=1), axis=2)
-    assert edges.max() <= 1.5
-    np.testing.assert_allclose(np.bincount(owner, area / 2), [6.0, 0.5], rtol=1e-12)
+    random = np.random.default_rng(0)
+    normals, colours = random.normal(size=(20, 3)), random.uniform(size=(20, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    np.testing.assert_array_equal(lit(colours, normals), lit(colours, -normals))
+    assert lit(colours, normals).min() >= 0.0
+    assert lit(colours, normals).max() <= 1.0

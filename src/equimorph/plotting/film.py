@@ -43,7 +43,7 @@ def film(
     path: str | FilePath,
     eset: EquilibriumSet,
     *,
-    frames: int = 96,
+    frames: int = 72,
     fps: int = 20,
 ) -> FilePath:
     """Write an animated GIF: the structure on the left, its point in the parameter plane right.
@@ -104,7 +104,7 @@ class _Stage:
         renderer = self.canvas.get_renderer()
         for artist in self._moving():
             artist.draw(renderer)
-        return Image.fromarray(np.array(self.canvas.buffer_rgba())[..., :3])
+        return Image.fromarray(np.asarray(self.canvas.buffer_rgba())).convert("RGB")
 
     def _moving(self) -> tuple[Artist, ...]:
         return (self.shape, *self.parts.artists(), self.travelled, self.point, *self.texts)

@@ -19,6 +19,7 @@ from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.plotting import style
+from equimorph.plotting.badges import number_way_points
 from equimorph.plotting.curves import boundary_pieces, fold_pieces, intended, track, way_points
 from equimorph.plotting.regions import Regions, count_regions
 from equimorph.plotting.symbols import constraint_label, parameter_label
@@ -34,13 +35,14 @@ _CAP: dict[str, Any] = {
 }
 _ROUTE: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.6, "zorder": 6}
 
-_MARGINS = (0.5, 0.78, 0.4, 0.08)  # inches around the frame: left, bottom, right, top
+_FRAME_HEIGHT = 2.16  # inches
+_LEFT, _BOTTOM, _RIGHT, _TOP = 0.5, 0.4, 0.4, 0.08  # inches around the frame
+_LEGEND_COLUMNS, _LEGEND_ROW, _LEGEND_GAP = 2, 0.15, 0.06
 # Slivers of the mesh smaller than this share of the picture are no region of their own.
 _INVISIBLE = 1e-4
 _RASTER = 160
 # A number needs this much room around it, as a share of the picture.
 _ROOM = 0.03
-_BADGE = 0.07  # size of the badge of a way-point, as a share of the picture
 # Legs shorter than this share of the picture get no arrow head.
 _LONG_LEG = 0.12
 
@@ -79,25 +81,39 @@ def parameter_plane(
     if count not in ("all", "stable"):
         raise InputError(f'`count` must be "all" or "stable"; got {count!r}.')
     with style.house_style():
+        own = ax is None
         if ax is None:
-            ax = style.new_axes(style.SINGLE_COLUMN, 0.86 * style.SINGLE_COLUMN, _MARGINS)
+            height = _BOTTOM + _FRAME_HEIGHT + _TOP
+            ax = style.new_axes(style.SINGLE_COLUMN, height, (_LEFT, _BOTTOM, _RIGHT, _TOP))
         regions = count_regions(
             eset.coordinates, eset.cells if count == "all" else eset.cells[eset.cell_index == 0]
         )
         frame_plane(ax, eset)
         largest = shade_regions(ax, eset, regions)
         lines = draw_folds(ax, eset, stable_only=count == "stable")
-        corners = np.empty((0, 2))
+        covered = np.empty((0, 2))
         if route is not None and route.path is not None:
             lines.append(draw_track(ax, eset, route, route.path))
             corners = way_points(eset, route)[: None if route.status == "arrived" else -1]
             _draw_directions(ax, corners)
-            _number_way_points(ax, corners)
-        _write_counts(ax, regions, largest, _taken(eset, route, corners))
+            covered = np.concatenate([_covered(eset, route.path), number_way_points(ax, corners)])
+        _write_counts(ax, regions, largest, covered)
         _count_bar(ax, largest, "equilibria" if count == "all" else "stable equilibria")
         if lines:
-            ax.legend(handles=lines, loc="upper center", bbox_to_anchor=(0.54, -0.17), ncols=2)
+            _write_legend(ax, lines, room=own)
     return ax
+
+
+def _write_legend(ax: Axes, lines: list[Line2D], *, room: bool) -> None:
+    """Legend below the frame; with `room`, the figure grows by its height."""
+    if room:
+        rows = -(-len(lines) // _LEGEND_COLUMNS)
+        style.grow_below(ax, _LEGEND_GAP + rows * _LEGEND_ROW)
+    below = -(_BOTTOM + 0.5 * _LEGEND_GAP) / _FRAME_HEIGHT
+    ax.legend(
+        handles=lines, loc="upper center", bbox_to_anchor=(0.54, below), ncols=_LEGEND_COLUMNS,
+        borderaxespad=0.0, borderpad=0.0,
+    )  # fmt: skip
 
 
 def frame_plane(ax: Axes, eset: EquilibriumSet) -> None:
@@ -182,31 +198,9 @@ def _draw_directions(ax: Axes, corners: Float[np.ndarray, "corners 2"]) -> None:
             )  # fmt: skip
 
 
-def _number_way_points(ax: Axes, corners: Float[np.ndarray, "corners 2"]) -> None:
-    """Number the way-points; those at one place share a badge."""
-    size = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
-    badges: dict[tuple[float, float], list[int]] = {}
-    # First the ends, then the others as far as there is room: badges must not hide each other.
-    last = len(corners) - 1
-    for k in sorted(range(len(corners)), key=lambda k: k not in (0, last)):
-        near = [place for place in badges if np.hypot(*((corners[k] - place) / size)) < _BADGE]
-        if not near:
-            badges[tuple(corners[k].tolist())] = [k + 1]
-        elif np.allclose(near[0], corners[k], rtol=0, atol=1e-9):
-            badges[near[0]].append(k + 1)
-    box = {"boxstyle": "round,pad=0.2,rounding_size=0.6", "fc": "white", "ec": style.ROUTE_COLOUR}
-    for place, numbers in badges.items():
-        text = ", ".join(map(str, numbers))
-        ax.text(*place, text, ha="center", va="center", size=6.5, zorder=7, bbox=box | {"lw": 0.8})
-
-
-def _taken(
-    eset: EquilibriumSet, route: Route | None, corners: Float[np.ndarray, "corners 2"]
-) -> Float[np.ndarray, "places 2"]:
-    """Places that the route covers, where no count should be written."""
-    if route is None or route.path is None:
-        return corners
-    line = track(eset, route.path.states)
+def _covered(eset: EquilibriumSet, path: Path) -> Float[np.ndarray, "places 2"]:
+    """Places that a path covers, where no count should be written."""
+    line = track(eset, path.states)
     between = [line[:-1] + t * np.diff(line, axis=0) for t in (0.0, 0.25, 0.5, 0.75)]
     return np.concatenate([*between, line[-1:]])
 

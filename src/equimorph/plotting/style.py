@@ -103,6 +103,17 @@ def new_axes(width: float, height: float, room: tuple[float, float, float, float
     )
 
 
+def grow_below(ax: Axes, inches: float) -> None:
+    """Make the figure of an axes taller at its bottom; the frame keeps its size and place."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    width, height = figure.get_size_inches()
+    taller, frame = height + inches, ax.get_position(original=True)
+    figure.set_size_inches(width, taller)
+    left, bottom, across, up = frame.bounds
+    ax.set_position((left, (bottom * height + inches) / taller, across, up * height / taller))
+
+
 def attach_canvas(figure: Figure) -> Figure:
     """Give a figure the canvas that draws without a screen."""
     FigureCanvasAgg(figure)

@@ -1,7 +1,9 @@
 """The equilibrium surface over the plane of free parameters, coloured by index."""
 
+from typing import Any
+
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -9,13 +11,14 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from mpl_toolkits.mplot3d import Axes3D
 
+from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.curves import boundary_pieces, fold_pieces, states_along, track
-from equimorph.plotting.painter import Coat, PaintedPieces
-from equimorph.plotting.shading import brightness, corner_normals, split_long
+from equimorph.plotting.scene import Curve, Scene
+from equimorph.plotting.shading import Paint, corner_normals
 from equimorph.plotting.symbols import constraint_label, descriptor_label, parameter_label
 from equimorph.tasks import Route
 
@@ -23,15 +26,36 @@ Points = Float[np.ndarray, "vertices 3"]
 Cells = Float[np.ndarray, "cells 3 3"]
 Pieces = Float[np.ndarray, "pieces 3 3"]
 
-_ELEVATION, _AZIMUTH = 18.0, -135.0
+_ELEVATION, _AZIMUTH = 23.0, 125.0
 _ASPECT = np.array([1.2, 1.3, 1.0])
-_ZOOM = 1.12
-# Longest edge of a painted triangle, in the units of _ASPECT.
-_LONGEST = 0.05
-_ISOLINES = 11
-_SEAM = 0.35  # width of edges in the colour of the face: they close the seams of antialiasing
+_ZOOM = 1.17
+_LINES_PER_TICK = 2
 _ROUTE_POINTS = 240
-_CAP_COLOUR = "#4d4d4d"
+# The route runs on the exact surface, which is curved between the vertices of the drawn one.
+_ROUTE_SLACK = 0.015
+
+_BOX: dict[str, Any] = {"color": style.INK, "linewidth": 0.5}
+_CAP: dict[str, Any] = {"color": "#4d4d4d", "linewidth": 0.9}
+_FOLD: dict[str, Any] = {"color": style.INK, "linewidth": 1.5, "capstyle": "round"}
+_HIDDEN_FOLD: dict[str, Any] = {
+    "color": style.INK,
+    "linewidth": 0.6,
+    "linestyle": (0, (3, 2)),
+    "alpha": 0.45,
+}
+_RIM: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]
+_ROUTE: dict[str, Any] = {
+    "color": style.ROUTE_COLOUR,
+    "linewidth": 1.6,
+    "capstyle": "round",
+    "path_effects": _RIM,
+}
+_HIDDEN_ROUTE: dict[str, Any] = {
+    "color": style.ROUTE_COLOUR,
+    "linewidth": 1.0,
+    "linestyle": (0, (2, 1.5)),
+    "alpha": 0.7,
+}
 
 
 def surface(
@@ -73,15 +97,15 @@ def surface(
         heights = np.asarray(height_descriptor(eset.points))
         points = np.column_stack([eset.coordinates, heights])
         _frame(ax, eset, height_descriptor, points)
-        legend = _draw_set(ax, eset, points)
+        curves, legend = _curves(eset, points)
         if route is not None and route.path is not None:
-            label = "route (○ start, ● goal)"
-            if route.status != "arrived":
-                label = f"route, refused (○ start, ● {route.path.end.kind})"
             states = states_along(route.path, _ROUTE_POINTS)
             places = np.column_stack([track(eset, states), height_descriptor(states)])
-            legend.append(_draw_route(ax, places, label))
-        ax.legend(handles=legend, loc="upper center", ncols=4, bbox_to_anchor=(0.5, 1.0))
+            curves.append(Curve(places, _ROUTE, _HIDDEN_ROUTE, slack=_ROUTE_SLACK))
+            legend.append(_route_entry(route.status, route.path))
+            _draw_ends(ax, places)
+        ax.add_artist(Scene(points[eset.cells], _paint(ax, eset, points), curves))
+        ax.legend(handles=legend, loc="upper center", ncols=4, bbox_to_anchor=(0.53, 1.0))
     return ax
 
 
@@ -89,7 +113,7 @@ def _new_axes() -> Axes:
     """Axes that fill a figure; room for the labels is inside them."""
     figure = Figure(figsize=(0.72 * style.DOUBLE_COLUMN, 0.58 * style.DOUBLE_COLUMN))
     style.attach_canvas(figure)
-    return figure.add_axes((0.02, -0.02, 0.96, 0.98), projection="3d")
+    return figure.add_axes((-0.045, 0.0, 1.0, 0.98), projection="3d")
 
 
 def _frame(ax: Axes3D, eset: EquilibriumSet, height: Descriptor, points: Points) -> None:
@@ -112,23 +136,28 @@ def _frame(ax: Axes3D, eset: EquilibriumSet, height: Descriptor, points: Points)
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
 
 
-def _draw_set(ax: Axes3D, eset: EquilibriumSet, points: Points) -> list[Patch | Line2D]:
-    """Draw cells and curves as one collection; return the entries of a legend."""
-    cells = points[eset.cells]
-    limits = np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()])
+def _curves(eset: EquilibriumSet, points: Points) -> tuple[list[Curve], list[Patch | Line2D]]:
+    """Folds and boundaries of the set, and the entries of a legend for them and for the cells."""
     folds = [line for line, _ in fold_pieces(eset)]
     caps, box = ([line for line, _ in boundary_pieces(eset, box=side)] for side in (False, True))
-    ink = style.rgba(style.INK)
-    coats = [
-        _coat(eset, points, _ASPECT / np.ptp(limits, axis=1)),
-        Coat(_isolines(cells, limits[:2]), style.rgba(style.INK, 0.25), 0.3, lift=0.5),
-        Coat(_segments(points, box), ink, 0.4, lift=1.0),
-        Coat(_segments(points, caps), style.rgba(_CAP_COLOUR), 0.8, lift=1.0),
-        Coat(_segments(points, folds), ink, 1.5, lift=1.0),
-    ]
-    # Ten thousand triangles are too many for a vector file.
-    ax.add_collection3d(PaintedPieces(coats, rasterized=True, zorder=1), autolim=False)
-    return _legend(eset, bool(folds), bool(caps))
+    looks = [(box, _BOX, None), (caps, _CAP, None), (folds, _FOLD, _HIDDEN_FOLD)]
+    curves = [Curve(points[line], seen, hidden) for lines, seen, hidden in looks for line in lines]
+    return curves, _legend(eset, bool(folds), bool(caps))
+
+
+def _paint(ax: Axes3D, eset: EquilibriumSet, points: Points) -> Paint:
+    """Cells in the colours of their indices, with thin lines at even steps of the parameters."""
+    limits = np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()])
+    proportions = _ASPECT / np.ptp(limits, axis=1)
+    palette = np.array([style.rgba(style.index_colour(k))[:3] for k in range(1 + eset.index.max())])
+    steps = [np.diff(style.few_ticks().tick_values(*ends))[0] for ends in limits[:2]]
+    return Paint(
+        corner_normals(points[eset.cells] * proportions, eset.cells, eset.cell_index),
+        proportions,
+        palette[eset.cell_index],
+        tuple(float(step) / _LINES_PER_TICK for step in steps),
+        style.rgba(style.INK)[:3],
+    )
 
 
 def _legend(eset: EquilibriumSet, folds: bool, caps: bool) -> list[Patch | Line2D]:
@@ -139,67 +168,25 @@ def _legend(eset: EquilibriumSet, folds: bool, caps: bool) -> list[Patch | Line2
         for label, colour in sorted(labels.items(), key=lambda pair: (pair[0] != "stable", pair[0]))
     ]
     if folds:
-        entries.append(Line2D([], [], color=style.INK, linewidth=1.5, label="fold"))
+        entries.append(Line2D([], [], label="fold", color=style.INK, linewidth=1.5))
     if caps:
         label = constraint_label(eset.constraints)
-        entries.append(Line2D([], [], color=_CAP_COLOUR, linewidth=0.8, label=label))
+        entries.append(Line2D([], [], **_CAP, label=label))
     return entries
 
 
-def _draw_route(ax: Axes3D, places: Points, label: str) -> Line2D:
-    """Draw a route over everything, a ring at its start and a dot at its end."""
+def _route_entry(status: str, path: Path) -> Line2D:
+    """Entry for a route in a legend."""
+    label = "route (○ start, ● goal)"
+    if status != "arrived":
+        label = f"route, refused (○ start, ● {path.end.kind})"
+    return Line2D([], [], color=style.ROUTE_COLOUR, linewidth=1.6, label=label)
+
+
+def _draw_ends(ax: Axes3D, places: Points) -> None:
+    """Draw a ring at the start of a route and a dot at its end."""
     rim: list[AbstractPathEffect] = [withStroke(linewidth=2.8, foreground="white")]
     colour = style.ROUTE_COLOUR
-    drawn: Line2D
-    (drawn,) = ax.plot(*places.T, color=colour, linewidth=1.6, zorder=5, label=label)
-    drawn.set_path_effects(rim)
     for end, fill in ((places[0], "white"), (places[-1], colour)):
         (mark,) = ax.plot(*end[:, None], "o", color=colour, ms=4.5, mfc=fill, zorder=6)
         mark.set_path_effects(rim)
-    return drawn
-
-
-def _segments(points: Points, lines: list[Int[np.ndarray, " _"]]) -> Pieces:
-    """Segments of polylines as triangles with two equal corners."""
-    pairs = [np.stack([line[:-1], line[1:], line[1:]], axis=1) for line in lines]
-    return np.asarray(points[np.concatenate([np.empty((0, 3), int), *pairs])])
-
-
-def _isolines(cells: Cells, limits: Float[np.ndarray, "axes 2"]) -> Pieces:
-    """Segments where the surface meets evenly spaced planes across the first axes."""
-    levels = [
-        (k, x)
-        for k, (low, high) in enumerate(limits)
-        for x in np.linspace(low, high, _ISOLINES)[1:-1]
-    ]
-    return np.concatenate([_slice(cells, axis, float(level)) for axis, level in levels])
-
-
-def _slice(cells: Cells, axis: int, level: float) -> Pieces:
-    """Segments where the surface meets one plane across an axis."""
-    above = cells[..., axis] > level
-    cut = cells[above.any(axis=1) & ~above.all(axis=1)]
-    above = cut[..., axis] > level
-    # The corner that is alone on its side of the plane; both cuts lie on its edges.
-    alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
-    lanes = np.arange(len(cut))
-    tip = cut[lanes, alone]
-    ends = []
-    for step in (1, 2):
-        other = cut[lanes, (alone + step) % 3]
-        share = (level - tip[:, axis]) / (other[:, axis] - tip[:, axis])
-        ends.append(tip + share[:, None] * (other - tip))
-    return np.stack([ends[0], ends[1], ends[1]], axis=1)
-
-
-def _coat(eset: EquilibriumSet, points: Points, scale: Float[np.ndarray, "3"]) -> Coat:
-    """Cells in the colours of their indices, in the light; `scale` leads to what is drawn."""
-    corners = points[eset.cells] * scale
-    normals = corner_normals(corners, eset.cells, eset.cell_index)
-    pieces, normals, owner = split_long(corners, normals, _LONGEST)
-    bright = brightness(normals, _ELEVATION, _AZIMUTH)
-    index = eset.cell_index[owner]
-    palette = np.array([style.rgba(style.index_colour(k)) for k in range(int(index.max()) + 1)])
-    colours = palette[index]
-    colours[:, :3] *= bright[:, None]
-    return Coat(pieces / scale, colours, _SEAM)

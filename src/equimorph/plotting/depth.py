@@ -1,0 +1,154 @@
+"""Depth buffer: which triangle is nearest behind every pixel, and which points it hides.
+
+Triangles may cross each other; every pixel decides for itself, so no order of drawing is needed.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+Corners = Float[np.ndarray, "cells 3 3"]
+
+_BATCH = 1_000_000  # pixels written at a time: bounds the memory
+_LEVELS = 2.0**31 - 1
+_EMPTY = np.iinfo(np.int64).max
+# Pixels around a point that are asked whether they hide it: a curve runs along edges of the
+# surface, and is seen as soon as one side of it is.
+_AROUND = 2
+
+
+@dataclass(frozen=True)
+class DepthBuffer:
+    """What is nearest to the viewer at every pixel.
+
+    Attributes
+    ----------
+    owner
+        Number of the triangle seen at the middle of each pixel, −1 where there is none.
+    depth
+        Distance of that place from the viewer, infinite where there is none.
+    """
+
+    owner: Int[np.ndarray, "rows columns"]
+    depth: Float[np.ndarray, "rows columns"]
+
+    def shows(self, places: Float[np.ndarray, "points 3"], slack: float) -> Bool[np.ndarray, " _"]:
+        """Whether points can be seen.
+
+        Parameters
+        ----------
+        places
+            Column, row and depth of the points, as the corners of the triangles are given.
+        slack
+            How far behind the surface a point may lie that belongs to it.
+        """
+        rows, columns = self.depth.shape
+        column, row = np.floor(places[:, :2]).astype(int).T
+        farthest = np.full(len(places), -np.inf)
+        for up in (-_AROUND, 0, _AROUND):
+            for right in (-_AROUND, 0, _AROUND):
+                i = np.clip(row + up, 0, rows - 1)
+                j = np.clip(column + right, 0, columns - 1)
+                farthest = np.maximum(farthest, self.depth[i, j])
+        return np.asarray(places[:, 2] <= farthest + slack)
+
+
+def depth_buffer(corners: Corners, rows: int, columns: int) -> DepthBuffer:
+    """Depth buffer of triangles seen along the third axis.
+
+    A triangle covers the pixels whose middles it contains; of two that share an edge exactly one
+    covers each pixel there. Depth is linear on each triangle, as it is in a parallel projection,
+    and compared in steps of 2⁻³¹ of its range.
+
+    Parameters
+    ----------
+    corners
+        Columns and rows of the corners in pixels, and their distances from the viewer.
+    rows, columns
+        Size of the picture; what lies outside is left out.
+    """
+    key = np.full(rows * columns, _EMPTY)
+    low, high = (f(corners[..., 2], initial=0.0) for f in (np.min, np.max))
+    step = max(high - low, np.finfo(float).tiny) / _LEVELS
+    for cell, row, first, last in _spans(corners, rows, columns):
+        count = last - first
+        owner, line = np.repeat(cell, count), np.repeat(row, count)
+        column = np.arange(len(owner)) + np.repeat(first - np.cumsum(count) + count, count)
+        depth = _depth_on(corners, owner, column + 0.5, line + 0.5)
+        level = ((depth - low) / step).astype(np.int64)
+        # Depth in the upper bits, triangle in the lower: the smallest key is the nearest triangle.
+        np.minimum.at(key, line * columns + column, (level << 32) | owner)
+    seen = key != _EMPTY
+    owner = np.where(seen, key & 0xFFFFFFFF, -1)
+    depth = np.where(seen, low + step * (key >> 32), np.inf)
+    return DepthBuffer(owner.reshape(rows, columns), depth.reshape(rows, columns))
+
+
+_Span = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def _spans(corners: Corners, rows: int, columns: int) -> Iterator[_Span]:
+    """Runs of pixels in one row inside one triangle: triangle, row, first and last-plus-one column.
+
+    They come in batches of about `_BATCH` pixels.
+    """
+    order = np.argsort(corners[..., 1], axis=1, kind="stable")
+    a, b, c = (corners[np.arange(len(corners)), order[:, k]] for k in range(3))
+    first = np.clip(np.ceil(a[:, 1] - 0.5), 0, rows).astype(int)
+    count = np.maximum(np.clip(np.ceil(c[:, 1] - 0.5), 0, rows).astype(int) - first, 0)
+    cell = np.repeat(np.arange(len(corners)), count)
+    row = np.arange(len(cell)) + np.repeat(first - np.cumsum(count) + count, count)
+    y = row + 0.5
+    lower = y < b[cell, 1]
+    start, end = (
+        np.where(lower[:, None], a[cell], b[cell]),
+        np.where(lower[:, None], b[cell], c[cell]),
+    )
+    one, other = _at_height(a[cell], c[cell], y), _at_height(start, end, y)
+    left = np.clip(np.ceil(np.minimum(one, other) - 0.5), 0, columns).astype(int)
+    right = np.clip(np.ceil(np.maximum(one, other) - 0.5), 0, columns).astype(int)
+    full = np.flatnonzero(right > left)
+    cell, row, left, right = cell[full], row[full], left[full], right[full]
+    cuts = np.searchsorted(np.cumsum(right - left), np.arange(_BATCH, (right - left).sum(), _BATCH))
+    for part in np.split(np.arange(len(cell)), cuts):
+        yield cell[part], row[part], left[part], right[part]
+
+
+def _at_height(
+    start: Float[np.ndarray, "n 3"], end: Float[np.ndarray, "n 3"], y: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Where edges cross a row."""
+    rise = end[:, 1] - start[:, 1]
+    share = np.clip((y - start[:, 1]) / np.where(rise > 0, rise, 1.0), 0.0, 1.0)
+    return np.asarray(start[:, 0] + share * (end[:, 0] - start[:, 0]))
+
+
+def slopes(
+    corners: Corners, values: Float[np.ndarray, "cells 3 *n"]
+) -> Float[np.ndarray, "cells 2 *n"]:
+    """Change of a quantity, linear on each triangle, per pixel to the right and per row.
+
+    Zero on triangles seen exactly edge-on.
+    """
+    u, v = (corners[:, k, :2] - corners[:, 0, :2] for k in (1, 2))
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    scale = np.divide(1.0, area, out=np.zeros_like(area), where=area != 0.0)
+    inverse = np.array([[v[:, 1], -u[:, 1]], [-v[:, 0], u[:, 0]]]) * scale
+    change = values[:, 1:] - values[:, :1]
+    return np.asarray(np.einsum("dkc,ck...->cd...", inverse, change))
+
+
+def _depth_on(
+    corners: Corners,
+    cell: Int[np.ndarray, " n"],
+    x: Float[np.ndarray, " n"],
+    y: Float[np.ndarray, " n"],
+) -> Float[np.ndarray, " n"]:
+    """Depth of triangles at places, never beyond their corners (those seen edge-on are steep)."""
+    z = corners[..., 2]
+    steep = slopes(corners, z)
+    right, up = x - corners[cell, 0, 0], y - corners[cell, 0, 1]
+    depth = z[cell, 0] + steep[cell, 0] * right + steep[cell, 1] * up
+    return np.asarray(np.clip(depth, z.min(axis=1)[cell], z.max(axis=1)[cell]))
