@@ -1,8 +1,4 @@
-"""Draw docs/surface.png, the picture on top of the README, from the results of the arch.
-
-    make run
-    .venv/bin/python docs/surface.py
-"""
+"""Draw docs/surface.png, the picture on top of the README, from the results of `make run`."""
 
 from pathlib import Path
 
