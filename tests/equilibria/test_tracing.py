@@ -5,7 +5,8 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, FOLD, init, initial_front, step
+from equimorph.equilibria.fronts import initial_front
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, FOLD
 from oracles.polynomial import fold_form, pitchfork_form
 
 
@@ -24,25 +25,6 @@ def test_tangents_point_towards_growing_t_and_have_unit_length():
     length = front.tangent_z[:, 0] ** 2 + (slope * front.tangent_t) ** 2
     assert length == pytest.approx(np.ones(2), rel=1e-14)
     assert front.index.tolist() == [0, 1]
-
-
-def test_a_branch_can_be_walked_with_for():
-    """`step` is pure: the march it is given stays as it was."""
-    curve, z = lines(fold_form(), [[1.0]], [[1.0]], [[4.0]])
-    options = TraceOptions()
-    march, news = init(curve, initial_front(curve, z, np.zeros(1)), options)
-    assert not news.lost
-    x = [float(march.front.z[0, 0])]
-    for _ in range(50):
-        before = march
-        march, _ = step(before, (), options)
-        assert before.front.z[0, 0] == x[-1]
-        if len(march.lanes) == 0:
-            break
-        x.append(float(march.front.z[0, 0]))
-    assert len(march.lanes) == 0
-    assert (np.diff(x) > 0).all()
-    assert x[-1] < 2.0
 
 
 def test_lanes_do_not_influence_each_other():
@@ -75,10 +57,11 @@ def test_recorded_points_keep_the_names_of_their_lanes():
     curve, z = lines(pitchfork_form(1.0), [[0.0], [1.0]], [[-1.0, 0], [1, 0]], [[1.0, 0], [4, 0]])
     outcome = follow(curve, z)
     assert outcome.code.tolist() == [BRANCH, ARRIVAL]
-    for lanes, travelled, front in outcome.traces.points:
-        assert len(lanes) == len(travelled) == len(front.t)
-        assert front.z[lanes == 0] == pytest.approx(0.0, abs=1e-14)
-        assert (front.z[lanes == 1] >= 1.0).all()
+    points = outcome.points
+    assert points.z[points.lanes == 0] == pytest.approx(0.0, abs=1e-14)
+    assert (points.z[points.lanes == 1] >= 1.0).all()
+    for lane in range(2):
+        assert (np.diff(points.travelled[points.lanes == lane]) > 0.0).all()
 
 
 def test_length_of_a_path_is_its_length_in_the_metric():

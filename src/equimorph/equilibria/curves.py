@@ -6,13 +6,11 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT, squared_lengths
 from equimorph.structures import Advance, Structure, bordered_advance
 
 Lanes = Float[np.ndarray, "lanes size"]
 Values = Float[np.ndarray, " lanes"]
-
-MULTIPLIER_WEIGHT = 1e-2
-"""Weight of the multipliers' squares in the norm of corrections (they are not in the metric)."""
 
 
 @runtime_checkable
@@ -94,14 +92,18 @@ class NewtonHomotopy:
 
 def squared_length(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> Values:
     """Squared length of a step (dz, dt) in the structure's metric and the curve's own."""
-    return np.asarray(dz[:, : structure.unknowns] ** 2 @ structure.mass + (weight * dt) ** 2)
+    return _squared(structure, weight, dz, dt, 0.0)
 
 
 def correction_size(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> Values:
     """Size of a Newton correction: its length, with the multipliers included lightly."""
-    multipliers = dz[:, structure.unknowns :]
-    extra = MULTIPLIER_WEIGHT * (multipliers**2).sum(axis=1)
-    return np.asarray(np.sqrt(squared_length(structure, weight, dz, dt) + extra))
+    return np.asarray(np.sqrt(_squared(structure, weight, dz, dt, MULTIPLIER_WEIGHT)))
+
+
+def _squared(structure: Structure, weight: Values, dz: Lanes, dt: Values, light: float) -> Values:
+    out = np.empty(len(dz))
+    squared_lengths(np.ascontiguousarray(dz), dt, weight, structure.mass, light, out)
+    return out
 
 
 def dual(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> tuple[Lanes, Values]:

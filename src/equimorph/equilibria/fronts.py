@@ -5,17 +5,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.curves import Curve, correction_size, dual, squared_length
+from equimorph.equilibria import kernels
+from equimorph.equilibria.curves import Curve, squared_length
+from equimorph.equilibria.kernels import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
 
 Lanes = Float[np.ndarray, "lanes size"]
 Values = Float[np.ndarray, " lanes"]
 Flags = Bool[np.ndarray, " lanes"]
 
-ACCEPTED = 1e-7
-"""Size of the last correction: Newton is quadratic, so the point itself is good to its square."""
-
-ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT = 1, 2, 4, 8, 16
-"""Bits of what can happen in a step."""
+__all__ = [
+    "ARRIVAL",
+    "BRANCH",
+    "CONSTRAINT",
+    "FOLD",
+    "RETURN",
+    "Bracket",
+    "Front",
+    "initial_front",
+    "new_scalars",
+    "step_along",
+]
 
 
 @dataclass(frozen=True)
@@ -92,47 +101,36 @@ def _unit(curve: Curve, front: Front) -> Front:
     )
 
 
-def step_along(
-    curve: Curve, front: Front, length: Values, bend: Lanes
-) -> tuple[Front, Values, Flags]:
-    """Go `length` along each curve: predict, correct, and tell the turning and the success.
+def step_along(curve: Curve, front: Front, length: Values) -> tuple[Front, Flags]:
+    """Go `length` along each curve: predict by the tangent, correct, and tell the success.
 
-    The predictor adds ½ length² times the curvature estimate `bend` (dT/ds); the corrector is
-    Newton on the curve and the pseudo-arclength condition. A step counts only if the first
-    correction is below a quarter of its length and the tangents stay within acos 0.9.
+    The corrector is Newton on the curve and the pseudo-arclength condition. A step counts only if
+    the first correction is below a quarter of its length and the tangents stay within acos 0.9.
     """
-    dz = length[:, None] * front.tangent_z + 0.5 * (length**2)[:, None] * bend
-    guess = replace(front, z=front.z + dz, t=front.t + length * front.tangent_t)
-    out, good = _corrected(curve, front, guess, length)
-    # row·tangent = 1 by construction, so the cosine of the turning is 1 over the new length
-    norm = np.sqrt(squared_length(curve.structure, curve.weight, out.tangent_z, out.tangent_t))
-    cosine = np.where(good, 1.0 / norm, -1.0)
-    turning = np.arccos(np.clip(cosine, -1.0, 1.0))
-    return _unit(curve, out), turning, np.asarray(good & (cosine >= 0.9))
+    lanes, mass = len(length), curve.structure.mass
+    numbers, counts = new_scalars(lanes)
+    numbers[kernels.T], numbers[kernels.SLOPE] = front.t, front.tangent_t
+    numbers[kernels.LENGTH], numbers[kernels.WEIGHT] = length, curve.weight**2
+    trial, row = np.empty_like(front.z), np.empty_like(front.z)
+    places = (front.z, front.tangent_z, front.z, front.tangent_z, trial, row)
+    kernels.predict_all(mass, places, numbers, counts, 0, lanes)
+    out = replace(front, tangent_z=np.zeros_like(trial), index=np.zeros(lanes, int))
+    closing = (numbers[kernels.CORNER], numbers[kernels.DEFECT])
+    while (counts[kernels.STAGE] == kernels.CORRECTING).any():
+        open_lanes = counts[kernels.STAGE] == kernels.CORRECTING
+        move = curve.advance(trial, numbers[kernels.TRIAL], row, *closing)
+        state = (trial, numbers, counts, lanes, 0.0)
+        kernels.correct(move.dz, move.dt, move.tangent_z, move.tangent_t, mass, *state)
+        new = open_lanes & (counts[kernels.STAGE] == kernels.CONVERGED)
+        out.tangent_z[new] = move.tangent_z[new] / numbers[kernels.NORM, new, None]
+        out.index[new] = move.index[new]
+    good = counts[kernels.STAGE] == kernels.CONVERGED
+    t, slope = numbers[kernels.TRIAL].copy(), np.where(good, numbers[kernels.NEW_SLOPE], 0.0)
+    return replace(out, z=trial, t=t, tangent_t=slope), good
 
 
-def _corrected(curve: Curve, front: Front, guess: Front, length: Values) -> tuple[Front, Flags]:
-    """Newton from a guess to the point at arclength `length` along the tangents of `front`."""
-    row, corner = dual(curve.structure, curve.weight, front.tangent_z, front.tangent_t)
-    out = Front(*(column.copy() for column in vars(guess).values()))
-    todo, good = np.arange(len(length)), np.zeros(len(length), bool)
-    last = np.full(len(length), np.inf)
-    for iteration in range(6):
-        here = curve.take(todo)
-        defect = np.einsum("li,li->l", row[todo], out.z[todo] - front.z[todo])
-        defect += corner[todo] * (out.t[todo] - front.t[todo]) - length[todo]
-        move = here.advance(out.z[todo], out.t[todo], row[todo], corner[todo], defect)
-        size = correction_size(curve.structure, here.weight, move.dz, move.dt)
-        limit = 0.25 * length[todo] if iteration == 0 else 0.5 * last[todo]
-        alive = size <= np.maximum(limit, ACCEPTED)
-        out.z[todo[alive]] += move.dz[alive]
-        out.t[todo[alive]] += move.dt[alive]
-        last[todo] = size
-        done = alive & (size <= ACCEPTED)
-        ready = todo[done]
-        out.tangent_z[ready], out.tangent_t[ready] = move.tangent_z[done], move.tangent_t[done]
-        out.index[ready], good[ready] = move.index[done], True
-        todo = todo[alive & ~done]
-        if len(todo) == 0:
-            break
-    return out, good
+def new_scalars(
+    lanes: int,
+) -> tuple[Float[np.ndarray, "numbers lanes"], Int[np.ndarray, "counts lanes"]]:
+    """Empty scalars of lanes: the rows are named in `kernels`."""
+    return np.zeros((kernels.NUMBERS, lanes)), np.zeros((kernels.COUNTS, lanes), np.int64)

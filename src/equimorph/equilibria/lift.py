@@ -197,19 +197,14 @@ def _segment(
     curve = ParameterLine(structure, state.p[None].copy(), velocity[None].copy())
     outcome = follow(curve, state.z[None].copy(), within, options)
     events = (*_passed(curve, outcome, number), _end(curve, outcome, number, within))
-    points = outcome.traces.points
     last = outcome.travelled[0] if outcome.code[0] else np.inf
-    kept = [(length[0], front) for _, length, front in points if length[0] < last]
-    z = [front.z[0] for _, front in kept]
-    t = [float(front.t[0]) for _, front in kept]
-    length, index = [x for x, _ in kept], [int(front.index[0]) for _, front in kept]
-    if outcome.code[0]:
-        z, t = [*z, outcome.z[0]], [*t, float(outcome.t[0])]
-        length, index = [*length, float(last)], [*index, int(outcome.index[0])]
-    shares = np.array(t)
-    states = np.array(z).reshape(len(z), structure.size)
-    p = state.p + shares[:, None] * velocity
-    return _Segment(states, p, number + shares, np.array(length), np.array(index, int), events)
+    points = outcome.points.take(outcome.points.travelled < last)
+    ended = slice(0, int(outcome.code[0] != 0))
+    z = np.concatenate([points.z, outcome.z[ended]])
+    t = np.concatenate([points.t, outcome.t[ended]])
+    length = np.concatenate([points.travelled, outcome.travelled[ended]])
+    index = np.concatenate([points.index, outcome.index[ended]])
+    return _Segment(z, state.p + t[:, None] * velocity, number + t, length, index, events)
 
 
 def _passed(curve: ParameterLine, outcome: Outcome, number: int) -> list[Event]:

@@ -235,12 +235,11 @@ def locate_root(
     # a start on the bound may exceed it by round-off: then it is itself the root
     f_low = np.minimum(function(front.z, front.t), 0.0)
     f_high = function(bracket.after.z, bracket.after.t)
-    flat = np.zeros_like(front.z)
     here, found = front, np.ones(lanes, bool)
     at = high.copy()
     for _ in range(60):
         at = np.clip((low * f_high - high * f_low) / (f_high - f_low), low, high)
-        here, _, good = step_along(curve, front, at, flat)
+        here, good = step_along(curve, front, at)
         tiny = at < 1e-12
         here = here.updated(front, tiny)
         value = function(here.z, here.t)

@@ -1,35 +1,34 @@
-"""From brackets to events: what happened to each lane of a trace, and exactly where."""
+"""`follow`: trace many lanes, locate what happened to each, and tell how it ended."""
 
-from dataclasses import dataclass
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import wait
+from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from equimorph.equilibria.curves import Curve
-from equimorph.equilibria.location import (
-    Located,
-    locate_branch_point,
-    locate_fold,
-    locate_goal,
-    locate_root,
-)
+from equimorph.equilibria.fronts import Bracket
+from equimorph.equilibria.happenings import Happenings, locate_all
+from equimorph.equilibria.march import Block, News
 from equimorph.equilibria.tracing import (
     ARRIVAL,
     BRANCH,
     CONSTRAINT,
     FOLD,
     RETURN,
-    Bracket,
-    Front,
+    Points,
     TraceOptions,
-    Traces,
-    initial_front,
-    trace,
 )
-from equimorph.model import Constraint
+from equimorph.linalg.lanes import in_background, threads
+from equimorph.model import Constraint, Progress, Silent
 
 Lanes = Float[np.ndarray, "lanes size"]
 Values = Float[np.ndarray, " lanes"]
+Names = Int[np.ndarray, " lanes"]
+Some = Int[np.ndarray, " some"]
 
 LOST = 0
 KINDS = {
@@ -40,40 +39,37 @@ KINDS = {
     CONSTRAINT: "constraint",
     LOST: "lost",
 }
+LANES_PER_THREAD = 128
+"""A second thread is not worth its start for fewer lanes than this on each."""
+EVENTS_AT_ONCE = 128
+REPORT_EVERY = 0.2
+"""Seconds."""
 
 
 @dataclass(frozen=True)
-class Happenings:
-    """Located events of all lanes, sorted by lane and then by arclength.
+class Batching:
+    """How many lanes march side by side on how many threads; no result depends on it.
 
-    `code` as in `tracing`; `index` before and after; `terminal` marks the one that ended its lane.
+    capacity: lanes of a thread that fit into its cache together; threads: as many as there are
+    processors if None.
     """
 
-    lanes: Int[np.ndarray, " events"]
-    code: Int[np.ndarray, " events"]
-    z: Float[np.ndarray, "events size"]
-    t: Float[np.ndarray, " events"]
-    travelled: Float[np.ndarray, " events"]
-    index: Int[np.ndarray, "events 2"]
-    found: Bool[np.ndarray, " events"]
-
-    def take(self, events: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"]) -> "Happenings":
-        """Return some of the events."""
-        return Happenings(*(column[events] for column in vars(self).values()))
+    capacity: int = 256
+    threads: int | None = None
 
 
 @dataclass(frozen=True)
 class Outcome:
     """How each lane ended, the events on its way, and its points if they were recorded."""
 
-    code: Int[np.ndarray, " lanes"]
+    code: Names
     z: Lanes
     t: Values
-    index: Int[np.ndarray, " lanes"]
+    index: Names
     travelled: Values
     why: dict[int, str]
     passed: Happenings
-    traces: Traces
+    points: Points
 
 
 def follow(
@@ -81,134 +77,209 @@ def follow(
     z: Lanes,
     constraints: tuple[Constraint, ...] = (),
     options: TraceOptions | None = None,
+    *,
+    batching: Batching | None = None,
+    progress: Progress | None = None,
 ) -> Outcome:
-    """Trace every lane from t = 0 and locate everything that happened.
+    """Trace every lane from t = 0 until it arrives, returns or something ends it.
 
-    Of the events in the last step of a lane the first along the curve is its end.
+    Lanes wait in a queue; each thread takes as many as march well together and fills up from the
+    queue as lanes finish. Of the events in the last step of a lane the first along the curve is its
+    end. Lanes whose events could not be located are traced again with finer steps. Every lane is
+    treated by itself: its result is the same, bit for bit, whatever the other lanes, their order
+    and the threads.
+
+    Whatever `progress` raises stops all threads and reaches the caller: so a computation is
+    cancelled.
     """
-    options = options or TraceOptions()
-    start = initial_front(curve, z, np.zeros(len(z)))
-    traces = trace(curve, start, constraints, options)
-    bits = [FOLD, BRANCH, ARRIVAL, RETURN, CONSTRAINT]
-    if not options.locate_passed:
-        bits = [bit for bit in bits if bit & options.stops]
-    events = _locate_all(curve, traces.brackets, bits, constraints)
-    finer = options
-    while finer.retries and not events.found.all():
-        again, finer = np.unique(events.lanes[~events.found]), finer.finer()
-        retraced = trace(curve.take(again), start.take(again), constraints, finer).renamed(again)
-        traces = traces.without(again)
-        located = _locate_all(curve, retraced.brackets, bits, constraints)
-        events = _merged([events.take(~np.isin(events.lanes, again)), located])
-        traces.extend(retraced)
-    return _settle(start, traces, events, options)
+    options, batching = options or TraceOptions(), batching or Batching()
+    count = max(1, min(batching.threads or threads(), len(z) // LANES_PER_THREAD))
+    queue = _Queue(len(z))
+    ledger = _Ledger.of(z)
+    capacity = min(batching.capacity, -(-len(z) // count))
+    jobs = [
+        _Job(Block(curve, constraints, options, capacity), queue, ledger, z) for _ in range(count)
+    ]
+    _run(jobs, queue, progress or Silent())
+    return _outcome(ledger, jobs)
 
 
-def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
-    """All brackets in which `bit` happened, as one."""
-    parts = [(b, np.flatnonzero(b.what & bit)) for b in brackets]
-    parts = [(b, at) for b, at in parts if len(at)]
-    if not parts:
-        return None
+@dataclass
+class _Queue:
+    """Lanes that wait, handed out in order; how many are finished; whether to stop."""
 
-    def gather(name: str) -> Front:
-        fronts = [vars(getattr(b, name).take(at)) for b, at in parts]
-        return Front(**{key: np.concatenate([f[key] for f in fronts]) for key in fronts[0]})
+    total: int
+    handed: int = 0
+    finished: int = 0
+    stopped: bool = False
+    lock: threading.Lock = field(default_factory=threading.Lock)
 
-    return Bracket(
-        np.concatenate([b.lanes[at] for b, at in parts]),
-        gather("before"),
-        gather("after"),
-        np.concatenate([b.step[at] for b, at in parts]),
-        np.concatenate([b.travelled[at] for b, at in parts]),
-        np.concatenate([b.what[at] for b, at in parts]),
-    )
+    def take(self, most: int) -> Some:
+        """Return the next lanes."""
+        with self.lock:
+            start, self.handed = self.handed, min(self.handed + most, self.total)
+            return np.arange(start, self.handed)
 
-
-def _locate(
-    curve: Curve, bracket: Bracket, bit: int, constraints: tuple[Constraint, ...]
-) -> Located:
-    here = curve.take(bracket.lanes)
-    if bit == FOLD:
-        return locate_fold(here, bracket)
-    if bit == BRANCH:
-        return locate_branch_point(here, bracket)
-    if bit in {ARRIVAL, RETURN}:
-        return locate_goal(here, bracket, 1.0 if bit == ARRIVAL else 0.0)
-
-    def worst(z: Lanes, t: Values) -> Values:
-        p = here.parameters(t)
-        return np.asarray(np.max([c.excess(z, p) for c in constraints], axis=0))
-
-    return locate_root(here, bracket, worst)
+    def finish(self, lanes: int) -> None:
+        """Count finished lanes."""
+        with self.lock:
+            self.finished += lanes
 
 
-def _locate_all(
-    curve: Curve, brackets: list[Bracket], bits: list[int], constraints: tuple[Constraint, ...]
-) -> Happenings:
-    size, none = curve.structure.size, np.zeros(0, int)
-    nothing = Happenings(
-        none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
-        np.zeros((0, 2), int), np.zeros(0, bool),
-    )  # fmt: skip
-    parts = [nothing]
-    for bit in bits:
-        bracket = _join(brackets, bit)
-        if bracket is None:
-            continue
-        place = _locate(curve, bracket, bit, constraints)
-        parts.append(
-            Happenings(
-                bracket.lanes,
-                np.full(len(bracket.lanes), bit),
-                place.z,
-                place.t,
-                bracket.travelled + place.step,
-                np.stack([bracket.before.index, bracket.after.index], 1),
-                place.found,
-            )
+@dataclass(frozen=True)
+class _Ledger:
+    """How each lane ended, written by the job that traced it, and how often it was retried."""
+
+    code: Names
+    z: Lanes
+    t: Values
+    index: Names
+    travelled: Values
+    retries: Names
+    why: dict[int, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, z: Lanes) -> "_Ledger":
+        """Nothing known yet."""
+        lanes = len(z)
+        code, index, retries = (np.zeros(lanes, int) for _ in range(3))
+        return cls(code, z.copy(), np.zeros(lanes), index, np.zeros(lanes), retries)
+
+
+@dataclass
+class _Job:
+    """What one thread does: march, locate events, note how lanes ended, trace some again."""
+
+    block: Block
+    queue: _Queue
+    ledger: _Ledger
+    z: Lanes
+    brackets: list[Bracket] = field(default_factory=list)
+    again: list[int] = field(default_factory=list)
+    passed: list[tuple[Happenings, Some]] = field(default_factory=list)
+    points: list[tuple[Points, Some]] = field(default_factory=list)
+    missed: dict[int, str] = field(default_factory=dict)
+
+    def run(self, report: Callable[[], None] = lambda: None) -> None:
+        """Work until the queue is empty and everything is located, or until stopped."""
+        try:
+            while not self.queue.stopped and self._round():
+                report()
+        except BaseException:
+            self.queue.stopped = True
+            raise
+
+    def _round(self) -> bool:
+        """One round of all lanes in the block; whether there is more to do."""
+        block = self.block
+        if block.active == 0 or block.room >= max(block.capacity // 4, 1):
+            self._fill()
+        if block.active:
+            self._take(block.tick())
+        if sum(len(b.lanes) for b in self.brackets) >= (EVENTS_AT_ONCE if block.active else 1):
+            self._locate()
+        return bool(block.active or self.again or self.queue.handed < self.queue.total)
+
+    def _fill(self) -> None:
+        room = self.block.room
+        old, self.again = self.again[:room], self.again[room:]
+        lanes = np.concatenate([np.array(old, int), self.queue.take(room - len(old))])
+        if len(lanes):
+            self._take(self.block.admit(lanes, self.z[lanes], self.ledger.retries[lanes]))
+
+    def _take(self, news: News) -> None:
+        """Take up what a round has brought."""
+        self.brackets.extend(news.brackets)
+        ledger = self.ledger
+        self.points.extend((part, ledger.retries[part.lanes]) for part in news.points)
+        for loss in news.lost:
+            lane, front = loss.lane, loss.front
+            ledger.z[lane], ledger.t[lane] = front.z[0], front.t[0]
+            ledger.index[lane], ledger.why[lane] = front.index[0], loss.why
+        self.queue.finish(len(news.lost))
+
+    def _locate(self) -> None:
+        """Locate everything that is pending; settle lanes that ended, retry where it failed."""
+        block, ledger = self.block, self.ledger
+        brackets, self.brackets = self.brackets, []
+        events = locate_all(block.curve, brackets, block.constraints, block.options)
+        bad = np.unique(events.lanes[~events.found])
+        again = bad[ledger.retries[bad] < block.options.retries]
+        if len(again):
+            ledger.retries[again] += 1
+            block.drop(again)
+            for lane in again:
+                ledger.why.pop(int(lane), None)
+            self.again.extend(again.tolist())
+            events = events.take(~np.isin(events.lanes, again))
+        self._settle(events)
+
+    def _settle(self, events: Happenings) -> None:
+        """Each lane's end is its first terminal event; what lies before was passed."""
+        ledger, stop = self.ledger, self.block.options.stops
+        terminal = np.flatnonzero(events.code & stop)
+        first = terminal[np.unique(events.lanes[terminal], return_index=True)[1]]
+        at = events.lanes[first]
+        ledger.code[at], ledger.z[at], ledger.t[at] = (
+            events.code[first],
+            events.z[first],
+            events.t[first],
         )
-    return _merged(parts)
+        ledger.index[at], ledger.travelled[at] = events.near_side(first), events.travelled[first]
+        for i in first[~events.found[first]]:
+            kind = KINDS[int(events.code[i])]
+            self.missed[int(events.lanes[i])] = f"the {kind} could not be located"
+        last = np.full(len(events.lanes), np.inf)
+        which = np.searchsorted(at, events.lanes)
+        ended = np.isin(events.lanes, at)
+        last[ended] = events.travelled[first][which[ended]]
+        passing = ((events.code & ~stop) != 0) & (events.travelled < last)
+        for i in np.flatnonzero(passing & ~events.found):
+            kind = KINDS[int(events.code[i])]
+            self.missed[int(events.lanes[i])] = f"a {kind} on the way could not be located"
+        some = events.take(passing)
+        self.passed.append((some, ledger.retries[some.lanes]))
+        self.queue.finish(len(at))
 
 
-def _merged(parts: list[Happenings]) -> Happenings:
-    """All events, sorted by lane and then by arclength."""
-    columns = zip(*(vars(part).values() for part in parts), strict=True)
-    whole = Happenings(*(np.concatenate(column) for column in columns))
-    return whole.take(np.lexsort((whole.travelled, whole.lanes)))
+def _run(jobs: list[_Job], queue: _Queue, progress: Progress) -> None:
+    """Run jobs, the only one in this thread, and report from this thread how far they are."""
+    shown = time.monotonic()
+
+    def report() -> None:
+        nonlocal shown
+        if time.monotonic() - shown > REPORT_EVERY:
+            shown = time.monotonic()
+            progress.report("tracing lanes", queue.finished, queue.total)
+
+    if len(jobs) == 1:
+        jobs[0].run(report)
+        return
+    futures = in_background([job.run for job in jobs])
+    try:
+        while wait(futures, REPORT_EVERY).not_done:
+            report()
+    finally:
+        queue.stopped = True
+        wait(futures)
+    for future in futures:
+        future.result()
 
 
-def _near_side(events: Happenings, ends: Int[np.ndarray, " ends"]) -> Int[np.ndarray, " ends"]:
-    """Index just before some events: a fold or branch point may lie between step and event."""
-    before = np.maximum(ends - 1, 0)
-    passed = (ends > 0) & (events.lanes[before] == events.lanes[ends]) & events.found[before]
-    return np.asarray(np.where(passed, events.index[before, 1], events.index[ends, 0]))
-
-
-def _settle(start: Front, traces: Traces, events: Happenings, options: TraceOptions) -> Outcome:
-    """Choose each lane's end: its first terminal event; lanes without one are lost."""
-    lanes = len(start.t)
-    stop = options.stops
-    terminal = np.flatnonzero(events.code & stop)
-    first = terminal[np.unique(events.lanes[terminal], return_index=True)[1]]
-    code, z, t = np.zeros(lanes, int), start.z.copy(), start.t.copy()
-    index, travelled = start.index.copy(), np.zeros(lanes)
-    why: dict[int, str] = {}
-    for lane, (reason, front) in traces.lost.items():
-        z[lane], t[lane], index[lane], why[lane] = front.z[0], front.t[0], front.index[0], reason
-    at = events.lanes[first]
-    code[at], z[at], t[at] = events.code[first], events.z[first], events.t[first]
-    index[at], travelled[at] = _near_side(events, first), events.travelled[first]
-    for i in first[~events.found[first]]:
-        lane = int(events.lanes[i])
-        code[lane] = LOST
-        why[lane] = f"the {KINDS[int(events.code[i])]} could not be located"
-    ends = np.full(lanes, np.inf)
-    ends[at] = events.travelled[first]
-    passing = ((events.code & ~stop) != 0) & (events.travelled < ends[events.lanes])
-    bad = passing & ~events.found
-    for i in np.flatnonzero(bad):
-        lane = int(events.lanes[i])
-        code[lane] = LOST
-        why[lane] = f"a {KINDS[int(events.code[i])]} on the way could not be located"
-    return Outcome(code, z, t, index, travelled, why, events.take(passing), traces)
+def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Outcome:
+    """Put together what the jobs left; first tries of lanes that were retried are dropped."""
+    for lane, reason in (pair for job in jobs for pair in job.missed.items()):
+        ledger.code[lane], ledger.why[lane] = LOST, reason
+    size = ledger.z.shape[1]
+    passed = [part.take(ledger.retries[part.lanes] == t) for job in jobs for part, t in job.passed]
+    points = [part.take(ledger.retries[part.lanes] == t) for job in jobs for part, t in job.points]
+    return Outcome(
+        ledger.code,
+        ledger.z,
+        ledger.t,
+        ledger.index,
+        ledger.travelled,
+        ledger.why,
+        Happenings.joined(passed, size),
+        Points.joined(points, size),
+    )

@@ -1,8 +1,9 @@
 """Running a compiled kernel over many lanes on several threads."""
 
 import os
+import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -17,10 +18,26 @@ SMALLEST_SHARE = 256
 
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(_threads(), thread_name_prefix="lanes")
+    return ThreadPoolExecutor(threads(), thread_name_prefix="lanes", initializer=_mark)
 
 
-def _threads() -> int:
+_worker = threading.local()
+
+
+def _mark() -> None:
+    """Mark a thread of the pool: what it computes is not shared out once more."""
+    _worker.own = True
+
+
+def in_background(tasks: Sequence[Callable[[], None]]) -> list[Future[None]]:
+    """Start tasks on threads of the pool, one on each."""
+    return [_pool().submit(task) for task in tasks]
+
+
+def threads() -> int:
+    """Number of processors that this process may use; 1 inside a thread of the pool."""
+    if hasattr(_worker, "own"):
+        return 1
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -36,7 +53,7 @@ def over_lanes(
     They need at least eight lanes: fewer are filled up with copies of the last one.
     """
     lanes = len(inputs[0])
-    shares = min(_threads(), lanes // SMALLEST_SHARE)
+    shares = min(threads(), lanes // SMALLEST_SHARE)
     if 0 < lanes < LANES:
         at = np.minimum(np.arange(LANES), lanes - 1)
         wide = [np.empty((LANES, *array.shape[1:]), array.dtype) for array in outputs]

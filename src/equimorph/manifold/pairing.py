@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import Outcome, follow
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN, Front
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
 from equimorph.manifold.directly import lift_directly
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.points import BETWEEN, CAP, Points
@@ -332,16 +332,14 @@ def _between(
     outcome: Outcome, line: ParameterLine, lane: int, span: tuple[float, float]
 ) -> tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"], int, int]:
     """Recorded point of a lane nearest to the middle of an interval of its length."""
-    middle = 0.5 * (span[0] + span[1])
-    best: tuple[float, Front, int] | None = None
-    for lanes, travelled, front in outcome.traces.points:
-        for k in np.flatnonzero((lanes == lane) & (travelled >= span[0]) & (travelled <= span[1])):
-            if best is None or abs(travelled[k] - middle) < abs(best[0] - middle):
-                best = (float(travelled[k]), front, int(k))
-    assert best is not None, "two folds in one step are refused by the tracer"
-    _, front, at = best
-    p = line.start[lane] + front.t[at] * line.velocity[lane]
-    return front.z[at], p, int(front.index[at]), BETWEEN
+    points = outcome.points
+    own = slice(*np.searchsorted(points.lanes, [lane, lane + 1]))
+    inside = (points.travelled[own] >= span[0]) & (points.travelled[own] <= span[1])
+    assert inside.any(), "two folds in one step are refused by the tracer"
+    off = np.abs(points.travelled[own] - 0.5 * (span[0] + span[1]))
+    at = own.start + int(np.argmin(np.where(inside, off, np.inf)))
+    p = line.start[lane] + points.t[at] * line.velocity[lane]
+    return points.z[at], p, int(points.index[at]), BETWEEN
 
 
 def abandoned(pairing: Pairing) -> list[tuple[int, int]]:

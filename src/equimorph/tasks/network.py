@@ -164,9 +164,9 @@ def _keeps_margin(
 ) -> Bool[np.ndarray, " lanes"]:
     """Whether every recorded point of the lifts has at least the margin."""
     keeps = np.ones(len(outcome.code), bool)
-    for lanes, _, front in outcome.traces.points:
-        states = States(line.structure, front.z, line.take(lanes).parameters(front.t))
-        keeps[lanes] &= _admissible(states, (), margin)
+    points = outcome.points
+    p = line.take(points.lanes).parameters(points.t)
+    keeps[points.lanes[~_admissible(States(line.structure, points.z, p), (), margin)]] = False
     return keeps
 
 

@@ -1,0 +1,128 @@
+"""From brackets to events: what happened to lanes on their way, and exactly where."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria.curves import Curve
+from equimorph.equilibria.fronts import Bracket, Front
+from equimorph.equilibria.location import (
+    Located,
+    locate_branch_point,
+    locate_fold,
+    locate_goal,
+    locate_root,
+)
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN, TraceOptions
+from equimorph.model import Constraint
+
+Lanes = Float[np.ndarray, "lanes size"]
+Values = Float[np.ndarray, " lanes"]
+
+
+@dataclass(frozen=True)
+class Happenings:
+    """Located events of lanes, sorted by lane and then by arclength.
+
+    `code` as in `tracing`; `index` before and after; `found` tells which could be located.
+    """
+
+    lanes: Int[np.ndarray, " events"]
+    code: Int[np.ndarray, " events"]
+    z: Float[np.ndarray, "events size"]
+    t: Float[np.ndarray, " events"]
+    travelled: Float[np.ndarray, " events"]
+    index: Int[np.ndarray, "events 2"]
+    found: Bool[np.ndarray, " events"]
+
+    def take(self, events: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"]) -> "Happenings":
+        """Return some of the events."""
+        return Happenings(*(column[events] for column in vars(self).values()))
+
+    @classmethod
+    def joined(cls, parts: list["Happenings"], size: int) -> "Happenings":
+        """All events of some parts, sorted by lane and then by arclength."""
+        none = np.zeros(0, int)
+        nothing = cls(
+            none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
+            np.zeros((0, 2), int), np.zeros(0, bool),
+        )  # fmt: skip
+        columns = zip(*(vars(part).values() for part in (nothing, *parts)), strict=True)
+        whole = cls(*(np.concatenate(column) for column in columns))
+        return whole.take(np.lexsort((whole.travelled, whole.lanes)))
+
+    def near_side(self, events: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
+        """Index just before some events: a fold or branch point may lie between step and event."""
+        before = np.maximum(events - 1, 0)
+        passed = (events > 0) & (self.lanes[before] == self.lanes[events]) & self.found[before]
+        return np.asarray(np.where(passed, self.index[before, 1], self.index[events, 0]))
+
+
+def locate_all(
+    curve: Curve,
+    brackets: list[Bracket],
+    constraints: tuple[Constraint, ...],
+    options: TraceOptions,
+) -> Happenings:
+    """Locate the events in all brackets that have to be located, all of a kind at once."""
+    bits = [FOLD, BRANCH, ARRIVAL, RETURN, CONSTRAINT]
+    if not options.locate_passed:
+        bits = [bit for bit in bits if bit & options.stops]
+    parts = []
+    for bit in bits:
+        bracket = _join(brackets, bit)
+        if bracket is None:
+            continue
+        place = _locate(curve, bracket, bit, constraints)
+        parts.append(
+            Happenings(
+                bracket.lanes,
+                np.full(len(bracket.lanes), bit),
+                place.z,
+                place.t,
+                bracket.travelled + place.step,
+                np.stack([bracket.before.index, bracket.after.index], 1),
+                place.found,
+            )
+        )
+    return Happenings.joined(parts, curve.structure.size)
+
+
+def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
+    """All brackets in which `bit` happened, as one."""
+    parts = [(b, np.flatnonzero(b.what & bit)) for b in brackets]
+    parts = [(b, at) for b, at in parts if len(at)]
+    if not parts:
+        return None
+
+    def gather(name: str) -> Front:
+        fronts = [vars(getattr(b, name).take(at)) for b, at in parts]
+        return Front(**{key: np.concatenate([f[key] for f in fronts]) for key in fronts[0]})
+
+    return Bracket(
+        np.concatenate([b.lanes[at] for b, at in parts]),
+        gather("before"),
+        gather("after"),
+        np.concatenate([b.step[at] for b, at in parts]),
+        np.concatenate([b.travelled[at] for b, at in parts]),
+        np.concatenate([b.what[at] for b, at in parts]),
+    )
+
+
+def _locate(
+    curve: Curve, bracket: Bracket, bit: int, constraints: tuple[Constraint, ...]
+) -> Located:
+    here = curve.take(bracket.lanes)
+    if bit == FOLD:
+        return locate_fold(here, bracket)
+    if bit == BRANCH:
+        return locate_branch_point(here, bracket)
+    if bit in {ARRIVAL, RETURN}:
+        return locate_goal(here, bracket, 1.0 if bit == ARRIVAL else 0.0)
+
+    def worst(z: Lanes, t: Values) -> Values:
+        p = here.parameters(t)
+        return np.asarray(np.max([c.excess(z, p) for c in constraints], axis=0))
+
+    return locate_root(here, bracket, worst)

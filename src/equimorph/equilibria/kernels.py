@@ -1,0 +1,267 @@
+"""Compiled kernels of lanes that march along curves: one lane a row, whatever the structure.
+
+Every lane is a small machine with its own stage, step and iteration; a kernel takes each lane as
+far as it gets without another Newton step of the structure. Scalars of the lanes are the rows of
+`numbers` and `counts`, named below. Lanes do not look at each other, so that what a lane does is
+the same, bit for bit, whichever lanes march beside it.
+"""
+
+import numpy as np
+from numba import njit
+
+from equimorph.linalg.kernels import FLAGS
+
+SUMS = {**FLAGS, "fastmath": {"contract", "reassoc"}, "_nrt": False}
+"""Sums over the entries of one lane may be reordered: always in the same way."""
+
+(
+    T, SLOPE, T_OLD, SLOPE_OLD, ARC, TRIAL, CORNER, DEFECT, LENGTH, TRAVELLED, LAST, WEIGHT,
+    LARGEST, TURNING, NEW_SLOPE, NORM, TURN,
+) = range(17)  # fmt: skip
+"""Rows of `numbers`: t and dt/ds here and at the step before, its arclength; t, closing equation
+and length of the step that is tried; way so far; last correction; squared weight of dt; knobs;
+dt/ds at the end, length of the tangent and turning angle of a step that converged."""
+NUMBERS = 17
+
+LANE, STAGE, ITERATION, INDEX, NEW_INDEX, WHAT, STEPS, MOST, LEVEL = range(9)
+"""Rows of `counts`: number of the lane; stage; Newton steps so far; index here and at the end of
+the step; events in the step; steps so far and their limit; number of retries."""
+COUNTS = 9
+
+CORRECTING, CONVERGED, REFUSED, ENDED, SHORT, LONG = range(6)
+"""Stages: in Newton's iteration; step converged; step refused; lane finished; given up because its
+step is too short, or took too many."""
+
+ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT = 1, 2, 4, 8, 16
+"""Bits of what can happen in a step."""
+
+ACCEPTED = 1e-7
+"""Size of the last correction: Newton is quadratic, so the point itself is good to its square."""
+NEARLY, NEXT = 1e-5, 1e-11
+"""Last correction on the way if the next one, by the rate of the last two, would be below."""
+MOST_ITERATIONS = 6
+FIRST_SHARE = 0.25
+"""First correction over the step: more could lead to another branch."""
+LEAST_COSINE = 0.9
+"""Of the angle between the tangents at both ends of a step."""
+MULTIPLIER_WEIGHT = 1e-2
+"""Weight of the multipliers' squares in the norm of corrections (they are not in the metric)."""
+BACK = 0.4
+"""Factor of a step's length after a refusal."""
+
+
+@njit(**SUMS)
+def squared_lengths(dz, dt, weight, mass, light, out):
+    """Squared lengths of steps; multipliers count with the factor `light`."""
+    n = mass.shape[0]
+    for i in range(dz.shape[0]):
+        total, extra = 0.0, 0.0
+        for j in range(n):
+            total += mass[j] * dz[i, j] * dz[i, j]
+        for j in range(n, dz.shape[1]):
+            extra += dz[i, j] * dz[i, j]
+        along = weight[i] * dt[i]
+        out[i] = total + along * along + light * extra
+
+
+@njit(**SUMS)
+def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, nearly):
+    """Apply a Newton correction to each lane in its iteration; tell whether it converged.
+
+    The first correction has to be below a quarter of the step and each later one below half of the
+    one before; at the end the tangents have to agree. A last correction up to `nearly` does if the
+    next one would be below `NEXT`, by the rate of the last two.
+    """
+    n, size = mass.shape[0], trial.shape[1]
+    for i in range(active):
+        if counts[STAGE, i] != CORRECTING:
+            continue
+        total, extra = 0.0, 0.0
+        for j in range(n):
+            total += mass[j] * dz[i, j] * dz[i, j]
+        for j in range(n, size):
+            extra += dz[i, j] * dz[i, j]
+        weight, last = numbers[WEIGHT, i], numbers[LAST, i]
+        correction = np.sqrt(total + weight * dt[i] * dt[i] + MULTIPLIER_WEIGHT * extra)
+        first = counts[ITERATION, i] == 0
+        limit = FIRST_SHARE * numbers[LENGTH, i] if first else 0.5 * last
+        if not correction <= max(limit, ACCEPTED):
+            counts[STAGE, i] = REFUSED
+            continue
+        for j in range(size):
+            trial[i, j] += dz[i, j]
+        numbers[TRIAL, i] += dt[i]
+        ratio = 1.0 if first else correction / last
+        close = correction <= nearly and correction * ratio * ratio <= NEXT
+        if not (correction <= ACCEPTED or close):
+            counts[ITERATION, i] += 1
+            numbers[LAST, i] = correction
+            # the closing equation is linear: the correction has met it
+            numbers[DEFECT, i] = 0.0
+            if counts[ITERATION, i] == MOST_ITERATIONS:
+                counts[STAGE, i] = REFUSED
+            continue
+        total = 0.0
+        for j in range(n):
+            total += mass[j] * tangent[i, j] * tangent[i, j]
+        norm = np.sqrt(total + weight * slope[i] * slope[i])
+        # row·tangent = 1 by construction: the cosine of the turning is 1 over the new length
+        if not LEAST_COSINE * norm <= 1.0:
+            counts[STAGE, i] = REFUSED
+            continue
+        counts[STAGE, i] = CONVERGED
+        numbers[NORM, i] = norm
+        numbers[NEW_SLOPE, i] = slope[i] / norm
+        numbers[TURN, i] = np.arccos(min(1.0 / norm, 1.0))
+
+
+@njit(**SUMS)
+def judge(index, numbers, counts, active, smallest, locates):
+    """Tell what happened in steps that converged, and refuse those that hide something."""
+    for i in range(active):
+        if counts[STAGE, i] != CONVERGED:
+            continue
+        counts[NEW_INDEX, i] = index[i]
+        old, new, length = numbers[SLOPE, i], numbers[NEW_SLOPE, i], numbers[LENGTH, i]
+        start, end = numbers[T, i], numbers[TRIAL, i]
+        flipped = np.sign(new) != np.sign(old)
+        changed = abs(index[i] - counts[INDEX, i])
+        # at a fold the path turns and the index changes; at a branch point one without the other
+        fold = flipped and changed == 1
+        what = FOLD if fold else (BRANCH if flipped or changed == 1 else 0)
+        what |= ARRIVAL if end >= 1.0 else 0
+        what |= RETURN if end < 0.0 else 0
+        counts[WHAT, i] = what
+        # a turn hides an arrival if t went beyond 1 (or below 0) and came back within the step;
+        # a step this short cannot go beyond by more than round-off
+        reach = start + old * length
+        hidden = reach >= 1.0 if old > 0.0 else reach <= 0.0
+        hidden = (hidden or (what & (ARRIVAL | RETURN)) != 0) and length > 10 * smallest
+        bad = changed > 1 or (flipped and hidden) or _turns_twice(old, new, end - start, length)
+        if bad or (flipped and not fold and not locates):
+            counts[STAGE, i] = REFUSED
+
+
+@njit(**SUMS)
+def _turns_twice(old, new, gain, length):
+    """Whether t runs back inside a step that leaves it rising, or falling, at both ends.
+
+    By the least slope of the cubic through both ends and slopes: near a cusp two folds lie close
+    together, with the same index before and behind.
+    """
+    sign = np.sign(old)
+    rise, a, b = sign * gain / length, sign * old, sign * new
+    if not b > 0.0:
+        return False
+    # slope at share s: a + 2 s (3 rise - 2 a - b) + 3 s² (a + b - 2 rise)
+    bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
+    share = min(max(-bend / (3 * bow), 0.0), 1.0) if bow > 0.0 else 0.0
+    return a + 2 * share * bend + 3 * share * share * bow < 0.0
+
+
+@njit(**SUMS)
+def proceed(new_tangent, mass, places, numbers, counts, active, smallest):
+    """Take over accepted steps, shorten refused ones, and try the next step of each lane."""
+    for i in range(active):
+        stage = counts[STAGE, i]
+        if stage not in (CONVERGED, REFUSED):
+            continue
+        if stage == CONVERGED:
+            _take_over(i, new_tangent, mass, places, numbers, counts)
+        else:
+            numbers[LENGTH, i] *= BACK
+        counts[STEPS, i] += 1
+        if not numbers[LENGTH, i] >= smallest:
+            counts[STAGE, i] = SHORT
+        elif counts[STEPS, i] >= counts[MOST, i]:
+            counts[STAGE, i] = LONG
+        else:
+            predict(i, mass, places, numbers, counts)
+
+
+@njit(**SUMS)
+def _take_over(i, new_tangent, mass, places, numbers, counts):
+    """Make the end of an accepted step the place of the lane, and choose the next length."""
+    z_old, tangent_old, z, tangent, trial, _ = places
+    n, norm = mass.shape[0], 1.0 / numbers[NORM, i]
+    chord = 0.0
+    for j in range(n):
+        dz = trial[i, j] - z[i, j]
+        chord += mass[j] * dz * dz
+    for j in range(z.shape[1]):
+        z_old[i, j], tangent_old[i, j] = z[i, j], tangent[i, j]
+        z[i, j], tangent[i, j] = trial[i, j], new_tangent[i, j] * norm
+    dt = numbers[TRIAL, i] - numbers[T, i]
+    chord = np.sqrt(chord + numbers[WEIGHT, i] * dt * dt)
+    half, length = 0.5 * numbers[TURN, i], numbers[LENGTH, i]
+    # arclength over chord, as on a circle
+    numbers[ARC, i] = chord * half / np.sin(half) if half > 1e-4 else chord
+    numbers[T_OLD, i], numbers[SLOPE_OLD, i] = numbers[T, i], numbers[SLOPE, i]
+    numbers[T, i], numbers[SLOPE, i] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
+    counts[INDEX, i] = counts[NEW_INDEX, i]
+    numbers[TRAVELLED, i] += length
+    growth = numbers[TURNING, i] / max(numbers[TURN, i], 1e-3)
+    numbers[LENGTH, i] = min(length * min(max(growth, 0.5), 2.0), numbers[LARGEST, i])
+
+
+@njit(**SUMS)
+def predict(i, mass, places, numbers, counts):
+    """Guess the end of the next step of lane i: the cubic through the last two points, continued.
+
+    At first the tangent. Prepares the closing equation of the pseudo-arclength as well.
+    """
+    z_old, tangent_old, z, tangent, trial, row = places
+    n, size, length, arc = mass.shape[0], z.shape[1], numbers[LENGTH, i], numbers[ARC, i]
+    if arc > 0.0:
+        s = 1.0 + length / arc
+        a = 2 * s * s * s - 3 * s * s + 1
+        c, d = (s * s * s - 2 * s * s + s) * arc, (s * s * s - s * s) * arc
+        for j in range(size):
+            step = a * (z_old[i, j] - z[i, j]) + c * tangent_old[i, j] + d * tangent[i, j]
+            trial[i, j] = z[i, j] + step
+        step = a * (numbers[T_OLD, i] - numbers[T, i]) + c * numbers[SLOPE_OLD, i]
+        numbers[TRIAL, i] = numbers[T, i] + step + d * numbers[SLOPE, i]
+    else:
+        for j in range(size):
+            trial[i, j] = z[i, j] + length * tangent[i, j]
+        numbers[TRIAL, i] = numbers[T, i] + length * numbers[SLOPE, i]
+    along = 0.0
+    for j in range(n):
+        row[i, j] = mass[j] * tangent[i, j]
+        along += row[i, j] * (trial[i, j] - z[i, j])
+    for j in range(n, size):
+        row[i, j] = 0.0
+    numbers[CORNER, i] = numbers[WEIGHT, i] * numbers[SLOPE, i]
+    along += numbers[CORNER, i] * (numbers[TRIAL, i] - numbers[T, i])
+    numbers[DEFECT, i] = along - length
+    numbers[LAST, i] = np.inf
+    counts[ITERATION, i], counts[STAGE, i] = 0, CORRECTING
+
+
+@njit(**SUMS)
+def predict_all(mass, places, numbers, counts, start, stop):
+    """`predict` for lanes from `start` to `stop`."""
+    for i in range(start, stop):
+        predict(i, mass, places, numbers, counts)
+
+
+@njit(**SUMS)
+def close_gaps(places, numbers, counts, values, active):
+    """Move lanes from the end into the places of those that are finished; return how many stay."""
+    i = 0
+    while i < active:
+        if counts[STAGE, i] <= REFUSED:
+            i += 1
+            continue
+        active -= 1
+        if i < active:
+            for each in places:
+                for j in range(each.shape[1]):
+                    each[i, j] = each[active, j]
+            for k in range(numbers.shape[0]):
+                numbers[k, i] = numbers[k, active]
+            for k in range(counts.shape[0]):
+                counts[k, i] = counts[k, active]
+            for k in range(values.shape[0]):
+                values[k, i] = values[k, active]
+    return active
