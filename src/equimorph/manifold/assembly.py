@@ -17,7 +17,7 @@ from equimorph.manifold.normals import existence_normals
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.pins import pin
 from equimorph.manifold.points import CAP, CORNER, FOLD
-from equimorph.manifold.polygons import Loops, Polygon
+from equimorph.manifold.polygons import Loops, Polygon, edges_at
 
 SAME_SIDE = 0.3
 """Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
@@ -41,6 +41,8 @@ class _Plan:
 
     polygon: Polygon
     points: list[int]
+    sides: dict[int, frozenset[int]]
+    """Sides of the grid triangle on which each point lies; extra points inside it lie on none."""
     chords: list[Chord] = field(default_factory=list)
     middle: dict[Chord, int] = field(default_factory=dict)
 
@@ -50,7 +52,7 @@ def assemble(pairing: Pairing, loops: Loops) -> Cells:
     cells = Cells()
     cells.corners = [tuple(row) for row in loops.plain.tolist()]
     cells.index = pairing.points.index[loops.plain[:, 0]].tolist() if len(loops.plain) else []
-    plans = [_Plan(polygon, list(polygon.points)) for polygon in loops.polygons]
+    plans = [_plan(pairing, polygon) for polygon in loops.polygons]
     _close(pairing, plans, cells)
     plans = [plan for plan in plans if _join_folds(pairing, plan, cells)]
     _split_chords(pairing, plans, cells)
@@ -59,17 +61,22 @@ def assemble(pairing: Pairing, loops: Loops) -> Cells:
     return cells
 
 
-def _same_edge(pairing: Pairing, a: int, b: int) -> bool:
-    """Whether two points lie on one grid edge (at most one of them over a vertex)."""
-    return bool(_sides(pairing, a) & _sides(pairing, b))
+def _plan(pairing: Pairing, polygon: Polygon) -> _Plan:
+    at_corner = {
+        vertex: frozenset(pair) for vertex, pair in edges_at(pairing, polygon.triangle).items()
+    }
+    points = np.array(polygon.points)
+    vertices, edges = pairing.points.vertex[points].tolist(), pairing.points.edge[points].tolist()
+    sides = {
+        point: at_corner[vertex] if vertex >= 0 else frozenset([edge])
+        for point, vertex, edge in zip(polygon.points, vertices, edges, strict=True)
+    }
+    return _Plan(polygon, list(polygon.points), sides)
 
 
-def _sides(pairing: Pairing, point: int) -> frozenset[int]:
-    vertex, edge = int(pairing.points.vertex[point]), int(pairing.points.edge[point])
-    if vertex >= 0:
-        row = pairing.incident[vertex]
-        return frozenset(row[row >= 0].tolist())
-    return frozenset([edge]) if edge >= 0 else frozenset()
+def _same_side(plan: _Plan, chord: Chord) -> bool:
+    """Whether two points lie on one side of the grid triangle."""
+    return bool(plan.sides[chord[0]] & plan.sides[chord[1]])
 
 
 def _is_fold(pairing: Pairing, point: int) -> bool:
@@ -86,7 +93,7 @@ def _close(pairing: Pairing, plans: list[_Plan], cells: Cells) -> None:
         odd = sum(_is_fold(pairing, point) for point in plan.points) % 2
         if odd:
             wanted.append((plan, CORNER))
-        elif _same_edge(pairing, first, last):
+        elif _same_side(plan, (first, last)):
             wanted.append((plan, CAP))
         else:
             cells.caps.add(_chord(first, last))
@@ -129,7 +136,7 @@ def _continuous(pairing: Pairing, ways: list[list[Chord]]) -> list[list[Chord]]:
 
 def _split_chords(pairing: Pairing, plans: list[_Plan], cells: Cells) -> None:
     """Put an exact fold point on chords that would lie on a grid edge, or block triangulation."""
-    wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(pairing, plan)]
+    wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
     extra = _pinned(pairing, [chord for _, chord in wanted], [FOLD] * len(wanted))
     for (plan, chord), point in zip(wanted, extra, strict=True):
         if point is None:
@@ -138,26 +145,25 @@ def _split_chords(pairing: Pairing, plans: list[_Plan], cells: Cells) -> None:
             plan.middle[chord] = point
 
 
-def _chords_to_split(pairing: Pairing, plan: _Plan) -> list[Chord]:
+def _chords_to_split(plan: _Plan) -> list[Chord]:
     """Chords between ends on one grid edge, and as many others as free all pieces for triangles.
 
     Where a corner of the grid triangle sees two fold curves cross both its sides, one of them with
     a cusp, the sheet between them lies over the corner twice, and has no allowed diagonal.
     """
-    chosen = [chord for chord in plan.chords if _same_edge(pairing, *chord)]
+    chosen = [chord for chord in plan.chords if _same_side(plan, chord)]
     for chord in plan.chords:
         stand_in = {split: -1 - number for number, split in enumerate(chosen)}
         pieces = cut(plan.points, plan.chords, stand_in)
-        if all(can_be_triangulated(_sides_of(pairing, piece)) for piece in pieces):
+        if all(can_be_triangulated(_sides_of(plan, piece)) for piece in pieces):
             break
         if chord not in chosen:
             chosen.append(chord)
     return chosen
 
 
-def _sides_of(pairing: Pairing, piece: Piece) -> list[frozenset[int]]:
-    """Grid edges on which the points of a piece lie; points still to be found lie on none."""
-    return [_sides(pairing, point) if point >= 0 else frozenset() for point in piece]
+def _sides_of(plan: _Plan, piece: Piece) -> list[frozenset[int]]:
+    return [plan.sides.get(point, frozenset()) for point in piece]
 
 
 def _pinned(pairing: Pairing, pairs: list[Chord], kinds: list[int]) -> list[int | None]:
@@ -187,7 +193,7 @@ def _fill(pairing: Pairing, plan: _Plan, cells: Cells) -> None:
         index = {
             int(pairing.points.index[point]) for point in piece if not _is_fold(pairing, point)
         }
-        triangles = _triangles(pairing, piece)
+        triangles = _triangles(pairing, plan, piece)
         if len(index) != 1 or triangles is None:
             cells.undecided.append(plan.polygon.triangle)
             continue
@@ -195,11 +201,11 @@ def _fill(pairing: Pairing, plan: _Plan, cells: Cells) -> None:
         cells.index.extend([index.pop()] * len(triangles))
 
 
-def _triangles(pairing: Pairing, piece: Piece) -> list[tuple[int, int, int]] | None:
-    if len(piece) < 3:
-        return None
+def _triangles(pairing: Pairing, plan: _Plan, piece: Piece) -> list[tuple[int, int, int]] | None:
+    if len(piece) <= 3:
+        return [(piece[0], piece[1], piece[2])] if len(piece) == 3 else None
     place = embedding(pairing, np.array(piece))
-    return triangulate(piece, _sides_of(pairing, piece), place)
+    return triangulate(piece, _sides_of(plan, piece), place)
 
 
 def embedding(pairing: Pairing, points: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n dims"]:

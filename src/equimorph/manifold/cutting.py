@@ -101,8 +101,10 @@ def triangulate(
 
 def can_be_triangulated(sides: Sequence[frozenset[int]]) -> bool:
     """Whether corners that lie on these sides of the grid triangle have enough diagonals."""
+    if len(sides) <= 3:
+        return len(sides) == 3
     places = np.zeros((len(sides), 1))
-    return len(sides) >= 3 and triangulate(tuple(range(len(sides))), sides, places) is not None
+    return triangulate(tuple(range(len(sides))), sides, places) is not None
 
 
 def _allowed(sides: Sequence[frozenset[int]]) -> Bool[np.ndarray, "corners corners"]:

@@ -8,7 +8,7 @@ constraint. New ends are new equilibria; flood until nothing new appears.
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import Outcome, follow
@@ -20,7 +20,8 @@ from equimorph.manifold.points import FOLD as ON_FOLD
 from equimorph.model import Constraint, Progress
 from equimorph.structures import Structure
 
-UNTRACED, ABANDONED = -1, -2
+UNTRACED, ABANDONED, HARD = -1, -2, -3
+"""Marks of rays without a curve; hard are those that one step cannot lift."""
 EFFORTS = 4
 CHUNK = 4096
 
@@ -64,6 +65,19 @@ class Curves:
             self.inner[len(self.edge) - 1] = inner
         return len(self.edge) - 1
 
+    def extend(
+        self,
+        edges: Int[np.ndarray, " n"],
+        starts: Int[np.ndarray, " n"],
+        ends: Int[np.ndarray, " n"],
+    ) -> Int[np.ndarray, " n"]:
+        """Add curves without inner points; return their numbers."""
+        numbers = len(self.edge) + np.arange(len(edges))
+        self.edge.extend(edges.tolist())
+        self.start.extend(starts.tolist())
+        self.end.extend(ends.tolist())
+        return numbers
+
 
 @dataclass
 class Pairing:
@@ -91,6 +105,10 @@ class Pairing:
         """Enter the curve at a point along an edge."""
         side = int(self.mesh.edges[edge, 1] == self.points.vertex[point])
         self.rays[point, self.slots[edge, side]] = curve
+
+    def mark(self, rays: "Rays", mark: int) -> None:
+        """Mark rays that have no curve."""
+        self.rays[rays.points, self.slots[rays.edges, rays.sides]] = mark
 
     def fit(self) -> None:
         """Make room for rays of new points and edges."""
@@ -160,84 +178,98 @@ def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
 
 
 def flood(pairing: Pairing, progress: Progress) -> None:
-    """Lift edges from all known points until every ray is traced or given up."""
+    """Lift edges from all known points until every ray is traced or given up.
+
+    All rays that one step can lift go first; the others wait and are traced many at a time.
+    """
     while True:
         pairing.fit()
-        points, edges, sides = _pending(pairing)
-        if len(points) == 0:
+        rays, tracer = _pending(pairing, {UNTRACED}), _lift_directly
+        if len(rays.points) == 0:
+            rays, tracer = _pending(pairing, {UNTRACED, HARD}), _trace
+        if len(rays.points) == 0:
             return
-        for at in range(0, len(points), CHUNK):
-            part = slice(at, at + CHUNK)
-            _round(pairing, points[part], edges[part], sides[part])
+        for at in range(0, len(rays.points), CHUNK):
+            tracer(pairing, rays.take(slice(at, at + CHUNK)))
             pairing.fit()
         live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == 0)
         progress.report("lifting edges", int(live), None)
 
 
-def _pending(
-    pairing: Pairing,
-) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
-    """Untraced rays: from one end of an edge at a time, lest a curve be traced from both."""
+@dataclass(frozen=True)
+class Rays:
+    """Edges seen from points over one of their ends: the first or the second."""
+
+    points: Int[np.ndarray, " n"]
+    edges: Int[np.ndarray, " n"]
+    sides: Int[np.ndarray, " n"]
+
+    def take(self, some: Int[np.ndarray, " m"] | Bool[np.ndarray, " n"] | slice) -> "Rays":
+        """Return some of the rays."""
+        return Rays(self.points[some], self.edges[some], self.sides[some])
+
+
+def _pending(pairing: Pairing, marks: set[int]) -> Rays:
+    """Rays with certain marks: from one end of an edge at a time, lest a curve be traced twice."""
     count = pairing.points.count
     vertex = pairing.points.vertex[:count]
-    open_rays = (pairing.rays[:count] == UNTRACED) & (vertex >= 0)[:, None]
-    points, slots = np.nonzero(open_rays)
+    marked = np.isin(pairing.rays[:count], list(marks)) & (vertex >= 0)[:, None]
+    points, slots = np.nonzero(marked)
     edges = pairing.incident[vertex[points], slots]
     points, edges = points[edges >= 0], edges[edges >= 0]
     sides = (pairing.mesh.edges[edges, 1] == vertex[points]).astype(int)
     from_first = np.zeros(len(pairing.mesh.edges), bool)
     from_first[edges[sides == 0]] = True
-    keep = (sides == 0) | ~from_first[edges]
-    return points[keep], edges[keep], sides[keep]
+    return Rays(points, edges, sides).take((sides == 0) | ~from_first[edges])
 
 
-def _round(
-    pairing: Pairing,
-    points: Int[np.ndarray, " n"],
-    edges: Int[np.ndarray, " n"],
-    sides: Int[np.ndarray, " n"],
-) -> None:
-    """Lift a batch of rays: directly where one step does it, else by pseudo-arclength."""
-    setting, mesh, store = pairing.setting, pairing.mesh, pairing.points
-    origin = mesh.edges[edges, sides]
-    target = mesh.edges[edges, 1 - sides]
-    start = setting.parameters(mesh.vertices[origin])
-    line = ParameterLine(
-        setting.structure, start, setting.parameters(mesh.vertices[target]) - start
-    )
-    easy = np.flatnonzero(pairing.effort[edges] == 0)
+def _line(pairing: Pairing, rays: Rays) -> ParameterLine:
+    setting, mesh = pairing.setting, pairing.mesh
+    start = setting.parameters(mesh.vertices[mesh.edges[rays.edges, rays.sides]])
+    end = setting.parameters(mesh.vertices[mesh.edges[rays.edges, 1 - rays.sides]])
+    return ParameterLine(setting.structure, start, end - start)
+
+
+def _lift_directly(pairing: Pairing, rays: Rays) -> None:
+    """Enter the curves of rays that one step lifts; mark the others as hard."""
+    store = pairing.points
+    pairing.mark(rays, HARD)
+    rays = rays.take(pairing.effort[rays.edges] == 0)
+    line = _line(pairing, rays)
     direct = lift_directly(
-        line.take(easy), store.z[points[easy]], store.index[points[easy]], setting.constraints
+        line, store.z[rays.points], store.index[rays.points], pairing.setting.constraints
     )
-    done = easy[direct.good]
+    done = rays.take(direct.good)
     ids, _ = store.over_vertices(
-        target[done],
+        pairing.mesh.edges[done.edges, 1 - done.sides],
         direct.z[direct.good],
-        setting.parameters(mesh.vertices[target[done]]),
+        (line.start + line.velocity)[direct.good],
         direct.index[direct.good],
     )
     pairing.fit()
-    for point, edge, end in zip(points[done], edges[done], ids, strict=True):
-        _enter(pairing, int(point), int(edge), int(end), [])
-    left = np.ones(len(points), bool)
-    left[done] = False
+    _enter_many(pairing, done, ids)
+
+
+def _trace(pairing: Pairing, rays: Rays) -> None:
+    """Lift rays by pseudo-arclength, in ever finer steps where that is needed."""
+    line = _line(pairing, rays)
+    left = np.ones(len(rays.points), bool)
     for effort in range(EFFORTS):
-        lanes = np.flatnonzero(left & (np.maximum(pairing.effort[edges], 0) == effort))
+        lanes = np.flatnonzero(left & (pairing.effort[rays.edges] == effort))
         if len(lanes):
-            some = (points[lanes], edges[lanes], sides[lanes])
-            _trace_rays(pairing, some, line.take(lanes), effort)
-    for lane in np.flatnonzero(left & (pairing.effort[edges] >= EFFORTS)):
-        pairing.set_ray(int(points[lane]), int(edges[lane]), ABANDONED)
+            left[lanes] = False
+            _trace_rays(pairing, rays.take(lanes), line.take(lanes), effort)
+    pairing.mark(rays.take(left & (pairing.effort[rays.edges] >= EFFORTS)), ABANDONED)
 
 
 def _trace_rays(
     pairing: Pairing,
-    rays: tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]],
+    rays: Rays,
     line: ParameterLine,
     effort: int,
 ) -> None:
-    """Lift rays (points, edges, sides) by pseudo-arclength; failures ask for a higher effort."""
-    points, edges, sides = rays
+    """Lift rays by pseudo-arclength; failures ask for a higher effort."""
+    points, edges, sides = rays.points, rays.edges, rays.sides
     finer = 0.35**effort
     options = TraceOptions(
         through_folds=True,
@@ -255,7 +287,7 @@ def _trace_rays(
         if code not in {ARRIVAL, RETURN, CONSTRAINT} or lane in branched:
             pairing.effort[edge] += 1
             continue
-        if pairing.ray(point, edge) not in {UNTRACED, ABANDONED} and code == CONSTRAINT:
+        if pairing.ray(point, edge) >= 0 and code == CONSTRAINT:
             continue
         rows = inner.get(lane, [])
         end = -1
@@ -307,6 +339,25 @@ def _enter(pairing: Pairing, point: int, edge: int, end: int, inner: list[int]) 
     pairing.set_ray(point, edge, curve)
     if end >= 0:
         pairing.set_ray(end, edge, curve)
+
+
+def _enter_many(pairing: Pairing, rays: Rays, ends: Int[np.ndarray, " n"]) -> None:
+    """Register curves that cross their edges: at once where nothing is known, else one by one."""
+    near, far = (pairing.slots[rays.edges, side] for side in (rays.sides, 1 - rays.sides))
+    _, first, shared = np.unique(
+        ends * pairing.rays.shape[1] + far, return_index=True, return_counts=True
+    )
+    new = np.zeros(len(ends), bool)
+    new[first] = shared == 1
+    new &= (pairing.rays[rays.points, near] < 0) & (pairing.rays[ends, far] < 0)
+    numbers = pairing.curves.extend(rays.edges[new], rays.points[new], ends[new])
+    pairing.rays[rays.points[new], near[new]] = numbers
+    pairing.rays[ends[new], far[new]] = numbers
+    rest = rays.take(~new)
+    for point, edge, end in zip(
+        rest.points.tolist(), rest.edges.tolist(), ends[~new].tolist(), strict=True
+    ):
+        _enter(pairing, point, edge, end, [])
 
 
 def _inner_points(

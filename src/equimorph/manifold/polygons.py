@@ -113,13 +113,13 @@ def _across(
 
 def _around(pairing: Pairing, triangle: int) -> Iterator[Polygon | None]:
     """Polygons over one triangle; None where curves are missing or go around twice."""
-    points, edges_at = pairing.points, _edges_at(pairing, triangle)
+    points, at = pairing.points, edges_at(pairing, triangle)
     corners = pairing.mesh.triangles[triangle].tolist()
     todo = {point for corner in corners for point in points.over(corner)}
     ends = [
         (point, edge)
         for point in sorted(todo)
-        for edge in edges_at[int(points.vertex[point])]
+        for edge in at[int(points.vertex[point])]
         if pairing.ray(point, edge) >= 0 and pairing.curves.end[pairing.ray(point, edge)] < 0
     ]
     for point, edge in ends:
@@ -134,12 +134,12 @@ def _walk(
     pairing: Pairing, triangle: int, point: int, came_by: int | None, todo: set[int]
 ) -> Polygon | None:
     """Follow curves from a point; from an exit if `came_by` names the edge that leads to it."""
-    points, curves, edges_at = pairing.points, pairing.curves, _edges_at(pairing, triangle)
+    points, curves, at = pairing.points, pairing.curves, edges_at(pairing, triangle)
     path: list[int] = []
     if came_by is not None:
         path.extend(reversed(curves.inner[pairing.ray(point, came_by)]))
     first, visited = point, []
-    here = edges_at[int(points.vertex[point])]
+    here = at[int(points.vertex[point])]
     edge = here[0] if came_by is None else _other(here, came_by)
     while True:
         path.append(point)
@@ -159,11 +159,11 @@ def _walk(
         if following in visited:
             return None
         point = following
-        edge = _other(edges_at[int(points.vertex[point])], edge)
+        edge = _other(at[int(points.vertex[point])], edge)
     return None if _twice(pairing, triangle, visited) else Polygon(triangle, tuple(path), False)
 
 
-def _edges_at(pairing: Pairing, triangle: int) -> dict[int, tuple[int, int]]:
+def edges_at(pairing: Pairing, triangle: int) -> dict[int, tuple[int, int]]:
     """Return the two sides of a triangle that meet at each of its corners."""
     mesh = pairing.mesh
     corners, sides = mesh.triangles[triangle].tolist(), mesh.sides[triangle].tolist()
@@ -175,11 +175,11 @@ def _twice(pairing: Pairing, triangle: int, visited: list[int]) -> bool:
     vertices = [int(pairing.points.vertex[point]) for point in visited]
     if len(set(vertices)) == len(vertices):
         return False
-    edges_at = _edges_at(pairing, triangle)
+    at = edges_at(pairing, triangle)
     curves = (
         pairing.ray(point, edge)
         for point, vertex in zip(visited, vertices, strict=True)
-        for edge in edges_at[vertex]
+        for edge in at[vertex]
     )
     return not any(pairing.curves.inner.get(curve) for curve in curves)
 

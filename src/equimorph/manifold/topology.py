@@ -30,10 +30,11 @@ class Surface:
 def surface(cells: Int[np.ndarray, "C 3"]) -> Surface:
     """Edges and adjacency of triangles."""
     pairs = np.stack([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]], 1).reshape(-1, 2)
-    edges, inverse, counts = np.unique(
-        np.sort(pairs, axis=1), axis=0, return_inverse=True, return_counts=True
+    base = int(cells.max(initial=0)) + 1
+    keys, inverse, counts = np.unique(
+        pairs.min(axis=1) * base + pairs.max(axis=1), return_inverse=True, return_counts=True
     )
-    inverse = inverse.ravel()
+    edges = np.stack(np.divmod(keys, base), axis=1)
     order = np.argsort(inverse, kind="stable")
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     twice = np.flatnonzero(counts == 2)
