@@ -125,3 +125,18 @@ def test_no_lanes_give_no_solutions():
     generator = np.random.default_rng(9)
     layout = random_layout(generator, 4, 4)
     assert layout.solve(*random_system(generator, layout, lanes=0)).x.shape[0] == 0
+
+
+def test_solutions_with_a_small_pivot_are_refined_to_full_accuracy():
+    """A pivot of 1e-5 loses five digits; refinement restores them without pivoting."""
+    generator = np.random.default_rng(11)
+    layout = random_layout(generator, 4, 4)
+    diagonal, border, *rest = random_system(generator, layout, lanes=9)
+    diagonal[:8, 1] = 10.0 ** np.linspace(-5.4, -4.9, 8) - layout.stiffness[0, 1, 1]
+    solution = layout.solve(diagonal, border, *rest)
+    dense = solve_bordered(layout.dense(diagonal, border), *rest)
+    assert (solution.pivot_ratio[:8] < PIVOT_GUARD).all()
+    assert not solution.pivoted.any()
+    np.testing.assert_array_equal(solution.negative, dense.negative)
+    size = np.abs(dense.x).max(axis=(1, 2), keepdims=True)
+    np.testing.assert_allclose(solution.x / size, dense.x / size, atol=1e-12)

@@ -4,14 +4,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.linalg.condensed.kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered
 from equimorph.linalg.lanes import over_lanes
 
-PIVOT_GUARD = 1e-6
-"""Smallest pivot ratio that is trusted; below it a lane is factored again, dense and pivoted."""
+PIVOT_GUARD = 1e-8
+"""Smallest pivot ratio that is trusted as it is; below it solutions are refined.
+
+A pivot ε among pivots of size 1 makes another of size 1/ε: the ratio is ε², the loss of digits ε.
+"""
+REFINABLE = 1e-12
+"""Smallest pivot ratio whose solutions are refined; below it a lane is solved dense and pivoted."""
+REFINED = 1e-8
+"""Largest refinement, relative to the solution, after which a solution is trusted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,22 +89,50 @@ class CondensedLayout:
     ) -> BorderedSolution:
         """Solve ``[A Cᵀ; R D] x = rhs`` with ``A = [H B; Bᵀ 0]``, and count A's inertia.
 
-        ``In(A) = In(H) + In(−BᵀH⁻¹B)`` with the pivots' signs as In(H). Lanes with a pivot ratio
-        below `PIVOT_GUARD` (or not a number) are solved again by the pivoted dense factorisation.
+        ``In(A) = In(H) + In(−BᵀH⁻¹B)`` with the pivots' signs as In(H). A small pivot loses digits
+        of the solution: a step of iterative refinement brings them back. Lanes with a pivot ratio
+        below `REFINABLE` (or not a number) are solved again by the pivoted dense factorisation.
         """
-        lanes = len(diagonal)
-        x, ratio = np.empty(rhs.shape), np.empty(lanes)
-        negative = np.empty(lanes, dtype=np.int64)
         arrays = [np.ascontiguousarray(a) for a in (diagonal, border, columns, rows, corner, rhs)]
+        x, negative, ratio = self._solve(*arrays)
+        pivoted = np.zeros(len(x), bool)
+        doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
+        if len(doubtful):
+            refined = doubtful[ratio[doubtful] >= REFINABLE]
+            x[refined], good = self._refined([a[refined] for a in arrays], x[refined])
+            pivoted[doubtful] = True
+            pivoted[refined[good]] = False
+        if pivoted.any():
+            matrix = self.dense(diagonal[pivoted], border[pivoted])
+            again = solve_bordered(matrix, *(a[pivoted] for a in arrays[2:]))
+            x[pivoted], negative[pivoted] = again.x, again.negative
+        return BorderedSolution(x, negative, ratio, pivoted)
+
+    def _solve(
+        self, *arrays: np.ndarray
+    ) -> tuple[
+        Float[np.ndarray, "lanes sides bordered"],
+        Int[np.ndarray, " lanes"],
+        Float[np.ndarray, " lanes"],
+    ]:
+        """Solutions, negative eigenvalues and pivot ratios by the condensed elimination."""
+        lanes = len(arrays[0])
+        x, ratio = np.empty(arrays[-1].shape), np.empty(lanes)
+        negative = np.empty(lanes, dtype=np.int64)
         over_lanes(solve_condensed, (self.stiffness, self.ends), arrays, [x, negative, ratio])
-        unsafe = ~(ratio >= PIVOT_GUARD)
-        if unsafe.any():
-            again = solve_bordered(
-                self.dense(diagonal[unsafe], border[unsafe]),
-                columns[unsafe],
-                rows[unsafe],
-                corner[unsafe],
-                rhs[unsafe],
-            )
-            x[unsafe], negative[unsafe] = again.x, again.negative
-        return BorderedSolution(x, negative, ratio, unsafe)
+        return x, negative, ratio
+
+    def _refined(
+        self, arrays: list[np.ndarray], x: Float[np.ndarray, "lanes sides bordered"]
+    ) -> tuple[Float[np.ndarray, "lanes sides bordered"], Bool[np.ndarray, " lanes"]]:
+        """Solutions after a step of iterative refinement, and which of them can be trusted."""
+        diagonal, border, columns, rows, corner, rhs = arrays
+        n = columns.shape[2]
+        full = np.zeros((len(x), rhs.shape[2], rhs.shape[2]))
+        full[:, :n, :n] = self.dense(diagonal, border)
+        full[:, :n, n:], full[:, n:, :n] = columns.transpose(0, 2, 1), rows
+        full[:, n:, n:] = corner
+        defect = np.ascontiguousarray(rhs - np.einsum("lij,lsj->lsi", full, x))
+        change = self._solve(*arrays[:-1], defect)[0]
+        size, largest = (np.abs(a).max(axis=(1, 2), initial=0.0) for a in (change, x))
+        return x + change, np.asarray(size <= REFINED * largest)
