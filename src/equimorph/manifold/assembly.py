@@ -76,7 +76,8 @@ def _plan(pairing: Pairing, polygon: Polygon) -> _Plan:
 
 def _same_side(plan: _Plan, chord: Chord) -> bool:
     """Whether two points lie on one side of the grid triangle."""
-    return bool(plan.sides[chord[0]] & plan.sides[chord[1]])
+    first, second = _sides_of(plan, chord)
+    return bool(first & second)
 
 
 def _is_fold(pairing: Pairing, point: int) -> bool:
