@@ -102,3 +102,13 @@ def test_goal_of_the_paper_on_another_level_is_no_equilibrium_at_the_load(spring
     assert state(0.40, 0.90)["F"] == pytest.approx(0.008904, abs=5e-7)
     with pytest.raises(ValueError, match="`goal` must"):
         plan(spring_set, start, state(0.40, 0.90, LOAD))
+
+
+def test_a_demand_made_twice_counts_once(spring_set, start):
+    """Constraints of equal meaning are one, though each was made from a spring of its own."""
+    caps = [Spring().angle <= 1.4, Spring().descriptor("angle") <= 1.4]
+    route = plan(spring_set, start, state(-0.62, 0.80), within=caps, margin=0.45)
+    assert route.why == (
+        "start and goal are connected by stable states, but not within "
+        "angle <= 1.4 and margin >= 0.45"
+    )

@@ -27,6 +27,7 @@ class ScreenProgress:
             console=Console(stderr=True),
         )
         self._tasks: dict[str, TaskID] = {}
+        self._current: str | None = None
 
     def __enter__(self) -> "ScreenProgress":
         """Draw from the first report on: a mistake found before leaves only its line."""
@@ -43,16 +44,21 @@ class ScreenProgress:
             self._bars.stop()
 
     def report(self, stage: str, done: int, total: int | None) -> None:
-        """Move the bar of a stage; a stage that begins ends the one before it."""
+        """Move the bar of a stage; another stage that begins ends it, until it goes on."""
         if stage not in self._tasks:
-            self._finish_stage()
+            if not self._tasks:
+                self._bars.start()
             self._tasks[stage] = self._bars.add_task(stage, total=total)
-        self._bars.update(self._tasks[stage], completed=done, total=total)
+        if stage != self._current:
+            self._end(self._current)
+            self._current = stage
+        # A stage may find more to do than it first said, or only know in the end.
+        known = self._bars.tasks[self._tasks[stage]].total if total is None else total
+        reached = None if known is None else max(known, done)
+        self._bars.update(self._tasks[stage], completed=done, total=reached)
 
-    def _finish_stage(self) -> None:
-        if not self._tasks:
-            self._bars.start()
-            return
-        last = self._bars.tasks[-1]
-        total = last.completed if last.total is None else last.total
-        self._bars.update(last.id, completed=total, total=total)
+    def _end(self, stage: str | None) -> None:
+        if stage is not None:
+            task = self._bars.tasks[self._tasks[stage]]
+            total = task.completed if task.total is None else task.total
+            self._bars.update(task.id, completed=total, total=total)

@@ -1,6 +1,6 @@
 """Descriptors: scalars of a state; constraints: comparisons of descriptors with numbers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, overload, runtime_checkable
 
@@ -44,18 +44,29 @@ class ManyStates(Protocol):
         """Return the number of states."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Descriptor:
     """A scalar of a state, with its name, unit and symbol for axes.
 
     Call it on a state for a float, on a batch of states for an array; compare it with a number for
     a `Constraint`.
+
+    Parameters
+    ----------
+    name, unit, symbol
+        Its name as it is written in a study, its unit, and its symbol for axes.
+    function
+        Values on a batch of unknowns and parameters.
+    origin
+        Signature of the structure that it describes. Descriptors of the same origin and name are
+        equal, whenever they were made; without an origin, those with the same function.
     """
 
     name: str
     unit: str
     function: Evaluate
     symbol: str = ""
+    origin: Hashable = None
 
     # one and many states differ by the number of axes only, which static types do not see
     @overload
@@ -69,6 +80,20 @@ class Descriptor:
         if states.z.ndim == 1:
             return float(self.function(states.z[None], states.p[None])[0])
         return self.function(states.z, states.p)
+
+    @property
+    def _meaning(self) -> Hashable:
+        return (self.name, self.function if self.origin is None else self.origin)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are the same scalar of the same structure."""
+        if not isinstance(other, Descriptor):
+            return NotImplemented
+        return self._meaning == other._meaning
+
+    def __hash__(self) -> int:
+        """Return equal numbers for equal descriptors."""
+        return hash(self._meaning)
 
     def __le__(self, bound: float) -> "Constraint":
         """Return the constraint that the descriptor stays at or below `bound`."""

@@ -1,7 +1,8 @@
 """What a structure must offer so that everything else works with it."""
 
+import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -9,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.model import Descriptor, Parameter, names_of
 
@@ -74,6 +76,14 @@ class Structure(ABC):
     @abstractmethod
     def identity(self) -> dict[str, Any]:
         """Return the kind and the data from which the structure can be built again."""
+
+    @cached_property
+    def signature(self) -> Hashable:
+        """The identity as one text; the structure itself if it cannot be written down."""
+        try:
+            return json.dumps(self.identity(), sort_keys=True)
+        except InputError:
+            return self
 
     @abstractmethod
     def energy(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:

@@ -180,18 +180,21 @@ class Spring(Structure):
     @cached_property
     def angle(self) -> Descriptor:
         """δ in radians."""
-        return Descriptor("angle", "rad", lambda z, p: z[:, 0].copy(), "δ")
+        return Descriptor("angle", "rad", lambda z, p: z[:, 0].copy(), "δ", self.signature)
 
     @cached_property
     def height(self) -> Descriptor:
         """Height of B in natural lengths."""
-        return Descriptor("height", "natural length", lambda z, p: p[:, 0] * np.tan(z[:, 0]), "y_B")
+        def value(z: Lanes, p: Parameters) -> Values:
+            return np.asarray(p[:, 0] * np.tan(z[:, 0]))
+
+        return Descriptor("height", "natural length", value, "y_B", self.signature)
 
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written as ``angle``, ``height`` or ``energy``."""
         name = re.sub(r"\s", "", text)
         if name == "energy":
-            return Descriptor("energy", "force·length", self.energy, "E")
+            return Descriptor("energy", "force·length", self.energy, "E", self.signature)
         if name not in {"angle", "height"}:
             raise InputError(f"`descriptor` must be angle, height or energy; got {text!r}.")
         return self.angle if name == "angle" else self.height

@@ -30,6 +30,13 @@ def _arclength(s: float) -> float:
     return value
 
 
+def _written(name: str, s: float) -> str:
+    """Name at an arclength, from which the arclength is read back exactly: ``height(1/3)``."""
+    nice = (f"{s:.6g}", *(f"{round(s * below)}/{below}" for below in (3, 6, 7, 9, 11, 12)))
+    exact = (text for text in nice if _fraction(text) == s)
+    return f"{name}({next(exact, repr(s))})"
+
+
 def _symbol(letter: str, s: float) -> str:
     return f"{letter}({_SYMBOLS.get(s, f'{s:g}')})"
 
@@ -43,8 +50,8 @@ def coordinate(rod: RodMechanics, s: float, axis: int) -> Descriptor:
     def value(z: Lanes, p: Parameters) -> Values:
         return np.asarray(wave(rod.nodal_angles(z, p)) @ row)
 
-    name = "height" if axis else "x"
-    return Descriptor(f"{name}({at:.6g})", "L", value, _symbol("y" if axis else "x", at))
+    name, symbol = _written("height" if axis else "x", at), _symbol("y" if axis else "x", at)
+    return Descriptor(name, "L", value, symbol, rod.signature)
 
 
 def angle(rod: RodMechanics, s: float) -> Descriptor:
@@ -55,7 +62,7 @@ def angle(rod: RodMechanics, s: float) -> Descriptor:
     def value(z: Lanes, p: Parameters) -> Values:
         return np.asarray(rod.nodal_angles(z, p) @ row)
 
-    return Descriptor(f"angle({at:.6g})", "rad", value, _symbol("θ", at))
+    return Descriptor(_written("angle", at), "rad", value, _symbol("θ", at), rod.signature)
 
 
 def curvature(rod: RodMechanics, s: float) -> Descriptor:
@@ -73,7 +80,7 @@ def curvature(rod: RodMechanics, s: float) -> Descriptor:
         kappa, force = rod.nodal_curvature(z, p)
         return np.asarray(kappa[:, e, 0] + force[:, e] @ row)
 
-    return Descriptor(f"curvature({at:.6g})", "1/L", value, _symbol("κ", at))
+    return Descriptor(_written("curvature", at), "1/L", value, _symbol("κ", at), rod.signature)
 
 
 def max_curvature(rod: RodMechanics) -> Descriptor:
@@ -82,7 +89,7 @@ def max_curvature(rod: RodMechanics) -> Descriptor:
     def value(z: Lanes, p: Parameters) -> Values:
         return rod.largest_curvature(z, p)[0]
 
-    return Descriptor("max_curvature", "1/L", value, "max |κ|")
+    return Descriptor("max_curvature", "1/L", value, "max |κ|", rod.signature)
 
 
 def support_force(rod: RodMechanics, component: str) -> Descriptor:
@@ -95,7 +102,8 @@ def support_force(rod: RodMechanics, component: str) -> Descriptor:
         return z[:, place].copy()
 
     symbol = "λ" if component == "lambda" else "μ"
-    return Descriptor(f"support_force({component})", "4π²B/L²", value, symbol)
+    name = f"support_force({component})"
+    return Descriptor(name, "4π²B/L²", value, symbol, rod.signature)
 
 
 def end_moment(rod: RodMechanics, end: int) -> Descriptor:
@@ -108,7 +116,7 @@ def end_moment(rod: RodMechanics, end: int) -> Descriptor:
         # efforts of Θ and Δ are the difference and the sum of those of θ(0) and θ(1)
         return 0.5 * (effort[:, 1] + (1.0 if end == 0 else -1.0) * effort[:, 0])
 
-    return Descriptor(f"end_moment({end})", "4π²B/L", value, f"M({end})")
+    return Descriptor(f"end_moment({end})", "4π²B/L", value, f"M({end})", rod.signature)
 
 
 def named(rod: RodMechanics, text: str) -> Descriptor:
@@ -116,7 +124,7 @@ def named(rod: RodMechanics, text: str) -> Descriptor:
     match = re.fullmatch(r"\s*(\w+)\s*(?:\(\s*([^()]*?)\s*\))?\s*", text)
     name, argument = (match.group(1), match.group(2)) if match else ("", None)
     if argument is None and name in {"max_curvature", "energy"}:
-        return max_curvature(rod) if name == "max_curvature" else _energy(rod)
+        return max_curvature(rod) if name == "max_curvature" else total_energy(rod)
     if argument is not None and name == "support_force":
         return support_force(rod, argument)
     if argument in {"0", "1"} and name == "end_moment":
@@ -129,8 +137,9 @@ def named(rod: RodMechanics, text: str) -> Descriptor:
     raise InputError(f"`descriptor` must be one of {WRITTEN}; got {text!r}.")
 
 
-def _energy(rod: RodMechanics) -> Descriptor:
-    return Descriptor("energy", "4π²B/L", rod.energy, "E")
+def total_energy(rod: RodMechanics) -> Descriptor:
+    """Potential energy E."""
+    return Descriptor("energy", "4π²B/L", rod.energy, "E", rod.signature)
 
 
 def _fraction(text: str) -> float:

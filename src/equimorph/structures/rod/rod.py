@@ -180,7 +180,7 @@ class Rod(RodMechanics):
     @cached_property
     def total_energy(self) -> Descriptor:
         """Potential energy E, in units of 4π²B/L."""
-        return Descriptor("energy", "4π²B/L", self.energy, "E")
+        return descriptors.total_energy(self)
 
     def support_force(self, component: str) -> Descriptor:
         """Force of the support at A on the rod: "lambda" (horizontal) or "mu" (vertical)."""
