@@ -7,6 +7,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 
+import pytest
 from jaxtyping import install_import_hook
 
 COMPILED = ("kernels", "simd")
@@ -27,3 +28,11 @@ class PlainCompiledModules(MetaPathFinder):
 sys.path.insert(0, str(Path(__file__).parent))
 install_import_hook("equimorph", "typecheck.check")
 sys.meta_path.insert(0, PlainCompiledModules())
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, Path]:
+    """Outcome and results folder of the small spring study, run once; change nothing there."""
+    from studies import finished_run  # noqa: PLC0415  # imports the package, so after the hook
+
+    return finished_run(tmp_path_factory.mktemp("finished"))

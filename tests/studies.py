@@ -1,11 +1,16 @@
-"""Small studies, and dots in place of figures, for the tests of the outer layers."""
+"""Small studies, one finished run, and dots for figures, for the tests of the outer layers."""
 
+import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
 from equimorph import plotting
+from equimorph.study import Outcome, run_study
+from equimorph.study.folder import PRIVATE
+from typecheck import unchecked
 
 SPRING = """\
 [structure]
@@ -47,6 +52,20 @@ via = [{ Theta = 1.3 }, { Delta = 1.3 }]
 within = ["max_curvature <= 20"]
 margin = 0.1
 """
+
+
+def finished_run(base: Path) -> tuple[Outcome, Path]:
+    """Outcome of the spring study, run in a folder, and its results folder."""
+    (base / "spring.toml").write_text(SPRING)
+    with pytest.MonkeyPatch.context() as patch, unchecked():  # the layers below check themselves
+        patch.setattr(plotting, "film", partial(plotting.film, frames=12))
+        return run_study(base / "spring.toml", base / "out"), base / "out"
+
+
+def with_answers_of(finished: Path, out: Path) -> Path:
+    """Put the answers of a finished run where a new one will find them."""
+    shutil.copytree(finished / PRIVATE, out / PRIVATE)
+    return out
 
 
 def draw_dots(monkeypatch: pytest.MonkeyPatch) -> None:

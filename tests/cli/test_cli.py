@@ -1,5 +1,7 @@
 """Commands as a user meets them: exit codes, one line for bad input, nothing overwritten."""
 
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +10,9 @@ from time import perf_counter
 import pytest
 
 from equimorph.cli import main
-from studies import SPRING, draw_dots
+from equimorph.study import Outcome
+from studies import SPRING, draw_dots, with_answers_of
+from typecheck import unchecked
 
 SMALL = SPRING[: SPRING.index("[[route]]")]
 """The study without its route."""
@@ -40,6 +44,13 @@ def shell(
     monkeypatch.setenv("COLUMNS", "100")
     draw_dots(monkeypatch)
     return Shell(capsys, monkeypatch)
+
+
+@pytest.fixture
+def known(shell: Shell, finished: tuple[Outcome, Path]) -> Shell:
+    """A shell in a folder whose ``out`` was left by an interrupted run: it knows the set."""
+    with_answers_of(finished[1], Path("out"))
+    return shell
 
 
 def _says_one_line(shell: Shell, part: str) -> bool:
@@ -93,45 +104,94 @@ def test_new_overwrites_nothing(shell: Shell):
     assert Path("mine.toml").read_text() == "mine"
 
 
+@pytest.mark.parametrize("kind", ["arch", "spring"])
+def test_a_new_study_runs(kind: str, shell: Shell):
+    """On a coarser grid; the slow test below runs it as it is written."""
+    shell("new", "mine.toml", "--kind", kind)
+    text = Path("mine.toml").read_text()
+    Path("mine.toml").write_text(re.sub(r"intervals = .*", "intervals = [12, 21]", text))
+    with unchecked():
+        assert shell("run", "mine.toml") == 0
+    assert "audit clean" in shell.out
+    assert "arrived without a snap" in shell.out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["arch", "spring"])
+def test_a_new_study_runs_as_it_is_written(kind: str, shell: Shell):
+    shell("new", "mine.toml", "--kind", kind)
+    with unchecked():
+        assert shell("run", "mine.toml") == 0
+    assert "audit clean" in shell.out
+    assert "arrived without a snap" in shell.out
+
+
 def test_a_run_shows_its_answers_and_names_its_page(shell: Shell):
     Path("spring.toml").write_text(SPRING)
-    assert shell("run", "spring.toml") == 0
+    with unchecked():
+        assert shell("run", "spring.toml") == 0
+    assert "Equilibrium set computed" in shell.out
     assert "audit clean" in shell.out
     assert "0.64350" in shell.out
     assert "Route over: arrived without a snap" in shell.out
     assert "results/spring/index.html" in shell.out
     assert Path("results/spring/index.html").is_file()
+    assert shell("run", "spring.toml") == 0
+    assert "Equilibrium set read from an earlier run" in shell.out
 
 
-def test_a_refused_route_is_a_successful_run(shell: Shell):
+def test_a_refused_route_is_a_successful_run(known: Shell):
     Path("spring.toml").write_text(SPRING + "margin = 50.0\n")
-    assert shell("run", "spring.toml", "--out", "here") == 0
-    assert "Route over: refused" in shell.out
+    assert known("run", "spring.toml", "--out", "out") == 0
+    assert "Route over: refused" in known.out
 
 
 # What is changed in the study, and a part of the one line.
 WRONG = {
     "unknown key": ("intervals", "intervalls", "`set.intervalls`"),
+    "unknown section": ("[[route]]", "[[rout]]", "`rout`"),
     "wrong type": ("[11, 11]", '"many"', "`set.intervals` must be a list"),
     "malformed TOML": ("[set]", "[set", "must be valid TOML"),
     "reversed bounds": ("[0.5, 1.3]", "[1.3, 0.5]", "`set.box.x_l`"),
-    "start that is no equilibrium": ('highest = "angle"', "near = { angle = 0.3 }", "near"),
-    "goal that is no equilibrium": ('lowest = "angle"', "near = { angle = 0.3 }", "goal.near"),
-    "start left open": (', highest = "angle"', "", "must choose by highest, lowest or near"),
+    "bound not finite": ("[0.5, 1.3]", "[0.5, inf]", "`set.box.x_l"),
+    "start outside the box": ("start = { at = { x_l = 0.8", "start = { at = { x_l = 3.0", "start"),
     "way-point outside the box": ('name = "over"', 'name = "o"\nvia = [{ x_l = 3.0 }]', "via[0]"),
+    "descriptor unknown": ('highest = "angle"', 'highest = "angel"', "angel"),
+    "more memory than there is": ("[11, 11]", "[90000, 90000]", "Reduce `set.intervals`"),
 }
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_bad_input_is_one_line_and_exit_code_2(case: str, shell: Shell):
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_bad_input_is_one_line_and_exit_code_2(command: str, case: str, shell: Shell):
     old, new, part = WRONG[case]
     assert old in SPRING
     Path("wrong.toml").write_text(SPRING.replace(old, new, 1))
-    assert shell("run", "wrong.toml") == 2
-    last = shell.err.strip().splitlines()[-1]
+    assert shell(command, "wrong.toml") == 2
+    assert _says_one_line(shell, part)
+    assert [file.name for file in Path().iterdir()] == ["wrong.toml"]
+
+
+# The same for what only the equilibrium set can tell: progress comes before the line.
+IMPOSSIBLE = {
+    "start that is no equilibrium": ('highest = "angle"', "near = { angle = 0.3 }", "start.near"),
+    "goal that is no equilibrium": ('lowest = "angle"', "near = { angle = 0.3 }", "goal.near"),
+    "start that is unstable": ('highest = "angle"', "near = { angle = 0.0 }", "has index 1"),
+    "start left open": (', highest = "angle"', "", "must choose by highest, lowest or near"),
+}
+
+
+@pytest.mark.parametrize("case", IMPOSSIBLE)
+def test_a_state_that_is_no_stable_equilibrium_is_one_line(case: str, known: Shell):
+    old, new, part = IMPOSSIBLE[case]
+    assert old in SPRING
+    Path("wrong.toml").write_text(SPRING.replace(old, new, 1))
+    assert known("run", "wrong.toml", "--out", "out") == 2
+    last = known.err.strip().splitlines()[-1]
     assert last.startswith("equimorph: ")
     assert part in last
-    assert "Traceback" not in shell.err
+    assert "Traceback" not in known.err
+    assert [file.name for file in Path("out").iterdir()] == [".equimorph"]
 
 
 @pytest.mark.parametrize(
@@ -151,28 +211,80 @@ def test_a_rod_that_cannot_be_is_one_line(old: str, new: str, part: str, shell: 
 
 
 def test_a_missing_file_is_one_line(shell: Shell):
-    assert shell("run", "none.toml") == 2
-    assert _says_one_line(shell, "none.toml: No such file or directory")
+    for command in ("check", "run"):
+        assert shell(command, "none.toml") == 2
+        assert _says_one_line(shell, "none.toml: No such file or directory")
     assert list(Path().iterdir()) == []
 
 
 def test_an_unwritable_folder_is_one_line(shell: Shell):
     Path("spring.toml").write_text(SMALL)
     Path("file").write_text("mine")
-    assert shell("run", "spring.toml", "--out", "file/out") == 2
-    assert "must be a folder that can be written" in shell.err
+    for out in ("file", "file/out"):
+        assert shell("run", "spring.toml", "--out", out) == 2
+        assert _says_one_line(shell, "must be a folder that can be written")
     assert Path("file").read_text() == "mine"
 
 
-def test_the_folder_of_another_study_is_kept(shell: Shell):
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write anywhere")
+def test_a_folder_without_permission_is_one_line(shell: Shell):
+    Path("spring.toml").write_text(SMALL)
+    Path("locked").mkdir(mode=0o500)
+    assert shell("run", "spring.toml", "--out", "locked/out") == 2
+    assert _says_one_line(shell, "Permission denied")
+
+
+def test_the_folder_of_another_study_is_kept(known: Shell):
     Path("one.toml").write_text(SMALL)
     Path("two.toml").write_text(SMALL.replace("0.8", "0.7"))
-    assert shell("run", "one.toml", "--out", "out") == 0
-    before = {file.name: file.read_bytes() for file in Path("out").iterdir()}
-    assert shell("run", "two.toml", "--out", "out") == 2
-    assert "results of another study" in shell.err
-    assert {file.name: file.read_bytes() for file in Path("out").iterdir()} == before
-    assert shell("run", "two.toml", "--out", "out", "--replace") == 0
+    assert known("run", "one.toml", "--out", "out") == 0
+    before = {file: file.read_bytes() for file in Path("out").rglob("*") if file.is_file()}
+    assert known("run", "two.toml", "--out", "out") == 2
+    assert _says_one_line(known, "results of another study")
+    assert {file: file.read_bytes() for file in before} == before
+    assert known("run", "two.toml", "--out", "out", "--replace") == 0
+
+
+def test_a_folder_with_other_files_is_kept(shell: Shell):
+    Path("spring.toml").write_text(SMALL)
+    Path("mine").mkdir()
+    Path("mine/notes.txt").write_text("mine")
+    assert shell("run", "spring.toml", "--out", "mine") == 2
+    assert _says_one_line(shell, "with other files")
+    assert [file.name for file in Path("mine").iterdir()] == ["notes.txt"]
+
+
+def test_an_interrupted_run_says_how_to_go_on(known: Shell, monkeypatch: pytest.MonkeyPatch):
+    """Ctrl-C while figures are drawn. Shells say 130 of a program that it ended."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    Path("spring.toml").write_text(SPRING)
+    with monkeypatch.context() as patch:
+        patch.setattr("equimorph.plotting.save", interrupt)
+        assert known("run", "spring.toml", "--out", "out") == 130
+    last = known.err.strip().splitlines()[-1]
+    assert last == "equimorph: interrupted; what is finished is kept in out. Run again to go on."
+    assert known("run", "spring.toml", "--out", "out") == 0
+    assert "read from an earlier run" in known.out
+
+
+def test_memory_that_runs_out_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch):
+    def run_out(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    Path("spring.toml").write_text(SPRING)
+    monkeypatch.setattr("equimorph.cli.show.run_study", run_out)
+    assert shell("run", "spring.toml") == 2
+    assert _says_one_line(shell, "must fit into memory")
+
+
+def test_a_message_is_fit_for_a_terminal(shell: Shell):
+    """Keys may hold escape sequences and line breaks."""
+    Path("wrong.toml").write_text('"a\\u001b[2Jb\\nc\\u2028d" = 1\n' + SPRING, encoding="utf-8")
+    assert shell("check", "wrong.toml") == 2
+    assert _says_one_line(shell, "a [2Jb c d")
 
 
 @pytest.mark.parametrize("words", [[], ["run"], ["run", "--sideways", "x.toml"], ["fly"]])

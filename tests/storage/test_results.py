@@ -178,8 +178,28 @@ def test_a_failed_write_leaves_the_old_file(
         raise OSError(28, "No space left on device")
 
     before = written.read_bytes()
-    monkeypatch.setattr("equimorph.storage.results.link_grid", fail)
+    monkeypatch.setattr(Path, "write_bytes", fail)
     with pytest.raises(InputError, match="No space left"):
         write_results(written, spring_set, spring_set.structure.descriptor("angle"))
     assert written.read_bytes() == before
     assert list(written.parent.iterdir()) == [written]
+
+
+def test_equilibria_over_points_come_back(spring_set: EquilibriumSet, tmp_path: Path):
+    points = [spring_set.at(x_l=0.8, F=0.0), spring_set.at(x_l=1.2, F=0.1)]
+    angle = spring_set.structure.descriptor("angle")
+    path = write_results(tmp_path / "results.h5", spring_set, angle, equilibria=points)
+    back = read_results(path).equilibria
+    assert [len(states) for states in back] == [3, 1]
+    for one, other in zip(back, points, strict=True):
+        np.testing.assert_array_equal(one.z, other.z)
+        np.testing.assert_array_equal(one.p, other.p)
+    with xarray.open_datatree(path, engine="h5netcdf") as tree:
+        assert tree["equilibria/0"]["margin"].dims == ("state",)
+
+
+def test_the_same_results_give_the_same_file(spring_set: EquilibriumSet, tmp_path: Path):
+    """Identity, byte by byte: no time of day, no addresses."""
+    angle = spring_set.structure.descriptor("angle")
+    files = [write_results(tmp_path / name, spring_set, angle) for name in ("a.h5", "b.h5")]
+    assert files[0].read_bytes() == files[1].read_bytes()

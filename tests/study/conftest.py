@@ -1,13 +1,11 @@
 """A small spring study, run once into a folder."""
 
-from functools import partial
 from pathlib import Path
 
 import pytest
 
-from equimorph import plotting
-from equimorph.study import Outcome, run_study
-from studies import ARCH, SPRING, draw_dots
+from equimorph.study import Outcome
+from studies import ARCH, SPRING, draw_dots, with_answers_of
 
 
 @pytest.fixture(scope="session")
@@ -27,14 +25,10 @@ def spring_file(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Path]:
-    """The outcome of the spring study and its results folder; read them, change nothing."""
-    base = tmp_path_factory.mktemp("finished")
-    (base / "spring.toml").write_text(SPRING)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plotting, "film", partial(plotting.film, frames=12))
-        return run_study(base / "spring.toml", base / "out"), base / "out"
+@pytest.fixture
+def out(finished: tuple[Outcome, Path], tmp_path: Path) -> Path:
+    """A results folder in which a run was interrupted before it stored anything but answers."""
+    return with_answers_of(finished[1], tmp_path / "out")
 
 
 @pytest.fixture

@@ -41,7 +41,7 @@ WRONG = {
     "number as truth": ("q = 2.5", "q = true", r"`set\.fixed\.q` must be a number; got true"),
     "number not finite": ("q = 2.5", "q = nan", r"`set\.fixed\.q` must be finite; got NaN"),
     "half intervals": ("[5, 9]", "[5, 9.5]", r"`set\.intervals\[1\]` must be a whole number"),
-    "no intervals": ("[5, 9]", "[0, 9]", r"`set\.intervals\[0\]` must be greater than 0"),
+    "no intervals": ("[5, 9]", "[0, 9]", r"`set\.intervals\[0\]` must be at least 2"),
     "one number for a list": ("[5, 9]", "5", r"`set\.intervals` must be a list; got 5"),
     "text for a table": ("{ q = 2.5 }", '"q"', r"`set\.fixed` must be a table"),
     "reversed bounds": (

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, run_study
+from typecheck import unchecked
 
 FIGURES = ["surface", "stable-plane", "over-plane", "over-shapes"]
 
@@ -57,7 +59,7 @@ def test_a_run_leaves_all_its_files(finished: tuple[Outcome, Path]):
     figures = [f"{name}.{kind}" for name in [*FIGURES, "over-margins"] for kind in ("png", "svg")]
     others = ["results.h5", "over-schedule.csv", "over-schedule.json", "index.html", "study.toml"]
     assert sorted(file.name for file in out.iterdir()) == sorted(
-        [*figures, *others, "over-film.gif", "equimorph.json"]
+        [*figures, *others, "over-film.gif", "equimorph.json", ".equimorph"]
     )
 
 
@@ -105,66 +107,119 @@ def test_the_page_says_the_answers(finished: tuple[Outcome, Path]):
 
 
 @pytest.mark.usefixtures("plain_figures")
-def test_stages_report_up_to_their_end(spring_file: Path, tmp_path: Path):
+def test_stages_report_up_to_their_end(spring_file: Path, out: Path):
     sink = Recorder()
-    run_study(spring_file, tmp_path / "out", progress=sink)
+    run_study(spring_file, out, progress=sink)
     for stage in ("routes", "figures"):
         done, total = sink.stages[stage][-1]
         assert done == total
 
 
-@pytest.mark.usefixtures("plain_figures")
-def test_running_again_reads_the_set_of_the_first_run(
-    finished: tuple[Outcome, Path], spring_file: Path, tmp_path: Path
+@pytest.fixture
+def copy(finished: tuple[Outcome, Path], tmp_path: Path) -> Path:
+    """The results folder of the finished run, to change."""
+    return Path(shutil.copytree(finished[1], tmp_path / "copy"))
+
+
+def _contents(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
+
+
+def test_a_finished_run_is_not_repeated(
+    finished: tuple[Outcome, Path], spring_file: Path, copy: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    out = tmp_path / "out"
-    shutil.copytree(finished[1], out)
-    again = run_study(spring_file, out)
+    """Set, equilibria, routes, figures: nothing is computed or drawn, and no byte changes."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    for name in ("equilibrium_set", "plan", "choose_state"):
+        monkeypatch.setattr(f"equimorph.study.run.{name}", fail)
+    for name in ("surface", "parameter_plane", "shapes", "margins", "film", "save"):
+        monkeypatch.setattr(plotting, name, fail)
+    again = run_study(spring_file, copy)
     assert again.reused
     assert not finished[0].reused
-    assert again.routes[0].route.margin == pytest.approx(
-        finished[0].routes[0].route.margin, rel=1e-9
-    )
+    assert _contents(copy) == _contents(finished[1])
+
+
+@pytest.mark.usefixtures("plain_figures")
+def test_answers_are_kept_though_no_results_were_stored(
+    finished: tuple[Outcome, Path], spring_file: Path, out: Path
+):
+    """Bit for bit: a run goes on from the numbers that it stored."""
+    again = run_study(spring_file, out)
+    assert again.reused
+    for name in ("results.h5", "over-schedule.csv", "over-schedule.json"):
+        assert (out / name).read_bytes() == (finished[1] / name).read_bytes()
+
+
+def test_a_figure_that_is_missing_or_damaged_is_drawn_again(
+    finished: tuple[Outcome, Path], spring_file: Path, copy: Path
+):
+    (copy / "over-margins.svg").unlink()
+    (copy / "surface.png").write_bytes(b"half")
+    before = (copy / "over-film.gif").stat().st_mtime_ns
+    run_study(spring_file, copy)
+    assert _contents(copy) == _contents(finished[1])
+    assert (copy / "over-film.gif").stat().st_mtime_ns == before
+
+
+@pytest.mark.usefixtures("plain_figures")
+def test_another_comment_reaches_the_page_and_nothing_else(
+    finished: tuple[Outcome, Path], spring_text: str, copy: Path, tmp_path: Path
+):
+    (tmp_path / "spring.toml").write_text(spring_text + "# why\n")
+    run_study(tmp_path / "spring.toml", copy)
+    assert "# why" in (copy / "index.html").read_text(encoding="utf-8")
+    before, now = _contents(finished[1]), _contents(copy)
+    changed = {name for name in now if now[name] != before[name]}
+    assert changed == {"study.toml", "index.html", "equimorph.json"}
 
 
 @pytest.mark.usefixtures("plain_figures")
 def test_an_edited_study_takes_over_the_set_but_not_the_routes(
-    finished: tuple[Outcome, Path], spring_text: str, tmp_path: Path
+    spring_text: str, copy: Path, tmp_path: Path
 ):
-    out = tmp_path / "out"
-    shutil.copytree(finished[1], out)
     (tmp_path / "edited.toml").write_text(spring_text[: spring_text.index("[[route]]")])
-    edited = run_study(tmp_path / "edited.toml", out, replace=True)
+    edited = run_study(tmp_path / "edited.toml", copy, replace=True)
     assert edited.reused
-    assert read_results(out / "results.h5").routes == {}
-    assert not list(out.glob("over-*"))
-    assert (out / "parameter-plane.png").is_file()
+    assert read_results(copy / "results.h5").routes == {}
+    assert not list(copy.glob("over-*"))
+    assert (copy / "parameter-plane.png").is_file()
+    assert len(list((copy / ".equimorph" / "checkpoints").iterdir())) == 2
 
 
 @pytest.mark.usefixtures("plain_figures")
-def test_a_damaged_earlier_set_is_computed_again(
-    finished: tuple[Outcome, Path], spring_file: Path, tmp_path: Path
+def test_a_damaged_answer_is_computed_again(
+    finished: tuple[Outcome, Path], spring_file: Path, out: Path
 ):
-    out = tmp_path / "out"
-    shutil.copytree(finished[1], out)
-    (out / "results.h5").write_bytes((out / "results.h5").read_bytes()[:500])
-    assert not run_study(spring_file, out).reused
-    assert len(read_results(out / "results.h5").routes) == 1
+    for file in (out / ".equimorph" / "checkpoints").iterdir():
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 0xFF
+        file.write_bytes(content)
+    with unchecked():  # the tests of sets check shapes
+        assert not run_study(spring_file, out).reused
+    assert (out / "results.h5").read_bytes() == (finished[1] / "results.h5").read_bytes()
 
 
 @pytest.mark.usefixtures("plain_figures")
-def test_a_start_that_is_no_equilibrium_stops_the_run(spring_text: str, tmp_path: Path):
+def test_a_start_that_is_no_equilibrium_stops_the_run_until_it_is_corrected(
+    spring_text: str, spring_file: Path, out: Path, tmp_path: Path
+):
     wrong = spring_text.replace('highest = "angle"', "near = { angle = 0.3 }")
     (tmp_path / "wrong.toml").write_text(wrong)
     with pytest.raises(InputError, match=r"`route\[0\]\.start\.near` must be an equilibrium"):
-        run_study(tmp_path / "wrong.toml", tmp_path / "out")
+        run_study(tmp_path / "wrong.toml", out)
+    assert [file.name for file in out.iterdir()] == [".equimorph"]
+    assert run_study(spring_file, out).reused
 
 
 @pytest.mark.usefixtures("plain_figures")
-def test_a_refused_route_is_an_answer(spring_text: str, tmp_path: Path):
+def test_a_refused_route_is_an_answer(spring_text: str, out: Path, tmp_path: Path):
     (tmp_path / "tight.toml").write_text(spring_text + "margin = 50.0\n")
-    outcome = run_study(tmp_path / "tight.toml", tmp_path / "out")
+    outcome = run_study(tmp_path / "tight.toml", out)
     assert outcome.routes[0].route.status == "refused"
-    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    page = (out / "index.html").read_text(encoding="utf-8")
     assert "Refused." in page
-    assert not (tmp_path / "out" / "over-schedule.csv").exists()
+    assert not (out / "over-schedule.csv").exists()

@@ -13,6 +13,8 @@ import typer
 from equimorph.errors import InputError
 
 BAD_INPUT = 2
+INTERRUPTED = 130
+"""What shells say of a program that was ended by Ctrl-C."""
 
 app = typer.Typer(
     add_completion=False,
@@ -31,13 +33,21 @@ class Kind(StrEnum):
 
 
 def main() -> None:
-    """Run the command line: the caller's mistakes are one line on stderr and exit code 2."""
+    """Run the command line: what cannot be done is one line on stderr and exit code 2."""
     try:
         app()
     except InputError as error:
-        line = " ".join(str(error).split())
-        sys.stderr.write(f"equimorph: {line}\n")
+        _complain(str(error))
         sys.exit(BAD_INPUT)
+    except MemoryError:
+        _complain("the computation must fit into memory; reduce `set.intervals` or `set.box`.")
+        sys.exit(BAD_INPUT)
+
+
+def _complain(message: str) -> None:
+    """Write one line, fit for a terminal: names from a file may hold any character."""
+    printable = "".join(each if each.isprintable() else " " for each in message)
+    sys.stderr.write(f"equimorph: {' '.join(printable.split())}\n")
 
 
 def _show_version(wanted: bool) -> bool:
@@ -74,10 +84,10 @@ def new(
 @app.command()
 def check(file: Annotated[Path, typer.Argument(help="Study file.")]) -> None:
     """Check a study file without computing anything."""
-    from equimorph.study import parse_study, prepare, read_study_text
+    from equimorph.study import check_memory, parse_study, prepare, read_study_text
 
     study = parse_study(read_study_text(file), file.name)
-    prepare(study)
+    check_memory(prepare(study))
     points, routes = _count(len(study.equilibria), "point"), _count(len(study.routes), "route")
     typer.echo(f"{file} is a sound study with {points} and {routes}.")
 
@@ -95,7 +105,15 @@ def run(
     """Run a study: equilibrium set, equilibria, routes, figures, schedules, report."""
     from equimorph.cli.show import run_and_show
 
-    run_and_show(file, out or Path("results") / file.stem, replace=replace)
+    out = out or Path("results") / file.stem
+    try:
+        run_and_show(file, out, replace=replace)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"equimorph: interrupted; what is finished is kept in {out}. Run again to go on.",
+            err=True,
+        )
+        raise typer.Exit(INTERRUPTED) from None
 
 
 def _count(number: int, word: str) -> str:

@@ -1,5 +1,6 @@
 """Writing files so that a reader finds the old one or the new one, never half of one."""
 
+import hashlib
 import os
 import tempfile
 from collections.abc import Generator
@@ -16,7 +17,7 @@ def replacing(path: Path) -> Generator[Path]:
     Raises
     ------
     InputError
-        If the folder cannot be written.
+        If the folder cannot be written, or is full.
     """
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent)
@@ -28,18 +29,33 @@ def replacing(path: Path) -> Generator[Path]:
     partial = Path(name)
     try:
         yield partial
-        partial.replace(path)
+        move_whole(partial, path)
     except OSError as error:
         raise _unwritable(path, error) from error
     finally:
         partial.unlink(missing_ok=True)
 
 
+def move_whole(source: Path, target: Path) -> None:
+    """Move a finished file within a file system so that a power cut leaves the old or the new one.
+
+    Its content reaches the disk before its name does.
+    """
+    _synchronise(source)
+    source.replace(target)
+    _synchronise(target.parent)
+
+
+def write_bytes(path: Path, content: bytes) -> Path:
+    """Write a file in one step."""
+    with replacing(path) as partial:
+        partial.write_bytes(content)
+    return path
+
+
 def write_text(path: Path, text: str) -> Path:
     """Write a text file in one step."""
-    with replacing(path) as partial:
-        partial.write_text(text, encoding="utf-8")
-    return path
+    return write_bytes(path, text.encode("utf-8"))
 
 
 def read_text(path: Path) -> str:
@@ -60,6 +76,19 @@ def read_text(path: Path) -> str:
         ) from error
 
 
+def checksum(content: bytes) -> str:
+    """SHA-256 of a file's content."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def _synchronise(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
 def _umask() -> int:
     mask = os.umask(0o022)
     os.umask(mask)
@@ -67,4 +96,6 @@ def _umask() -> int:
 
 
 def _unwritable(path: Path, error: OSError) -> InputError:
-    return InputError(f"`{path}` must be a place that can be written; got: {error.strerror}.")
+    return InputError(
+        f"`{path}` must be a place that can be written; got: {error.strerror or error}."
+    )

@@ -4,8 +4,9 @@ Every array carries a checksum of its own, so that damage is found when it is re
 """
 
 import json
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+from importlib.metadata import version as release
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +70,26 @@ def get(group: h5py.Group, name: str) -> Shaped[np.ndarray, "..."]:
 def get_json(group: h5py.Group, name: str) -> Any:
     """Read plain data."""
     return json.loads(group[name].asstr()[()])
+
+
+def content(kind: str, version: int, fill: Callable[[h5py.File], None]) -> bytes:
+    """Return the content of a new HDF5 file of ours.
+
+    It is made in memory: on a full disk the HDF5 library fails late and leaves a wreck open, while
+    bytes are written or not.
+
+    Parameters
+    ----------
+    kind, version
+        What `opened` checks.
+    fill
+        Puts the groups into the file.
+    """
+    with h5py.File("memory", "w", driver="core", backing_store=False) as file:
+        file.attrs.update(format=kind, version=version, release=release("equimorph"))
+        fill(file)
+        file.flush()
+        return bytes(file.id.get_file_image())
 
 
 @contextmanager

@@ -1,38 +1,38 @@
 """Results as one HDF5 file for everybody: xarray opens its groups, ParaView its ``/VTKHDF``.
 
-Groups: ``set`` (vertices and triangles of the equilibrium set), ``routes/<name>`` (one each), and
-``VTKHDF``, an unstructured grid whose arrays are hard links to those of ``set``. The points of the
-grid are the free parameters and a descriptor: that embedding is for looking at, the states are in
-``set``.
+Groups: ``set`` (vertices and triangles of the equilibrium set), ``equilibria/<number>`` (states
+over one point each), ``routes/<name>`` (one each), and ``VTKHDF``, an unstructured grid whose
+arrays are hard links to those of ``set``. The points of the grid are the free parameters and a
+descriptor: that embedding is for looking at, the states are in ``set``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version as release
 from pathlib import Path
 
 import h5py
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
-from equimorph.storage import route_group, set_group
-from equimorph.storage.files import replacing
-from equimorph.storage.hdf import get_json, opened, put_json
+from equimorph.storage import route_group, set_group, states_group
+from equimorph.storage.files import write_bytes
+from equimorph.storage.hdf import content, get_json, opened, put_json
 from equimorph.storage.vtkhdf import link_grid
-from equimorph.structures import from_identity
+from equimorph.structures import States, from_identity
 from equimorph.tasks import Route
 
 FORMAT = "equimorph results"
 VERSION = 1
-SET, ROUTES, STRUCTURE = "set", "routes", "structure"
+SET, ROUTES, EQUILIBRIA, STRUCTURE = "set", "routes", "equilibria", "structure"
 
 
 @dataclass(frozen=True)
 class Results:
-    """What a results file holds: a set, and routes on it by name."""
+    """What a results file holds: a set, routes on it by name, and equilibria over points."""
 
     equilibrium_set: EquilibriumSet
     routes: dict[str, Route]
+    equilibria: tuple[States, ...]
 
 
 def write_results(
@@ -40,8 +40,9 @@ def write_results(
     eset: EquilibriumSet,
     height: Descriptor,
     routes: Mapping[str, Route] | None = None,
+    equilibria: Sequence[States] = (),
 ) -> Path:
-    """Write an equilibrium set and routes on it, in one step.
+    """Write an equilibrium set and what was found on it, in one step.
 
     Parameters
     ----------
@@ -53,6 +54,8 @@ def write_results(
         Third coordinate of the surface that ParaView shows.
     routes
         Routes by name.
+    equilibria
+        States over one point each.
 
     Raises
     ------
@@ -60,14 +63,17 @@ def write_results(
         If `path` cannot be written, or the structure has a callable and cannot be written down.
     """
     identity = eset.structure.identity()
-    with replacing(Path(path)) as partial, h5py.File(partial, "w") as file:
-        file.attrs.update(format=FORMAT, version=VERSION, release=release("equimorph"))
+
+    def fill(file: h5py.File) -> None:
         put_json(file, STRUCTURE, identity)
         set_group.write(file.create_group(SET), eset, height)
         link_grid(file, file[SET])
+        for number, states in enumerate(equilibria):
+            states_group.write(file.create_group(f"{EQUILIBRIA}/{number}"), states)
         for name, route in (routes or {}).items():
             route_group.write(file.create_group(f"{ROUTES}/{name}"), route)
-    return Path(path)
+
+    return write_bytes(Path(path), content(FORMAT, VERSION, fill))
 
 
 def read_results(path: str | Path) -> Results:
@@ -88,4 +94,8 @@ def read_results(path: str | Path) -> Results:
         eset = set_group.read(file[SET], structure)
         names = list(file[ROUTES]) if ROUTES in file else []
         routes = {name: route_group.read(file[ROUTES][name], structure) for name in names}
-    return Results(eset, routes)
+        count = len(file[EQUILIBRIA]) if EQUILIBRIA in file else 0
+        equilibria = tuple(
+            states_group.read(file[f"{EQUILIBRIA}/{number}"], structure) for number in range(count)
+        )
+    return Results(eset, routes, equilibria)

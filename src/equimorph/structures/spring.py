@@ -185,6 +185,7 @@ class Spring(Structure):
     @cached_property
     def height(self) -> Descriptor:
         """Height of B in natural lengths."""
+
         def value(z: Lanes, p: Parameters) -> Values:
             return np.asarray(p[:, 0] * np.tan(z[:, 0]))
 

@@ -1,5 +1,6 @@
 """Studies: a problem file in, results and a report out."""
 
+from equimorph.study.memory import check_memory
 from equimorph.study.outcome import Outcome, RouteOutcome
 from equimorph.study.prepare import Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
@@ -10,6 +11,7 @@ __all__ = [
     "Problem",
     "RouteOutcome",
     "Study",
+    "check_memory",
     "parse_study",
     "prepare",
     "read_study_text",

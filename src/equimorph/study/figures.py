@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from equimorph import plotting
 from equimorph.model import Progress
+from equimorph.study.folder import ResultsFolder
 from equimorph.study.outcome import Outcome, RouteOutcome
 
 SURFACE = "surface"
@@ -31,55 +32,71 @@ def route_figures(name: str) -> RouteFigures:
     return RouteFigures(f"{name}-plane", f"{name}-shapes", f"{name}-margins", f"{name}-film.gif")
 
 
-def draw_figures(outcome: Outcome, folder: Path, progress: Progress) -> None:
-    """Draw all figures of an outcome.
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a study: its files, and how they get into a folder."""
+
+    files: tuple[str, ...]
+    draw: Callable[[Path], None]
+
+
+def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) -> None:
+    """Draw all figures of an outcome that the folder does not hold yet.
 
     Parameters
     ----------
     outcome
         What was found.
     folder
-        Where the files go.
+        Where the files go, figure by figure.
     progress
         Told how far the drawing is.
     """
-    drawings = _drawings(outcome)
-    films = [each for each in outcome.routes if each.arrived]
-    total = len(drawings) + len(films)
-    for done, (name, draw) in enumerate(drawings.items()):
-        progress.report("figures", done, total)
-        plotting.save(draw(), folder, name)
-    for done, each in enumerate(films, start=len(drawings)):
-        progress.report("figures", done, total)
-        plotting.film(
-            each.route, folder / route_figures(each.name).film, eset=outcome.equilibrium_set
-        )
-    progress.report("figures", total, total)
+    figures = _figures(outcome)
+    for done, figure in enumerate(figures):
+        progress.report("figures", done, len(figures))
+        if not folder.holds(figure.files):
+            with folder.adding() as staging:
+                figure.draw(staging)
+    progress.report("figures", len(figures), len(figures))
 
 
-def _drawings(outcome: Outcome) -> dict[str, Callable[[], Axes]]:
-    """Still figures by file name."""
+def _figures(outcome: Outcome) -> list[Figure]:
     eset, arrived = outcome.equilibrium_set, [each for each in outcome.routes if each.arrived]
     first = arrived[0].route if arrived else None
-    drawings: dict[str, Callable[[], Axes]] = {
-        SURFACE: partial(plotting.surface, eset, outcome.problem.height, route=first),
-        STABLE_PLANE: partial(plotting.parameter_plane, eset, count="stable"),
-    }
+    height = outcome.problem.height
+    figures = [
+        _still(SURFACE, partial(plotting.surface, eset, height, route=first)),
+        _still(STABLE_PLANE, partial(plotting.parameter_plane, eset, count="stable")),
+    ]
     # With routes, each of them is shown on this plane; once more without it would say nothing new.
     if not outcome.routes:
-        drawings[PLANE] = partial(plotting.parameter_plane, eset)
+        figures.append(_still(PLANE, partial(plotting.parameter_plane, eset)))
     for each in outcome.routes:
-        drawings |= _drawings_of_route(outcome, each)
-    return drawings
+        figures += _figures_of_route(outcome, each)
+    return figures
 
 
-def _drawings_of_route(outcome: Outcome, each: RouteOutcome) -> dict[str, Callable[[], Axes]]:
-    names, route = route_figures(each.name), each.route
-    plane = partial(plotting.parameter_plane, outcome.equilibrium_set, route)
+def _figures_of_route(outcome: Outcome, each: RouteOutcome) -> list[Figure]:
+    names, route, eset = route_figures(each.name), each.route, outcome.equilibrium_set
+    plane = _still(names.plane, partial(plotting.parameter_plane, eset, route))
     if not each.arrived:
-        return {names.plane: plane}
-    return {
-        names.plane: plane,
-        names.shapes: partial(plotting.shapes, route),
-        names.margins: partial(plotting.margins, route),
-    }
+        return [plane]
+    return [
+        plane,
+        _still(names.shapes, partial(plotting.shapes, route)),
+        _still(names.margins, partial(plotting.margins, route)),
+        Figure((names.film,), lambda folder: _draw_film(outcome, each, folder)),
+    ]
+
+
+def _still(name: str, draw: Callable[[], Axes]) -> Figure:
+    def into(folder: Path) -> None:
+        plotting.save(draw(), folder, name)
+
+    return Figure((f"{name}.png", f"{name}.svg"), into)
+
+
+def _draw_film(outcome: Outcome, each: RouteOutcome, folder: Path) -> None:
+    path = folder / route_figures(each.name).film
+    plotting.film(each.route, path, eset=outcome.equilibrium_set)

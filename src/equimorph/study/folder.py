@@ -1,32 +1,33 @@
 """The results folder of a study: ours alone, never half-written, never someone else's.
 
-A manifest names the study and lists every file that was put there. Files are made in a hidden
-staging folder and moved when complete; a file that the manifest does not list is never touched.
+A manifest names the study and lists every file that was put there with its checksum. Files are made
+in a hidden folder of ours and moved when complete; a file that the manifest does not list is never
+touched. While a run has the folder open, no other one has.
 """
 
-import hashlib
+import errno
 import json
 import shutil
 import tempfile
-from collections.abc import Generator
-from contextlib import contextmanager
+from collections.abc import Generator, Iterable
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from time import time
 from typing import Any
 
 from equimorph.errors import InputError
-from equimorph.storage.files import write_text
+from equimorph.storage.files import checksum, move_whole
+from equimorph.storage.lock import locked
+from equimorph.study.fingerprint import FINGERPRINT, fingerprint
 from equimorph.study.problem import Study
 
 MANIFEST = "equimorph.json"
-RESULTS = "results.h5"
+PRIVATE = ".equimorph"
 FORMAT = "equimorph results folder"
-VERSION = 1
-_STAGING = ".partial-"
-_ABANDONED = 3600.0
-"""Age in seconds after which a staging folder is taken for one of a killed run."""
+VERSION = 2
+_CHECKPOINTS, _LOCK, _STAGING = "checkpoints", "lock", "staging-"
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True)
@@ -38,11 +39,16 @@ class ResultsFolder:
     path
         Where it is.
     study
-        Digests of the study whose results it holds.
+        Fingerprint of the study whose results it holds.
     """
 
     path: Path
-    study: dict[str, str]
+    study: str
+
+    @property
+    def checkpoints(self) -> Path:
+        """Folder for the answers to go on from."""
+        return self.path / PRIVATE / _CHECKPOINTS
 
     @contextmanager
     def adding(self) -> Generator[Path]:
@@ -53,28 +59,27 @@ class ResultsFolder:
         InputError
             If the folder cannot be written, or holds a file of that name that is not ours.
         """
-        with _writable(self.path):
-            staging = Path(tempfile.mkdtemp(prefix=_STAGING, dir=self.path))
-        try:
-            yield staging
-            with _writable(self.path):
+        with writable(self.path):
+            staging = Path(tempfile.mkdtemp(prefix=_STAGING, dir=self.path / PRIVATE))
+            try:
+                yield staging
                 self._admit(sorted(staging.iterdir()))
-        finally:
-            shutil.rmtree(staging, ignore_errors=True)
+            finally:
+                shutil.rmtree(staging, ignore_errors=True)
 
-    def add_text(self, name: str, text: str) -> None:
-        """Put one text file here."""
-        with self.adding() as staging:
-            (staging / name).write_text(text, encoding="utf-8")
+    def holds(self, names: Iterable[str]) -> bool:
+        """Whether all files of these names are here, ours, and as they were written."""
+        files = self.files()
+        return all(
+            name in files
+            and (self.path / name).is_file()
+            and checksum((self.path / name).read_bytes()) == files[name]
+            for name in names
+        )
 
-    def holds(self, name: str) -> bool:
-        """Whether a file of that name is here and ours."""
-        return name in self.files() and (self.path / name).is_file()
-
-    def files(self) -> list[str]:
-        """Names of our files."""
-        names: list[str] = _read_manifest(self.path).get("files", [])
-        return names
+    def files(self) -> dict[str, str]:
+        """Names of our files with their checksums."""
+        return dict(_read_manifest(self.path).get("files", {}))
 
     def _admit(self, arrivals: list[Path]) -> None:
         known = self.files()
@@ -85,12 +90,16 @@ class ResultsFolder:
                     "got one. Move it away, or choose another folder."
                 )
         # Listed before they arrive: after an interruption they are still known to be ours.
-        _write_manifest(self.path, self.study, sorted({*known, *(file.name for file in arrivals)}))
+        new = {file.name: checksum(file.read_bytes()) for file in arrivals}
+        _write_manifest(self.path, self.study, {**known, **new})
         for file in arrivals:
-            file.replace(self.path / file.name)
+            move_whole(file, self.path / file.name)
 
 
-def open_results_folder(path: Path, study: Study, *, replace: bool = False) -> ResultsFolder:
+@contextmanager
+def open_results_folder(
+    path: Path, study: Study, *, replace: bool = False
+) -> Generator[ResultsFolder]:
     """Make a results folder, or open the one that an earlier run of the same study left.
 
     Parameters
@@ -100,59 +109,60 @@ def open_results_folder(path: Path, study: Study, *, replace: bool = False) -> R
     study
         The study to be run.
     replace
-        Take over a folder with the results of another study: its files are removed, except the
-        equilibrium set if both studies ask for the same one. Files of others stay.
+        Take over a folder with the results of another study: its files are removed, but not the
+        answers to questions that both studies ask. Files of others stay.
 
     Raises
     ------
     InputError
-        If `path` cannot be a folder or be written, or holds other files or another study's results.
+        If `path` cannot be a folder or be written, is in use by another run, or holds other files
+        or another study's results.
     """
-    folder = ResultsFolder(path, study_digests(study))
-    with _writable(path):
-        path.mkdir(parents=True, exist_ok=True)
-        manifest = _read_manifest(path)
-        if replace and manifest:
-            manifest = _cleared(path, manifest, folder.study)
-        _check_owner(path, manifest, folder.study)
-        _sweep(path)
-        _write_manifest(path, folder.study, manifest.get("files", []))
-    return folder
+    folder = ResultsFolder(path, study_fingerprint(study))
+    with ExitStack() as held:
+        with writable(path):
+            path.mkdir(parents=True, exist_ok=True)
+            _check_owner(path, folder.study, replace=replace)
+            folder.checkpoints.mkdir(parents=True, exist_ok=True)
+            held.enter_context(locked(path / PRIVATE / _LOCK, f"results folder {path}"))
+            _check_owner(path, folder.study, replace=replace)
+            _sweep(path)
+            _clear_other(path, folder.study)
+        yield folder
 
 
-def study_digests(study: Study) -> dict[str, str]:
-    """Fingerprints of what a study asks for, as a whole and of its set.
-
-    Comments, the order of keys and the title do not count.
-    """
+def study_fingerprint(study: Study) -> str:
+    """Fingerprint of what a study asks for; comments, order of keys and the title do not count."""
     whole = study.model_dump(mode="json", by_alias=True, exclude={"title"})
-    whole["version"] = version("equimorph")
-    part = {key: whole[key] for key in ("structure", "set", "version")}
-    return {"study": _digest(whole), "set": _digest(part)}
-
-
-def _digest(content: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return fingerprint({**whole, "version": version("equimorph")})
 
 
 @contextmanager
-def _writable(path: Path) -> Generator[None]:
+def writable(path: Path) -> Generator[None]:
+    """Say in one line that a results folder cannot be written, and what to do."""
     try:
         yield
     except OSError as error:
+        reason = error.strerror or str(error)
+        if error.errno in _FULL:
+            raise InputError(
+                f"`results folder` must have room for the results; got {path}: {reason}. What is "
+                "finished is kept: free some space and run again."
+            ) from error
         raise InputError(
-            f"`results folder` must be a folder that can be written; got {path}: {error.strerror}. "
+            f"`results folder` must be a folder that can be written; got {path}: {reason}. "
             "Choose another one with --out."
         ) from error
 
 
-def _check_owner(path: Path, manifest: dict[str, Any], study: dict[str, str]) -> None:
-    if not manifest and any(not file.name.startswith(_STAGING) for file in path.iterdir()):
+def _check_owner(path: Path, study: str, *, replace: bool) -> None:
+    manifest = _read_manifest(path)
+    if not manifest and any(file.name != PRIVATE for file in path.iterdir()):
         raise InputError(
             f"`results folder` must be empty or hold earlier results of this study; got {path} "
             "with other files. Choose another one with --out."
         )
-    if manifest and manifest["study"] != study:
+    if manifest and manifest["study"] != study and not replace:
         raise InputError(
             f"`results folder` must be empty or hold earlier results of this study; got {path} "
             "with the results of another study, or of another version of this one. "
@@ -160,20 +170,19 @@ def _check_owner(path: Path, manifest: dict[str, Any], study: dict[str, str]) ->
         )
 
 
-def _cleared(path: Path, manifest: dict[str, Any], study: dict[str, str]) -> dict[str, Any]:
-    """Remove what does not belong to a study; the manifest of what is left."""
-    same_set = manifest["study"].get("set") == study["set"]
-    kept = [name for name in manifest["files"] if same_set and name == RESULTS]
-    for name in set(manifest["files"]) - set(kept):
-        (path / name).unlink(missing_ok=True)
-    return {"study": study, "files": kept}
+def _clear_other(path: Path, study: str) -> None:
+    """Remove the files of another study, then take the folder over."""
+    manifest = _read_manifest(path)
+    if manifest and manifest["study"] != study:
+        for name in manifest["files"]:
+            (path / name).unlink(missing_ok=True)
+        _write_manifest(path, study, {})
 
 
 def _sweep(path: Path) -> None:
-    """Remove staging folders of runs that were killed; living ones are seconds old."""
-    for staging in path.glob(f"{_STAGING}*"):
-        if time() - staging.stat().st_mtime > _ABANDONED:
-            shutil.rmtree(staging, ignore_errors=True)
+    """Remove what runs that were killed had not finished."""
+    for staging in (path / PRIVATE).glob(f"{_STAGING}*"):
+        shutil.rmtree(staging, ignore_errors=True)
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
@@ -186,9 +195,12 @@ def _read_manifest(path: Path) -> dict[str, Any]:
         return {}
     try:
         manifest = json.loads(file.read_text(encoding="utf-8"))
-        sound = manifest["format"] == FORMAT and manifest["version"] <= VERSION
-        sound = sound and isinstance(manifest["study"], dict)
-        sound = sound and all(Path(name).name == name for name in manifest["files"])
+        sound = manifest["format"] == FORMAT and 1 <= manifest["version"] <= VERSION
+        if manifest["version"] == 1:  # no checksums: every file is written again
+            manifest["files"] = dict.fromkeys(manifest["files"], "")
+            manifest["study"] = manifest["study"]["study"][:FINGERPRINT]
+        sound = sound and isinstance(manifest["study"], str)
+        sound = sound and all(Path(name).name == name for name in dict(manifest["files"]))
     except (ValueError, KeyError, TypeError):
         sound = False
     if not sound:
@@ -199,6 +211,8 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     return dict(manifest)
 
 
-def _write_manifest(path: Path, study: dict[str, str], files: list[str]) -> None:
+def _write_manifest(path: Path, study: str, files: dict[str, str]) -> None:
     manifest = {"format": FORMAT, "version": VERSION, "study": study, "files": files}
-    write_text(path / MANIFEST, json.dumps(manifest, indent=2) + "\n")
+    partial = path / PRIVATE / MANIFEST
+    partial.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+    move_whole(partial, path / MANIFEST)

@@ -3,14 +3,23 @@
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from inspect import signature
 
 import numpy as np
 
 from equimorph.errors import InputError
+from equimorph.manifold import equilibrium_set
 from equimorph.model import Box, Constraint, Descriptor, parameter_vector, position
 from equimorph.structures import Rod, Spring, Structure
 from equimorph.study.expressions import parse_comparison
-from equimorph.study.problem import RodSection, RouteSection, SpringSection, StateSection, Study
+from equimorph.study.problem import (
+    RodSection,
+    RouteSection,
+    SetSection,
+    SpringSection,
+    StateSection,
+    Study,
+)
 
 
 @dataclass(frozen=True)
@@ -30,6 +39,7 @@ class Problem:
     box: Box
     fixed: dict[str, float]
     constraints: tuple[Constraint, ...]
+    intervals: tuple[int, int]
     points: tuple[dict[str, float], ...]
     tasks: tuple[Task, ...]
     height: Descriptor
@@ -65,6 +75,7 @@ def prepare(study: Study) -> Problem:
         box=box,
         fixed=wanted.fixed,
         constraints=_constraints(structure, wanted.within, "set.within"),
+        intervals=_intervals(wanted),
         points=tuple(point.at for point in study.equilibria),
         tasks=tuple(_task(structure, box, route, i) for i, route in enumerate(study.routes)),
         height=structure.descriptor("height(0.5)" if structure.kind == "rod" else "angle"),
@@ -121,6 +132,12 @@ def _check_fixed(structure: Structure, box: Box, fixed: Mapping[str, float]) -> 
         middle = dict(zip(box.names, 0.5 * (box.lower + box.upper), strict=True))
         vector = parameter_vector(structure.parameters, {**middle, **fixed})
     assert np.isfinite(vector).all()
+
+
+def _intervals(wanted: SetSection) -> tuple[int, int]:
+    """Intervals of the grid; what a study leaves out takes the library's default."""
+    default: tuple[int, int] = signature(equilibrium_set).parameters["intervals"].default
+    return default if wanted.intervals is None else (wanted.intervals[0], wanted.intervals[1])
 
 
 def _constraints(structure: Structure, texts: Sequence[str], key: str) -> tuple[Constraint, ...]:

@@ -96,7 +96,7 @@ class SetSection(_Section):
     box: Annotated[dict[str, Interval], AfterValidator(_two)]
     fixed: Point = Field(default_factory=dict)
     within: list[ComparisonText] = Field(default_factory=list)
-    intervals: list[Annotated[int, Field(gt=0)]] | None = Field(
+    intervals: list[Annotated[int, Field(ge=2)]] | None = Field(
         default=None, min_length=2, max_length=2
     )
 

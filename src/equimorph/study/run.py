@@ -2,17 +2,22 @@
 
 from collections.abc import Generator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent
-from equimorph.storage import read_results, write_results, write_schedule
+from equimorph.storage import write_results, write_schedule
+from equimorph.storage.files import read_text
+from equimorph.storage.parts import JOURNEY_PART, STATES_PART, Journey, set_part
+from equimorph.structures import States
+from equimorph.study.checkpoints import Checkpoints
 from equimorph.study.choose import choose_state
 from equimorph.study.figures import draw_figures
-from equimorph.study.folder import RESULTS, ResultsFolder, open_results_folder
+from equimorph.study.folder import ResultsFolder, open_results_folder
+from equimorph.study.memory import MemoryWatch, check_memory
 from equimorph.study.outcome import Outcome, RouteOutcome
 from equimorph.study.prepare import Problem, Task, at_key, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
@@ -20,8 +25,8 @@ from equimorph.study.report import report
 from equimorph.tasks import plan
 
 INPUT_COPY = "study.toml"
+RESULTS = "results.h5"
 REPORT = "index.html"
-FIGURE_SECONDS = "figures"
 
 
 def run_study(
@@ -29,8 +34,8 @@ def run_study(
 ) -> Outcome:
     """Run a study file into a results folder.
 
-    Everything is stored as soon as it is known. A set that an earlier run left in the folder is
-    read instead of computed, if it was asked for in the same words.
+    Every answer (the set, the equilibria at a point, a route) and every figure is stored as soon as
+    it is known. A run that was interrupted, however abruptly, is continued by running it again.
 
     Parameters
     ----------
@@ -50,104 +55,123 @@ def run_study(
     Raises
     ------
     InputError
-        For a wrong study file, a start or goal that is no stable equilibrium, or a folder that
-        cannot be written or holds something else.
+        For a wrong study file, one that needs more memory than there is, a start or goal that is no
+        stable equilibrium, or a folder that cannot be written, is in use, or holds something else.
     """
-    sink = progress or Silent()
+    sink = MemoryWatch(progress or Silent())
     text = read_study_text(path)
     study = parse_study(text, path.name)
     problem = prepare(study)
-    folder = open_results_folder(out, study, replace=replace)
-    folder.add_text(INPUT_COPY, text)
-    outcome = solve(study, problem, folder, sink)
-    with _timed(outcome.seconds, FIGURE_SECONDS), folder.adding() as staging:
-        draw_figures(outcome, staging, sink)
-    with folder.adding() as staging:
-        page = report(outcome, folder.path, text, study.title or path.stem)
-        (staging / REPORT).write_text(page, encoding="utf-8")
+    check_memory(problem)
+    with open_results_folder(out, study, replace=replace) as folder:
+        outcome = solve(study, problem, folder, sink)
+        same_words = folder.holds([INPUT_COPY]) and read_text(out / INPUT_COPY) == text
+        _store(outcome, folder, text)
+        with _timed(outcome.seconds, "figures"):
+            draw_figures(outcome, folder, sink)
+        # The page of a run that had finished tells how long the answers took.
+        if not (same_words and folder.holds([REPORT])):
+            with folder.adding() as staging:
+                page = report(outcome, folder.path, text, study.title or path.stem)
+                (staging / REPORT).write_text(page, encoding="utf-8")
     return outcome
 
 
 def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progress) -> Outcome:
-    """Compute everything that a study asks for, and store it in the folder.
+    """Answer everything that a study asks for.
 
     Parameters
     ----------
     study, problem
         What is asked, as written and as objects.
     folder
-        Where results go and where an earlier set may be.
+        Where answers are kept, and where earlier ones may be.
     progress
         Told how far the run is.
     """
     seconds: dict[str, float] = {}
+    answers = Checkpoints(folder, problem.structure)
     with _timed(seconds, "equilibrium set"):
-        eset, reused = _equilibrium_set(study, problem, folder, progress)
+        eset = _equilibrium_set(study, problem, answers, progress)
+    reused = bool(answers.found)
     with _timed(seconds, "equilibria"):
-        points = tuple(eset.at(**point) for point in problem.points)
+        points = tuple(_equilibria(study, eset, point, answers) for point in problem.points)
     routes = []
     for i, task in enumerate(problem.tasks):
         progress.report("routes", i, len(problem.tasks))
         with _timed(seconds, f"route {task.section.name}"):
-            routes.append(_route(eset, problem, task))
+            routes.append(_route(study, problem, eset, task, answers))
     progress.report("routes", len(routes), len(routes))
-    _store_routes(eset, problem, routes, folder)
+    answers.forget_others()
     return Outcome(study, problem, eset, points, tuple(routes), reused, seconds)
 
 
+def _set_question(study: Study) -> dict[str, Any]:
+    """Return all that the equilibrium set depends on."""
+    asked = study.model_dump(mode="json", by_alias=True)
+    return {"version": version("equimorph"), "structure": asked["structure"], "set": asked["set"]}
+
+
 def _equilibrium_set(
-    study: Study, problem: Problem, folder: ResultsFolder, progress: Progress
-) -> tuple[EquilibriumSet, bool]:
-    """Set of an earlier run if it can be read, else a new one; and whether it was read."""
-    if folder.holds(RESULTS):
-        try:
-            return read_results(folder.path / RESULTS).equilibrium_set, True
-        except InputError:
-            # A damaged file of ours is no loss: the set is computed again and replaces it.
-            pass
-    # What the study leaves out takes the library's default.
-    intervals = study.equilibrium_set.intervals
-    options: dict[str, Any] = {} if intervals is None else {"intervals": tuple(intervals)}
-    with at_key("set"):
-        eset = equilibrium_set(
-            problem.structure,
-            problem.box,
-            fixed=problem.fixed,
-            within=problem.constraints,
-            progress=progress,
-            **options,
-        )
-    with folder.adding() as staging:
-        write_results(staging / RESULTS, eset, problem.height)
-    return eset, False
+    study: Study, problem: Problem, answers: Checkpoints, progress: Progress
+) -> EquilibriumSet:
+    def compute() -> EquilibriumSet:
+        with at_key("set"):
+            return equilibrium_set(
+                problem.structure,
+                problem.box,
+                fixed=problem.fixed,
+                within=problem.constraints,
+                intervals=problem.intervals,
+                progress=progress,
+            )
+
+    return answers.answer(_set_question(study), set_part(problem.height), compute)
 
 
-def _route(eset: EquilibriumSet, problem: Problem, task: Task) -> RouteOutcome:
+def _equilibria(
+    study: Study, eset: EquilibriumSet, point: dict[str, float], answers: Checkpoints
+) -> States:
+    question = {**_set_question(study), "at": point}
+    return answers.answer(question, STATES_PART, lambda: eset.at(**point))
+
+
+def _route(
+    study: Study, problem: Problem, eset: EquilibriumSet, task: Task, answers: Checkpoints
+) -> RouteOutcome:
     section = task.section
-    start = choose_state(eset, section.start, f"{task.key}.start")
-    goal = choose_state(eset, section.goal, f"{task.key}.goal")
-    with at_key(task.key):
-        route = plan(
-            eset,
-            start,
-            goal,
-            via=section.via,
-            within=task.constraints,
-            margin=section.margin,
-            monitor=[problem.height],
-        )
-    return RouteOutcome(task, start, goal, route)
+
+    def compute() -> Journey:
+        start = choose_state(eset, section.start, f"{task.key}.start")
+        goal = choose_state(eset, section.goal, f"{task.key}.goal")
+        with at_key(task.key):
+            route = plan(
+                eset,
+                start,
+                goal,
+                via=section.via,
+                within=task.constraints,
+                margin=section.margin,
+                monitor=[problem.height],
+            )
+        return start, goal, route
+
+    asked = section.model_dump(mode="json", exclude={"name"})
+    question = {**_set_question(study), "route": asked}
+    return RouteOutcome(task, *answers.answer(question, JOURNEY_PART, compute))
 
 
-def _store_routes(
-    eset: EquilibriumSet, problem: Problem, routes: list[RouteOutcome], folder: ResultsFolder
-) -> None:
+def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
+    """Put the answers into the folder, as data for people and programs."""
     with folder.adding() as staging:
-        named = {each.name: each.route for each in routes}
-        write_results(staging / RESULTS, eset, problem.height, named)
-        for each in routes:
+        (staging / INPUT_COPY).write_text(text, encoding="utf-8")
+        for each in outcome.routes:
             if each.route.schedule is not None:
                 write_schedule(each.route.schedule, staging / f"{each.name}-schedule.csv")
+        if not folder.holds([RESULTS]):
+            routes = {each.name: each.route for each in outcome.routes}
+            eset, height = outcome.equilibrium_set, outcome.problem.height
+            write_results(staging / RESULTS, eset, height, routes, outcome.points)
 
 
 @contextmanager

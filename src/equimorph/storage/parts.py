@@ -1,0 +1,82 @@
+"""Parts of a study's results as files of their own, from which an interrupted run goes on."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import h5py
+
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Descriptor
+from equimorph.storage import route_group, set_group, states_group
+from equimorph.storage.hdf import content, opened
+from equimorph.structures import State, States, Structure
+from equimorph.tasks import Route
+
+FORMAT = "an equimorph checkpoint"
+VERSION = 1
+START, GOAL, ROUTE = "start", "goal", "route"
+
+Answer = TypeVar("Answer")
+Journey = tuple[State, State, Route]
+"""Start, goal, and the route between them or its refusal."""
+
+
+@dataclass(frozen=True)
+class Part(Generic[Answer]):
+    """How one kind of answer is written into an HDF5 group and read back.
+
+    Parameters
+    ----------
+    kind
+        Of the answer, in a word.
+    write
+        Writes it into an empty group.
+    read
+        Reads it, for a structure.
+    """
+
+    kind: str
+    write: Callable[[h5py.Group, Answer], None]
+    read: Callable[[h5py.Group, Structure], Answer]
+
+    def content(self, answer: Answer) -> bytes:
+        """Return the content of a file that holds an answer."""
+        return content(
+            FORMAT, VERSION, lambda file: self.write(file.create_group(self.kind), answer)
+        )
+
+    def load(self, path: Path, structure: Structure) -> Answer:
+        """Read the answer that a file holds.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, damaged, or holds something else.
+        """
+        with opened(path, FORMAT, VERSION) as file:
+            return self.read(file[self.kind], structure)
+
+
+def set_part(height: Descriptor) -> Part[EquilibriumSet]:
+    """Equilibrium sets, with a descriptor as third coordinate of their embedding."""
+    return Part("set", lambda group, eset: set_group.write(group, eset, height), set_group.read)
+
+
+STATES_PART: Part[States] = Part("states", states_group.write, states_group.read)
+
+
+def _write_journey(group: h5py.Group, journey: Journey) -> None:
+    start, goal, route = journey
+    states_group.write(group.create_group(START), start.batch)
+    states_group.write(group.create_group(GOAL), goal.batch)
+    route_group.write(group.create_group(ROUTE), route)
+
+
+def _read_journey(group: h5py.Group, structure: Structure) -> Journey:
+    start, goal = (states_group.read(group[end], structure)[0] for end in (START, GOAL))
+    return start, goal, route_group.read(group[ROUTE], structure)
+
+
+JOURNEY_PART: Part[Journey] = Part("journey", _write_journey, _read_journey)

@@ -1,0 +1,96 @@
+"""What a run has finished, answer by answer, to go on from after an interruption of any kind.
+
+An answer's file is named after a fingerprint of its question and a checksum of its content. It is
+found by asking the same question again, in this study or an edited one; a damaged file is not read.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from equimorph.errors import InputError
+from equimorph.storage.files import checksum, move_whole
+from equimorph.storage.parts import Part
+from equimorph.structures import Structure
+from equimorph.study.fingerprint import fingerprint
+from equimorph.study.folder import ResultsFolder, writable
+
+Answer = TypeVar("Answer")
+
+
+@dataclass
+class Checkpoints:
+    """Answers in a hidden part of a results folder.
+
+    Parameters
+    ----------
+    results
+        The results folder, open.
+    structure
+        To which the answers belong.
+    asked
+        Fingerprints of the questions asked so far.
+    found
+        Those whose answers were there already.
+    """
+
+    results: ResultsFolder
+    structure: Structure
+    asked: set[str] = field(default_factory=set)
+    found: set[str] = field(default_factory=set)
+
+    def answer(
+        self, question: dict[str, Any], part: Part[Answer], compute: Callable[[], Answer]
+    ) -> Answer:
+        """Return the stored answer to a question; without one, compute it and store it.
+
+        The answer is always the one read from the file, so that a run that was interrupted goes on
+        from the very numbers that it would have had.
+
+        Parameters
+        ----------
+        question
+            All that the answer depends on, as plain data.
+        part
+            How such answers are stored.
+        compute
+            Finds the answer.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be written.
+        """
+        key = fingerprint({"part": part.kind, **question})
+        self.asked.add(key)
+        for file in self.results.checkpoints.glob(f"{key}-*"):
+            answer = self._load(file, part)
+            if answer is not None:
+                self.found.add(key)
+                return answer
+            file.unlink()
+        return part.load(self._store(key, part.content(compute())), self.structure)
+
+    def forget_others(self) -> None:
+        """Remove answers that were not asked for."""
+        for file in self.results.checkpoints.iterdir():
+            if file.name.partition("-")[0] not in self.asked:
+                file.unlink()
+
+    def _store(self, key: str, content: bytes) -> Path:
+        file = self.results.checkpoints / f"{key}-{checksum(content)}"
+        partial = self.results.checkpoints / "partial"
+        with writable(self.results.path):
+            partial.write_bytes(content)
+            move_whole(partial, file)
+        return file
+
+    def _load(self, file: Path, part: Part[Answer]) -> Answer | None:
+        """Answer in a file, unless it is damaged."""
+        if not file.name.endswith(checksum(file.read_bytes())):
+            return None
+        try:
+            return part.load(file, self.structure)
+        except InputError:
+            return None
