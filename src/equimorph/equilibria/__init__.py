@@ -1,5 +1,13 @@
 """Equilibria: solving, lifting, events, limit loads, searching."""
 
+from equimorph.equilibria.both_ways import CriticalCurve
+from equimorph.equilibria.critical_curves import (
+    branch_curve,
+    constraint_curve,
+    cusp_curve,
+    fold_curve,
+    grazing_curve,
+)
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
 from equimorph.equilibria.lift import Event, Path, check_start, lift, way_points
 from equimorph.equilibria.limit import LimitLoad, limit_load
@@ -9,6 +17,7 @@ from equimorph.equilibria.search import distinct, find_equilibria
 from equimorph.equilibria.tracing import TraceOptions
 
 __all__ = [
+    "CriticalCurve",
     "Event",
     "LimitLoad",
     "NewtonHomotopy",
@@ -16,10 +25,15 @@ __all__ = [
     "ParameterLine",
     "Path",
     "TraceOptions",
+    "branch_curve",
     "check_start",
+    "constraint_curve",
+    "cusp_curve",
     "distinct",
     "find_equilibria",
+    "fold_curve",
     "follow",
+    "grazing_curve",
     "lift",
     "limit_load",
     "newton",

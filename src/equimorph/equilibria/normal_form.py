@@ -1,61 +1,92 @@
-"""Criticality of branch points from the normal form of the reduced energy."""
+"""Normal forms of branch points: how two paths cross, and which of them is stable."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.curves import ParameterLine
+from equimorph.structures import Structure
 
 Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
 
-TRANSCRITICAL = 1e-4
-"""Size of the quadratic coefficient, relative to the cubic one, that counts as not zero."""
+SKEW = 1e-4
+"""Quadratic over cubic coefficient, a length in the metric, from which on it counts as not zero."""
+DEGENERATE = 1e-7
+"""Size of the cubic coefficient, relative to its terms, below which its sign is not known."""
+
+
+@dataclass(frozen=True)
+class NormalForm:
+    """Reduced equation of paths along ``dp`` at simple branch points.
+
+    With the null vector φ, |φ| = 1 in the metric, and ψ from ``F_z ψ = −F_p dp``, ``b·ψ = 0``,
+    points of the paths are ``z + ξφ + τψ``, ``p + τ dp`` up to terms of second order, where
+    ``½ (A ξ² + 2 B ξ τ + C τ²) + c ξ³/6 = 0`` with ``A = φᵀF_zz[φ, φ]``,
+    ``B = φᵀD²F[φ, (ψ, dp)]``, ``C = φᵀD²F[(ψ, dp), (ψ, dp)]`` (Lyapunov–Schmidt reduction).
+    """
+
+    phi: Lanes
+    psi: Lanes
+    quadratic: Values
+    """A."""
+    mixed: Values
+    """B."""
+    path: Values
+    """C."""
+    cubic: Values
+    """c."""
+    cubic_scale: Values
+
+    @property
+    def discriminant(self) -> Values:
+        """B² − AC: two paths cross where it is positive, isolated points are where it is not."""
+        return np.asarray(self.mixed**2 - self.quadratic * self.path)
+
+    @property
+    def kinds(self) -> list[str]:
+        """Criticality of each branch point.
+
+        "transcritical": two paths cross at finite slopes; "isola": no path leads through.
+        Pitchforks have A = 0: "supercritical" if c > 0, when side branches are stable where the
+        straight one is not, "subcritical" if c < 0, "degenerate" if c is not known from zero.
+        """
+        skew = np.abs(self.quadratic) > np.maximum(
+            SKEW * np.abs(self.cubic), 1e-9 * self.cubic_scale
+        )
+        unknown = np.abs(self.cubic) <= DEGENERATE * self.cubic_scale
+        kinds = np.where(self.cubic > 0.0, "supercritical", "subcritical")
+        kinds = np.where(unknown, "degenerate", kinds)
+        crossing = np.where(self.discriminant > 0.0, "transcritical", "isola")
+        return [str(kind) for kind in np.where(skew, crossing, kinds)]
+
+
+def normal_form(structure: Structure, z: Lanes, p: Parameters, dp: Parameters) -> NormalForm:
+    """Coefficients at simple branch points of paths along `dp`; F_zzz by differences, to 1e-10."""
+    n, still = structure.unknowns, np.zeros_like(p)
+    b = null_border(structure, z, p)
+    norm = np.sqrt(b[:, :n] ** 2 @ structure.mass)
+    # with b·v = 1 a border b·|b|_M makes v = φ of unit length in the metric
+    at = Critical(structure, z, p, np.ascontiguousarray(b * norm[:, None]))
+    phi = at.v
+    rhs = np.zeros((len(z), 1, structure.size + 1))
+    rhs[:, 0, :-1] = -structure.parameter_derivative(z, p, dp)
+    psi = np.ascontiguousarray(at.solve(rhs)[:, 0, :-1])
+    twice = structure.second_derivative(z, p, (psi, dp), (psi, dp))
+    return NormalForm(
+        phi,
+        psi,
+        at.second(phi, still),
+        at.second(psi, dp),
+        np.einsum("li,li->l", phi, twice),
+        at.cubic,
+        at.cubic_scale,
+    )
 
 
 def criticality(curve: ParameterLine, z: Lanes, t: Values) -> list[str]:
-    """Classify simple branch points: "subcritical", "supercritical" or "transcritical".
-
-    Lyapunov–Schmidt reduction with the null vector φ, |φ| = 1 in the metric: the reduced equation
-    is ``σ' τ ξ + ½ b ξ² + c ξ³/6 = 0`` with ``b = φᵀF_zz[φ, φ]`` and
-    ``c = φᵀF_zzz[φ, φ, φ] − 3 φᵀF_zz[φ, w]``, ``F_z w = F_zz[φ, φ]``, ``w ⊥ φ``. Side branches of
-    a pitchfork are stable where the main path is not if c > 0 (supercritical). The third derivative
-    is a central difference of F_zz, good to 1e-8.
-    """
-    structure, p = curve.structure, curve.parameters(t)
-    n, none_p = structure.unknowns, np.zeros_like(p)
-    phi = _null_vector(curve, z, t)
-    norm = np.sqrt(phi[:, :n] ** 2 @ structure.mass)
-    phi = phi / norm[:, None]
-
-    def second(at: Lanes) -> Lanes:
-        return structure.second_derivative(at, p, (phi, none_p), (phi, none_p))
-
-    twice = second(z)
-    quadratic = np.einsum("li,li->l", phi, twice)
-    h = 1e-4
-    third = np.einsum("li,li->l", phi, second(z + h * phi) - second(z - h * phi)) / (2 * h)
-    unit = phi / np.linalg.norm(phi, axis=1, keepdims=True)
-    rhs = np.zeros((len(z), 1, structure.size + 1))
-    rhs[:, 0, :-1] = twice
-    border = (unit[:, None], unit[:, None], np.zeros((len(z), 1, 1)))
-    w = np.ascontiguousarray(structure.solve(z, p, rhs, border).x[:, 0, :-1])
-    inner = structure.second_derivative(z, p, (phi, none_p), (w, none_p))
-    cubic = third - 3.0 * np.einsum("li,li->l", phi, inner)
-    skew = np.abs(quadratic) > TRANSCRITICAL * np.maximum(np.abs(cubic), 1.0)
-    return [
-        "transcritical" if s else ("supercritical" if c > 0 else "subcritical")
-        for s, c in zip(skew, cubic, strict=True)
-    ]
-
-
-def _null_vector(curve: ParameterLine, z: Lanes, t: Values) -> Lanes:
-    """Null vector of F_z by bordered solves that stay regular at the singular point."""
-    structure, p = curve.structure, curve.parameters(t)
-    b = np.tile(np.cos(1.3 * np.arange(z.shape[1])) + 1.1, (len(z), 1))
-    for _ in range(4):
-        b = b / np.linalg.norm(b, axis=1, keepdims=True)
-        rhs = np.zeros((len(z), 1, structure.size + 1))
-        rhs[:, 0, -1] = 1.0
-        border = (b[:, None], b[:, None], np.zeros((len(z), 1, 1)))
-        b = np.ascontiguousarray(structure.solve(z, p, rhs, border).x[:, 0, :-1])
-    return np.asarray(b / np.linalg.norm(b, axis=1, keepdims=True))
+    """Classify simple branch points of lines in parameter space; see `NormalForm.kinds`."""
+    return normal_form(curve.structure, z, curve.parameters(t), curve.velocity).kinds

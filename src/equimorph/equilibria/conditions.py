@@ -1,0 +1,108 @@
+"""Conditions on curves of critical states: what vanishes along them, and what ends them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria.critical import Critical
+from equimorph.equilibria.following import Watch
+from equimorph.equilibria.lift import check_start
+from equimorph.equilibria.locus import Test
+from equimorph.errors import InputError
+from equimorph.model import Box, Constraint, position
+from equimorph.structures import State, Structure
+
+
+def places(structure: Structure, names: Sequence[str], count: int) -> Int[np.ndarray, " k"]:
+    """Places of so many different parameters."""
+    found = [position(structure.parameters, name) for name in names]
+    if len(found) != count or len(set(found)) != count:
+        raise InputError(f"`parameters` must be {count} different names; got {list(names)!r}.")
+    return np.array(found)
+
+
+def gap(at: Critical) -> Float[np.ndarray, " lanes"]:
+    """g: zero at singular states."""
+    return at.g
+
+
+def quadratic(at: Critical) -> Float[np.ndarray, " lanes"]:
+    """vᵀF_zz[v, v]: zero at cusps."""
+    return at.quadratic
+
+
+def cubic(at: Critical) -> Float[np.ndarray, " lanes"]:
+    """Cubic coefficient: zero at swallowtails and where criticality changes."""
+    return at.cubic
+
+
+def branching(structure: Structure, name: str) -> Test:
+    """vᵀF_p for one parameter: zero where its paths branch."""
+    place = position(structure.parameters, name)
+
+    def test(at: Critical) -> Float[np.ndarray, " lanes"]:
+        dp = np.zeros_like(at.p)
+        dp[:, place] = structure.scales[place]
+        return at.along(dp)
+
+    return test
+
+
+def bound(constraint: Constraint) -> Test:
+    """Excess over a bound, relative to it."""
+    size = max(1.0, abs(constraint.bound))
+    return lambda at: constraint.excess(at.z, at.p) / size
+
+
+def grazing(structure: Structure, constraint: Constraint, name: str) -> Test:
+    """Change of a constraint along the path in one parameter, per unit length."""
+    place = position(structure.parameters, name)
+    size, h = max(1.0, abs(constraint.bound)), 1e-4
+
+    def test(at: Critical) -> Float[np.ndarray, " lanes"]:
+        dp = np.zeros_like(at.p)
+        dp[:, place] = structure.scales[place]
+        column = structure.parameter_derivative(at.z, at.p, dp)
+        dz = -structure.solve(at.z, at.p, column[:, None]).x[:, 0]
+        length = np.sqrt(dz[:, : structure.unknowns] ** 2 @ structure.mass + 1.0)[:, None]
+        dz, dp = h * dz / length, h * dp / length
+        ahead, behind = (constraint.excess(at.z + s * dz, at.p + s * dp) for s in (1.0, -1.0))
+        return np.asarray((ahead - behind) / (2.0 * h * size))
+
+    return test
+
+
+def branchings(structure: Structure, free: Int[np.ndarray, " k"]) -> list[Watch]:
+    """Watches for branch points of the paths along each free parameter."""
+    names = [structure.parameters[place].name for place in free]
+    return [Watch("branch point", branching(structure, name), name) for name in names]
+
+
+def limits(
+    state: State, free: Int[np.ndarray, " k"], box: Box | None, within: Sequence[Constraint]
+) -> list[Watch]:
+    """Watches that end a curve: the box, the limits of the parameters' meaning, constraints."""
+    check_start(state, within)
+    watches = [Watch("constraint", bound(c), str(c), ends=True) for c in within]
+    for place in free:
+        parameter = state.structure.parameters[place]
+        low, high = parameter.lower, parameter.upper
+        if box is not None and parameter.name in box.names:
+            at = box.names.index(parameter.name)
+            low, high = max(low, box.lower[at]), min(high, box.upper[at])
+        value = state.p[place]
+        if not low - 1e-12 <= value <= high + 1e-12:
+            raise InputError(
+                f"`state` must lie in the box; got {parameter.name} = {value:g} "
+                f"outside {low:g} to {high:g}."
+            )
+        for side, sign in ((low, -1.0), (high, 1.0)):
+            if np.isfinite(side):
+                test = _beyond(int(place), float(side), sign, parameter.scale)
+                watches.append(Watch("box", test, f"{parameter.name} = {side:g}", ends=True))
+    return watches
+
+
+def _beyond(place: int, bound: float, sign: float, scale: float) -> Test:
+    return lambda at: sign * (at.p[:, place] - bound) / scale

@@ -1,0 +1,117 @@
+"""Test functions of nearly singular equilibria: what vanishes at folds, branch points and cusps."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.structures import Structure
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+
+THIRD_STEP = 2e-3
+"""Step of differences for F_zzz, in the metric: of fourth order, with errors near 1e-11."""
+
+
+@dataclass(frozen=True)
+class Critical:
+    """Points with F_z nearly singular, seen through a border b.
+
+    With ``[F_z b; bᵀ 0] [v; g] = [0; 1]`` the matrix F_z is singular exactly where g = 0, and then
+    v is its null vector with b·v = 1 [Govaerts2000]_. All test functions are smooth in (z, p) as
+    long as no second eigenvalue vanishes.
+    """
+
+    structure: Structure
+    z: Lanes
+    p: Parameters
+    b: Lanes
+
+    @cached_property
+    def _bordered(self) -> Lanes:
+        rhs = np.zeros((len(self.z), 1, self.structure.size + 1))
+        rhs[:, 0, -1] = 1.0
+        return np.asarray(self.solve(rhs)[:, 0])
+
+    def solve(
+        self, rhs: Float[np.ndarray, "lanes sides bordered"]
+    ) -> Float[np.ndarray, "lanes sides bordered"]:
+        """Solve with the bordered matrix, which stays regular at simple singular points."""
+        border = (self.b[:, None], self.b[:, None], np.zeros((len(self.z), 1, 1)))
+        return self.structure.solve(self.z, self.p, rhs, border).x
+
+    @property
+    def v(self) -> Lanes:
+        """Approximate null vector."""
+        return np.ascontiguousarray(self._bordered[:, :-1])
+
+    @property
+    def g(self) -> Values:
+        """Zero exactly where F_z is singular; its sign is minus the critical eigenvalue's."""
+        return np.asarray(self._bordered[:, -1])
+
+    def second(self, dz: Lanes, dp: Parameters) -> Values:
+        """vᵀ D²F[(v, 0), (dz, dp)]: minus the derivative of g along (dz, dp)."""
+        still = np.zeros_like(self.p)
+        twice = self.structure.second_derivative(self.z, self.p, (self.v, still), (dz, dp))
+        return np.asarray(np.einsum("li,li->l", self.v, twice))
+
+    @property
+    def quadratic(self) -> Values:
+        """vᵀ F_zz[v, v]: zero at cusps."""
+        return self.second(self.v, np.zeros_like(self.p))
+
+    def along(self, dp: Parameters) -> Values:
+        """vᵀ F_p dp: zero where paths along dp have a branch point instead of a fold."""
+        column = self.structure.parameter_derivative(self.z, self.p, dp)
+        return np.asarray(np.einsum("li,li->l", self.v, column))
+
+    @cached_property
+    def _cubic_parts(self) -> tuple[Values, Values, Values]:
+        """Third derivative along v, the part of the unknowns that follow v², and their size."""
+        structure, p, v = self.structure, self.p, self.v
+        still = np.zeros_like(p)
+        norm = np.sqrt(v[:, : structure.unknowns] ** 2 @ structure.mass)
+        h = THIRD_STEP / norm
+
+        def at(shift: float) -> Values:
+            z = self.z + (shift * h)[:, None] * v
+            twice = structure.second_derivative(z, p, (v, still), (v, still))
+            return np.asarray(np.einsum("li,li->l", v, twice))
+
+        ahead, behind = (at(1.0), at(2.0)), (at(-1.0), at(-2.0))
+        third = (8.0 * (ahead[0] - behind[0]) - (ahead[1] - behind[1])) / (12.0 * h)
+        twice = structure.second_derivative(self.z, p, (v, still), (v, still))
+        rhs = np.zeros((len(v), 1, structure.size + 1))
+        rhs[:, 0, :-1] = twice
+        w = np.ascontiguousarray(self.solve(rhs)[:, 0, :-1])
+        inner = structure.second_derivative(self.z, p, (v, still), (w, still))
+        following = 3.0 * np.einsum("li,li->l", v, inner)
+        size = np.max(np.abs([*ahead, *behind]), axis=0) / h
+        return third, following, size + np.abs(third) + np.abs(following)
+
+    @property
+    def cubic(self) -> Values:
+        """c = vᵀF_zzz[v, v, v] − 3 vᵀF_zz[v, w] with F_z w = F_zz[v, v]: zero at swallowtails.
+
+        The reduced energy along v is ``b ξ³/6 + c ξ⁴/24`` with b = `quadratic`.
+        """
+        third, inner, _ = self._cubic_parts
+        return np.asarray(third - inner)
+
+    @property
+    def cubic_scale(self) -> Values:
+        """Size of the terms that `cubic` is the sum of: what its round-off is relative to."""
+        return self._cubic_parts[2]
+
+
+def null_border(structure: Structure, z: Lanes, p: Parameters) -> Lanes:
+    """Unit vectors near the null vectors of F_z, by bordered solves that stay regular there."""
+    b = np.tile(np.cos(1.3 * np.arange(z.shape[1])) + 1.1, (len(z), 1))
+    for _ in range(4):
+        b = b / np.linalg.norm(b, axis=1, keepdims=True)
+        b = Critical(structure, z, p, np.ascontiguousarray(b)).v
+    return np.ascontiguousarray(b / np.linalg.norm(b, axis=1, keepdims=True))
