@@ -8,10 +8,10 @@ import pytest
 
 from equimorph.linalg import solve_bordered
 from equimorph.structures import Rod
-from equimorph.structures.rod.curvature.kernels import largest_lanes
+from equimorph.structures.rod.recovery.kernels import largest_lanes
 from equimorph.structures.rod.kernels import advance_lanes
 
-RESOLUTIONS = [(12, 8), (12, 6), (8, 6), (24, 8)]
+RESOLUTIONS = [(6, 9), (12, 6), (12, 8), (24, 8)]
 
 
 def lanes_near_the_arch(rod, lanes):
@@ -70,7 +70,7 @@ def bench_newton_step_through_the_contract(benchmark, lanes):
 def bench_largest_curvature_on_one_thread(benchmark, lanes):
     rod = Rod()
     z, p, _, _ = lanes_near_the_arch(rod, lanes)
-    shared = (*rod._curvature_data, rod.mesh.reference.nodes, rod.mesh.reference.to_legendre)
+    shared = rod.recovery.extremum_data
     largest, place = np.empty(lanes), np.empty(lanes)
     benchmark.pedantic(largest_lanes, (*shared, z, p, largest, place), rounds=60, warmup_rounds=2)
     record(benchmark, rod, lanes)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from equimorph.equilibria.newton import newton as equilibria_near
 from equimorph.model import Descriptor
 from equimorph.structures import Rod, State, States
 
@@ -26,12 +27,14 @@ def loaded(rod, Theta=0.9, Delta=0.3, q=1.5):
     return z, p
 
 
-def shaken(rod, lanes=20, seed=0):
-    """Smooth random shapes, not equilibria, with forces: curvature of all kinds."""
+def many_equilibria(rod, guesses=300, seed=0):
+    """Equilibria of all kinds with max |κ| ≤ 30, by Newton from random shapes."""
     generator = np.random.default_rng(seed)
-    p = np.column_stack([generator.normal(size=(lanes, 3)), np.full(lanes, 0.8)])
-    z = rod.sample(p, generator)
-    return z, p
+    p = np.column_stack([generator.normal(size=(guesses, 3)), np.full(guesses, 0.8)])
+    z, found = equilibria_near(rod, rod.sample(p, generator), p, iterations=30)
+    found[found] = rod.largest_curvature(z[found], p[found])[0] < 30.0
+    assert found.sum() > 20
+    return z[found], p[found]
 
 
 def test_natural_arch_without_skew_is_the_circular_arc():
@@ -39,7 +42,7 @@ def test_natural_arch_without_skew_is_the_circular_arc():
     for load in ("uniform", "left-half"):
         rod = Rod(load)
         state = rod.natural_state(Theta=1.0, Delta=0.0)
-        kappa, _ = rod.nodal_curvature(state.z[None], state.p[None])
+        kappa = rod.fields(state.z[None], state.p[None], np.linspace(0, 1, 50))[:, :, 1]
         np.testing.assert_allclose(kappa, -2.0, atol=1e-12)
         np.testing.assert_allclose(state.multipliers, 0.0, atol=1e-12)
         assert rod.max_curvature(state) == pytest.approx(2.0, abs=1e-12)
@@ -88,10 +91,10 @@ def test_curvature_of_an_equilibrium_is_the_slope_of_the_angle():
     rod = Rod(elements=12, degree=12)
     z, p = loaded(rod)
     theta = rod.nodal_angles(z, p)[0]
-    ref, kappa = rod.mesh.reference, rod.nodal_curvature(z, p)[0][0]
+    ref, kappa = rod.mesh.reference, rod.fields(z, p, rod.mesh.nodes)[0, :, 1]
     for e, at in enumerate(rod.mesh.element_nodes):
         slope = ref.derivative @ theta[at] / rod.mesh.lengths[e]
-        np.testing.assert_allclose(kappa[e], slope, atol=1e-7)
+        np.testing.assert_allclose(kappa[at], slope, atol=1e-7)
 
 
 def test_slope_of_the_curvature_obeys_the_equilibrium_equation():
@@ -107,27 +110,18 @@ def test_slope_of_the_curvature_obeys_the_equilibrium_equation():
         assert (above - below) / (2 * h) == pytest.approx(-4 * np.pi**2 * load, abs=1e-5)
 
 
-@pytest.mark.parametrize(("elements", "degree"), [(12, 8), (5, 5), (3, 3)])
+@pytest.mark.parametrize(("elements", "degree"), [(6, 9), (12, 6), (5, 7), (24, 3)])
 def test_largest_curvature_is_that_of_a_fine_sampling(elements, degree):
-    """Brute force: κ at 4000 points, element ends from both sides. 1e-5: sampling of a maximum."""
+    """Brute force: κ at 4000 points. 1e-5: sampling of a maximum."""
     rod = Rod("left-half", elements=elements, degree=degree)
-    z, p = shaken(rod)
-    kappa, force = rod.nodal_curvature(z, p)
-    ref, t = rod.mesh.reference, np.linspace(0, 1, 4000 // rod.mesh.elements)
-    basis = [np.polynomial.legendre.legint(r, lbnd=-1) for r in np.eye(degree + 1)]
-    sums = [0.5 * np.polynomial.legendre.legval(2 * t - 1, b) for b in basis]
-    rows = np.stack(sums, axis=1) @ ref.to_legendre
-    lengths = rod.mesh.lengths[None, :, None]
-    fine = kappa[:, :, :1] + 4 * np.pi**2 * lengths * (force @ rows.T)
-    brute = np.abs(fine).max(axis=(1, 2))
+    z, p = many_equilibria(rod)
+    brute = np.abs(rod.fields(z, p, np.linspace(0, 1, 4001))[:, :, 1]).max(axis=1)
     found, place = rod.largest_curvature(z, p)
-    assert (found >= brute * (1 - 1e-12)).all()
+    assert (found >= brute * (1 - 1e-7)).all()  # the mesh's own error, from vertex to vertex
     np.testing.assert_allclose(found, brute, rtol=1e-5)
-    assert ((place >= 0) & (place <= 1)).all()
     for lane in range(len(z)):
-        there = rod.curvature(min(max(place[lane], 1e-13), 1 - 1e-13)).function(z, p)[lane]
-        if np.abs(rod.mesh.breaks - place[lane]).min() > 1e-9:
-            assert abs(there) == pytest.approx(found[lane], rel=1e-10)
+        there = rod.curvature(min(max(place[lane], 0.0), 1.0)).function(z, p)[lane]
+        assert abs(there) == pytest.approx(found[lane], rel=1e-6)
 
 
 def test_largest_curvature_at_an_end_is_found():
@@ -162,17 +156,17 @@ def test_end_forces_converge_with_twice_the_degree(degree, coarse):
     assert np.log2(errors[0] / errors[1]) > 2 * degree - 0.5
 
 
-def test_error_estimate_bounds_the_error_of_the_curvature():
-    """Against elements of degree 16: the estimate is right within a factor of two."""
-    reference = Rod(elements=12, degree=16)
-    for elements, degree in ((4, 4), (6, 5), (12, 6)):
-        rod = Rod(elements=elements, degree=degree)
-        z, p = loaded(rod)
-        exact = reference.largest_curvature(*loaded(reference))[0][0]
-        error = abs(rod.largest_curvature(z, p)[0][0] - exact)
-        estimate = rod.error_estimate(z, p)[0]
-        assert error < 2 * estimate + 1e-12
-        assert estimate < 2 * error + 1e-12
+@pytest.mark.parametrize(("elements", "degree"), [(4, 5), (6, 6), (6, 9), (12, 6)])
+def test_error_estimate_bounds_the_error_of_curvature_and_height(elements, degree):
+    """Against 24 elements of degree 12; no more than 30 times too large."""
+    rod, reference = Rod(elements=elements, degree=degree), Rod(elements=24, degree=12)
+    s = np.linspace(0, 1, 40)
+    (z, p), (fine, _) = loaded(rod), loaded(reference)
+    error = np.abs(rod.fields(z, p, s) - reference.fields(fine, p, s))[:, :, [1, 3]].max()
+    peak = np.abs(rod.largest_curvature(z, p)[0] - reference.largest_curvature(fine, p)[0])[0]
+    estimate = rod.error_estimate(z, p)[0]
+    assert max(error, peak) < 1.5 * estimate + 1e-11
+    assert estimate < 30 * max(error, peak) + 1e-11
 
 
 def test_mirror_maps_equilibria_to_equilibria():
@@ -194,8 +188,8 @@ def test_work_of_the_load_is_the_moment_of_the_height():
     rod = Rod()
     z, p = loaded(rod)
     s = rod.mesh.nodes
-    heights = np.sin(rod.nodal_angles(z, p)) @ rod.mesh.integration(s).T
-    assert rod.effort(z, p)[0, 2] == pytest.approx(heights[0] @ rod.mesh.weights, abs=1e-9)
+    heights = rod.fields(z, p, s)[0, :, 3]
+    assert rod.effort(z, p)[0, 2] == pytest.approx(heights @ rod.mesh.weights, abs=1e-9)
 
 
 @pytest.mark.parametrize("q", [0.0, 1.5])

@@ -1,6 +1,7 @@
 """Descriptors of the rod."""
 
 import re
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
@@ -17,6 +18,11 @@ WRITTEN = (
     "height(s), x(s), angle(s), curvature(s), max_curvature, energy, support_force(lambda), "
     "support_force(mu), end_moment(0), end_moment(1)"
 )
+REFINING = 6
+"""Newton iterations on the finer rod, started from the interpolated state."""
+SOLVED = 1e-6
+"""Last correction from which one more Newton step would be below round-off."""
+SAMPLES = np.linspace(0.0, 1.0, 25)
 _SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
 
 
@@ -41,46 +47,35 @@ def _symbol(letter: str, s: float) -> str:
     return f"{letter}({_SYMBOLS.get(s, f'{s:g}')})"
 
 
-def coordinate(rod: RodMechanics, s: float, axis: int) -> Descriptor:
-    """x(s) (axis 0) or y(s) (axis 1): the integral of cos θ or sin θ, spectral in elements."""
-    at = _arclength(s)
-    row = rod.mesh.integration(np.array([at]))[0]
-    wave = np.sin if axis else np.cos
+def _field(rod: RodMechanics, s: float, which: int) -> Callable[[Lanes, Parameters], Values]:
+    """θ, κ, x or y (0 … 3) at one arclength."""
+    at = np.array([s])
 
     def value(z: Lanes, p: Parameters) -> Values:
-        return np.asarray(wave(rod.nodal_angles(z, p)) @ row)
+        return rod.fields(z, p, at)[:, 0, which]
 
+    return value
+
+
+def coordinate(rod: RodMechanics, s: float, axis: int) -> Descriptor:
+    """x(s) (axis 0) or y(s) (axis 1)."""
+    at = _arclength(s)
     name, symbol = _written("height" if axis else "x", at), _symbol("y" if axis else "x", at)
-    return Descriptor(name, "L", value, symbol, rod.signature)
+    return Descriptor(name, "L", _field(rod, at, 2 + axis), symbol, rod.signature)
 
 
 def angle(rod: RodMechanics, s: float) -> Descriptor:
-    """θ(s), interpolated in its element."""
+    """θ(s)."""
     at = _arclength(s)
-    row = rod.mesh.interpolation(np.array([at]))[0]
-
-    def value(z: Lanes, p: Parameters) -> Values:
-        return np.asarray(rod.nodal_angles(z, p) @ row)
-
-    return Descriptor(_written("angle", at), "rad", value, _symbol("θ", at), rod.signature)
+    name, value = _written("angle", at), _field(rod, at, 0)
+    return Descriptor(name, "rad", value, _symbol("θ", at), rod.signature)
 
 
 def curvature(rod: RodMechanics, s: float) -> Descriptor:
-    """κ(s): moment at the left end of the element plus the integral of κ' to s."""
+    """κ(s)."""
     at = _arclength(s)
-    element, t = rod.mesh.locate(np.array([at]))
-    e = int(element[0])
-    ref = rod.mesh.reference
-    basis = [np.polynomial.legendre.legint(r, lbnd=-1) for r in np.eye(ref.degree + 1)]
-    x = 2.0 * t[0] - 1.0
-    sums = np.array([0.5 * np.polynomial.legendre.legval(x, b) for b in basis])
-    row = 4.0 * np.pi**2 * rod.mesh.lengths[e] * (sums @ ref.to_legendre)
-
-    def value(z: Lanes, p: Parameters) -> Values:
-        kappa, force = rod.nodal_curvature(z, p)
-        return np.asarray(kappa[:, e, 0] + force[:, e] @ row)
-
-    return Descriptor(_written("curvature", at), "1/L", value, _symbol("κ", at), rod.signature)
+    name, value = _written("curvature", at), _field(rod, at, 1)
+    return Descriptor(name, "1/L", value, _symbol("κ", at), rod.signature)
 
 
 def max_curvature(rod: RodMechanics) -> Descriptor:
@@ -150,16 +145,19 @@ def _fraction(text: str) -> float:
         raise InputError(f"`s` must be a number or a fraction like 1/3; got {text!r}.") from None
 
 
-def curvature_change(
+def discretisation_error(
     rod: RodMechanics, finer: RodMechanics, z: Lanes, p: Parameters
 ) -> Float[np.ndarray, " lanes"]:
-    """|max |κ| on the rod − max |κ| on a finer rod| after Newton on the finer one."""
-    n = finer.unknowns
+    """Largest change of max |κ|, of κ(s) and of y(s) after Newton on a finer rod."""
     matrix = rod.mesh.interpolation(finer.mesh.nodes[1:-1])
     fine = np.concatenate([rod.nodal_angles(z, p) @ matrix.T, z[:, -2:]], axis=1)
     still = np.zeros((len(z), finer.size))
     one, none = np.ones(len(z)), np.zeros(len(z))
-    for _ in range(4):
-        fine = fine + finer.advance(fine, p, np.zeros_like(p), still, one, none).dz
+    for _ in range(REFINING):
+        last = finer.advance(fine, p, np.zeros_like(p), still, one, none).dz
+        fine = fine + last
     change = np.abs(finer.largest_curvature(fine, p)[0] - rod.largest_curvature(z, p)[0])
-    return np.asarray(np.where(np.isfinite(fine[:, :n]).all(axis=1), change, np.inf))
+    fields = np.abs(finer.fields(fine, p, SAMPLES) - rod.fields(z, p, SAMPLES))
+    change = np.maximum(change, fields[:, :, [1, 3]].max(axis=(1, 2)))
+    solved = np.abs(last).max(axis=1) < SOLVED
+    return np.asarray(np.where(solved, change, np.inf))

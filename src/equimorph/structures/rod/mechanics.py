@@ -10,10 +10,10 @@ from equimorph.linalg import BorderedSolution, CondensedLayout
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Advance, Direction, Structure, Symmetry
-from equimorph.structures.rod.curvature.kernels import curvature_lanes, largest_lanes
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.kernels import advance_lanes
 from equimorph.structures.rod.loads import LoadShape
+from equimorph.structures.rod.recovery import Recovery
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -52,32 +52,23 @@ class RodMechanics(Structure):
         theta[:, 0], theta[:, -1] = p[:, 1] + p[:, 0], p[:, 1] - p[:, 0]
         return theta
 
-    def nodal_curvature(
-        self, z: Lanes, p: Parameters
-    ) -> tuple[
-        Float[np.ndarray, "lanes elements order"], Float[np.ndarray, "lanes elements order"]
-    ]:
-        """Curvature at the nodes of each element by moment balance, and κ'/(4π²)."""
-        mesh, order = self.mesh, self.mesh.degree + 1
-        both = np.empty((len(z), 2 * mesh.elements * order))
-        over_lanes(curvature_lanes, self._curvature_data, _contiguous(z, p), [both])
-        kappa, force = np.split(both.reshape(len(z), 2 * mesh.elements, order), 2, axis=1)
-        return kappa, force
-
     @cached_property
-    def _curvature_data(self) -> tuple[np.ndarray, ...]:
-        ref = self.mesh.reference
-        return self.layout.stiffness, self.mesh.lengths, ref.weights, ref.integral, self.rho
+    def recovery(self) -> Recovery:
+        """Fields inside elements with the accuracy of the vertices."""
+        return Recovery(self.mesh, self.load, self.layout.stiffness, self.rho)
+
+    def fields(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes points 4"]:
+        """(θ, κ, x, y) at arclengths, recovered from the vertices."""
+        return self.recovery.fields(np.ascontiguousarray(z), np.ascontiguousarray(p), s)
 
     def largest_curvature(
         self, z: Lanes, p: Parameters
     ) -> tuple[Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
-        ref, out, place = self.mesh.reference, np.empty(len(z)), np.empty(len(z))
-        shared = (*self._curvature_data, ref.nodes, ref.to_legendre)
-        over_lanes(largest_lanes, shared, _contiguous(z, p), [out, place])
-        element = np.minimum(place.astype(int), self.mesh.elements - 1)
-        return out, self.mesh.breaks[element] + (place - element) * self.mesh.lengths[element]
+        z, p = np.ascontiguousarray(z), np.ascontiguousarray(p)
+        return self.recovery.largest_curvature(z, p)
 
     def _coefficients(self, z: Lanes, p: Parameters) -> tuple[Nodal, Nodal]:
         """Factors a of sin θᵢ and b of cos θᵢ in L."""
@@ -218,8 +209,7 @@ class RodMechanics(Structure):
     ) -> Float[np.ndarray, "lanes points 2"]:
         """Positions (x, y) at arclengths `s` (default: 101 equidistant ones), in units of L."""
         at = np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
-        theta, matrix = self.nodal_angles(z, p), self.mesh.integration(at)
-        return np.stack([np.cos(theta) @ matrix.T, np.sin(theta) @ matrix.T], axis=2)
+        return self.fields(z, p, at)[:, :, 2:]
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror x → ν − x for symmetric loads: θ(s) → −θ(1 − s), Δ → −Δ."""

@@ -1,107 +1,191 @@
 """The natural state of the arch: unloaded, continued from the straight rod."""
 
+from dataclasses import dataclass
+from enum import IntEnum
+
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from equimorph.structures.rod.mechanics import RodMechanics
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
 Flags = Bool[np.ndarray, " lanes"]
 
-SCALE_STEPS = 24
+FIRST_STEP = 0.25
 SMALLEST_STEP = 1e-4
+ITERATIONS = 7
+CONVERGED = 1e-6
+"""Newton correction after which the error is below 1e-11, on the way."""
+BEND = 0.5
+"""Largest second Newton correction relative to the first: beyond, the step may change branches."""
+BLOCK = 1024
+"""Lanes continued together: their arrays stay in the cache."""
 
 
-def natural_arch(rod: RodMechanics, p: Parameters) -> tuple[Lanes, Flags]:
-    """State at q = 0 reached from the straight rod, per lane, and whether it was reached.
+class Outcome(IntEnum):
+    """How the continuation to a natural state ended."""
+
+    FOUND = 0
+    NOT_UPRIGHT = 1
+    FREE_FOLD = 2
+    SPAN_FOLD = 3
+    UNRESOLVED = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Natural:
+    """Natural states, how each was met, and where the continuation ended.
+
+    `scale` is the share of the end angles that the free rod has borne, `span` the last span.
+    """
+
+    z: Lanes
+    outcome: Int[np.ndarray, " lanes"]
+    scale: Values
+    span: Values
+
+
+def natural_arch(rod: RodMechanics, p: Parameters) -> Natural:
+    """State at q = 0 reached from the straight rod, per lane.
 
     First λ = 0 and ν free while (Θ, Δ) grow from 0 to their values; then ν moves to its value with
-    (Θ, Δ) held. Lanes where the second part meets a fold, a loss of stability, or Θ ≤ 0 (no upright
-    side) are not found.
+    (Θ, Δ) held. Lanes with Θ ≤ 0 (no upright side) have none, nor those where either part meets a
+    fold or loses stability, nor those that the elements do not resolve.
     """
-    start, nu, found = _scaled_up(rod, p)
-    found &= p[:, 0] > 0.0
-    z = np.full_like(start, np.nan)
-    lanes = np.flatnonzero(found)
-    z[lanes], reached = _moved(rod, start[lanes], p[lanes], nu[lanes])
-    found[lanes] = reached
-    return z, found
+    lanes = len(p)
+    out = Natural(
+        np.full((lanes, rod.size), np.nan), np.zeros(lanes, int), np.zeros(lanes), np.ones(lanes)
+    )
+    upright = p[:, 0] > 0.0
+    out.outcome[~upright] = Outcome.NOT_UPRIGHT
+    for block in np.array_split(np.flatnonzero(upright), lanes // BLOCK + 1):
+        _continue(rod, p, block, out)
+    return out
 
 
-def _scaled_up(
-    rod: RodMechanics, p: Parameters
-) -> tuple[Lanes, Float[np.ndarray, " lanes"], Flags]:
-    """Free-span states (λ = 0) at the end angles of p, with their spans."""
-    lanes, size = len(p), rod.size
-    column, row = np.zeros((lanes, 1, size)), np.zeros((lanes, 1, size))
-    column[:, 0, -2], row[:, 0, -2] = -1.0, 1.0  # ∂F/∂ν, and the equation λ = 0
-    border = (column, row, np.zeros((lanes, 1, 1)))
-    s = rod.mesh.nodes[1:-1]
-    # small angles: θ = Θ(1 − 2s) + Δ(1 − 6s + 6s²) has ∫θ = 0 and θ'' = 12Δ = 4π²μ
-    unit = np.zeros((lanes, size + 1))
-    unit[:, : rod.unknowns] = np.outer(p[:, 0], 1 - 2 * s) + np.outer(p[:, 1], 1 - 6 * s + 6 * s**2)
-    unit[:, -2] = 3.0 * p[:, 1] / np.pi**2
-    x, before, found = np.zeros_like(unit), np.zeros_like(unit), np.ones(lanes, bool)
-    x[:, -1] = before[:, -1] = 1.0
-    at = p.copy()
-    at[:, 2] = 0.0
-    for step in range(1, SCALE_STEPS + 1):
-        at[:, :2] = p[:, :2] * step / SCALE_STEPS
-        guess = 2.0 * x - before if step > 1 else x + unit / SCALE_STEPS
-        before, x = x, guess
-        for _ in range(8):
-            at[:, 3] = x[:, -1]
-            defect = np.concatenate([rod.residual(x[:, :-1], at), x[:, -3:-2]], axis=1)
-            change = rod.solve(x[:, :-1], at, -defect[:, None], border).x[:, 0]
-            x = x + change
-            if np.abs(change).max() < 1e-12:
-                break
-        found &= np.isfinite(x).all(axis=1) & (np.abs(change).max(axis=1) < 1e-8)
-        x[~found] = 0.0
-    return np.ascontiguousarray(x[:, :-1]), x[:, -1], found
+def _continue(
+    rod: RodMechanics, p: Parameters, lanes: Int[np.ndarray, " some"], out: Natural
+) -> None:
+    """Fill in the natural states of some lanes."""
+    stop = p[lanes] * [1.0, 1.0, 0.0, 1.0]
+    x = np.zeros((len(lanes), rod.size + 1))
+    x[:, -1] = 1.0
+    out.scale[lanes], x = _follow(rod, _Part(stop * [0.0, 0.0, 0.0, 1.0], stop, free=True), x)
+    out.span[lanes], free = x[:, -1], out.scale[lanes] >= 1.0
+    out.outcome[lanes[~free]] = Outcome.FREE_FOLD
+    lanes, x, stop = lanes[free], x[free], stop[free]
+    start = stop.copy()
+    start[:, 3] = x[:, -1]
+    last = _Part(start, stop, free=False)
+    t, x = _follow(rod, last, x)
+    out.span[lanes], there = x[:, -1], t >= 1.0
+    # a rod that is pulled straighter cannot fold
+    stretched = stop[:, 3] > start[:, 3]
+    out.outcome[lanes[~there]] = np.where(stretched, Outcome.UNRESOLVED, Outcome.SPAN_FOLD)[~there]
+    reached = np.flatnonzero(there)
+    exact = _newton(rod, last, reached, np.ones(len(reached)), x[reached])[0].x[:, :-1]
+    resolved = rod.resolved(exact, stop[reached])
+    out.outcome[lanes[reached[~resolved]]] = Outcome.UNRESOLVED
+    out.z[lanes[reached[resolved]]] = exact[resolved]
 
 
-def _moved(
-    rod: RodMechanics, z: Lanes, p: Parameters, nu: Float[np.ndarray, " lanes"]
-) -> tuple[Lanes, Flags]:
-    """Move the span from `nu` to its value in p: steps halved until they follow one branch."""
-    lanes = len(z)
-    velocity = np.zeros_like(p)
-    velocity[:, 3] = p[:, 3] - nu
-    t, step = np.zeros(lanes), np.full(lanes, 0.1)
-    tangent = np.zeros_like(z)
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One part of the way, from `start` to `stop`: with λ = 0 and ν free, or with ν prescribed."""
+
+    start: Parameters
+    stop: Parameters
+    free: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Lanes on the way: share t of the part, x = (z, ν), and its slope dx/dt where ν is held."""
+
+    t: Values
+    x: Float[np.ndarray, "lanes extended"]
+    slope: Float[np.ndarray, "lanes extended"]
+
+    def __getitem__(self, lanes: np.ndarray) -> "_Point":
+        return _Point(self.t[lanes], self.x[lanes], self.slope[lanes])
+
+    def put(self, lanes: np.ndarray, other: "_Point") -> None:
+        """Overwrite some lanes."""
+        self.t[lanes], self.x[lanes], self.slope[lanes] = other.t, other.x, other.slope
+
+
+def _follow(
+    rod: RodMechanics, part: _Part, x: Float[np.ndarray, "lanes extended"]
+) -> tuple[Values, Float[np.ndarray, "lanes extended"]]:
+    """Move x = (z, ν) along a part: the share of it that was reached, 1 if all, and x there."""
+    here = _newton(rod, part, np.arange(len(x)), np.zeros(len(x)), x)[0]
+    before = _Point(here.t.copy(), here.x.copy(), here.slope.copy())
+    step = np.full(len(x), FIRST_STEP)
     for _ in range(400):
-        active = np.flatnonzero((t < 1.0) & (step > SMALLEST_STEP))
+        active = np.flatnonzero((here.t < 1.0) & (step > SMALLEST_STEP))
         if len(active) == 0:
             break
-        target = np.minimum(t[active] + step[active], 1.0)
-        tangent = _newton(rod, z[active], p[active], velocity[active], t[active], 1)[1]
-        guess = z[active] + tangent * (target - t[active])[:, None]
-        end, _, good = _newton(rod, guess, p[active], velocity[active], target, 7)
-        moved = np.abs(end - z[active]).max(axis=1)
-        good &= np.abs(end - guess).max(axis=1) <= 0.25 * moved + 1e-9
-        taken = active[good]
-        z[taken], t[taken] = end[good], target[good]
-        step[active] *= np.where(good, 1.5, 0.5)
-    return z, t >= 1.0
+        old = here[active]
+        target = np.minimum(old.t + step[active], 1.0)
+        guess = old.x if part.free else _predicted(before[active], old, target)
+        new, bend = _newton(rod, part, active, target, guess)
+        if not part.free:
+            way, off = (np.abs(new.x - x).max(axis=1) for x in (old.x, guess))
+            bend = np.maximum(bend, off / np.maximum(way, 1e-6))
+        good = bend <= BEND
+        before.put(active[good], old[good])
+        here.put(active[good], new[good])
+        step[active] *= np.clip(np.sqrt(0.5 * BEND / np.maximum(bend, 1e-12)), 0.3, 3.0)
+    return here.t, here.x
+
+
+def _predicted(before: _Point, here: _Point, t: Values) -> Float[np.ndarray, "lanes extended"]:
+    """Cubic through two points with their slopes; the line where there is one point only."""
+    width = here.t - before.t
+    alone = width == 0.0
+    width = np.where(alone, 1.0, width)[:, None]
+    s = (t[:, None] - before.t[:, None]) / width
+    cubic = before.x + s * s * (3.0 - 2.0 * s) * (here.x - before.x)
+    cubic += width * s * (s - 1.0) * ((s - 1.0) * before.slope + s * here.slope)
+    line = here.x + (t - here.t)[:, None] * here.slope
+    return np.asarray(np.where(alone[:, None], line, cubic))
 
 
 def _newton(
     rod: RodMechanics,
-    z: Lanes,
-    p: Parameters,
-    velocity: Parameters,
-    t: Float[np.ndarray, " lanes"],
-    iterations: int,
-) -> tuple[Lanes, Lanes, Flags]:
-    """Newton at fixed parameters; state, tangent dz/dt, and whether it is a stable equilibrium."""
-    at = p.copy()
-    at[:, 2] = 0.0
-    at[:, 3] += (t - 1.0) * velocity[:, 3]
-    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
-    for _ in range(iterations):
-        step = rod.advance(z, at, velocity, still, one, none)
-        z = z + step.dz
-    small = np.abs(step.dz).max(axis=1) < 1e-9
-    return z, step.tangent_z, small & (step.index == 0)
+    part: _Part,
+    lanes: Int[np.ndarray, " lanes"],
+    t: Values,
+    guess: Float[np.ndarray, "lanes extended"],
+) -> tuple[_Point, Values]:
+    """Solve at share t of the part; the point, and the second correction relative to the first.
+
+    Infinite where Newton does not converge or the equilibrium is not stable: the free span also
+    needs dν/dλ < 0.
+    """
+    change = part.stop[lanes] - part.start[lanes]
+    at = part.start[lanes] + t[:, None] * change
+    z, nu, span = np.ascontiguousarray(guess[:, :-1]), guess[:, -1].copy(), at[:, 3].copy()
+    velocity, row = np.zeros_like(at), np.zeros_like(z)
+    velocity[:, 3] = 1.0
+    row[:, -2] = float(part.free)
+    corner = np.full(len(z), float(not part.free))
+    first, worst = np.zeros(len(z)), np.zeros(len(z))
+    for k in range(ITERATIONS):
+        at[:, 3] = nu
+        step = rod.advance(z, at, velocity, row, corner, z[:, -2] if part.free else nu - span)
+        z, nu = z + step.dz, nu + step.dt
+        size = np.abs(step.dz).max(axis=1)
+        first = size if k == 0 else first
+        worst = worst if k == 0 else np.maximum(worst, size)
+        if not (size > CONVERGED).any():
+            break
+    stable = (step.index == 0) & ((step.tangent_t < 0.0) if part.free else True)
+    bend = np.where(stable & (size <= CONVERGED), worst / np.maximum(first, 1e-6), np.inf)
+    slope = np.zeros_like(guess)
+    if not part.free:  # the last matrix is that of the point, but for a correction below 1e-6
+        slope[:, :-1] = step.tangent_z * change[:, 3:]
+        slope[:, -1] = change[:, 3]
+    return _Point(t, np.concatenate([z, nu[:, None]], axis=1), slope), bend

@@ -13,7 +13,7 @@ from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.discretisation import mesh_with_kinks
 from equimorph.structures.rod.loads import LoadSpec, load_shape
 from equimorph.structures.rod.mechanics import RodMechanics
-from equimorph.structures.rod.natural import natural_arch
+from equimorph.structures.rod.natural import Natural, Outcome, natural_arch
 from equimorph.structures.states import State, States
 
 Lanes = Float[np.ndarray, "lanes size"]
@@ -22,13 +22,32 @@ Parameters = Float[np.ndarray, "lanes parameters"]
 DEFAULT_SPAN = float(np.sin(1.0))
 
 
+def _why_not(natural: Natural) -> str:
+    """Reason and remedy for one state that was not found."""
+    match natural.outcome[0]:
+        case Outcome.NOT_UPRIGHT:
+            return "Choose Theta > 0."
+        case Outcome.FREE_FOLD:
+            return (
+                f"The free rod folds at {natural.scale[0]:.3g} of these angles. "
+                "Choose smaller angles."
+            )
+        case Outcome.SPAN_FOLD:
+            return (
+                f"Continued from the free rod it ends at nu={natural.span[0]:.9g}. "
+                "Choose a span nearer to the free one."
+            )
+    return "It bends too sharply for the elements. Choose more elements, or a smaller span."
+
+
 class Rod(RodMechanics):
     """Planar, inextensible, unshearable elastic rod of length 1 with clamped ends.
 
     Energy ``E = ∫ θ'²/(8π²) ds − q ∫ ρ sin θ ds`` with ``ρ = ∫₀ˢ Q``; constraints ``∫ cos θ = ν``
     and ``∫ sin θ = 0``; end angles θ(0) = Δ + Θ, θ(1) = Δ − Θ. Gauss–Lobatto elements with
     quadrature at the nodes, so that energy, residual and Hessian agree exactly; element ends meet
-    the kinks of the load. Scales: lengths by L, forces by 4π²B/L², energies by 4π²B/L, curvature
+    the kinks of the load. Fields are recovered from the elements' ends, where they converge with
+    twice the degree. Scales: lengths by L, forces by 4π²B/L², energies by 4π²B/L, curvature
     by 1/L.
 
     Parameters
@@ -40,8 +59,8 @@ class Rod(RodMechanics):
     kinks
         Arclengths at which a callable Q is not smooth.
     elements, degree
-        Resolution: the default keeps limit loads, heights and max |κ| within 1e-8 for
-        max |κ| ≤ 20.
+        Resolution: the default keeps limit loads, heights and curvature within 1e-8 for
+        max |κ| ≤ 10; `error_estimate` tells what it is worth beyond.
 
     Raises
     ------
@@ -60,8 +79,8 @@ class Rod(RodMechanics):
         span: float = DEFAULT_SPAN,
         *,
         kinks: Sequence[float] = (),
-        elements: int = 12,
-        degree: int = 8,
+        elements: int = 6,
+        degree: int = 9,
     ) -> None:
         if not (isinstance(elements, int) and elements >= 2):
             raise InputError(f"`elements` must be a whole number >= 2; got {elements!r}.")
@@ -119,7 +138,8 @@ class Rod(RodMechanics):
 
     def natural(self, p: Parameters) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
         """Unloaded arch, continued from the straight rod."""
-        return natural_arch(self, p)
+        natural = natural_arch(self, p)
+        return natural.z, natural.outcome == Outcome.FOUND
 
     def unloaded(self) -> Mapping[str, float]:
         """q = 0."""
@@ -132,18 +152,18 @@ class Rod(RodMechanics):
         ------
         InputError
             For unknown or meaningless parameters, q ≠ 0, Θ ≤ 0 (the straight rod has no upright
-            side), or where the continuation meets a fold.
+            side), where the continuation meets a fold, or where the elements do not resolve it.
         """
         if values.get("q", 0.0) != 0.0:
             raise InputError(f"`q` must be 0 in the natural state; got {values['q']!r}.")
         p = parameter_vector(self.parameters, values)
-        z, found = self.natural(p[None])
-        if not found[0]:
+        natural = natural_arch(self, p[None])
+        if natural.outcome[0] != Outcome.FOUND:
             raise InputError(
                 f"`Theta`, `Delta` must have a natural state; got Theta={p[0]:g}, Delta={p[1]:g} "
-                f"at nu={p[3]:g}. Choose Theta > 0."
+                f"at nu={p[3]:g}. {_why_not(natural)}"
             )
-        return State(self, z[0], p)
+        return State(self, natural.z[0], p)
 
     def natural_states(self, p: Parameters) -> tuple[States, Bool[np.ndarray, " lanes"]]:
         """Natural states of many settings, and which of them were found."""
@@ -151,8 +171,13 @@ class Rod(RodMechanics):
         return States(self, z, p), found
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
-        """Change of max |κ| when the state is solved again with elements of a higher degree."""
-        return descriptors.curvature_change(self, self.refined(), z, p)
+        """Change of curvature and height when the state is solved again with a higher degree.
+
+        The largest change of max |κ|, and of κ(s) and y(s) at 25 arclengths; the heights' part is
+        the smallest by far. Infinite where the finer rod has no equilibrium beside the state, as
+        may happen at a fold.
+        """
+        return descriptors.discretisation_error(self, self.refined(), z, p)
 
     # --- descriptors ------------------------------------------------------------------------
 
@@ -169,7 +194,7 @@ class Rod(RodMechanics):
         return descriptors.angle(self, s)
 
     def curvature(self, s: float) -> Descriptor:
-        """κ(s) in units of 1/L, by moment balance."""
+        """κ(s) in units of 1/L."""
         return descriptors.curvature(self, s)
 
     @cached_property

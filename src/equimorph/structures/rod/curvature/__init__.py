@@ -1,1 +1,0 @@
-"""Curvature of the rod by moment balance, and its largest value."""

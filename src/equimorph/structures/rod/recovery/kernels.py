@@ -1,0 +1,303 @@
+"""Compiled kernels of the recovery, eight lanes at a time; at least eight lanes.
+
+From a vertex, where θ and κ are superconvergent, the rod's equation ``κ' = 4π² f`` with
+``f = −λ sin θ + (μ − qρ) cos θ`` is followed by Taylor series. With ``κ = Σ c_k τ^k`` the series
+of the waves obey ``k S_k = Σ_j c_{j−1} C_{k−j}`` and ``k C_k = −Σ_j c_{j−1} S_{k−j}``, j = 1 … k.
+"""
+
+import numpy as np
+from numba import njit
+
+from equimorph.linalg.kernels import FLAGS, INNER, write_lanes
+from equimorph.linalg.simd import (
+    LANES,
+    absolute,
+    lanes_less,
+    larger,
+    load,
+    load2,
+    repeat2,
+    row_of,
+    sincos,
+    spread,
+    stack2,
+    store,
+    where_less,
+    work_rows,
+)
+from equimorph.structures.rod.kernels import LAMBDA, MU, Q, read_state
+
+FOUR_PI_SQUARED = 4.0 * np.pi**2
+ORDER = np.int64(16)
+"""Terms of the series of sin θ and cos θ; κ has one more, θ two."""
+REACH = 0.6
+"""Longest step, times the rate at which the series grow: its last term is below 1e-13."""
+MOST_STEPS = 12
+THETA, KAPPA, X, Y = range(4)
+"""Rows of a local state."""
+DISTANCE, WIDTH, CENTRE = range(3)
+"""Rows of the moves: from a vertex to a sought extremum, how far it may be off, its arclength."""
+NEWTON = 4
+"""Iterations from a secant's root of κ' to round-off in κ, which is stationary there."""
+
+
+@njit(**INNER)
+def _expand(state, pull, terms, lam, waves, slopes):
+    """Series about a local state: rows (sin, cos) of waves, κ in slopes; pull holds μ − qρ."""
+    sine, cosine = sincos(load(state, THETA))
+    store(waves, 0, stack2(sine, cosine))
+    store(slopes, 0, load(state, KAPPA))
+    for k in range(ORDER):
+        if k > 0:
+            total = repeat2(spread(0.0))
+            for j in range(k):
+                total = total + repeat2(load(slopes, j)) * load2(waves, 2 * (k - 1 - j))
+            inverse = spread(1.0 / k)
+            sine, cosine = row_of(total, 1) * inverse, spread(0.0) - row_of(total, 0) * inverse
+            store(waves, 2 * k, stack2(sine, cosine))
+        force = spread(0.0) - lam * sine
+        for j in range(min(k + 1, terms)):
+            force = force + load(pull, j) * load(waves, 2 * (k - j) + 1)
+        store(slopes, k + 1, force * spread(FOUR_PI_SQUARED / (k + 1)))
+
+
+@njit(**INNER)
+def _step(state, pull, terms, waves, slopes, distance):
+    """Move a local state, and the centre of the load's polynomial, along its series."""
+    kappa, turned = load(slopes, ORDER), load(slopes, ORDER) * spread(1.0 / (ORDER + 1))
+    along = repeat2(spread(0.0))
+    for k in range(ORDER - 1, -1, -1):
+        kappa = load(slopes, k) + distance * kappa
+        turned = load(slopes, k) * spread(1.0 / (k + 1)) + distance * turned
+        along = load2(waves, 2 * k) * repeat2(spread(1.0 / (k + 1))) + repeat2(distance) * along
+    store(state, THETA, load(state, THETA) + distance * turned)
+    store(state, KAPPA, kappa)
+    store(state, X, load(state, X) + distance * row_of(along, 1))
+    store(state, Y, load(state, Y) + distance * row_of(along, 0))
+    for i in range(terms - 1):
+        for j in range(terms - 2, i - 1, -1):
+            store(pull, j, load(pull, j) + distance * load(pull, j + 1))
+
+
+@njit(**INNER)
+def _follow(state, pull, terms, lam, waves, slopes, distance):
+    """Move a local state over a distance in equal steps that the series can take."""
+    forces = spread(2.0 * FOUR_PI_SQUARED) * (absolute(lam) + absolute(load(pull, 0)))
+    kappa = load(state, KAPPA)
+    square = distance * distance * (kappa * kappa + forces)
+    store(waves, 0, square)
+    most = 0.0
+    for k in range(LANES):
+        most = max(most, waves[0, k])
+    steps = min(max(np.ceil(np.sqrt(most) / REACH), 1.0), MOST_STEPS)
+    part = distance * spread(1.0 / steps)
+    for _ in range(np.int64(steps)):
+        _expand(state, pull, terms, lam, waves, slopes)
+        _step(state, pull, terms, waves, slopes, part)
+
+
+@njit(**INNER)
+def _vertex_curvature(stiffness, pressures, e, side, theta, force):
+    """κ at the left (side 0) or right vertex of an element, by balance of its moment.
+
+    `force` is f there, `pressures` the quadrature weight of a vertex in each element.
+    """
+    order = stiffness.shape[1]
+    base, own = e * (order - 1), side * (order - 1)
+    moment = spread(pressures[e]) * force
+    for i in range(order):
+        moment = moment + spread(stiffness[e, own, i]) * load(theta, base + i)
+    return spread((2.0 * side - 1.0) * FOUR_PI_SQUARED) * moment
+
+
+@njit(**FLAGS)
+def fields_lanes(stiffness, pressures, weights, rho, rises, element, side, distance, z, p, out):
+    """θ, κ, x and y at points of every lane; out (lanes, 4 · points).
+
+    A point lies at `distance` from the left (side 0) or right vertex of its `element`. weights
+    (elements, degree + 1); rho at the nodes; rises (elements, 2, terms): Taylor coefficients of ρ
+    about both vertices.
+    """
+    elements, degree, terms = stiffness.shape[0], stiffness.shape[1] - 1, rises.shape[2]
+    n, points = z.shape[1] - 2, len(element)
+    theta, scalars, nodal = work_rows(n + 3), work_rows(4), work_rows(2 * (n + 2))
+    places, results = work_rows(2 * (elements + 1)), work_rows(4 * points)
+    state, pull = work_rows(4), work_rows(terms)
+    waves, slopes = work_rows(2 * ORDER), work_rows(ORDER + 1)
+    for block in range(0, z.shape[0], LANES):
+        start = min(block, z.shape[0] - LANES)
+        read_state(z, p, start, n, theta, scalars)
+        lam, mu, q = load(scalars, LAMBDA), load(scalars, MU), load(scalars, Q)
+        for i in range(n + 2):
+            sine, cosine = sincos(load(theta, i))
+            store(nodal, 2 * i, stack2(sine, cosine))
+        _vertex_places(weights, nodal, places)
+        for point in range(points):
+            e, right = element[point], side[point]
+            vertex = e + right
+            node = vertex * degree
+            sine, cosine = load(nodal, 2 * node), load(nodal, 2 * node + 1)
+            force = (mu - q * spread(rho[node])) * cosine - lam * sine
+            store(state, THETA, load(theta, node))
+            kappa = _vertex_curvature(stiffness, pressures, e, right, theta, force)
+            store(state, KAPPA, kappa)
+            store(state, X, load(places, 2 * vertex + 1))
+            store(state, Y, load(places, 2 * vertex))
+            if distance[point] != 0.0:
+                store(pull, 0, mu - q * spread(rises[e, right, 0]))
+                for j in range(1, terms):
+                    store(pull, j, spread(0.0) - q * spread(rises[e, right, j]))
+                _follow(state, pull, terms, lam, waves, slopes, spread(distance[point]))
+            for row in range(4):
+                store(results, 4 * point + row, load(state, row))
+        write_lanes(results, 0, 1, out, start * 4 * points, 4 * points, 4 * points)
+
+
+@njit(**INNER)
+def _vertex_places(weights, nodal, places):
+    """(y, x) of every vertex: quadrature of (sin θ, cos θ) over the elements before it."""
+    degree = weights.shape[1] - 1
+    total = repeat2(spread(0.0))
+    store(places, 0, total)
+    for e in range(weights.shape[0]):
+        for i in range(degree + 1):
+            total = total + repeat2(spread(weights[e, i])) * load2(nodal, 2 * (e * degree + i))
+        store(places, 2 * (e + 1), total)
+
+
+@njit(**FLAGS)
+def largest_lanes(stiffness, pressures, breaks, nodes, integral, rho, rises, z, p, largest, place):
+    """Largest |κ| over s of each lane and where: vertices, then every extremum that may exceed.
+
+    Where κ' changes sign between nodes an extremum is sought from the nearer vertex, the most
+    promising of each lane first.
+    """
+    elements, order, terms = stiffness.shape[0], stiffness.shape[1], rises.shape[2]
+    n = z.shape[1] - 2
+    theta, scalars, forces = work_rows(n + 3), work_rows(4), work_rows(n + 2)
+    ends, best = work_rows(2 * elements), work_rows(2)
+    state, pull, moves = work_rows(4), work_rows(terms), work_rows(3)
+    waves, slopes = work_rows(2 * ORDER), work_rows(ORDER + 1)
+    found = np.empty((LANES, elements * order, 3))
+    count = np.empty(LANES, np.int64)
+    for block in range(0, z.shape[0], LANES):
+        start = min(block, z.shape[0] - LANES)
+        read_state(z, p, start, n, theta, scalars)
+        lam, mu, q = load(scalars, LAMBDA), load(scalars, MU), load(scalars, Q)
+        for i in range(n + 2):
+            sine, cosine = sincos(load(theta, i))
+            store(forces, i, (mu - q * spread(rho[i])) * cosine - lam * sine)
+        _vertex_maximum(stiffness, pressures, breaks, theta, forces, ends, best)
+        count[:] = 0
+        for e in range(elements):
+            _note_extrema(e, breaks, nodes, integral, forces, ends, best, found, count, moves)
+        state[:] = 0.0
+        pull[:] = 0.0
+        while _next_extrema(
+            breaks, order, rises, theta, scalars, ends, best, found, count, state, pull, moves
+        ):
+            _follow(state, pull, terms, lam, waves, slopes, load(moves, DISTANCE))
+            _expand(state, pull, terms, lam, waves, slopes)
+            _take_extremum(slopes, moves, best)
+        for k in range(LANES):
+            largest[start + k], place[start + k] = best[0, k], best[1, k]
+
+
+@njit(**INNER)
+def _vertex_maximum(stiffness, pressures, breaks, theta, forces, ends, best):
+    """κ of both vertices of every element; the largest |κ| and its arclength into best."""
+    elements, degree = stiffness.shape[0], stiffness.shape[1] - 1
+    most, where = spread(0.0), spread(0.0)
+    for e in range(elements):
+        for side in range(2):
+            force = load(forces, (e + side) * degree)
+            kappa = _vertex_curvature(stiffness, pressures, e, side, theta, force)
+            store(ends, 2 * e + side, kappa)
+            value = absolute(kappa)
+            where = where_less(most, value, spread(breaks[e + side]), where)
+            most = larger(most, value)
+    store(best, 0, most)
+    store(best, 1, where)
+
+
+@njit(**INNER)
+def _note_extrema(e, breaks, nodes, integral, forces, ends, best, found, count, spill):
+    """Append the extrema in an element that may exceed the best: bound, element + t, width.
+
+    κ' changes sign between two nodes; from the left one |κ| can grow by the width times the slope
+    there, twice what a straight slope would give.
+    """
+    order, base, length = len(nodes), e * (len(nodes) - 1), breaks[e + 1] - breaks[e]
+    limit = load(best, 0) * spread(1.0 + 1e-12)
+    for i in range(order - 1):
+        left, right = load(forces, base + i), load(forces, base + i + 1)
+        turning = lanes_less(left * right, spread(0.0))
+        if turning == 0:
+            continue
+        kappa = spread(0.0)
+        for j in range(order):
+            kappa = kappa + spread(integral[i, j]) * load(forces, base + j)
+        kappa = load(ends, 2 * e) + spread(FOUR_PI_SQUARED * length) * kappa
+        width = (nodes[i + 1] - nodes[i]) * length
+        bound = absolute(kappa) + spread(FOUR_PI_SQUARED * width) * absolute(left)
+        store(spill, 0, bound)
+        store(spill, 1, left / (left - right))
+        turning &= lanes_less(limit, bound)
+        for k in range(LANES):
+            if turning >> k & 1:
+                t = nodes[i] + spill[1, k] * (nodes[i + 1] - nodes[i])
+                found[k, count[k], 0], found[k, count[k], 1] = spill[0, k], e + t
+                found[k, count[k], 2] = width
+                count[k] += 1
+
+
+@njit(**INNER)
+def _next_extrema(
+    breaks, order, rises, theta, scalars, ends, best, found, count, state, pull, moves
+):
+    """Set out from the vertex nearest to each lane's most promising extremum; whether any is left.
+
+    Lanes without one stay where they are, with nothing to move.
+    """
+    some = False
+    for k in range(LANES):
+        top, bound = -1, best[0, k] * (1.0 + 1e-12)
+        for c in range(count[k]):
+            if found[k, c, 0] > bound:
+                top, bound = c, found[k, c, 0]
+        moves[DISTANCE, k] = moves[WIDTH, k] = 0.0
+        if top < 0:
+            continue
+        some, found[k, top, 0] = True, 0.0
+        e = np.int64(found[k, top, 1])
+        t = found[k, top, 1] - e
+        side = np.int64(t > 0.5)
+        q = scalars[Q, k]
+        moves[DISTANCE, k] = (t - side) * (breaks[e + 1] - breaks[e])
+        moves[WIDTH, k] = found[k, top, 2]
+        moves[CENTRE, k] = breaks[e + side] + moves[DISTANCE, k]
+        state[THETA, k], state[KAPPA, k] = theta[(e + side) * (order - 1), k], ends[2 * e + side, k]
+        pull[0, k] = scalars[MU, k] - q * rises[e, side, 0]
+        for j in range(1, rises.shape[2]):
+            pull[j, k] = -q * rises[e, side, j]
+    return some
+
+
+@njit(**INNER)
+def _take_extremum(slopes, moves, best):
+    """Newton on the series of κ' from its centre, kept within the width; κ there into best."""
+    at, width = spread(0.0), load(moves, WIDTH)
+    for _ in range(NEWTON):
+        slope, bend = spread(0.0), spread(0.0)
+        for k in range(ORDER, 0, -1):
+            bend = slope + at * bend
+            slope = spread(k) * load(slopes, k) + at * slope
+        moved = at - slope / bend
+        at = where_less(absolute(moved), width, moved, at)
+    kappa = spread(0.0)
+    for k in range(ORDER, -1, -1):
+        kappa = load(slopes, k) + at * kappa
+    kappa, most = absolute(kappa), load(best, 0)
+    better = where_less(spread(0.0), width, kappa, most)
+    store(best, 1, where_less(most, better, load(moves, CENTRE) + at, load(best, 1)))
+    store(best, 0, where_less(most, better, better, most))

@@ -1,0 +1,106 @@
+"""Natural states of the rod: which exist, and what is said where none does."""
+
+import numpy as np
+import pytest
+
+from equimorph.errors import InputError
+from equimorph.structures import Rod, States
+from equimorph.structures.rod import natural
+from equimorph.structures.rod.natural import Outcome, natural_arch
+
+SPAN = float(np.sin(1.0))
+
+
+def settings(thetas, deltas, nu=SPAN):
+    grid = np.stack(np.meshgrid(thetas, deltas, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.column_stack([grid, np.zeros(len(grid)), np.full(len(grid), nu)])
+
+
+def test_natural_states_are_stable_unloaded_equilibria_over_the_box():
+    """Θ from 0.2 to 2.5, Δ from −2 to 2: every state found; none only where the free rod folds."""
+    rod, p = Rod(), settings(np.linspace(0.2, 2.5, 12), np.linspace(-2, 2, 9))
+    found = natural_arch(rod, p)
+    assert set(found.outcome) == {Outcome.FOUND, Outcome.FREE_FOLD}
+    there = found.outcome == Outcome.FOUND
+    states = States(rod, found.z[there], p[there])
+    assert states.residual.max() < 1e-12
+    assert (states.index == 0).all()
+    assert np.isnan(found.z[~there]).all()
+    corner = np.abs(p[:, 1]) + p[:, 0] > 3.7
+    assert (corner[~there]).all()
+
+
+def test_which_states_exist_depends_neither_on_mesh_nor_on_steps(monkeypatch):
+    """Finer elements and steps a third as long; fold scales within 1e-3, the smallest step's."""
+    p = settings(np.linspace(1.6, 2.5, 7), np.linspace(1.2, 2.0, 5))
+    coarse = natural_arch(Rod(), p)
+    monkeypatch.setattr(natural, "BEND", 0.1)
+    fine = natural_arch(Rod(elements=12, degree=8), p)
+    np.testing.assert_array_equal(coarse.outcome, fine.outcome)
+    np.testing.assert_allclose(coarse.scale, fine.scale, atol=1e-3)
+    there = coarse.outcome == Outcome.FOUND
+    np.testing.assert_allclose(coarse.z[there, -2:], fine.z[there, -2:], atol=1e-3)
+
+
+def test_the_free_rod_really_folds_where_it_is_said_to():
+    """At Θ = Δ = 2: dν/dλ grows without bound as the scale nears the fold (λ = 0 all the way).
+
+    Near a fold the square of its inverse falls linearly to zero; extrapolated from scales 0.90 to
+    0.92 by a parabola, within 0.003.
+    """
+    rod = Rod(elements=12, degree=8)
+    scale = natural_arch(rod, settings([2.0], [2.0])).scale[0]
+    row = np.zeros((1, rod.size))
+    row[0, -2] = 1.0
+    at = np.array([0.90, 0.91, 0.92])
+    slopes = []
+    for t in at:
+        p = settings([2.0 * t], [2.0 * t])
+        z = _free_state(rod, p)
+        nu = np.array([np.cos(rod.nodal_angles(z, p)[0]) @ rod.mesh.weights])
+        p[:, 3] = nu
+        step = rod.advance(z, p, np.eye(4)[3:], row, np.zeros(1), z[:, -2].copy())
+        assert np.abs(step.dz).max() < 1e-8
+        slopes.append(step.tangent_t[0])
+    square = 1.0 / np.array(slopes) ** 2
+    line = np.polyfit(at, square, 2)
+    roots = np.roots(line).real
+    assert np.abs(roots - scale).min() < 3e-3
+
+
+def _free_state(rod, p):
+    """Free-span state at the end angles of p, by the package's own continuation."""
+    part = natural._Part(p * [0.0, 0.0, 0.0, 1.0], p, free=True)
+    x = np.zeros((1, rod.size + 1))
+    x[0, -1] = 1.0
+    return np.ascontiguousarray(natural._follow(rod, part, x)[1][:, :-1])
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"Theta": 2.0, "Delta": 2.0}, r"The free rod folds at 0\.93 of these angles"),
+        ({"Theta": 1.0, "nu": 1 - 1e-8}, "It bends too sharply for the elements"),
+        ({"Theta": -1.0}, "Choose Theta > 0"),
+    ],
+)
+def test_what_is_missing_is_named_with_its_reason(values, text):
+    with pytest.raises(InputError, match=text):
+        Rod().natural_state(**values)
+
+
+def test_a_nearly_straight_rod_has_its_natural_state():
+    """Small angles: θ = Θ(1 − 2s) has the free span 1 − Θ²/6; 1e-8: Θ⁴/120 at Θ = 0.02."""
+    state = Rod().natural_state(Theta=0.02, nu=1 - 0.02**2 / 6)
+    assert abs(state.multipliers[0]) < 1e-4
+    assert state.stable
+
+
+def test_states_of_a_batch_do_not_depend_on_the_batch(monkeypatch):
+    """Settings continued alone and together agree to the accuracy of Newton's last step."""
+    rod, p = Rod(), settings(np.linspace(0.3, 2.4, 9), np.linspace(-1.9, 1.9, 7))
+    together = natural_arch(rod, p)
+    monkeypatch.setattr(natural, "BLOCK", 3)
+    apart = natural_arch(rod, p)
+    np.testing.assert_array_equal(together.outcome, apart.outcome)
+    np.testing.assert_allclose(together.z, apart.z, atol=1e-9)
