@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracles.shooting import LEFT_HALF, UNIFORM, Load, from_package
 
 from equimorph.equilibria.newton import newton
 from equimorph.structures import Rod, State, States
+from oracles.shooting import LEFT_HALF, UNIFORM, Load, from_package
 
 SPOTS = (0.1234, 1 / 3, 0.46, 0.7, 0.9)
 

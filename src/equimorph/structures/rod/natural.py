@@ -52,7 +52,7 @@ def natural_arch(rod: RodMechanics, p: Parameters) -> Natural:
 
     First λ = 0 and ν free while (Θ, Δ) grow from 0 to their values; then ν moves to its value with
     (Θ, Δ) held. Lanes with Θ ≤ 0 (no upright side) have none, nor those where either part meets a
-    fold or loses stability, nor those that the elements do not resolve.
+    fold or loses stability, nor those whose bends become too sharp for the elements.
     """
     lanes = len(p)
     out = Natural(
@@ -86,9 +86,7 @@ def _continue(
     out.outcome[lanes[~there]] = np.where(stretched, Outcome.UNRESOLVED, Outcome.SPAN_FOLD)[~there]
     reached = np.flatnonzero(there)
     exact = _newton(rod, last, reached, np.ones(len(reached)), x[reached])[0].x[:, :-1]
-    resolved = rod.resolved(exact, stop[reached])
-    out.outcome[lanes[reached[~resolved]]] = Outcome.UNRESOLVED
-    out.z[lanes[reached[resolved]]] = exact[resolved]
+    out.z[lanes[reached]] = exact
 
 
 @dataclass(frozen=True, eq=False)

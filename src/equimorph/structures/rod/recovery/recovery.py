@@ -22,7 +22,7 @@ NEGLIGIBLE = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """Fields anywhere on the rod with the accuracy of the vertices: errors of order 2N for degree N.
+    """Fields anywhere on the rod as accurate as at its vertices: errors of order 2N for degree N.
 
     θ and the moments are superconvergent at the vertices, λ and μ everywhere; inside an element θ
     of degree N is less accurate. So the equilibrium equation is integrated from the nearest vertex,
