@@ -14,9 +14,11 @@ from equimorph.equilibria.limit import LimitLoad, limit_load
 from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.search import distinct, find_equilibria
+from equimorph.equilibria.switching import Branch, branches
 from equimorph.equilibria.tracing import TraceOptions
 
 __all__ = [
+    "Branch",
     "CriticalCurve",
     "Event",
     "LimitLoad",
@@ -26,6 +28,7 @@ __all__ = [
     "Path",
     "TraceOptions",
     "branch_curve",
+    "branches",
     "check_start",
     "constraint_curve",
     "cusp_curve",

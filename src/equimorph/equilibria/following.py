@@ -1,6 +1,6 @@
 """Following loci by pseudo-arclength, with the special points on the way and how they end."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,8 @@ ZERO = 1e-9
 """Size of a watched test that counts as zero: noise of tests that vanish identically."""
 CLOSE = 0.05
 """Least value inside a step, as a share of those at its ends, that asks for shorter steps."""
+BISECTIONS = 5
+"""Halvings of a step in which the index changes."""
 NARROW = 1e-3
 """Share of the first step below which hidden pairs of special points are not told apart."""
 
@@ -199,61 +201,89 @@ def _landmarks(
     """Special points and ends within a step, in order."""
     step, found = after.travelled - walk.travelled, []
     for watch, low, high in zip(watches, walk.values, after.values, strict=True):
-        leaving = watch.ends and high > 0.0
-        if low * high < 0.0 if not watch.ends else leaving:
-            share = _root(locus, walk, step, watch.test, (low, high))
-            found.append((share, watch.kind, watch.detail, watch.ends))
+        if high > 0.0 if watch.ends else low * high < 0.0:
+            length = _by_newton(locus, walk, step, watch.test, (low, high))
+            if length is None and after.index != walk.index and not watch.ends:
+                continue  # tests have poles where a second eigenvalue vanishes
+            if length is None:
+                length = _by_bracketing(locus, walk, step, watch.test, (low, high))
+            mark = Landmark(
+                watch.kind, _part(locus, walk, length), walk.travelled + length, watch.detail
+            )
+            found.append((mark, watch.ends))
     if after.index != walk.index:
-        found.append((_double(locus, walk, step), *_SECOND[locus.singular], False))
-    return [
-        (Landmark(kind, _part(locus, walk, length), walk.travelled + length, detail), ends)
-        for length, kind, detail, ends in sorted(found, key=lambda entry: entry[0])
-    ]
+        length, spot = _double(locus, walk, step)
+        kind, detail = _SECOND[locus.singular]
+        found.append((Landmark(kind, spot, walk.travelled + length, detail), False))
+    return sorted(found, key=lambda entry: entry[0].length)
 
 
-def _root(locus: Locus, walk: Walk, step: float, test: Test, ends: tuple[float, float]) -> float:
-    """Length at which a test vanishes within a step: Newton, or bracketing where that fails."""
+def _by_newton(
+    locus: Locus, walk: Walk, step: float, test: Test, ends: tuple[float, float]
+) -> float | None:
+    """Length at which a test vanishes within a step, by Newton; None if it fails."""
     guess = step * ends[0] / (ends[0] - ends[1])
     spot = advance(locus, walk.spot, guess, walk.bend, test)
-    if spot is not None:
-        length = float((spot.x - walk.spot.x) * locus.weights @ walk.spot.tangent)
-        if 0.0 <= length <= step:
-            return length
-    b = walk.spot.b
+    if spot is None:
+        return None
+    length = float((spot.x - walk.spot.x) * locus.weights @ walk.spot.tangent)
+    return length if 0.0 <= length <= step else None
+
+
+def _by_bracketing(
+    locus: Locus, walk: Walk, step: float, test: Test, ends: tuple[float, float]
+) -> float:
+    """Length at which a test changes its sign within a step."""
+    known, b = {0.0: ends[0], step: ends[1]}, walk.spot.b
 
     def value(length: float) -> float:
+        if length in known:
+            return known[length]
         return float(test(locus.critical(_part(locus, walk, length).x[None], b))[0])
 
-    return _bracketed(value, (0.0, step), ends)
+    return float(brentq(value, 0.0, step, xtol=1e-13))
 
 
-def _bracketed(
-    value: Callable[[float], float], span: tuple[float, float], ends: tuple[float, float]
-) -> float:
-    """Root of a function with known values of opposite sign at the ends of a span."""
-    known = dict(zip(span, ends, strict=True))
-    root = brentq(lambda at: known[at] if at in known else value(at), *span, xtol=1e-13)
-    return float(root)
+def _double(locus: Locus, walk: Walk, step: float) -> tuple[float, Spot]:
+    """Where the index changes within a step: from points around it, since tests fail at it.
 
-
-def _double(locus: Locus, walk: Walk, step: float) -> float:
-    """Length at which the index changes: by bisection, then with a second border."""
+    Bisection on the index, then the root of the interpolated gap of a second border.
+    """
     low, high = 0.0, step
-    for _ in range(18):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         same = negative_others(locus, _part(locus, walk, middle)) == walk.index
         low, high = (middle, high) if same else (low, middle)
-    c = _second_border(locus, _part(locus, walk, high))
+    width = high - low
+    first = min(max(low - 2.0 * width, 0.0), step - 5.0 * width)
+    lengths = first + width * np.arange(6)
+    spots = [_part(locus, walk, float(length)) for length in lengths]
+    nearest = spots[int(np.argmin(np.abs(lengths - middle)))]
+    c = _second_border(locus, nearest)
+    # c·(solution) has a pole where the second eigenvalue vanishes: its inverse is smooth
+    gaps = [-1.0 / float(c @ _solve_beside(locus, spot, c)) for spot in spots]
+    place = _zero(np.array(gaps))
+    weights = _lagrange(place)
+    x = weights @ np.array([spot.x for spot in spots])
+    x = x + locus.frame(x, nearest.b, nearest.basis * locus.weights)[0]
+    return float(first + width * place), replace(nearest, x=x)
 
-    def gap(length: float) -> float:
-        """Zero exactly where a second eigenvalue vanishes; see `Critical`."""
-        solved = float(c @ _solve_beside(locus, _part(locus, walk, length), c))
-        return -1.0 / solved if np.isfinite(solved) else 0.0
 
-    wide = 1e-3 * step
-    span = (max(low - wide, 0.0), min(high + wide, step))
-    ends = (gap(span[0]), gap(span[1]))
-    return _bracketed(gap, span, ends) if ends[0] * ends[1] < 0.0 else 0.5 * (low + high)
+def _lagrange(place: float) -> Float[np.ndarray, " 6"]:
+    """Weights that interpolate values at 0, 1, ..., 5."""
+    others = place - np.arange(6.0)
+    apart = np.subtract.outer(np.arange(6.0), np.arange(6.0)) + np.eye(6)
+    whole = [np.prod(np.delete(others, j)) for j in range(6)]
+    return np.asarray(np.array(whole) / apart.prod(axis=1))
+
+
+def _zero(values: Float[np.ndarray, " 6"]) -> float:
+    """Root of the polynomial through values at 0, 1, ..., 5, where their sign changes."""
+    change = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
+    if len(change) != 1:
+        raise LostPartError
+    at = float(change[0])
+    return float(brentq(lambda place: _lagrange(place) @ values, at, at + 1.0, xtol=1e-13))
 
 
 def _second_border(locus: Locus, spot: Spot) -> Float[np.ndarray, " bordered"]:
