@@ -6,7 +6,8 @@ import pytest
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.equilibria.fronts import initial_front
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, FOLD
+from equimorph.equilibria.outcome import Batching
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD
 from oracles.polynomial import fold_form, pitchfork_form
 
 
@@ -75,3 +76,63 @@ def test_length_of_a_path_is_its_length_in_the_metric():
     x = 1.5 + 0.5 * x
     exact = 0.5 * w @ np.sqrt(1 + 4 * x**2)
     assert path.length[-1] == pytest.approx(exact, rel=1e-4)
+
+
+def outcome_columns(outcome):
+    """What an outcome says of each lane, and its points, to be compared bit for bit."""
+    points = outcome.points
+    per_point = np.column_stack([points.travelled, points.z, points.t, points.index])
+    return (outcome.code, outcome.z, outcome.t, outcome.index, outcome.travelled), [
+        per_point[points.lanes == lane] for lane in range(len(outcome.code))
+    ]
+
+
+@pytest.mark.parametrize(
+    "batching",
+    [Batching(threads=1), Batching(threads=2), Batching(capacity=9), Batching(capacity=61)],
+    ids=["one thread", "two threads", "few at once", "some at once"],
+)
+def test_results_are_the_same_bit_for_bit_in_any_order_on_any_number_of_threads(batching):
+    """300 rays in q with folds, branch points, constraints and arrivals among their ends."""
+    arch = em.Rod(elements=6, degree=6)
+    Theta, Delta = np.meshgrid(np.linspace(0.5, 1.3, 20), np.linspace(0.0, 0.4, 15))
+    start = np.zeros((300, 4))
+    start[:, 0], start[:, 1], start[:, 3] = Theta.ravel(), Delta.ravel(), np.sin(1.0)
+    z, found = arch.natural(start)
+    assert found.all()
+    velocity = np.zeros_like(start)
+    velocity[:, 2] = np.where(np.arange(300) % 3 == 0, 2.0, 8.0)
+    within = (arch.max_curvature <= 5.0,)
+    order = np.random.default_rng(2).permutation(300)
+    back = np.argsort(order)
+    columns, points = outcome_columns(follow(ParameterLine(arch, start, velocity), z, within))
+    assert set(columns[0].tolist()) == {ARRIVAL, FOLD, BRANCH, CONSTRAINT}
+    line = ParameterLine(arch, start[order], velocity[order])
+    other, others = outcome_columns(follow(line, z[order], within, batching=batching))
+    for a, b in zip(columns, other, strict=True):
+        assert np.array_equal(a, b[back])
+    for lane in range(300):
+        assert np.array_equal(points[lane], others[back[lane]])
+
+
+def test_progress_is_reported_and_an_error_of_the_sink_cancels():
+    """Raising from the sink stops all threads at once and reaches the caller."""
+
+    class Impatient:
+        def __init__(self):
+            self.seen = []
+
+        def report(self, stage, done, total):
+            self.seen.append((stage, done, total))
+            raise TimeoutError
+
+    arch = em.Rod(elements=6, degree=6)
+    rest = arch.natural_state(Theta=0.9)
+    start, velocity = np.tile(rest.p, (20000, 1)), np.zeros((20000, 4))
+    velocity[:, 2] = 8.0
+    sink = Impatient()
+    with pytest.raises(TimeoutError):
+        follow(ParameterLine(arch, start, velocity), np.tile(rest.z, (20000, 1)), progress=sink)
+    [(stage, done, total)] = sink.seen
+    assert stage == "tracing lanes"
+    assert 0 <= done < total == 20000

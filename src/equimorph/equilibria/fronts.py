@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import kernels
-from equimorph.equilibria.curves import Curve, squared_length
+from equimorph.equilibria.curves import Curve, dual, squared_length
 from equimorph.equilibria.kernels import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
 
 Lanes = Float[np.ndarray, "lanes size"]
@@ -23,6 +23,7 @@ __all__ = [
     "Front",
     "initial_front",
     "new_scalars",
+    "onto_curve",
     "step_along",
 ]
 
@@ -102,25 +103,35 @@ def _unit(curve: Curve, front: Front) -> Front:
 
 
 def step_along(curve: Curve, front: Front, length: Values) -> tuple[Front, Flags]:
-    """Go `length` along each curve: predict by the tangent, correct, and tell the success.
+    """Go `length` along each curve, predicted by the tangent; see `onto_curve`."""
+    z = front.z + length[:, None] * front.tangent_z
+    return onto_curve(curve, front, (z, front.t + length * front.tangent_t), length)
 
-    The corrector is Newton on the curve and the pseudo-arclength condition. A step counts only if
-    the first correction is below a quarter of its length and the tangents stay within acos 0.9.
+
+def onto_curve(
+    curve: Curve, front: Front, guess: tuple[Lanes, Values], length: Values
+) -> tuple[Front, Flags]:
+    """Points at pseudo-arclength `length` from `front`, corrected from guesses, and the success.
+
+    The corrector is Newton on the curve and the pseudo-arclength condition. A point counts only if
+    the first correction is below a quarter of the length and its tangent within acos 0.9 of that of
+    `front`.
     """
-    lanes, mass = len(length), curve.structure.mass
+    structure, lanes = curve.structure, len(length)
     numbers, counts = new_scalars(lanes)
-    numbers[kernels.T], numbers[kernels.SLOPE] = front.t, front.tangent_t
+    trial = np.ascontiguousarray(guess[0]).copy()
+    row, corner = dual(structure, curve.weight, front.tangent_z, front.tangent_t)
+    numbers[kernels.TRIAL], numbers[kernels.CORNER] = guess[1], corner
+    numbers[kernels.DEFECT] = kernels.row_sums(row, trial - front.z) - length
+    numbers[kernels.DEFECT] += corner * (guess[1] - front.t)
     numbers[kernels.LENGTH], numbers[kernels.WEIGHT] = length, curve.weight**2
-    trial, row = np.empty_like(front.z), np.empty_like(front.z)
-    places = (front.z, front.tangent_z, front.z, front.tangent_z, trial, row)
-    kernels.predict_all(mass, places, numbers, counts, 0, lanes)
     out = replace(front, tangent_z=np.zeros_like(trial), index=np.zeros(lanes, int))
     closing = (numbers[kernels.CORNER], numbers[kernels.DEFECT])
     while (counts[kernels.STAGE] == kernels.CORRECTING).any():
         open_lanes = counts[kernels.STAGE] == kernels.CORRECTING
         move = curve.advance(trial, numbers[kernels.TRIAL], row, *closing)
         state = (trial, numbers, counts, lanes, 0.0)
-        kernels.correct(move.dz, move.dt, move.tangent_z, move.tangent_t, mass, *state)
+        kernels.correct(move.dz, move.dt, move.tangent_z, move.tangent_t, structure.mass, *state)
         new = open_lanes & (counts[kernels.STAGE] == kernels.CONVERGED)
         out.tangent_z[new] = move.tangent_z[new] / numbers[kernels.NORM, new, None]
         out.index[new] = move.index[new]

@@ -121,8 +121,8 @@ def _locate(
     if bit in {ARRIVAL, RETURN}:
         return locate_goal(here, bracket, 1.0 if bit == ARRIVAL else 0.0)
 
-    def worst(z: Lanes, t: Values) -> Values:
-        p = here.parameters(t)
+    def worst(some: Int[np.ndarray, " lanes"], z: Lanes, t: Values) -> Values:
+        p = here.take(some).parameters(t)
         return np.asarray(np.max([c.excess(z, p) for c in constraints], axis=0))
 
     return locate_root(here, bracket, worst)

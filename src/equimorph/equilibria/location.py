@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria.curves import (
     Curve,
@@ -18,13 +18,18 @@ from equimorph.equilibria.curves import (
     dual,
     squared_length,
 )
-from equimorph.equilibria.fronts import Bracket, Front, step_along
+from equimorph.equilibria.fronts import Bracket, Front
+from equimorph.equilibria.kernels import cubic_shares
+from equimorph.equilibria.roots import root_inside
 
 Lanes = Float[np.ndarray, "lanes size"]
 Values = Float[np.ndarray, " lanes"]
 Flags = Bool[np.ndarray, " lanes"]
+Some = Int[np.ndarray, " lanes"]
 
 NEWTON_STEPS = 12
+POLISHED = 1e-8
+"""Correction after which a point is exact to round-off: Newton is quadratic."""
 FAR = 1e6
 """A larger correction, in any unknown, is no step towards an event near by: the lane has failed."""
 
@@ -51,20 +56,10 @@ def hermite(bracket: Bracket, share: Values) -> tuple[Lanes, Values]:
     return z, t
 
 
-def _share(function: Callable[[Values], Values], lanes: int) -> Values:
-    """Root in [0, 1] of a function with a sign change, by bisection on the cubic."""
-    low, high = np.zeros(lanes), np.ones(lanes)
-    sign = np.sign(function(low))
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        same = np.sign(function(middle)) == sign
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return 0.5 * (low + high)
-
-
 def locate_goal(curve: Curve, bracket: Bracket, goal: float) -> Located:
     """Where t reaches `goal` (0 or 1): Newton at fixed parameters, from the cubic."""
-    share = _share(lambda s: hermite(bracket, s)[1] - goal, len(bracket.lanes))
+    old, new, share = bracket.before, bracket.after, np.empty(len(bracket.lanes))
+    cubic_shares(old.t - goal, new.t - goal, old.tangent_t, new.tangent_t, bracket.step, share)
     z, _ = hermite(bracket, share)
     t = np.full(len(z), goal)
     z, found = polish(curve, z, t)
@@ -74,16 +69,20 @@ def locate_goal(curve: Curve, bracket: Bracket, goal: float) -> Located:
 
 def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:
     """Newton at fixed t until the correction stops shrinking; whether it reached round-off."""
-    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
-    size = np.full(len(z), np.inf)
-    z = z.copy()
+    z, size = z.copy(), np.full(len(z), np.inf)
+    todo = np.arange(len(z))
     for _ in range(NEWTON_STEPS):
-        step = curve.advance(z, t, still, one, none)
-        new = correction_size(curve.structure, curve.weight, step.dz, none)
-        better = new < size
-        z[better] += step.dz[better]
-        size = np.where(better, new, size)
-        if (~better | (new < 1e-13)).all():
+        here, lanes = curve.take(todo), len(todo)
+        still, one, none = np.zeros((lanes, z.shape[1])), np.ones(lanes), np.zeros(lanes)
+        step = here.advance(z[todo], t[todo], still, one, none)
+        new = correction_size(curve.structure, here.weight, step.dz, none)
+        better = new < size[todo]
+        todo = todo[better]
+        z[todo] += step.dz[better]
+        size[todo] = new[better]
+        # the last correction of a quadratic iteration is squared by applying it
+        todo = todo[new[better] > POLISHED]
+        if len(todo) == 0:
             break
     return z, np.asarray(size < 1e-9)
 
@@ -151,63 +150,64 @@ def _null_guess(curve: Curve, z: Lanes, t: Values) -> Lanes:
 
 
 def locate_fold(curve: Curve, bracket: Bracket) -> Located:
-    """Fold of the path: ``F = 0, g = 0`` in (z, t), regular where the path turns back."""
-    lanes = len(bracket.lanes)
-    old, new = bracket.before.tangent_t, bracket.after.tangent_t
-    share = old / (old - new)
-    z, t = hermite(bracket, share)
-    b = (1 - share)[:, None] * bracket.before.tangent_z + share[:, None] * bracket.after.tangent_z
-    b = b / np.linalg.norm(b, axis=1, keepdims=True)
-    size = np.full(lanes, np.inf)
-    for _ in range(NEWTON_STEPS):
-        test = _test_function(curve, z, t, b)
-        residual = curve.structure.residual(z, curve.parameters(t))
-        rhs = np.concatenate([-residual, -test.g[:, None]], axis=1)[:, None]
-        border = (_column(curve, z, t)[:, None], test.g_z[:, None], test.g_t[:, None, None])
-        step = _bounded(curve.structure.solve(z, curve.parameters(t), rhs, border).x[:, 0])
-        z, t = z + step[:, :-1], t + step[:, -1]
-        size = correction_size(curve.structure, curve.weight, step[:, :-1], step[:, -1])
-        b = test.v / np.linalg.norm(test.v, axis=1, keepdims=True)
-        if (size < 1e-13).all():
-            break
-    found = np.asarray(size < 1e-9) & _inside(curve, bracket, z, t)
-    return Located(z, t, _arclength(curve, bracket, z, t, share), found)
+    """Fold of the path: where dt/ds vanishes."""
+    old, new = bracket.before, bracket.after
+    a, b = old.tangent_t, new.tangent_t
+    # slope of the cubic at a share s: a + 2 s bend + 3 s² bow
+    rise = (new.t - old.t) / bracket.step
+    bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
+    under = np.maximum(bend**2 - 3 * bow * a, 0.0)
+    share = np.clip(a / (-bend + np.sign(a) * np.sqrt(under)), 1e-3, 1.0 - 1e-3)
+    root = root_inside(curve, bracket, lambda _, front: front.tangent_t, (a, b), share)
+    return Located(root.front.z, root.front.t, root.at, root.found)
 
 
 def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
     """Branch point of the path: ``F + βb = 0, g = 0, vᵀF_t = 0`` in (z, t, β)."""
-    structure, lanes = curve.structure, len(bracket.lanes)
+    lanes = len(bracket.lanes)
     share = np.full(lanes, 0.5)
     z, t = hermite(bracket, share)
-    dp = _velocity(curve, lanes)
-    b = _null_guess(curve, z, t)
     beta, size = np.zeros(lanes), np.full(lanes, np.inf)
+    b = _null_guess(curve, z, t)
+    todo = np.arange(lanes)
     for _ in range(NEWTON_STEPS):
-        p = curve.parameters(t)
-        none_z, none_p = np.zeros_like(z), np.zeros_like(p)
-        test, column = _test_function(curve, z, t, b), _column(curve, z, t)
-        rhs = np.zeros((lanes, 1, structure.size + 1))
-        rhs[:, 0, :-1] = column
-        border = (b[:, None], b[:, None], np.zeros((lanes, 1, 1)))
-        y = np.ascontiguousarray(structure.solve(z, p, rhs, border).x[:, 0, :-1])
-        v = test.v
-        mixed = structure.second_derivative(z, p, (v, none_p), (none_z, dp))
-        h_z = mixed - structure.second_derivative(z, p, (v, none_p), (y, none_p))
-        twice = structure.second_derivative(z, p, (none_z, dp), (none_z, dp))
-        h_t = np.einsum("li,li->l", v, twice) - np.einsum("li,li->l", y, mixed)
-        residual = structure.residual(z, p) + beta[:, None] * b
-        h = np.einsum("li,li->l", v, column)
-        rhs = np.concatenate([-residual, -test.g[:, None], -h[:, None]], axis=1)[:, None]
-        corner = np.zeros((lanes, 2, 2))
-        corner[:, 0, 0], corner[:, 1, 0] = test.g_t, h_t
-        border = (np.stack([column, b], 1), np.stack([test.g_z, h_z], 1), corner)
-        step = _bounded(structure.solve(z, p, rhs, border).x[:, 0])
-        z, t, beta = z + step[:, :-2], t + step[:, -2], beta + step[:, -1]
-        size = correction_size(structure, curve.weight, step[:, :-2], step[:, -2])
-        if (size < 1e-13).all():
+        here = curve.take(todo)
+        step = _branch_step(here, z[todo], t[todo], b[todo], beta[todo])
+        z[todo] += step[:, :-2]
+        t[todo] += step[:, -2]
+        beta[todo] += step[:, -1]
+        size[todo] = correction_size(curve.structure, here.weight, step[:, :-2], step[:, -2])
+        todo = todo[size[todo] >= 1e-13]
+        if len(todo) == 0:
             break
     found = np.asarray((size < 1e-9) & (np.abs(beta) < 1e-9)) & _inside(curve, bracket, z, t)
     return Located(z, t, _arclength(curve, bracket, z, t, share), found)
+
+
+def _branch_step(
+    curve: Curve, z: Lanes, t: Values, b: Lanes, beta: Values
+) -> Float[np.ndarray, "lanes unknowns"]:
+    """Newton step (dz, dt, dβ) of the extended system of branch points."""
+    structure, lanes = curve.structure, len(z)
+    p, dp = curve.parameters(t), _velocity(curve, lanes)
+    none_z, none_p = np.zeros_like(z), np.zeros_like(p)
+    test, column = _test_function(curve, z, t, b), _column(curve, z, t)
+    rhs = np.zeros((lanes, 1, structure.size + 1))
+    rhs[:, 0, :-1] = column
+    border = (b[:, None], b[:, None], np.zeros((lanes, 1, 1)))
+    y = np.ascontiguousarray(structure.solve(z, p, rhs, border).x[:, 0, :-1])
+    v = test.v
+    mixed = structure.second_derivative(z, p, (v, none_p), (none_z, dp))
+    h_z = mixed - structure.second_derivative(z, p, (v, none_p), (y, none_p))
+    twice = structure.second_derivative(z, p, (none_z, dp), (none_z, dp))
+    h_t = np.einsum("li,li->l", v, twice) - np.einsum("li,li->l", y, mixed)
+    residual = structure.residual(z, p) + beta[:, None] * b
+    h = np.einsum("li,li->l", v, column)
+    rhs = np.concatenate([-residual, -test.g[:, None], -h[:, None]], axis=1)[:, None]
+    corner = np.zeros((lanes, 2, 2))
+    corner[:, 0, 0], corner[:, 1, 0] = test.g_t, h_t
+    border = (np.stack([column, b], 1), np.stack([test.g_z, h_z], 1), corner)
+    return _bounded(structure.solve(z, p, rhs, border).x[:, 0])
 
 
 def _bounded(step: Lanes) -> Lanes:
@@ -224,30 +224,20 @@ def _arclength(curve: Curve, bracket: Bracket, z: Lanes, t: Values, share: Value
 
 
 def locate_root(
-    curve: Curve, bracket: Bracket, function: Callable[[Lanes, Values], Values]
+    curve: Curve, bracket: Bracket, function: Callable[[Some, Lanes, Values], Values]
 ) -> Located:
-    """First zero of a scalar that changes sign over the step: regula falsi (Illinois) on the curve.
+    """Zero of a scalar of the state that changes sign over the step.
 
-    Every trial point is corrected onto the curve at its arclength, so that the root is exact.
+    `function` gets the numbers of lanes, z and t.
     """
-    front, lanes = bracket.before, len(bracket.lanes)
-    low, high = np.zeros(lanes), bracket.step.copy()
+    everyone = np.arange(len(bracket.lanes))
     # a start on the bound may exceed it by round-off: then it is itself the root
-    f_low = np.minimum(function(front.z, front.t), 0.0)
-    f_high = function(bracket.after.z, bracket.after.t)
-    here, found = front, np.ones(lanes, bool)
-    at = high.copy()
-    for _ in range(60):
-        at = np.clip((low * f_high - high * f_low) / (f_high - f_low), low, high)
-        here, good = step_along(curve, front, at)
-        tiny = at < 1e-12
-        here = here.updated(front, tiny)
-        value = function(here.z, here.t)
-        found = good | tiny
-        same = np.sign(value) == np.sign(f_high)
-        f_low = np.where(same, 0.5 * f_low, value)
-        f_high = np.where(same, value, 0.5 * f_high)
-        low, high = np.where(same, low, at), np.where(same, at, high)
-        if ((np.abs(value) < 1e-13) | (high - low < 1e-14) | ~found).all():
-            break
-    return Located(here.z, here.t, at, found & _inside(curve, bracket, here.z, here.t))
+    low = np.minimum(function(everyone, bracket.before.z, bracket.before.t), 0.0)
+    high = function(everyone, bracket.after.z, bracket.after.t)
+    share = np.clip(low / (low - high), 1e-3, 1.0 - 1e-3)
+
+    def scalar(some: Some, front: Front) -> Values:
+        return function(some, front.z, front.t)
+
+    root = root_inside(curve, bracket, scalar, (low, high), share)
+    return Located(root.front.z, root.front.t, root.at, root.found)

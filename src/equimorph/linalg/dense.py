@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.linalg.kernels import count_negative
+from equimorph.linalg.kernels import count_negative, multiply_lanes
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,19 @@ class BorderedSolution:
     negative: Int[np.ndarray, " lanes"]
     pivot_ratio: Float[np.ndarray, " lanes"]
     pivoted: Bool[np.ndarray, " lanes"]
+
+
+def multiply(
+    x: Float[np.ndarray, "lanes size"], matrix: Float[np.ndarray, "size ..."]
+) -> Float[np.ndarray, "lanes ..."]:
+    """``x @ matrix`` for a matrix or vector, every lane the same bit for bit in any batch.
+
+    Libraries choose the order of summation by the number of rows.
+    """
+    wide = np.ascontiguousarray(matrix.reshape(len(matrix), -1))
+    out = np.empty((len(x), wide.shape[1]))
+    multiply_lanes(np.ascontiguousarray(x), wide, out)
+    return out.reshape(len(x), *matrix.shape[1:])
 
 
 def negative_eigenvalues(matrix: Float[np.ndarray, "lanes n n"]) -> Int[np.ndarray, " lanes"]:

@@ -111,6 +111,17 @@ def _swap(a, i, j):
 
 
 @njit(**FLAGS)
+def multiply_lanes(x, matrix, out):
+    """Rows of x times a matrix, each summed in the same order."""
+    out[:] = 0.0
+    for lane in range(x.shape[0]):
+        for i in range(matrix.shape[0]):
+            factor = x[lane, i]
+            for j in range(matrix.shape[1]):
+                out[lane, j] += factor * matrix[i, j]
+
+
+@njit(**FLAGS)
 def count_negative(matrices, out):
     """Negative eigenvalues of each symmetric matrix (lanes, n, n)."""
     for lane in range(matrices.shape[0]):

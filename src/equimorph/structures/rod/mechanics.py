@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Bool, Float
 
-from equimorph.linalg import BorderedSolution, CondensedLayout
+from equimorph.linalg import BorderedSolution, CondensedLayout, multiply
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Advance, Direction, Structure, Symmetry
@@ -79,7 +79,8 @@ class RodMechanics(Structure):
         """∂L/∂θ at all nodes, the prescribed ends included."""
         theta = self.nodal_angles(z, p)
         a, b = self._coefficients(z, p)
-        return np.asarray(theta @ self.layout.assembled + a * np.cos(theta) - b * np.sin(theta))
+        bending = multiply(theta, self.layout.assembled)
+        return np.asarray(bending + a * np.cos(theta) - b * np.sin(theta))
 
     def _border(self, theta: Nodal) -> Float[np.ndarray, "lanes 2 nodes"]:
         weights = self.mesh.weights
@@ -90,13 +91,13 @@ class RodMechanics(Structure):
     def energy(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
         """∫ θ'²/(8π²) − q ∫ ρ sin θ."""
         theta = self.nodal_angles(z, p)
-        bending = 0.5 * np.einsum("li,li->l", theta @ self.layout.assembled, theta)
-        return np.asarray(bending - p[:, 2] * (np.sin(theta) @ self.loads))
+        bending = 0.5 * np.einsum("li,li->l", multiply(theta, self.layout.assembled), theta)
+        return np.asarray(bending - p[:, 2] * multiply(np.sin(theta), self.loads))
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:
         """(∂L/∂θ at the inner nodes, ∫cos θ − ν, ∫ sin θ)."""
         theta, weights = self.nodal_angles(z, p), self.mesh.weights
-        closing = [np.cos(theta) @ weights - p[:, 3], np.sin(theta) @ weights]
+        closing = [multiply(np.cos(theta), weights) - p[:, 3], multiply(np.sin(theta), weights)]
         return np.concatenate([self._gradient(z, p)[:, 1:-1], np.stack(closing, 1)], axis=1)
 
     def _spread(self, direction: Direction) -> tuple[Nodal, Nodal, Nodal]:
@@ -111,7 +112,7 @@ class RodMechanics(Structure):
         theta = self.nodal_angles(z, p)
         moved, change, _ = self._spread((np.zeros_like(z), dp))
         a, b = self._coefficients(z, p)
-        gradient = moved @ self.layout.assembled + change * np.cos(theta)
+        gradient = multiply(moved, self.layout.assembled) + change * np.cos(theta)
         gradient -= (a * np.sin(theta) + b * np.cos(theta)) * moved
         closing = np.einsum("lmi,li->lm", self._border(theta), moved)
         closing[:, 0] -= dp[:, 3]
@@ -119,21 +120,21 @@ class RodMechanics(Structure):
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
-        theta = self.nodal_angles(z, p)
+        theta, weights = self.nodal_angles(z, p), self.mesh.weights
         sine, cosine = np.sin(theta), np.cos(theta)
         a, b = self._coefficients(z, p)
         (v_t, v_a, v_b), (w_t, w_a, w_b) = self._spread(v), self._spread(w)
         gradient = (b * sine - a * cosine) * v_t * w_t
         gradient -= sine * (v_a * w_t + w_a * v_t) + cosine * (v_b * w_t + w_b * v_t)
         product = v_t * w_t
-        closing = [-(cosine * product) @ self.mesh.weights, -(sine * product) @ self.mesh.weights]
+        closing = [-multiply(cosine * product, weights), -multiply(sine * product, weights)]
         return np.concatenate([gradient[:, 1:-1], np.stack(closing, 1)], axis=1)
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""
         gradient, theta = self._gradient(z, p), self.nodal_angles(z, p)
         first, last = gradient[:, 0], gradient[:, -1]
-        lift = -(np.sin(theta) @ self.loads)
+        lift = -multiply(np.sin(theta), self.loads)
         return np.stack([first - last, first + last, lift, -z[:, -2]], axis=1)
 
     def solve(
