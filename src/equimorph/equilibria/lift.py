@@ -10,7 +10,8 @@ from jaxtyping import Float, Int
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.normal_form import criticality
 from equimorph.equilibria.outcome import KINDS, Outcome, follow
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, TraceOptions
+from equimorph.equilibria.probing import with_hidden_events
+from equimorph.equilibria.tracing import BRANCH, CONSTRAINT, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import State, States, Structure
@@ -195,7 +196,8 @@ def _segment(
 ) -> _Segment:
     structure = state.structure
     curve = ParameterLine(structure, state.p[None].copy(), velocity[None].copy())
-    outcome = follow(curve, state.z[None].copy(), within, options)
+    start = state.z[None].copy()
+    outcome = with_hidden_events(curve, start, follow(curve, start, within, options), options)
     events = (*_passed(curve, outcome, number), _end(curve, outcome, number, within))
     last = outcome.travelled[0] if outcome.code[0] else np.inf
     points = outcome.points.take(outcome.points.travelled < last)
@@ -233,8 +235,6 @@ def _end(
     if code == BRANCH:
         critical = criticality(curve, z[None], t)[0]
         detail = critical
-    if code in {FOLD, ARRIVAL}:
-        detail = ""
     return Event(kind, state, number + float(t[0]), critical, detail)
 
 
