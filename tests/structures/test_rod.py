@@ -124,6 +124,19 @@ def test_largest_curvature_is_that_of_a_fine_sampling(elements, degree):
         assert abs(there) == pytest.approx(found[lane], rel=1e-6)
 
 
+def test_recovery_of_a_lane_does_not_depend_on_the_lanes_beside_it():
+    """Same operations in the same order: bit for bit, whatever the batch."""
+    rod = Rod()
+    z, p = many_equilibria(rod)
+    s = np.linspace(0.01, 0.98, 7)
+    fields, (largest, place) = rod.fields(z, p, s), rod.largest_curvature(z, p)
+    order = np.random.default_rng(1).permutation(len(z))
+    for at in (order, order[:11], order[3:4]):
+        np.testing.assert_array_equal(rod.fields(z[at], p[at], s), fields[at])
+        np.testing.assert_array_equal(rod.largest_curvature(z[at], p[at])[0], largest[at])
+        np.testing.assert_array_equal(rod.largest_curvature(z[at], p[at])[1], place[at])
+
+
 def test_largest_curvature_at_an_end_is_found():
     """A skewed natural arch bends most at an end: compare κ(0), κ(1)."""
     rod = Rod()

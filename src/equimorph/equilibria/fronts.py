@@ -130,7 +130,7 @@ def onto_curve(
     while (counts[kernels.STAGE] == kernels.CORRECTING).any():
         open_lanes = counts[kernels.STAGE] == kernels.CORRECTING
         move = curve.advance(trial, numbers[kernels.TRIAL], row, *closing)
-        state = (trial, numbers, counts, lanes, 0.0)
+        state = (trial, numbers, counts, lanes, kernels.EXACT, 0.0)
         kernels.correct(move.dz, move.dt, move.tangent_z, move.tangent_t, structure.mass, *state)
         new = open_lanes & (counts[kernels.STAGE] == kernels.CONVERGED)
         out.tangent_z[new] = move.tangent_z[new] / numbers[kernels.NORM, new, None]

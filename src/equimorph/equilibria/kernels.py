@@ -35,11 +35,12 @@ step is too short, or took too many."""
 ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT = 1, 2, 4, 8, 16
 """Bits of what can happen in a step."""
 
-ACCEPTED = 1e-7
-"""Size of the last correction: Newton is quadratic, so the point itself is good to its square."""
+ACCEPTED, EXACT = 1e-7, 1e-10
+"""Size of the last correction on the way, and where events are: Newton is quadratic, so that the
+point itself is good to the square, but the tangent belongs to the point before."""
 NEARLY, NEXT = 1e-5, 1e-11
 """Last correction on the way if the next one, by the rate of the last two, would be below."""
-MOST_ITERATIONS = 6
+MOST_ITERATIONS = 7
 FIRST_SHARE = 0.25
 """First correction over the step: more could lead to another branch."""
 LEAST_COSINE = 0.9
@@ -77,12 +78,12 @@ def row_sums(a, b):
 
 
 @njit(**SUMS)
-def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, nearly):
+def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accepted, nearly):
     """Apply a Newton correction to each lane in its iteration; tell whether it converged.
 
     The first correction has to be below a quarter of the step and each later one below half of the
-    one before; at the end the tangents have to agree. A last correction up to `nearly` does if the
-    next one would be below `NEXT`, by the rate of the last two.
+    one before; at the end the tangents have to agree. The last one is below `accepted`, or up to
+    `nearly` if the next one would be below `NEXT`, by the rate of the last two.
     """
     n, size = mass.shape[0], trial.shape[1]
     for i in range(active):
@@ -97,7 +98,7 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, nearly
         correction = np.sqrt(total + weight * dt[i] * dt[i] + MULTIPLIER_WEIGHT * extra)
         first = counts[ITERATION, i] == 0
         limit = FIRST_SHARE * numbers[LENGTH, i] if first else 0.5 * last
-        if not correction <= max(limit, ACCEPTED):
+        if not correction <= max(limit, accepted):
             counts[STAGE, i] = REFUSED
             continue
         for j in range(size):
@@ -105,7 +106,7 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, nearly
         numbers[TRIAL, i] += dt[i]
         ratio = 1.0 if first else correction / last
         close = correction <= nearly and correction * ratio * ratio <= NEXT
-        if not (correction <= ACCEPTED or close):
+        if not (correction <= accepted or close):
             counts[ITERATION, i] += 1
             numbers[LAST, i] = correction
             # the closing equation is linear: the correction has met it

@@ -126,7 +126,7 @@ class Block:
         mass, smallest = self.curve.structure.mass, self.options.smallest_step
         state = (numbers, counts, active)
         steps = (move.dz, move.dt, move.tangent_z, move.tangent_t)
-        kernels.correct(*steps, mass, trial, *state, kernels.NEARLY)
+        kernels.correct(*steps, mass, trial, *state, kernels.ACCEPTED, kernels.NEARLY)
         kernels.judge(move.index, *state, smallest, self.options.locates_branch_points)
         news = News()
         good = np.flatnonzero(counts[kernels.STAGE, :active] == CONVERGED)

@@ -35,8 +35,8 @@ REACH = 0.6
 MOST_STEPS = 12
 THETA, KAPPA, X, Y = range(4)
 """Rows of a local state."""
-DISTANCE, WIDTH, CENTRE = range(3)
-"""Rows of the moves: from a vertex to a sought extremum, how far it may be off, its arclength."""
+DISTANCE, WIDTH, CENTRE, STEPS, PART = range(5)
+"""Rows of the moves: from a vertex to a place, how far off this may be, its arclength; steps."""
 NEWTON = 4
 """Iterations from a secant's root of κ' to round-off in κ, which is stationary there."""
 
@@ -80,18 +80,23 @@ def _step(state, pull, terms, waves, slopes, distance):
 
 
 @njit(**INNER)
-def _follow(state, pull, terms, lam, waves, slopes, distance):
-    """Move a local state over a distance in equal steps that the series can take."""
+def _follow(state, pull, terms, lam, waves, slopes, moves):
+    """Move a local state over the distance of each lane, in equal steps that its series can take.
+
+    Lanes that need fewer steps than others stay where they are in the last ones: what happens to a
+    lane never depends on those beside it.
+    """
+    distance = load(moves, DISTANCE)
     forces = spread(2.0 * FOUR_PI_SQUARED) * (absolute(lam) + absolute(load(pull, 0)))
     kappa = load(state, KAPPA)
-    square = distance * distance * (kappa * kappa + forces)
-    store(waves, 0, square)
-    most = 0.0
+    store(moves, STEPS, distance * distance * (kappa * kappa + forces))
+    most = 1
     for k in range(LANES):
-        most = max(most, waves[0, k])
-    steps = min(max(np.ceil(np.sqrt(most) / REACH), 1.0), MOST_STEPS)
-    part = distance * spread(1.0 / steps)
-    for _ in range(np.int64(steps)):
+        steps = min(max(np.ceil(np.sqrt(moves[STEPS, k]) / REACH), 1.0), MOST_STEPS)
+        moves[STEPS, k], moves[PART, k] = steps, moves[DISTANCE, k] / steps
+        most = max(most, np.int64(steps))
+    for i in range(most):
+        part = where_less(spread(i + 0.0), load(moves, STEPS), load(moves, PART), spread(0.0))
         _expand(state, pull, terms, lam, waves, slopes)
         _step(state, pull, terms, waves, slopes, part)
 
@@ -122,7 +127,7 @@ def fields_lanes(stiffness, pressures, weights, rho, rises, element, side, dista
     n, points = z.shape[1] - 2, len(element)
     theta, scalars, nodal = work_rows(n + 3), work_rows(4), work_rows(2 * (n + 2))
     places, results = work_rows(2 * (elements + 1)), work_rows(4 * points)
-    state, pull = work_rows(4), work_rows(terms)
+    state, pull, moves = work_rows(4), work_rows(terms), work_rows(5)
     waves, slopes = work_rows(2 * ORDER), work_rows(ORDER + 1)
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
@@ -147,7 +152,8 @@ def fields_lanes(stiffness, pressures, weights, rho, rises, element, side, dista
                 store(pull, 0, mu - q * spread(rises[e, right, 0]))
                 for j in range(1, terms):
                     store(pull, j, spread(0.0) - q * spread(rises[e, right, j]))
-                _follow(state, pull, terms, lam, waves, slopes, spread(distance[point]))
+                store(moves, DISTANCE, spread(distance[point]))
+                _follow(state, pull, terms, lam, waves, slopes, moves)
             for row in range(4):
                 store(results, 4 * point + row, load(state, row))
         write_lanes(results, 0, 1, out, start * 4 * points, 4 * points, 4 * points)
@@ -176,7 +182,7 @@ def largest_lanes(stiffness, pressures, breaks, nodes, integral, rho, rises, z, 
     n = z.shape[1] - 2
     theta, scalars, forces = work_rows(n + 3), work_rows(4), work_rows(n + 2)
     ends, best = work_rows(2 * elements), work_rows(2)
-    state, pull, moves = work_rows(4), work_rows(terms), work_rows(3)
+    state, pull, moves = work_rows(4), work_rows(terms), work_rows(5)
     waves, slopes = work_rows(2 * ORDER), work_rows(ORDER + 1)
     found = np.empty((LANES, elements * order, 3))
     count = np.empty(LANES, np.int64)
@@ -196,7 +202,7 @@ def largest_lanes(stiffness, pressures, breaks, nodes, integral, rho, rises, z, 
         while _next_extrema(
             breaks, order, rises, theta, scalars, ends, best, found, count, state, pull, moves
         ):
-            _follow(state, pull, terms, lam, waves, slopes, load(moves, DISTANCE))
+            _follow(state, pull, terms, lam, waves, slopes, moves)
             _expand(state, pull, terms, lam, waves, slopes)
             _take_extremum(slopes, moves, best)
         for k in range(LANES):
