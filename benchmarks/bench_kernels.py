@@ -91,9 +91,41 @@ def bench_dense_bordered_solve(benchmark):
     """The fall-back of lanes with an unsafe pivot."""
     rod, lanes = Rod(), 100
     z, p, _, row = lanes_near_the_arch(rod, lanes)
-    theta, (a, b) = rod.nodal_angles(z, p), rod._coefficients(z, p)
-    full = rod.layout.dense(-a * np.sin(theta) - b * np.cos(theta), rod._border(theta))
+    full = rod.layout.dense(*rod.kkt(z, p))
     rhs = np.ones((lanes, 2, rod.size + 1))
     arguments = (full, row[:, None], row[:, None], np.zeros((lanes, 1, 1)), rhs)
     benchmark.pedantic(solve_bordered, arguments, rounds=5, warmup_rounds=1)
     record(benchmark, rod, lanes)
+
+
+@pytest.mark.parametrize("lanes", [100, 4096])
+@pytest.mark.parametrize("what", ["residual", "parameter_derivative", "second_derivative"])
+def bench_derivatives(benchmark, what, lanes):
+    """Parts of extended systems, through the contract."""
+    rod = Rod()
+    z, p, dp, row = lanes_near_the_arch(rod, lanes)
+    arguments = {
+        "residual": (),
+        "parameter_derivative": (dp,),
+        "second_derivative": ((row, dp), (row, dp)),
+    }[what]
+    benchmark.pedantic(getattr(rod, what), (z, p, *arguments), rounds=30, warmup_rounds=1)
+    record(benchmark, rod, lanes)
+
+
+@pytest.mark.parametrize("points", [1, 101])
+def bench_fields(benchmark, points):
+    """A height between vertices, and a shape to draw."""
+    rod, lanes = Rod(), 4096
+    z, p, _, _ = lanes_near_the_arch(rod, lanes)
+    s = np.linspace(0.05, 0.95, points)
+    benchmark.pedantic(rod.fields, (z, p, s), rounds=10, warmup_rounds=1)
+    record(benchmark, rod, lanes)
+
+
+def bench_natural_states(benchmark):
+    """10⁴ natural states over the box of limit-load maps."""
+    rod, generator = Rod(), np.random.default_rng(0)
+    p = generator.uniform((0.2, -1.5, 0.0, 0.84), (2.0, 1.5, 0.0, 0.85), (10_000, 4))
+    benchmark.pedantic(rod.natural_states, (p,), rounds=3, warmup_rounds=1)
+    record(benchmark, rod, len(p))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from equimorph.linalg import negative_eigenvalues, solve_bordered
-from equimorph.linalg.kernels import solve_lanes, solve_small
+from equimorph.linalg.kernels import solve_lanes
 from equimorph.linalg.simd import work_rows
 
 
@@ -53,25 +53,16 @@ def test_entries_that_are_not_finite_count_as_minus_one():
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 6])
-def test_small_systems_are_solved_with_row_exchanges(size):
-    """Oracle: LAPACK; a zero in the corner needs the exchange. 1e-12: well conditioned."""
-    generator = np.random.default_rng(size)
-    a, b = generator.normal(size=(size, size)) + 2 * np.eye(size)[::-1], np.eye(size)
-    a[0, 0] = 0.0 if size > 1 else 2.0
-    x = b.copy()
-    solve_small(a.copy(), x)
-    np.testing.assert_allclose(x, np.linalg.solve(a, b), rtol=1e-12, atol=1e-12)
-
-
-def test_eight_small_systems_at_once_equal_eight_single_ones():
-    """Each lane exchanges its own rows. 1e-12: well conditioned."""
+def test_eight_small_systems_at_once_are_solved_with_row_exchanges(size):
+    """Oracle: LAPACK; zeros in a corner need exchanges, its own in each lane. 1e-12: conditions."""
     generator = np.random.default_rng(1)
-    a, b = generator.normal(size=(8, 3, 3)), generator.normal(size=(8, 3, 2))
-    a[::2, 0, 0] = 0.0
-    rows = work_rows(15)
-    rows[:] = np.concatenate([a, b], axis=2).transpose(1, 2, 0).reshape(15, 8)
-    solve_lanes(rows, 3, 5)
-    found = rows.reshape(3, 5, 8)[:, 3:].transpose(2, 0, 1)
+    a = generator.normal(size=(8, size, size)) + 2 * np.eye(size)[::-1]
+    b = generator.normal(size=(8, size, 2))
+    a[::2, 0, 0] = 0.0 if size > 1 else 2.0
+    rows = work_rows(size * (size + 2))
+    rows[:] = np.concatenate([a, b], axis=2).transpose(1, 2, 0).reshape(-1, 8)
+    solve_lanes(rows, size, size + 2)
+    found = rows.reshape(size, size + 2, 8)[:, size:].transpose(2, 0, 1)
     np.testing.assert_allclose(found, np.linalg.solve(a, b), rtol=1e-11, atol=1e-12)
 
 

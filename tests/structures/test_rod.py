@@ -5,8 +5,10 @@ import pytest
 import scipy.linalg
 
 from equimorph.equilibria.newton import newton as equilibria_near
+from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import Rod, State, States
+from typecheck import unchecked
 
 
 def newton(rod, z, p, steps=12):
@@ -210,9 +212,7 @@ def test_margin_is_the_smallest_constrained_eigenvalue(q):
     """Oracle: scipy's eigh on a basis of the constraints' null space, mass matrix. 1e-8."""
     rod = Rod(elements=6, degree=5)
     z, p = loaded(rod, q=q)
-    theta, (a, b) = rod.nodal_angles(z, p), rod._coefficients(z, p)
-    diagonal = -a * np.sin(theta) - b * np.cos(theta)
-    full = rod.layout.dense(diagonal, rod._border(theta))[0]
+    full = rod.layout.dense(*rod.kkt(z, p))[0]
     null = scipy.linalg.null_space(full[-2:, :-2])
     hessian, mass = null.T @ full[:-2, :-2] @ null, null.T @ np.diag(rod.mass) @ null
     values = scipy.linalg.eigh(hessian, mass, eigvals_only=True)
@@ -248,3 +248,34 @@ def test_states_are_read_by_name_number_and_mask():
     assert len(states[states["Delta"] > 0.05]) == 2
     assert len(states.stable) == 3
     assert [round(state["Delta"], 6) for state in states] == [0.0, 0.1, 0.2]
+
+
+def test_states_of_another_resolution_are_refused():
+    """Kernels read what they are told to: widths are checked at every door."""
+    rod, other = Rod(elements=4, degree=4), Rod(elements=6, degree=5)
+    state = other.natural_state(Theta=0.9)
+    z, p = state.z[None], state.p[None]
+    one, none = np.ones(1), np.zeros(1)
+    calls = [
+        lambda: rod.advance(z, p, p, z, one, none),
+        lambda: rod.residual(z, p),
+        lambda: rod.solve(z, p, np.zeros((1, 1, rod.size))),
+        lambda: rod.parameter_derivative(z, p, p),
+        lambda: rod.second_derivative(z, p, (z, p), (z, p)),
+        lambda: rod.largest_curvature(z, p),
+        lambda: rod.fields(z, p, np.array([0.5])),
+        lambda: rod.effort(z, p),
+        lambda: rod.energy(z, p),
+        lambda: rod.max_curvature.function(z, p),
+        lambda: rod.resolved(z, p),
+    ]
+    for call in calls:
+        with pytest.raises(InputError, match=r"`z` must have shape \(1, 17\); got \(1, 31\)"):
+            call()
+    good = rod.natural_state(Theta=0.9).z[None]
+    with pytest.raises(InputError, match=r"`p` must have shape \(1, 4\); got \(1, 3\)"):
+        rod.residual(good, p[:, :3])
+    with unchecked(), pytest.raises(InputError, match=r"shape \(1, 4\); got \(2, 4\)"):
+        rod.residual(good, np.tile(p, (2, 1)))
+    with pytest.raises(InputError, match="`rhs` must have"):
+        rod.solve(good, p, np.zeros((1, 1, 30)))

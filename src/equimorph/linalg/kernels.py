@@ -128,33 +128,6 @@ def count_negative(matrices, out):
         out[lane] = factor_symmetric(matrices[lane].copy())
 
 
-@njit(**FLAGS)
-def solve_small(a, b):
-    """Gauss with partial pivoting: overwrite b (size, count) with a⁻¹ b; `a` is overwritten."""
-    size, count = b.shape
-    for k in range(size):
-        best = k
-        for i in range(k + 1, size):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        if best != k:
-            for j in range(k, size):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-            for j in range(count):
-                b[k, j], b[best, j] = b[best, j], b[k, j]
-        for i in range(k + 1, size):
-            factor = a[i, k] / a[k, k]
-            for j in range(k + 1, size):
-                a[i, j] -= factor * a[k, j]
-            for j in range(count):
-                b[i, j] -= factor * b[k, j]
-    for j in range(count):
-        for i in range(size - 1, -1, -1):
-            for k in range(i + 1, size):
-                b[i, j] -= a[i, k] * b[k, j]
-            b[i, j] /= a[i, i]
-
-
 @njit(**INNER)
 def read_lanes(source, position, lane_step, count, target, row, step):
     """Read `count` consecutive entries of each lane into rows `step` apart; see `transpose`."""

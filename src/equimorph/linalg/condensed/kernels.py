@@ -15,16 +15,8 @@ complement of the vertices in their slots there.
 import numpy as np
 from numba import njit
 
-from equimorph.linalg.kernels import (
-    FLAGS,
-    INNER,
-    factor_symmetric,
-    read_lanes,
-    solve_small,
-    write_lanes,
-)
+from equimorph.linalg.kernels import FLAGS, INNER
 from equimorph.linalg.simd import (
-    LANES,
     absolute,
     load,
     load2,
@@ -254,117 +246,16 @@ def add_products(e, inner, ends, lower, vertices, columns, products):
 
 
 @njit(**INNER)
+def negative_of_two(rows, start, step):
+    """Negative eigenvalues of [a b; b c], by determinant and trace; rows `step` apart."""
+    zero, one = spread(0.0), spread(1.0)
+    a, b, c = load(rows, start), load(rows, start + 1), load(rows, start + step + 1)
+    definite = where_less(a + c, zero, one + one, zero)
+    return where_less(a * c - b * b, zero, one, definite)
+
+
+@njit(**INNER)
 def pivot_ratio(extremes, lane):
     """Smallest over largest |pivot| of a lane; not a number if a pivot is not."""
     total = extremes[3, lane]
     return extremes[1, lane] / extremes[2, lane] if total == total else np.nan  # noqa: PLR0124
-
-
-@njit(**FLAGS)
-def solve_condensed(
-    stiffness, ends, diagonal, border, columns, rows, corner, rhs, x, negative, ratio
-):
-    """Bordered solves ``[H B C; Bᵀ 0 …; R … D] x = rhs`` for lanes-first arrays; see `condensed`.
-
-    diagonal (lanes, nodes); border (lanes, m, nodes); columns (lanes, k, n + m) and rows alike;
-    corner (lanes, k, k); rhs (lanes, r, n + m + k); x like rhs. At least eight lanes; the last
-    block overlaps the one before.
-    """
-    elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
-    lanes, nodes = diagonal.shape
-    m, k, r = border.shape[1], columns.shape[1], rhs.shape[1]
-    first, last = min(ends[0], 1), nodes - 1 - min(elements - ends[1], 1)
-    n, total = last - first + 1, m + k + r
-    tiles = (TIES + total + TILE - 1) // TILE
-    lower, vertices, work, extremes = work_arrays(elements, inner, tiles)
-    block, left = work_rows(nodes), work_rows((m + k) * nodes)
-    products, closing = work_rows((m + k) * total), work_rows((m + k) * r)
-    schur, small = np.empty((m + k, m + k)), np.empty((m + k, r))
-    for begin in range(0, lanes, LANES):
-        start = min(begin, lanes - LANES)
-        work[:] = 0.0
-        read_lanes(diagonal, start * nodes, nodes, nodes, block, 0, 1)
-        for c in range(m):
-            position = (start * m + c) * nodes
-            read_lanes(border, position, m * nodes, nodes, work, _row(c, 0, nodes), TILE)
-            read_lanes(border, position, m * nodes, nodes, left, c * nodes, 1)
-        for c in range(k):
-            position, to = (start * k + c) * (n + m), (m + c) * nodes + first
-            at = _row(m + c, first, nodes)
-            read_lanes(columns, position, k * (n + m), n, work, at, TILE)
-            read_lanes(rows, position, k * (n + m), n, left, to, 1)
-        for c in range(r):
-            position, at = (start * r + c) * (n + m + k), _row(m + k + c, first, nodes)
-            read_lanes(rhs, position, r * (n + m + k), n, work, at, TILE)
-        start_block(block, vertices, extremes)
-        for group in range((elements + GROUP - 1) // GROUP):
-            reduce_group(stiffness, group, block, ends, tiles, lower, vertices, work, extremes)
-        for c in range(0, total, 2):
-            at = _row(c, 0, nodes)
-            for e in range(elements, -1, -1):
-                restore_element(e, elements, inner, ends, lower, vertices, work, work, at, TILE)
-        _border_products(left, work, nodes, first, last, m + k, total, products)
-        for lane in range(LANES):
-            at = start + lane
-            _fill_schur(columns[at], rows[at], corner[at], rhs[at], m, products, lane, schur, small)
-            of_border = factor_symmetric(schur[:m, :m].copy())
-            negative[at] = np.int64(extremes[0, lane]) + of_border
-            ratio[at] = pivot_ratio(extremes, lane)
-            solve_small(schur, small)
-            for c in range(r):
-                for b in range(m + k):
-                    x[at, c, n + b] = closing[b * r + c, lane] = small[b, c]
-        for c in range(r):
-            at = _row(m + k + c, first, nodes)
-            _combine_columns(work, nodes, first, last, m + k, c, r, closing)
-            position = (start * r + c) * (n + m + k)
-            write_lanes(work, at, TILE, x, position, r * (n + m + k), n)
-
-
-@njit(**INNER)
-def _row(c, node, nodes):
-    """Row of column c (ties not counted) at a node."""
-    slot = TIES + c
-    return ((slot // TILE) * nodes + node) * TILE + slot % TILE
-
-
-@njit(**INNER)
-def _border_products(left, work, nodes, first, last, count, total, products):
-    """Products of the border's rows with all solved columns: products[a, b] = aᵀ b."""
-    for a in range(count):
-        for b in range(total):
-            value, at = spread(0.0), _row(b, 0, nodes)
-            for i in range(first, last + 1):
-                value = value + load(left, a * nodes + i) * load(work, at + i * TILE)
-            store(products, a * total + b, value)
-
-
-@njit(**INNER)
-def _fill_schur(columns, rows, corner, rhs, m, products, lane, schur, small):
-    """Schur complement of H for one lane, and its right-hand sides."""
-    k, r = columns.shape[0], rhs.shape[0]
-    n, total = rhs.shape[1] - m - k, m + k + r
-    for a in range(m + k):
-        for b in range(m + k):
-            fixed = 0.0
-            if a < m <= b:
-                fixed = columns[b - m, n + a]
-            elif b < m <= a:
-                fixed = rows[a - m, n + b]
-            elif a >= m:
-                fixed = corner[a - m, b - m]
-            schur[a, b] = fixed - products[a * total + b, lane]
-        for c in range(r):
-            small[a, c] = rhs[c, n + a] - products[a * total + m + k + c, lane]
-
-
-@njit(**INNER)
-def _combine_columns(work, nodes, first, last, count, c, sides, closing):
-    """Take the border's solution out of right-hand side c: H⁻¹(rhs − [B C] y)."""
-    target = _row(count + c, 0, nodes)
-    for i in range(first, last + 1):
-        value = load(work, target + i * TILE)
-        for b in range(count):
-            at = _row(b, i, nodes)
-            value = value - load(work, at) * load(closing, b * sides + c)
-        store(work, target + i * TILE, value)

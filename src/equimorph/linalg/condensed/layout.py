@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.linalg.condensed.kernels import solve_condensed
+from equimorph.errors import InputError
+from equimorph.linalg.condensed.bordered.kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered
 from equimorph.linalg.lanes import over_lanes
 
@@ -93,6 +94,7 @@ class CondensedLayout:
         of the solution: a step of iterative refinement brings them back. Lanes with a pivot ratio
         below `REFINABLE` (or not a number) are solved again by the pivoted dense factorisation.
         """
+        self._check(diagonal, border, columns, rows, corner, rhs)
         arrays = [np.ascontiguousarray(a) for a in (diagonal, border, columns, rows, corner, rhs)]
         x, negative, ratio = self._solve(*arrays)
         pivoted = np.zeros(len(x), bool)
@@ -107,6 +109,23 @@ class CondensedLayout:
             again = solve_bordered(matrix, *(a[pivoted] for a in arrays[2:]))
             x[pivoted], negative[pivoted] = again.x, again.negative
         return BorderedSolution(x, negative, ratio, pivoted)
+
+    def _check(self, *arrays: np.ndarray) -> None:
+        """Refuse shapes that do not fit: the kernel does not check what it reads."""
+        lanes, m, k = len(arrays[0]), arrays[1].shape[1], arrays[2].shape[1]
+        size = self.unknown.stop - self.unknown.start + m
+        sides = arrays[5].shape[1]
+        shapes = {
+            "diagonal": (lanes, self.nodes),
+            "border": (lanes, m, self.nodes),
+            "columns": (lanes, k, size),
+            "rows": (lanes, k, size),
+            "corner": (lanes, k, k),
+            "rhs": (lanes, sides, size + k),
+        }
+        for (name, shape), array in zip(shapes.items(), arrays, strict=True):
+            if array.shape != shape:
+                raise InputError(f"`{name}` must have shape {shape}; got {array.shape}.")
 
     def _solve(
         self, *arrays: np.ndarray

@@ -12,6 +12,7 @@ from equimorph.linalg.condensed.kernels import (
     GROUP,
     TILE,
     add_products,
+    negative_of_two,
     pivot_ratio,
     reduce_group,
     restore_element,
@@ -34,7 +35,6 @@ from equimorph.linalg.simd import (
     spread,
     stack2,
     store,
-    where_less,
     work_rows,
 )
 
@@ -48,6 +48,8 @@ ALONG, ACROSS, CLOSE_ALONG, CLOSE_ACROSS, BALANCE, WORST = range(6)
 """Rows of the sums: constraints, their change by dp, residual at the last vertex, largest."""
 ONE_TILE, FIRST_ROW, SIDES = np.int64(1), np.int64(0), np.int64(2)
 """Columns of a step fill one tile; step and tangent are solved side by side."""
+SMALL_WIDTH = np.int64(5)
+"""Width of the Schur system of (λ, μ, t) with its two right-hand sides."""
 
 
 @njit(**INNER)
@@ -190,16 +192,6 @@ def _small_system(products, sums, closing, small):
 
 
 @njit(**INNER)
-def _negative_of_two(small):
-    """Negative eigenvalues of the leading 2 × 2 block, by its determinant and trace."""
-    zero, one = spread(0.0), spread(1.0)
-    a, b, c = load(small, 0), load(small, 1), load(small, 6)
-    determinant = a * c - b * b
-    definite = where_less(a + c, zero, one + one, zero)
-    return where_less(determinant, zero, one, definite)
-
-
-@njit(**INNER)
 def _combine(columns, small, nodes, solution):
     """Reduced columns of the step and of the tangent, side by side."""
     step0, step1, step2 = load(small, 3), load(small, 8), load(small, 13)
@@ -248,7 +240,7 @@ def advance_lanes(
             for e in range(group * GROUP, min(group * GROUP + GROUP, elements)):
                 add_products(e, inner, ends, lower, vertices, columns, products)
         _small_system(products, sums, closing, small)
-        store(extremes, 0, load(extremes, 0) + _negative_of_two(small))
+        store(extremes, 0, load(extremes, 0) + negative_of_two(small, 0, SMALL_WIDTH))
         solve_lanes(small, 3, 5)
         for e in range(elements, -1, -1):
             node = e * (inner + 1)

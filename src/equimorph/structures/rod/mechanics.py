@@ -6,10 +6,17 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Bool, Float
 
+from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Advance, Direction, Structure, Symmetry
+from equimorph.structures.rod.derivatives.kernels import (
+    matrix_lanes,
+    parameter_lanes,
+    residual_lanes,
+    second_lanes,
+)
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.kernels import advance_lanes
 from equimorph.structures.rod.loads import LoadShape
@@ -18,10 +25,6 @@ from equimorph.structures.rod.recovery import Recovery
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Nodal = Float[np.ndarray, "lanes nodes"]
-
-
-def _contiguous(*arrays: np.ndarray) -> list[np.ndarray]:
-    return [np.ascontiguousarray(array) for array in arrays]
 
 
 class RodMechanics(Structure):
@@ -43,10 +46,31 @@ class RodMechanics(Structure):
         self.unknowns = len(mesh.nodes) - 2
         self.mass = mesh.weights[1:-1].copy()
 
+    @cached_property
+    def _matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Stiffness, quadrature weights and load weights, as the kernels take them."""
+        return self.layout.stiffness, self.mesh.weights, self.loads
+
+    def _checked(self, *pairs: Direction) -> list[np.ndarray]:
+        """States and directions (z, p) as contiguous arrays of the right widths, for the kernels.
+
+        Kernels do not check what they read.
+        """
+        lanes, widths = len(pairs[0][0]), (self.size, len(self.parameters))
+        for pair in pairs:
+            for array, width, name in zip(pair, widths, ("z", "p"), strict=True):
+                if array.shape != (lanes, width):
+                    raise InputError(
+                        f"`{name}` must have shape ({lanes}, {width}); got {array.shape}. "
+                        "States belong to the rod, and the resolution, that made them."
+                    )
+        return [np.ascontiguousarray(array) for pair in pairs for array in pair]
+
     # --- fields -----------------------------------------------------------------------------
 
     def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
         """Angles θ at all nodes, the prescribed ends included."""
+        z, p = self._checked((z, p))
         theta = np.empty((len(z), self.unknowns + 2))
         theta[:, 1:-1] = z[:, : self.unknowns]
         theta[:, 0], theta[:, -1] = p[:, 1] + p[:, 0], p[:, 1] - p[:, 0]
@@ -61,30 +85,26 @@ class RodMechanics(Structure):
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
     ) -> Float[np.ndarray, "lanes points 4"]:
         """(θ, κ, x, y) at arclengths, recovered from the vertices."""
-        return self.recovery.fields(np.ascontiguousarray(z), np.ascontiguousarray(p), s)
+        z, p = self._checked((z, p))
+        return self.recovery.fields(z, p, s)
 
     def largest_curvature(
         self, z: Lanes, p: Parameters
     ) -> tuple[Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
-        z, p = np.ascontiguousarray(z), np.ascontiguousarray(p)
+        z, p = self._checked((z, p))
         return self.recovery.largest_curvature(z, p)
 
-    def _coefficients(self, z: Lanes, p: Parameters) -> tuple[Nodal, Nodal]:
-        """Factors a of sin θᵢ and b of cos θᵢ in L."""
-        lam, mu = z[:, -2:-1], z[:, -1:]
-        return mu * self.mesh.weights - p[:, 2:3] * self.loads, lam * self.mesh.weights
-
-    def _gradient(self, z: Lanes, p: Parameters) -> Nodal:
-        """∂L/∂θ at all nodes, the prescribed ends included."""
-        theta = self.nodal_angles(z, p)
-        a, b = self._coefficients(z, p)
-        bending = multiply(theta, self.layout.assembled)
-        return np.asarray(bending + a * np.cos(theta) - b * np.sin(theta))
-
-    def _border(self, theta: Nodal) -> Float[np.ndarray, "lanes 2 nodes"]:
-        weights = self.mesh.weights
-        return np.stack([-weights * np.sin(theta), weights * np.cos(theta)], axis=1)
+    def kkt(
+        self, z: Lanes, p: Parameters, shift: Float[np.ndarray, " lanes"] | None = None
+    ) -> tuple[Nodal, Float[np.ndarray, "lanes 2 nodes"]]:
+        """F_z − shift·mass as `layout` takes it: diagonal beside the stiffness, constraints."""
+        z, p = self._checked((z, p))
+        lanes, nodes = len(z), self.unknowns + 2
+        diagonal, gradients = np.empty((lanes, nodes)), np.empty((lanes, 2, nodes))
+        moved = np.zeros(lanes) if shift is None else np.ascontiguousarray(shift)
+        over_lanes(matrix_lanes, self._matrices[1:], [z, p, moved], [diagonal, gradients])
+        return diagonal, gradients
 
     # --- contract ---------------------------------------------------------------------------
 
@@ -96,45 +116,32 @@ class RodMechanics(Structure):
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:
         """(∂L/∂θ at the inner nodes, ∫cos θ − ν, ∫ sin θ)."""
-        theta, weights = self.nodal_angles(z, p), self.mesh.weights
-        closing = [multiply(np.cos(theta), weights) - p[:, 3], multiply(np.sin(theta), weights)]
-        return np.concatenate([self._gradient(z, p)[:, 1:-1], np.stack(closing, 1)], axis=1)
+        return self._residual(z, p)[0]
 
-    def _spread(self, direction: Direction) -> tuple[Nodal, Nodal, Nodal]:
-        """Nodal angles of a direction, and the changes of the factors of sin θ and cos θ."""
-        dz, dp = direction
-        weights = self.mesh.weights
-        change = dz[:, -1:] * weights - dp[:, 2:3] * self.loads
-        return self.nodal_angles(dz, dp), change, dz[:, -2:-1] * weights
+    def _residual(self, z: Lanes, p: Parameters) -> tuple[Lanes, Float[np.ndarray, "lanes 3"]]:
+        """F, and ∂L/∂(θ(0), θ(1), q)."""
+        z, p = self._checked((z, p))
+        out, ends = np.empty_like(z), np.empty((len(z), 3))
+        over_lanes(residual_lanes, self._matrices, [z, p], [out, ends])
+        return out, ends
 
     def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
         """F_p·dp."""
-        theta = self.nodal_angles(z, p)
-        moved, change, _ = self._spread((np.zeros_like(z), dp))
-        a, b = self._coefficients(z, p)
-        gradient = multiply(moved, self.layout.assembled) + change * np.cos(theta)
-        gradient -= (a * np.sin(theta) + b * np.cos(theta)) * moved
-        closing = np.einsum("lmi,li->lm", self._border(theta), moved)
-        closing[:, 0] -= dp[:, 3]
-        return np.concatenate([gradient[:, 1:-1], closing], axis=1)
+        z, p, _, dp = self._checked((z, p), (z, dp))
+        out = np.empty_like(z)
+        over_lanes(parameter_lanes, self._matrices, [z, p, dp], [out])
+        return out
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
-        theta, weights = self.nodal_angles(z, p), self.mesh.weights
-        sine, cosine = np.sin(theta), np.cos(theta)
-        a, b = self._coefficients(z, p)
-        (v_t, v_a, v_b), (w_t, w_a, w_b) = self._spread(v), self._spread(w)
-        gradient = (b * sine - a * cosine) * v_t * w_t
-        gradient -= sine * (v_a * w_t + w_a * v_t) + cosine * (v_b * w_t + w_b * v_t)
-        product = v_t * w_t
-        closing = [-multiply(cosine * product, weights), -multiply(sine * product, weights)]
-        return np.concatenate([gradient[:, 1:-1], np.stack(closing, 1)], axis=1)
+        arrays = self._checked((z, p), v, w)
+        out = np.empty_like(arrays[0])
+        over_lanes(second_lanes, self._matrices[1:], arrays, [out])
+        return out
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""
-        gradient, theta = self._gradient(z, p), self.nodal_angles(z, p)
-        first, last = gradient[:, 0], gradient[:, -1]
-        lift = -multiply(np.sin(theta), self.loads)
+        first, last, lift = self._residual(z, p)[1].T
         return np.stack([first - last, first + last, lift, -z[:, -2]], axis=1)
 
     def solve(
@@ -146,17 +153,12 @@ class RodMechanics(Structure):
         shift: Float[np.ndarray, " lanes"] | None = None,
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered."""
-        theta = self.nodal_angles(z, p)
-        a, b = self._coefficients(z, p)
-        diagonal = -a * np.sin(theta) - b * np.cos(theta)
-        if shift is not None:
-            diagonal -= shift[:, None] * self.mesh.weights
-        lanes = len(z)
+        diagonal, gradients = self.kkt(z, p, shift)
         if border is None:
-            nothing = np.zeros((lanes, 0, self.size))
-            border = (nothing, nothing, np.zeros((lanes, 0, 0)))
+            nothing = np.zeros((len(z), 0, self.size))
+            border = (nothing, nothing, np.zeros((len(z), 0, 0)))
         columns, rows, corner = border
-        return self.layout.solve(diagonal, self._border(theta), columns, rows, corner, rhs)
+        return self.layout.solve(diagonal, gradients, columns, rows, corner, rhs)
 
     def advance(
         self,
@@ -169,7 +171,8 @@ class RodMechanics(Structure):
     ) -> Advance:
         """Fused kernel; lanes with an unsafe pivot take the general solve."""
         lanes = len(z)
-        inputs = _contiguous(z, p, dp, row, corner, defect)
+        z, p, row, dp = self._checked((z, p), (row, dp))
+        inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
         out = Advance(
             np.empty_like(inputs[0]),
             np.empty(lanes),

@@ -1,0 +1,1 @@
+"""General bordered solves with the condensed factorisation."""

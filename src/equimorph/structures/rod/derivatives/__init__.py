@@ -1,0 +1,1 @@
+"""Residual, matrix and derivatives of the rod."""
