@@ -30,7 +30,7 @@ _HOMES = {
         "limit_load",
     ),
     "equimorph.manifold": ("Audit", "EquilibriumSet", "equilibrium_set"),
-    "equimorph.tasks": ("Route", "plan"),
+    "equimorph.tasks": ("LimitLoadMap", "MapCurve", "Route", "limit_load_map", "plan"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 _LAYERS = ("errors", "linalg", "model", "structures", "equilibria", "manifold", "tasks",

@@ -179,46 +179,26 @@ def _closer(
 
     `first` is a length at which it is known to be small.
     """
-    zero = TOUCH * float(min(np.abs(ends[0].value[0]), np.abs(ends[1].value[0])))
-    sign = float(np.sign(ends[0].value[0]))
-    low, high = (_upright(end, sign, zero) for end in ends)
-    doubt = 0.0
+    low, high = ends
     for _ in range(TRIALS):
-        width = high.length - low.length
-        if width[0] < NARROW:
+        if float(high.length[0] - low.length[0]) < NARROW:
             return _at_the_least(curve, (low, high), ends, options)
         share, least, size = _least(curve, low, high)
-        if first is None and least > max(CLOSE * size, zero, doubt):
+        if least > CLOSE * size and first is None:
             return []
+        width = high.length - low.length
         share = share if first is None else float((first - low.length[0]) / width[0])
         middle, first = _between(curve, ends[0], (low.length, width), share), None
         if middle is None:
             break
-        known = np.abs(middle.value[0]) > zero
-        if known and middle.front.index[0] != ends[0].front.index[0]:
-            return _both(curve, (low, middle, high), ends[0].front.index, options)
-        middle = _upright(middle, sign, zero)
-        doubt = _surprise(curve, (low, high), middle)
-        if middle.slope[0] < 0.0:
+        known = np.abs(middle.value[0]) > TOUCH * size
+        if known and middle.front.index[0] != low.front.index[0]:
+            return _both(curve, ends, middle.front, middle.length, options)
+        if np.sign(middle.value[0]) * middle.slope[0] < 0.0:
             low = middle
         else:
             high = middle
     return [_event(BRANCH, low.front.z, low.front.t, low, found=False)]
-
-
-def _upright(probe: _Probe, sign: float, zero: float) -> _Probe:
-    """The size of the eigenvalue; one that is zero within round-off has the sign of the ends."""
-    turned = np.where(np.abs(probe.value) > zero, np.sign(probe.value), sign)
-    return replace(probe, value=turned * probe.value, slope=turned * probe.slope)
-
-
-def _surprise(curve: ParameterLine, ends: tuple[_Probe, _Probe], middle: _Probe) -> float:
-    """By how much the cubic through two points misses the value between them."""
-    low, high = ends
-    s, width = (middle.length - low.length) / (high.length - low.length), _chord(curve, low, high)
-    cubic = (1 - s) ** 2 * ((1 + 2 * s) * low.value + s * width * low.slope)
-    cubic = cubic + s**2 * ((3 - 2 * s) * high.value - (1 - s) * width * high.slope)
-    return float(np.abs(middle.value - cubic)[0])
 
 
 def _between(
@@ -251,9 +231,10 @@ def _chord(curve: ParameterLine, low: _Probe, high: _Probe) -> Values:
 
 def _least(curve: ParameterLine, low: _Probe, high: _Probe) -> tuple[float, float, float]:
     """Share and least value of the cubic between two points, and the smaller of their values."""
-    values, slopes = (low.value, high.value), (low.slope, high.slope)
+    one, two = np.sign(low.value), np.sign(high.value)
+    values, slopes = (one * low.value, two * high.value), (one * low.slope, two * high.slope)
     share, least = least_inside(values, slopes, _chord(curve, low, high))
-    return float(share[0]), float(least[0]), float(np.minimum(*values)[0])
+    return float(share[0]), float(least[0]), float(min(values[0][0], values[1][0]))
 
 
 def _at_the_least(
@@ -273,13 +254,8 @@ def _at_the_least(
     length = low.length + share * (high.length - low.length)
     if least < -zero:
         front, good = step_along(curve, ends[0].front, length - ends[0].length)
-        if good[0] and front.index[0] != ends[0].front.index[0]:
-            return _both(
-                curve,
-                (low, _Probe(front, length, length, length), high),
-                ends[0].front.index,
-                options,
-            )
+        if good[0] and front.index[0] != low.front.index[0]:
+            return _both(curve, ends, front, length, options)
     code = FOLD if _turns(curve, z, t) else BRANCH
     return [_event(code, z, t, replace(low, length=length), found=True)]
 
@@ -294,15 +270,14 @@ def _turns(curve: ParameterLine, z: Float[np.ndarray, "1 size"], t: Values) -> b
 
 def _both(
     curve: ParameterLine,
-    points: tuple[_Probe, _Probe, _Probe],
-    index: Int[np.ndarray, " 1"],
+    ends: tuple[_Probe, _Probe],
+    middle: Front,
+    length: Values,
     options: TraceOptions,
 ) -> list[Happenings]:
-    """Locate the events on both sides of a point with another index than that around."""
-    low, middle, high = points
-    # at a point that is itself singular the index is one of round-off
-    low, high = (replace(each, front=replace(each.front, index=index)) for each in (low, high))
-    brackets = [_bracket(pair, None) for pair in ((low, middle), (middle, high))]
+    """Locate the events on both sides of a point with another index."""
+    between = _Probe(middle, length, length, length)
+    brackets = [_bracket(pair, None) for pair in ((ends[0], between), (between, ends[1]))]
     return [locate_all(curve, brackets, (), replace(options, locate_passed=True))]
 
 

@@ -60,6 +60,8 @@ class Descriptor:
     origin
         Signature of the structure that it describes. Descriptors of the same origin and name are
         equal, whenever they were made; without an origin, those with the same function.
+    place
+        For extrema along the structure: the arclength where they are.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Descriptor:
     function: Evaluate
     symbol: str = ""
     origin: Hashable = None
+    place: Evaluate | None = None
 
     # one and many states differ by the number of axes only, which static types do not see
     @overload

@@ -1,10 +1,20 @@
 """Figures and films of results; nothing else in the package draws."""
 
 from equimorph.plotting.film import film
+from equimorph.plotting.load_map import load_map
 from equimorph.plotting.margins import margins
 from equimorph.plotting.plane import parameter_plane
 from equimorph.plotting.shapes import shapes
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 
-__all__ = ["film", "house_style", "margins", "parameter_plane", "save", "shapes", "surface"]
+__all__ = [
+    "film",
+    "house_style",
+    "load_map",
+    "margins",
+    "parameter_plane",
+    "save",
+    "shapes",
+    "surface",
+]

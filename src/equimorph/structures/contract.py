@@ -127,6 +127,10 @@ class Structure(ABC):
     ) -> tuple[Float[np.ndarray, "lanes size"], Bool[np.ndarray, " lanes"]]:
         """Unloaded state from which the structure starts, and whether it was found."""
 
+    def may_be_natural(self, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """Whether natural states are defined at parameters; they need not exist everywhere."""
+        return np.ones(len(p), bool)
+
     @abstractmethod
     def unloaded(self) -> Mapping[str, float]:
         """Parameter values at which natural states are defined (loads at zero)."""

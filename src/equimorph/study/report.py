@@ -9,8 +9,7 @@ from jaxtyping import Float, Int
 
 from equimorph.model import Descriptor
 from equimorph.structures import States
-from equimorph.study import html
-from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE, route_figures, schedule_table
+from equimorph.study import figures, html
 from equimorph.study.outcome import Outcome, RouteOutcome
 from equimorph.study.prepare import Problem
 
@@ -58,7 +57,7 @@ def _question(problem: Problem) -> str:
 
 
 def _route(each: RouteOutcome, folder: Path) -> list[str]:
-    names = route_figures(each.name)
+    names = figures.route_figures(each.name)
     heading = f"<h2>Route {escape(each.name)}</h2>"
     plane = _still(folder, names.plane, "The route on the plane of the free parameters.")
     if not each.arrived:
@@ -82,8 +81,7 @@ def _route(each: RouteOutcome, folder: Path) -> list[str]:
 
 
 def _schedule_links(name: str) -> str:
-    table = schedule_table(name)
-    sidecar = table.replace(".csv", ".json")
+    table, sidecar = f"{name}-schedule.csv", f"{name}-schedule.json"
     return (
         f'<p>Actuator schedule: <a href="{table}">{table}</a>, with the structure, the first state '
         f'and the loads in <a href="{sidecar}">{sidecar}</a>.</p>'
@@ -136,16 +134,16 @@ def _set(outcome: Outcome, folder: Path) -> list[str]:
     word = "clean" if audit.clean else "not clean: do not rely on the set where it says so"
     pictures = [
         html.figure(
-            folder / f"{SURFACE}.png",
+            folder / f"{figures.SURFACE}.png",
             "The equilibrium set, coloured by index, with its folds.",
-            larger=f"{SURFACE}.svg",
+            larger=f"{figures.SURFACE}.svg",
             wide=True,
         ),
-        _still(folder, STABLE_PLANE, "Number of stable equilibria."),
+        _still(folder, figures.STABLE_PLANE, "Number of stable equilibria."),
     ]
     if not outcome.routes:
         caption = "Number of equilibria over the free parameters."
-        pictures.append(_still(folder, PLANE, caption))
+        pictures.append(_still(folder, figures.PLANE, caption))
     rows = [[escape(what), escape(value)] for what, value in audit.rows()]
     return [
         "<h2>Equilibrium set</h2>",

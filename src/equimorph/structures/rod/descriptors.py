@@ -84,7 +84,10 @@ def max_curvature(rod: RodMechanics) -> Descriptor:
     def value(z: Lanes, p: Parameters) -> Values:
         return rod.largest_curvature(z, p)[0]
 
-    return Descriptor("max_curvature", "1/L", value, "max |κ|", rod.signature)
+    def place(z: Lanes, p: Parameters) -> Values:
+        return rod.largest_curvature(z, p)[1]
+
+    return Descriptor("max_curvature", "1/L", value, "max |κ|", rod.signature, place)
 
 
 def support_force(rod: RodMechanics, component: str) -> Descriptor:

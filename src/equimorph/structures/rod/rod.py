@@ -141,6 +141,10 @@ class Rod(RodMechanics):
         natural = natural_arch(self, p)
         return natural.z, natural.outcome == Outcome.FOUND
 
+    def may_be_natural(self, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """Θ > 0: the straight rod has no upright side."""
+        return np.asarray(p[:, 0] > 0.0)
+
     def unloaded(self) -> Mapping[str, float]:
         """q = 0."""
         return {"q": 0.0}

@@ -1,0 +1,182 @@
+"""Natural states over a grid of settings: one from the structure, the others by continuation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy import ndimage
+
+from equimorph.model import Grid, position
+from equimorph.structures import Structure
+
+Settings = Float[np.ndarray, "lanes 2"]
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Flags = Bool[np.ndarray, " lanes"]
+
+SHARE = 0.25
+"""Largest correction of a step to a neighbour, relative to the step: beyond, it is not taken."""
+ITERATIONS = 8
+CONVERGED = 1e-7
+"""Size of the last correction; Newton squares it."""
+TRIES = 3
+"""Vertices of each unreached piece of the grid at which the structure is asked."""
+
+
+@dataclass(frozen=True)
+class NaturalSheet:
+    """Natural states over the vertices of a grid, and over settings between them.
+
+    Attributes
+    ----------
+    structure
+        The structure.
+    base
+        All parameters, unloaded; those of the grid are replaced.
+    axes, places
+        Grid lines and the places of their parameters.
+    z, found
+        States over the vertices (row by row), and whether there is one.
+    """
+
+    structure: Structure
+    base: Float[np.ndarray, " parameters"]
+    axes: tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]
+    places: Int[np.ndarray, " 2"]
+    z: Float[np.ndarray, "vertices size"]
+    found: Bool[np.ndarray, " vertices"]
+
+    def parameters(self, settings: Settings) -> Parameters:
+        """All parameters at settings, unloaded."""
+        return _parameters(self.base, self.places, settings)
+
+    def states(self, settings: Settings) -> tuple[Lanes, Flags]:
+        """Natural states at settings, continued from the nearest vertices."""
+        shape = tuple(len(axis) for axis in self.axes)
+        near = []
+        for axis, values in zip(self.axes, settings.T, strict=True):
+            step = axis[1] - axis[0]
+            near.append(np.clip(np.rint((values - axis[0]) / step), 0, len(axis) - 1).astype(int))
+        vertex = np.ravel_multi_index(tuple(near), shape)
+        start = np.stack([axis[k] for axis, k in zip(self.axes, near, strict=True)], axis=1)
+        p = self.parameters(settings)
+        z, found = np.full((len(p), self.structure.size), np.nan), self.found[vertex]
+        here = np.flatnonzero(found)
+        before = self.parameters(start[here])
+        z[here], found[here] = _stepped(self.structure, self.z[vertex[here]], before, p[here])
+        rest = np.flatnonzero(~found & self.found[vertex])
+        if len(rest):
+            z[rest], found[rest] = self.structure.natural(p[rest])
+        return z, found & self.structure.may_be_natural(p)
+
+
+def natural_sheet(
+    structure: Structure, grid: Grid, base: Float[np.ndarray, " parameters"]
+) -> NaturalSheet:
+    """Natural states over all vertices of a grid that can be reached from one of them.
+
+    The structure gives the state at a vertex in the middle; its neighbours follow by a tangent step
+    and Newton's method at fixed parameters, and so on. A step counts if its correction is small and
+    the state stable. For every piece of the grid that cannot be reached in this way, the structure
+    is asked again.
+    """
+    axes = grid.axes()
+    shape = (len(axes[0]), len(axes[1]))
+    settings = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    places = np.array([position(structure.parameters, name) for name in grid.names])
+    p = _parameters(base, places, settings)
+    z, found = np.full((len(p), structure.size), np.nan), np.zeros(len(p), bool)
+    asked = np.zeros(len(p), int)
+    defined = structure.may_be_natural(p)
+    asked[~defined] = 1
+    while (seeds := _seeds((found | ~defined).reshape(shape), asked)).size:
+        asked[seeds] = 1
+        z[seeds], found[seeds] = structure.natural(p[seeds])
+        _flood(structure, p, (z, found), shape, seeds[found[seeds]])
+    found &= defined
+    return NaturalSheet(structure, base, (axes[0], axes[1]), places, z, found)
+
+
+def _parameters(
+    base: Float[np.ndarray, " parameters"], places: Int[np.ndarray, " 2"], settings: Settings
+) -> Parameters:
+    p = np.tile(base, (len(settings), 1))
+    p[:, places] = settings
+    return p
+
+
+def _seeds(
+    found: Bool[np.ndarray, "rows columns"], asked: Int[np.ndarray, " vertices"]
+) -> Int[np.ndarray, " pieces"]:
+    """One vertex that was not asked yet, in the middle of each unreached piece of the grid."""
+    pieces, many = ndimage.label(~found)
+    seeds = []
+    for piece in range(1, many + 1):
+        inside = np.flatnonzero(pieces == piece)
+        if np.count_nonzero(asked[inside]) < min(TRIES, len(inside)):
+            depth = ndimage.distance_transform_edt(np.pad(pieces == piece, 1))[1:-1, 1:-1].ravel()
+            depth[asked > 0] = 0.0
+            seeds.append(int(depth.argmax()))
+    return np.array(seeds, int)
+
+
+def _flood(
+    structure: Structure,
+    p: Float[np.ndarray, "vertices parameters"],
+    sheet: tuple[Float[np.ndarray, "vertices size"], Bool[np.ndarray, " vertices"]],
+    shape: tuple[int, int],
+    front: Int[np.ndarray, " front"],
+) -> None:
+    """Continue states from the vertices of a front to all that can be reached; fills `sheet`."""
+    z, found = sheet
+    while len(front):
+        start, target = _neighbours(front, shape)
+        fresh = ~found[target]
+        start, target = start[fresh], target[fresh]
+        reached = np.zeros(0, int)
+        # a vertex with several neighbours in the front: the second is tried where the first fails
+        while len(target):
+            _, first = np.unique(target, return_index=True)
+            a, b = start[first], target[first]
+            end, good = _stepped(structure, z[a], p[a], p[b])
+            z[b[good]], found[b[good]] = end[good], True
+            reached = np.concatenate([reached, b[good]])
+            rest = np.setdiff1d(np.arange(len(target)), first)
+            rest = rest[~found[target[rest]]]
+            start, target = start[rest], target[rest]
+        front = reached
+
+
+def _neighbours(
+    front: Int[np.ndarray, " front"], shape: tuple[int, int]
+) -> tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]]:
+    """Vertices of a front and their neighbours on the grid."""
+    row, column = np.divmod(front, shape[1])
+    starts, targets = [], []
+    for down, right in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        i, j = row + down, column + right
+        inside = (i >= 0) & (i < shape[0]) & (j >= 0) & (j < shape[1])
+        starts.append(front[inside])
+        targets.append((i * shape[1] + j)[inside])
+    return np.concatenate(starts), np.concatenate(targets)
+
+
+def _stepped(
+    structure: Structure, z: Lanes, p: Parameters, target: Parameters
+) -> tuple[Lanes, Flags]:
+    """States at `target` on the sheet of the stable states (z, p), and whether they are sure."""
+    n = structure.unknowns
+    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
+    tangent = structure.advance(z, p, target - p, still, one, none).tangent_z
+    end, fixed = z + tangent, np.zeros_like(p)
+    size = np.full(len(z), np.inf)
+    for _ in range(ITERATIONS):
+        move = structure.advance(end, target, fixed, still, one, none)
+        end = end + move.dz
+        size = np.sqrt(move.dz[:, :n] ** 2 @ structure.mass)
+        if not (size > CONVERGED).any():
+            break
+    step, miss = (
+        np.sqrt(each[:, :n] ** 2 @ structure.mass) for each in (tangent, end - z - tangent)
+    )
+    return end, (size <= CONVERGED) & (miss <= SHARE * step + 1e-9) & (move.index == 0)

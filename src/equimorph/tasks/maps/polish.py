@@ -1,0 +1,140 @@
+"""Exact places of singular states, many at a time, each in two parameters of its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.locus import Test
+from equimorph.structures import Structure
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Pairs = Float[np.ndarray, "lanes 2 extended"]
+Values = Float[np.ndarray, " lanes"]
+
+ITERATIONS = 12
+CONVERGED = 1e-9
+DIFFERENCE = 1e-5
+"""Step of differences of tests, in the metric: it sets the rate of Newton, not the error."""
+FARTHEST = 0.5
+"""Longest correction, in the metric: the guesses are close."""
+
+
+@dataclass(frozen=True)
+class _Space:
+    """Unknowns and the two free parameters of each lane, with the metric and a border."""
+
+    structure: Structure
+    z: Lanes
+    p: Parameters
+    free: Int[np.ndarray, "lanes 2"]
+    b: Lanes
+
+    @property
+    def weights(self) -> Float[np.ndarray, "lanes extended"]:
+        """Metric of (z, free parameters); multipliers do not count."""
+        structure = self.structure
+        row = np.concatenate([structure.mass, np.zeros(structure.constraints)])
+        scaled = 1.0 / structure.scales[self.free] ** 2
+        return np.concatenate([np.tile(row, (len(self.z), 1)), scaled], axis=1)
+
+    def moved(self, step: Float[np.ndarray, "lanes extended"]) -> "_Space":
+        """Space at points moved by a step."""
+        p = self.p.copy()
+        np.put_along_axis(
+            p, self.free, np.take_along_axis(p, self.free, axis=1) + step[:, -2:], axis=1
+        )
+        return _Space(self.structure, self.z + step[:, :-2], p, self.free, self.b)
+
+    def frame(self, rows: Pairs) -> tuple[Float[np.ndarray, "lanes extended"], Pairs]:
+        """Newton correction onto the set with rows·dx = 0, and the kernel dual to the rows."""
+        structure, lanes = self.structure, len(self.z)
+        columns = np.zeros((lanes, 2, structure.size))
+        for k in range(2):
+            unit = np.zeros_like(self.p)
+            np.put_along_axis(unit, self.free[:, k : k + 1], 1.0, axis=1)
+            columns[:, k] = structure.parameter_derivative(self.z, self.p, unit)
+        rhs = np.zeros((lanes, 3, structure.size + 2))
+        rhs[:, 0, :-2] = -structure.residual(self.z, self.p)
+        rhs[:, 1:, -2:] = np.eye(2)
+        inner = np.ascontiguousarray(rows[..., :-2])
+        corner = np.ascontiguousarray(rows[..., -2:])
+        solved = structure.solve(self.z, self.p, rhs, (columns, inner, corner)).x
+        return solved[:, 0], solved[:, 1:]
+
+    def tests(self, tests: Sequence[Test], kernel: Pairs) -> tuple[np.ndarray, np.ndarray]:
+        """Values (tests, lanes) and derivatives (tests, lanes, 2) along the kernel."""
+        shifts = [s * DIFFERENCE * kernel[:, k] for k in (0, 1) for s in (1.0, -1.0)]
+        spaces = [self, *(self.moved(shift) for shift in shifts)]
+        at = Critical(
+            self.structure,
+            np.concatenate([each.z for each in spaces]),
+            np.concatenate([each.p for each in spaces]),
+            np.tile(self.b, (5, 1)),
+        )
+        values = np.array([test(at) for test in tests]).reshape(len(tests), 5, -1)
+        ahead, behind = values[:, 1::2], values[:, 2::2]
+        return values[:, 0], np.moveaxis(ahead - behind, 1, 2) / (2.0 * DIFFERENCE)
+
+
+def polished(
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    free: Int[np.ndarray, "lanes 2"],
+    tests: tuple[Test, Test],
+) -> tuple[Lanes, Parameters, Bool[np.ndarray, " lanes"]]:
+    """States near guesses at which two tests vanish, in two parameters; and whether they are found.
+
+    Newton's method on F = 0 and the tests, in a basis of the kernel of [F_z F_p] that is regular at
+    folds, branch points and cusps.
+
+    Parameters
+    ----------
+    structure
+        The structure.
+    z, p
+        Guesses.
+    free
+        Places of the two parameters that vary, for each lane its own.
+    tests
+        What vanishes, see `equimorph.equilibria.conditions`.
+    """
+    space = _Space(structure, z, p, free, null_border(structure, z, p))
+    waves = np.cos(np.outer([1, 2], 1.7 * np.arange(structure.size + 2)) + 0.4)
+    _, kernel = space.frame(np.tile(waves, (len(z), 1, 1)))
+    size = np.full(len(z), np.inf)
+    alive = np.ones(len(z), bool)
+    for _ in range(ITERATIONS):
+        kernel = _orthonormal(kernel, space.weights)
+        onto, kernel = space.frame(kernel * space.weights[:, None])
+        kernel = _orthonormal(kernel, space.weights)
+        values, slopes = space.moved(onto).tests(tests, kernel)
+        matrix = np.moveaxis(slopes, 1, 0)
+        alive &= np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(onto).all(axis=1)
+        alive[alive] = np.abs(np.linalg.det(matrix[alive])) > 0.0
+        share = np.zeros((len(z), 2))
+        share[alive] = np.linalg.solve(matrix[alive], -values.T[alive][..., None])[..., 0]
+        step = onto + np.einsum("lk,lki->li", share, kernel)
+        size = np.sqrt((step**2 * space.weights).sum(axis=1))
+        alive &= size < FARTHEST
+        step[~alive] = 0.0
+        space = space.moved(step)
+        if not (alive & (size > CONVERGED)).any():
+            break
+        b = Critical(structure, space.z, space.p, space.b).v
+        space = _Space(structure, space.z, space.p, free, b / np.linalg.norm(b, axis=1)[:, None])
+    return space.z, space.p, alive & (size <= CONVERGED)
+
+
+def _orthonormal(kernel: Pairs, weights: Float[np.ndarray, "lanes extended"]) -> Pairs:
+    """Orthonormal pairs in the metric that span the same planes."""
+    first = kernel[:, 0] / np.sqrt((kernel[:, 0] ** 2 * weights).sum(axis=1))[:, None]
+    along = (kernel[:, 1] * first * weights).sum(axis=1)[:, None]
+    rest = kernel[:, 1] - along * first
+    rest = rest - (rest * first * weights).sum(axis=1)[:, None] * first
+    second = rest / np.sqrt((rest**2 * weights).sum(axis=1))[:, None]
+    return np.stack([first, second], axis=1)
