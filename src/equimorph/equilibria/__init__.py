@@ -1,6 +1,7 @@
 """Equilibria: solving, lifting, events, limit loads, searching."""
 
 from equimorph.equilibria.both_ways import CriticalCurve
+from equimorph.equilibria.completeness import Completeness
 from equimorph.equilibria.critical_curves import (
     branch_curve,
     constraint_curve,
@@ -9,18 +10,22 @@ from equimorph.equilibria.critical_curves import (
     grazing_curve,
 )
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
+from equimorph.equilibria.deflation import deflated_newton
 from equimorph.equilibria.lift import Event, Path, check_start, lift, way_points
 from equimorph.equilibria.limit import LimitLoad, limit_load
 from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import Outcome, follow
-from equimorph.equilibria.search import distinct, find_equilibria
+from equimorph.equilibria.pools import distinct
+from equimorph.equilibria.search import FoundStates, find_equilibria, search_points
 from equimorph.equilibria.switching import Branch, branches
 from equimorph.equilibria.tracing import TraceOptions
 
 __all__ = [
     "Branch",
+    "Completeness",
     "CriticalCurve",
     "Event",
+    "FoundStates",
     "LimitLoad",
     "NewtonHomotopy",
     "Outcome",
@@ -32,6 +37,7 @@ __all__ = [
     "check_start",
     "constraint_curve",
     "cusp_curve",
+    "deflated_newton",
     "distinct",
     "find_equilibria",
     "fold_curve",
@@ -40,5 +46,6 @@ __all__ = [
     "lift",
     "limit_load",
     "newton",
+    "search_points",
     "way_points",
 ]

@@ -1,21 +1,38 @@
-"""All equilibria at given parameters: many starts, filtered and told apart."""
+"""All equilibria at given parameters, with an estimate of how many are missing."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.curves import NewtonHomotopy
-from equimorph.equilibria.newton import newton
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL, TraceOptions
+from equimorph.equilibria.completeness import Completeness
+from equimorph.equilibria.pools import Ground, Pools, distinct
+from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
+Points = Float[np.ndarray, "points parameters"]
 
-SAME = 1e-6
-"""Distance in the metric below which two equilibria over one point are the same."""
+REPEATS = 3
+"""Times that the runs at a point are made, at most: again while an equilibrium was found once."""
+
+
+@dataclass(frozen=True, eq=False)
+class FoundStates(States):
+    """What a search found: equilibria over one point, sorted by energy.
+
+    Parameters
+    ----------
+    completeness
+        Capture and recapture over the independent runs of the search; see `Completeness`.
+    failures
+        How many starts led to no equilibrium, by reason.
+    """
+
+    completeness: Completeness
+    failures: Mapping[str, int]
 
 
 def find_equilibria(
@@ -23,14 +40,19 @@ def find_equilibria(
     at: Mapping[str, float],
     *,
     within: Sequence[Constraint] = (),
-    starts: int = 400,
+    starts: int = 200,
+    runs: int = 3,
     seed: int = 0,
-) -> States:
-    """Equilibria at parameters `at`, sorted by energy.
+) -> FoundStates:
+    """Equilibria at parameters `at`, sorted by energy, with an estimate of how many are missing.
 
-    Newton from random guesses of the structure, then Newton homotopy from the guesses that failed,
-    then the images under symmetries that leave `at` unchanged. States that the discretisation does
-    not resolve, or that violate `within`, are dropped. An estimate of the whole, not a promise.
+    Several independent runs, together in one batch. In each: Newton from random guesses of the
+    structure; Newton homotopy from some of the guesses where Newton failed; Newton deflated by what
+    was found. Then lines in random directions of the actuators and loads are laid through every
+    equilibrium and followed both ways through folds: where they return to `at` they bring others,
+    through which lines are laid again, until nothing new comes. Images under symmetries that leave
+    `at` unchanged belong to each run. States that the discretisation does not resolve, or that
+    violate `within`, are dropped. While only one run found some equilibrium, runs are added.
 
     Parameters
     ----------
@@ -39,76 +61,124 @@ def find_equilibria(
     within
         Constraints that states must obey, like ``[arch.max_curvature <= 20]``.
     starts
-        Number of random guesses.
+        Number of random guesses of the first runs together.
+    runs
+        Number of independent runs; at most three times as many are made.
     seed
         Of the random generator.
 
     Raises
     ------
     InputError
-        For unknown parameters or values without meaning.
+        For unknown parameters or values without meaning, or less than one start or run.
     """
-    vector = parameter_vector(structure.parameters, at)
-    p = np.tile(vector, (starts, 1))
-    guesses = structure.sample(p, np.random.default_rng(seed))
-    z, found = newton(structure, guesses, p)
-    more = _by_homotopy(
-        structure, guesses[~found][: starts // 4], p[: int((~found).sum())][: starts // 4]
-    )
-    pool = np.concatenate([z[found], more])
-    pool = pool[_admissible(structure, pool, vector, within)]
-    pool = _with_images(structure, pool[distinct(structure, pool)], vector)
-    pool = pool[distinct(structure, pool)]
-    states = States(structure, pool, np.tile(vector, (len(pool), 1)))
-    return states[np.argsort(states.energy, kind="stable")]
+    points = parameter_vector(structure.parameters, at)[None]
+    return search_points(structure, points, within=within, starts=starts, runs=runs, seed=seed)[0]
 
 
-def distinct(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
-    """Return the first of each group of points closer than `SAME` in the metric."""
-    kept: list[int] = []
-    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    for i in range(len(z)):
-        if not kept or np.sqrt(((u[kept] - u[i]) ** 2).sum(axis=1)).min() > SAME:
-            kept.append(i)
-    return np.array(kept, dtype=int)
-
-
-def _by_homotopy(
-    structure: Structure, guesses: Lanes, p: Float[np.ndarray, "lanes parameters"]
-) -> Float[np.ndarray, "found size"]:
-    if len(guesses) == 0:
-        return guesses
-    p = p[: len(guesses)]
-    curve = NewtonHomotopy(structure, p, structure.residual(guesses, p))
-    options = TraceOptions(
-        through_folds=True, through_branch_points=True, steps=300, record=False, locate_passed=False
-    )
-    outcome = follow(curve, guesses, (), options)
-    arrived = outcome.code == ARRIVAL
-    z, found = newton(structure, outcome.z[arrived], p[arrived], iterations=10)
-    return np.asarray(z[found])
-
-
-def _admissible(
+def search_points(
     structure: Structure,
-    z: Lanes,
-    vector: Float[np.ndarray, " parameters"],
-    within: Sequence[Constraint],
-) -> np.ndarray:
-    p = np.tile(vector, (len(z), 1))
-    good = structure.resolved(z, p)
-    for constraint in within:
-        good = good & (constraint.excess(z, p) <= 0.0)
-    return np.asarray(good)
+    points: Points,
+    *,
+    within: Sequence[Constraint] = (),
+    starts: int = 200,
+    runs: int = 3,
+    seed: int = 0,
+) -> list[FoundStates]:
+    """`find_equilibria` at many points of the parameter space together, in less time.
+
+    Parameters
+    ----------
+    points
+        All parameters of the structure, one point per row.
+
+    Raises
+    ------
+    InputError
+        For less than one start or run.
+    """
+    for name, count in (("starts", starts), ("runs", runs)):
+        if count < 1:
+            raise InputError(f"`{name}` must be at least 1; got {count!r}.")
+    generator, guesses = np.random.default_rng(seed), -(-starts // runs)
+    catches = [_Catch.empty(structure, point, tuple(within)) for point in points]
+    todo = np.arange(len(points))
+    for _ in range(REPEATS):
+        ground = Ground(structure, np.repeat(points[todo], runs, axis=0), tuple(within))
+        pools = Pools(ground, generator)
+        pools.start(guesses)
+        pools.spread()
+        for number, point in enumerate(todo):
+            catches[point] = catches[point].extended(pools, number * runs, runs)
+        todo = np.array([point for point in todo if catches[point].doubtful], dtype=int)
+        if len(todo) == 0:
+            break
+    return [catch.states() for catch in catches]
 
 
-def _with_images(
-    structure: Structure, z: Lanes, vector: Float[np.ndarray, " parameters"]
-) -> Float[np.ndarray, "more size"]:
-    p = np.tile(vector, (len(z), 1))
-    images = [
-        symmetry.apply(z, p)[0]
-        for symmetry in structure.symmetries()
-        if np.array_equal(symmetry.signs * vector, vector)
-    ]
-    return np.concatenate([z, *images])
+@dataclass(frozen=True)
+class _Catch:
+    """What all runs at one point found: every state with the number of its run."""
+
+    ground: Ground
+    z: Float[np.ndarray, "caught size"]
+    run: Int[np.ndarray, " caught"]
+    runs: int
+    failures: Mapping[str, int]
+
+    @classmethod
+    def empty(
+        cls,
+        structure: Structure,
+        point: Float[np.ndarray, " parameters"],
+        within: tuple[Constraint, ...],
+    ) -> "_Catch":
+        """Before the first run."""
+        ground = Ground(structure, point[None], within)
+        return cls(ground, np.zeros((0, structure.size)), np.zeros(0, int), 0, {})
+
+    def extended(self, pools: Pools, first: int, runs: int) -> "_Catch":
+        """With the groups `first`, `first` + 1, ... of pools as further runs."""
+        mine = np.flatnonzero((pools.group >= first) & (pools.group < first + runs))
+        z, run = pools.z[mine], pools.group[mine] - first + self.runs
+        valid = self.ground.excess(z, np.zeros(len(z), int)) <= 0.0
+        counts = Counter(self.failures)
+        for reason, group in pools.failures:
+            counts[reason] += int(((group >= first) & (group < first + runs)).sum())
+        return _Catch(
+            self.ground,
+            np.concatenate([self.z, z[valid]]),
+            np.concatenate([self.run, run[valid]]),
+            self.runs + runs,
+            {reason: count for reason, count in counts.items() if count},
+        )
+
+    @property
+    def kept(self) -> Int[np.ndarray, " found"]:
+        """The different states, sorted by energy."""
+        structure, at = self.ground.structure, distinct(self.ground.structure, self.z)
+        energy = structure.energy(self.z[at], np.tile(self.ground.p, (len(at), 1)))
+        return at[np.argsort(energy, kind="stable")]
+
+    @property
+    def captured(self) -> Bool[np.ndarray, "runs found"]:
+        """Whether each run found each of the different states."""
+        kept = self.z[self.kept]
+        captured = np.zeros((self.runs, len(kept)), bool)
+        if len(kept):
+            n = self.ground.structure.unknowns
+            gap = (self.z[:, None, :n] - kept[None, :, :n]) ** 2 @ self.ground.structure.mass
+            captured[self.run, gap.argmin(axis=1)] = True
+        return captured
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a state was found only once in several runs: another one may be missing."""
+        return self.runs > 1 and bool((self.captured.sum(axis=0) == 1).any())
+
+    def states(self) -> FoundStates:
+        """Return the result."""
+        z = self.z[self.kept]
+        p = np.tile(self.ground.p, (len(z), 1))
+        completeness = Completeness(self.captured)
+        return FoundStates(self.ground.structure, z, p, completeness, self.failures)

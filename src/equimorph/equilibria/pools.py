@@ -1,0 +1,185 @@
+"""Pools of equilibria over points of the parameter space, filled by starts and by lines."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
+from equimorph.equilibria.deflation import deflated_newton
+from equimorph.equilibria.newton import newton
+from equimorph.equilibria.outcome import follow
+from equimorph.equilibria.tracing import ARRIVAL, RETURN, TraceOptions
+from equimorph.model import Constraint
+from equimorph.structures import Structure
+
+Lanes = Float[np.ndarray, "lanes size"]
+Groups = Int[np.ndarray, " lanes"]
+
+SAME = 1e-6
+"""Distance in the metric below which two equilibria over one point are the same."""
+LINES = 3
+"""Random lines through each equilibrium, followed both ways."""
+REACH = 4.0
+"""Length of a line to each side, in scaled parameters."""
+ROUNDS = 8
+"""Times that lines are laid through newly found equilibria, at most."""
+HOMOTOPIES = 0.05
+"""Share of the guesses from which Newton homotopy starts (where Newton found nothing)."""
+NUDGE = 0.1
+"""Part of the way from an equilibrium to a random guess, where deflated Newton starts."""
+WIDE_STEPS = TraceOptions(
+    through_folds=True,
+    through_branch_points=True,
+    first_step=0.1,
+    largest_step=1.0,
+    turning=0.5,
+    steps=80,
+    record=False,
+    locate_passed=False,
+    retries=0,
+)
+"""Coarse steps through everything: a lane that jumps to another branch does no harm here."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where is searched: points of the parameter space, one per group, and constraints."""
+
+    structure: Structure
+    p: Float[np.ndarray, "groups parameters"]
+    within: tuple[Constraint, ...]
+
+    def excess(self, z: Lanes, group: Groups) -> Float[np.ndarray, " lanes"]:
+        """Largest violation in units of its bound."""
+        parts = [
+            constraint.excess(z, self.p[group]) / max(1.0, abs(constraint.bound))
+            for constraint in self.within
+        ]
+        return np.asarray(np.max(parts, axis=0)) if parts else np.full(len(z), -np.inf)
+
+    def images(self, z: Lanes, group: int) -> list[Lanes]:
+        """Images of states under the symmetries that leave the group's point unchanged."""
+        vector = self.p[group]
+        p = np.tile(vector, (len(z), 1))
+        return [
+            symmetry.apply(z, p)[0]
+            for symmetry in self.structure.symmetries()
+            if np.array_equal(symmetry.signs * vector, vector)
+        ]
+
+
+class Pools:
+    """Different equilibria by group, and why starts led to none.
+
+    A group is one independent run at one point; all groups advance together in one batch.
+    """
+
+    def __init__(self, ground: Ground, generator: np.random.Generator) -> None:
+        self.ground, self.generator = ground, generator
+        self.z = np.zeros((0, ground.structure.size))
+        self.group = np.zeros(0, int)
+        self.failures: list[tuple[str, Groups]] = []
+
+    def start(self, guesses: int) -> None:
+        """Newton from random guesses, homotopy where it fails, deflation next to what was found."""
+        structure = self.ground.structure
+        group = np.repeat(np.arange(len(self.ground.p)), guesses)
+        p = self.ground.p[group]
+        guess = structure.sample(p, self.generator)
+        z, found = newton(structure, guess, p, iterations=40)
+        self.failures.append(("Newton did not converge", group[~found]))
+        self._take(z[found], group[found])
+        number = np.arange(len(group)) % guesses
+        again = ~found & (number < np.ceil(HOMOTOPIES * guesses))
+        self._by_homotopy(guess[again], group[again])
+        self._by_deflation()
+
+    def spread(self) -> None:
+        """Lay lines through equilibria until they bring nothing new."""
+        begin = 0
+        for _ in range(ROUNDS):
+            new = np.arange(begin, len(self.z))
+            begin = len(self.z)
+            if len(new) == 0:
+                return
+            self._along_lines(np.repeat(new, LINES))
+
+    def _by_homotopy(self, guess: Lanes, group: Groups) -> None:
+        if len(guess) == 0:
+            return
+        structure, p = self.ground.structure, self.ground.p[group]
+        curve = NewtonHomotopy(structure, p, structure.residual(guess, p))
+        outcome = follow(curve, guess, (), WIDE_STEPS)
+        arrived = outcome.code == ARRIVAL
+        self.failures.append(("the Newton homotopy did not arrive", group[~arrived]))
+        self._polished(outcome.z[arrived], group[arrived])
+
+    def _by_deflation(self) -> None:
+        if len(self.z) == 0:
+            return
+        structure, p = self.ground.structure, self.ground.p[self.group]
+        guess = self.z + NUDGE * (structure.sample(p, self.generator) - self.z)
+        z, found = deflated_newton(structure, guess, p, self._known())
+        self.failures.append(("deflated Newton did not converge", self.group[~found]))
+        self._take(z[found], self.group[found])
+
+    def _known(self) -> Float[np.ndarray, "lanes roots unknowns"]:
+        """The pool of its group for each state; rows of NaN fill up."""
+        n, most = self.ground.structure.unknowns, int(np.bincount(self.group).max())
+        known = np.full((len(self.z), most, n), np.nan)
+        for group in np.unique(self.group):
+            mine = np.flatnonzero(self.group == group)
+            known[mine, : len(mine)] = self.z[mine, :n]
+        return known
+
+    def _along_lines(self, lanes: Int[np.ndarray, " lanes"]) -> None:
+        group = np.tile(self.group[lanes], 2)
+        direction = self._directions(len(lanes))
+        velocity = np.concatenate([direction, -direction])
+        line = ParameterLine(self.ground.structure, self.ground.p[group], velocity)
+        outcome = follow(line, np.tile(self.z[lanes], (2, 1)), (), WIDE_STEPS)
+        returned = outcome.code == RETURN
+        lost = ~returned & (outcome.code != ARRIVAL)
+        self.failures.append(("a line was not followed to its end", group[lost]))
+        self._polished(outcome.z[returned], group[returned])
+
+    def _directions(self, count: int) -> Float[np.ndarray, "lanes parameters"]:
+        """Random directions of length `REACH` among actuators and loads."""
+        structure = self.ground.structure
+        steered = np.array([parameter.role != "fixed" for parameter in structure.parameters])
+        free = steered if steered.any() else ~steered
+        direction = self.generator.normal(size=(count, len(free))) * free
+        length = np.linalg.norm(direction, axis=1, keepdims=True)
+        return np.asarray(direction * structure.scales * (REACH / length))
+
+    def _polished(self, z: Lanes, group: Groups) -> None:
+        z, found = newton(self.ground.structure, z, self.ground.p[group], iterations=12)
+        self._take(z[found], group[found])
+
+    def _take(self, z: Lanes, group: Groups) -> None:
+        """Add what is resolved, not far outside the constraints, and new in its group."""
+        structure = self.ground.structure
+        good = structure.resolved(z, self.ground.p[group])
+        self.failures.append(("not resolved by the discretisation", group[~good]))
+        z, group = z[good], group[good]
+        # a little outside, states still serve as stepping stones
+        z, group = (part[self.ground.excess(z, group) < 1.0] for part in (z, group))
+        for each in np.unique(group):
+            mine, known = z[group == each], self.z[self.group == each]
+            pool = np.concatenate([known, mine[distinct(structure, mine)]])
+            pool = np.concatenate([pool, *self.ground.images(pool, int(each))])
+            kept = distinct(structure, pool)
+            new = pool[kept[kept >= len(known)]]
+            self.z = np.concatenate([self.z, new])
+            self.group = np.concatenate([self.group, np.full(len(new), each)])
+
+
+def distinct(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
+    """Return the first of each group of points closer than `SAME` in the metric."""
+    kept: list[int] = []
+    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    for i in range(len(z)):
+        if not kept or np.sqrt(((u[kept] - u[i]) ** 2).sum(axis=1)).min() > SAME:
+            kept.append(i)
+    return np.array(kept, dtype=int)
