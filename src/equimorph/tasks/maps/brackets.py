@@ -1,4 +1,4 @@
-"""Grid edges on which a map jumps or bends, narrowed down by bisection."""
+"""Grid edges on which a map jumps or bends, narrowed down by division."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ Edges = Int[np.ndarray, "edges 2"]
 
 RATIO = 2.0
 """Difference over an edge relative to the smaller of its neighbours' in line that is suspicious."""
+PARTS = 8
+"""Pairs are divided into so many parts at once: tracing one ray takes as long as tracing some."""
 SHRINKING = 0.6
-"""A smooth map's differences halve with each bisection; those of 2^−0.6 and slower are sharp."""
-LOOK_BACK = 3
-NEGLIGIBLE = 0.1
-ASIDE = (0.45, 0.56)
-"""Shares of a pair at which is looked where the middle gives no answer."""
+"""A smooth map's differences shrink with the interval h like h; those like h^0.6 are sharp."""
+ASIDE = (0.0, 0.4, -0.37)
+"""Where to look around a dividing point that gives no answer, in lengths of the parts."""
 
 
 @dataclass(frozen=True)
@@ -30,19 +30,11 @@ class Brackets:
         Samples at both ends.
     edge
         Number of the edge.
-    before
-        Differences of the ends at the last bisections, the oldest first; ∞ if there were fewer.
     """
 
     a: Samples
     b: Samples
     edge: Int[np.ndarray, " brackets"]
-    before: Float[np.ndarray, "last brackets"]
-
-    @classmethod
-    def new(cls, a: Samples, b: Samples, edge: Int[np.ndarray, " brackets"]) -> "Brackets":
-        """Pairs that were not bisected yet."""
-        return cls(a, b, edge, np.full((LOOK_BACK, len(edge)), np.inf))
 
     def __len__(self) -> int:
         """Return the number of pairs."""
@@ -50,13 +42,12 @@ class Brackets:
 
     def take(self, some: Int[np.ndarray, " some"]) -> "Brackets":
         """Return some of the pairs."""
-        return Brackets(self.a.take(some), self.b.take(some), self.edge[some], self.before[:, some])
+        return Brackets(self.a.take(some), self.b.take(some), self.edge[some])
 
     def with_more(self, more: "Brackets") -> "Brackets":
         """Return these and others."""
         edge = np.concatenate([self.edge, more.edge])
-        before = np.concatenate([self.before, more.before], axis=1)
-        return Brackets(joined([self.a, more.a]), joined([self.b, more.b]), edge, before)
+        return Brackets(joined([self.a, more.a]), joined([self.b, more.b]), edge)
 
 
 def grid_edges(shape: tuple[int, int]) -> Edges:
@@ -87,50 +78,44 @@ def _stands_out(
     return np.moveaxis(np.isinf(line) | (line > RATIO * usual), 0, axis)
 
 
-def halved(structure: Structure, sampler: Sampler, pairs: Brackets) -> Brackets:
-    """Halves of pairs with the greater difference, as long as they may be sharp.
-
-    Both halves are kept where both change kind, and at first where neither is negligible: beside a
-    jump a map is often steep. Differences of a smooth map shrink with the pair.
-    """
-    a, b = pairs.a, pairs.b
-    middle = _between(sampler, a, b)
-    left, right = difference(structure, a, middle), difference(structure, middle, b)
-    young = np.isinf(pairs.before[0])
-    both = np.isinf(left) & np.isinf(right)
-    both |= young & (np.minimum(left, right) > NEGLIGIBLE * np.maximum(left, right))
-    twice, go_left = np.flatnonzero(both), left >= right
-    low, high = a.where(go_left, middle), middle.where(go_left, b)
-    others = middle.where(go_left, a).take(twice), b.where(go_left, middle).take(twice)
-    order = np.concatenate([np.arange(len(pairs)), twice])
-    a, b, before = joined([low, others[0]]), joined([high, others[1]]), pairs.before[:, order]
+def divided(structure: Structure, sampler: Sampler, pairs: Brackets) -> Brackets:
+    """Parts of pairs that stay sharp: their ends differ in kind, or by more than a smooth map's."""
+    count = len(pairs)
+    before = difference(structure, pairs.a, pairs.b)
+    # one after the other: all first ends, all first dividing points, ..., all second ends
+    cuts = joined([pairs.a, _between(sampler, pairs), pairs.b])
+    a, b = (cuts.take(np.arange(PARTS * count) + shift) for shift in (0, count))
     now = difference(structure, a, b)
-    smooth = np.isfinite(now) & (now <= before[0] * 0.5 ** (SHRINKING * LOOK_BACK))
-    smooth &= ~np.isinf(before[0]) | (now == 0.0)
-    before = np.concatenate([before[1:], now[None]])
-    return Brackets(a, b, pairs.edge[order], before).take(np.flatnonzero(~smooth))
+    least = np.where(np.isfinite(before), PARTS**-SHRINKING * before, np.inf)
+    sharp = np.isinf(now) | (now > np.tile(least, PARTS))
+    return Brackets(a, b, np.tile(pairs.edge, PARTS)).take(np.flatnonzero(sharp))
 
 
-def narrowed(structure: Structure, sampler: Sampler, pairs: Brackets, bisections: int) -> Brackets:
-    """Pairs that stay sharp through some bisections."""
-    for _ in range(bisections):
+def narrowed(structure: Structure, sampler: Sampler, pairs: Brackets, times: int) -> Brackets:
+    """Pairs that stay sharp when they are divided some times."""
+    for _ in range(times):
         if len(pairs):
-            pairs = halved(structure, sampler, pairs)
+            pairs = divided(structure, sampler, pairs)
     return pairs
 
 
-def _between(sampler: Sampler, a: Samples, b: Samples) -> Samples:
-    """Samples in the middle of pairs; beside it where there is no answer."""
-    middle = sampler(0.5 * (a.setting + b.setting))
-    for share in ASIDE:
-        lost = ~np.isfinite(middle.z).all(axis=1) & np.isfinite(a.z + b.z).all(axis=1)
-        if not lost.any():
+def _between(sampler: Sampler, pairs: Brackets) -> Samples:
+    """Samples at all dividing points of pairs; beside them where there is no answer."""
+    a, b = pairs.a, pairs.b
+    share = np.repeat(np.arange(1, PARTS) / PARTS, len(pairs))
+    start, length = (np.tile(each, (PARTS - 1, 1)) for each in (a.setting, b.setting - a.setting))
+    defined = np.tile(np.isfinite(a.z + b.z).all(axis=1), PARTS - 1)
+    found, open_ = sampler(start[:0]), np.arange(len(share))
+    order = np.zeros(len(share), int)
+    for aside in ASIDE:
+        here = (share[open_] + aside / PARTS)[:, None]
+        order[open_] = len(found.kind) + np.arange(len(open_))
+        found = joined([found, sampler(start[open_] + here * length[open_])])
+        lost = ~np.isfinite(found.z[order[open_]]).all(axis=1) & defined[open_]
+        open_ = open_[lost]
+        if not len(open_):
             break
-        at = np.flatnonzero(lost)
-        here = a.setting[at] + share * (b.setting[at] - a.setting[at])
-        order = np.where(lost, np.cumsum(lost) - 1 + len(lost), np.arange(len(lost)))
-        middle = joined([middle, sampler(here)]).take(order)
-    return middle
+    return found.take(order)
 
 
 def cells_beside(edge: Int[np.ndarray, " n"], shape: tuple[int, int]) -> Int[np.ndarray, "n 2"]:

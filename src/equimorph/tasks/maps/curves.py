@@ -11,11 +11,12 @@ from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Test
 from equimorph.structures import States
 from equimorph.tasks.maps.brackets import (
+    PARTS,
     SHRINKING,
     Brackets,
+    divided,
     edges_ahead,
     grid_edges,
-    halved,
     narrowed,
     suspicious,
 )
@@ -24,11 +25,11 @@ from equimorph.tasks.maps.polish import polished
 from equimorph.tasks.maps.rays import END_BRANCH, END_CONSTRAINT, END_FOLD, MISSING, UNDEFINED, Rays
 from equimorph.tasks.maps.samples import Samples, difference
 
-ROUNDS = 5
-"""How often causes are looked for in halves of halves of a pair."""
-BISECTIONS = 12
-"""Of what remains without a cause."""
-BESIDE = 2.0**-6
+ROUNDS = 3
+"""How often causes are looked for, in parts of parts of a pair."""
+DIVISIONS = 2
+"""Of what remains without a cause: it is known to 8⁻⁵ of an edge."""
+BESIDE = 1.0 / PARTS**2
 """Distance from a place at which both sides are looked at, as a share of the pair."""
 JUMP = 5e-3
 """Difference of limit loads on both sides of a curve that counts as a jump."""
@@ -156,9 +157,9 @@ def _confirmed(
     now, before = difference(structure, left, right), difference(structure, wide.a, wide.b)
     sharp = np.isinf(now) | (np.isfinite(before) & (now > (2.0 * BESIDE) ** SHRINKING * before))
     sharp &= ~_undefined(left) & ~_undefined(right)
-    rest = Brackets.new(wide.a, left, wide.edge).with_more(Brackets.new(right, wide.b, wide.edge))
+    rest = Brackets(wide.a, left, wide.edge).with_more(Brackets(right, wide.b, wide.edge))
     again = np.isinf(difference(structure, rest.a, rest.b)) & np.tile(sharp, 2)
-    narrow = Brackets.new(left, right, wide.edge)
+    narrow = Brackets(left, right, wide.edge)
     sure = np.flatnonzero(sharp)
     confirmed = replace(here, brackets=narrow).take(sure)
     open_ = np.setdiff1d(np.arange(len(pairs)), at[sure])
@@ -185,14 +186,14 @@ def places_on(rays: Rays, vertices: Samples, shape: tuple[int, int]) -> tuple[Pl
     while len(fresh):
         tried[fresh] = True
         pairs = (vertices.take(edges[fresh, 0]), vertices.take(edges[fresh, 1]), fresh)
-        sure, open_ = _resolved(rays, Brackets.new(*pairs))
+        sure, open_ = _resolved(rays, Brackets(*pairs))
         found += sure
         left.append(unexplained(open_))
         seen = np.concatenate([seen, *(each.brackets.edge for each in (*sure, left[-1]))])
         ahead = edges_ahead(seen, shape)
         fresh = ahead[~tried[ahead] & (differences[ahead] > 0.0)]
     nothing = unexplained(
-        Brackets.new(vertices, vertices, np.arange(len(vertices.kind))).take(np.zeros(0, int))
+        Brackets(vertices, vertices, np.arange(len(vertices.kind))).take(np.zeros(0, int))
     )
     return _together([nothing, *found]), _together([nothing, *left])
 
@@ -220,7 +221,7 @@ def branching_between(
 
 
 def _resolved(rays: Rays, pairs: Brackets) -> tuple[list[Places], Brackets]:
-    """Look for causes and bisect in turn; what is never explained is bisected further."""
+    """Look for causes and divide in turn; what is never explained is divided further."""
     structure = rays.sheet.structure
     found: list[Places] = []
     for _ in range(ROUNDS):
@@ -228,8 +229,8 @@ def _resolved(rays: Rays, pairs: Brackets) -> tuple[list[Places], Brackets]:
             return found, pairs
         places, rest, more = explained(rays, pairs)
         found.append(places)
-        pairs = halved(structure, rays, rest).with_more(more) if len(rest) else more
-    return found, narrowed(structure, rays, pairs, BISECTIONS)
+        pairs = divided(structure, rays, rest).with_more(more) if len(rest) else more
+    return found, narrowed(structure, rays, pairs, DIVISIONS)
 
 
 def _together(parts: list[Places]) -> Places:

@@ -16,7 +16,7 @@ from equimorph.tasks.maps.natural import NaturalSheet, natural_sheet
 from equimorph.tasks.maps.rays import KINDS, LOST, UNDEFINED, Rays
 from equimorph.tasks.maps.samples import Samples
 
-UNLOADED_BISECTIONS = 40
+UNLOADED_DIVISIONS = 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +93,8 @@ def limit_load_map(  # noqa: PLR0913  # the knobs of the public face, most by ke
     From the natural state at every setting a ray in `load` is followed to the first loss of
     stability or constraint. On grid edges whose ends differ in status, or more than those of their
     neighbours, the cause is looked for: a state at which two tests vanish, found by Newton's method
-    and confirmed by limit loads on both sides. Edges without a cause are bisected. Places of one
-    kind are connected to curves across the cells.
+    and confirmed by limit loads on both sides. Edges without a cause are divided, again and again.
+    Places of one kind are connected to curves across the cells.
 
     Parameters
     ----------
@@ -184,8 +184,8 @@ def _edge_of_definition(rays: Rays, vertices: Samples, shape: tuple[int, int]) -
     start = replace(vertices, kind=np.where(vertices.kind < UNDEFINED, LOST, vertices.kind))
     out = start.kind[edges] != LOST
     at = np.flatnonzero(out[:, 0] != out[:, 1])
-    pairs = Brackets.new(start.take(edges[at, 0]), start.take(edges[at, 1]), at)
-    found = narrowed(rays.sheet.structure, rays.unloaded, pairs, UNLOADED_BISECTIONS)
+    pairs = Brackets(start.take(edges[at, 0]), start.take(edges[at, 1]), at)
+    found = narrowed(rays.sheet.structure, rays.unloaded, pairs, UNLOADED_DIVISIONS)
     middle = 0.5 * (found.a.setting + found.b.setting)
     inside = found.a.where(found.a.kind == LOST, found.b)
     kind = np.full(len(found), "edge", dtype=object)

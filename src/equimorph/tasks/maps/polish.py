@@ -1,7 +1,7 @@
 """Exact places of singular states, many at a time, each in two parameters of its own."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -15,9 +15,9 @@ Parameters = Float[np.ndarray, "lanes parameters"]
 Pairs = Float[np.ndarray, "lanes 2 extended"]
 Values = Float[np.ndarray, " lanes"]
 
-ITERATIONS = 12
+ITERATIONS = 10
 CONVERGED = 1e-9
-DIFFERENCE = 1e-5
+DIFFERENCE = 1e-6
 """Step of differences of tests, in the metric: it sets the rate of Newton, not the error."""
 FARTHEST = 0.5
 """Longest correction, in the metric: the guesses are close."""
@@ -49,6 +49,11 @@ class _Space:
         )
         return _Space(self.structure, self.z + step[:, :-2], p, self.free, self.b)
 
+    def take(self, lanes: Int[np.ndarray, " some"]) -> "_Space":
+        """Return some of the lanes."""
+        columns = (self.z, self.p, self.free, self.b)
+        return _Space(self.structure, *(column[lanes] for column in columns))
+
     def frame(self, rows: Pairs) -> tuple[Float[np.ndarray, "lanes extended"], Pairs]:
         """Newton correction onto the set with rows·dx = 0, and the kernel dual to the rows."""
         structure, lanes = self.structure, len(self.z)
@@ -67,17 +72,16 @@ class _Space:
 
     def tests(self, tests: Sequence[Test], kernel: Pairs) -> tuple[np.ndarray, np.ndarray]:
         """Values (tests, lanes) and derivatives (tests, lanes, 2) along the kernel."""
-        shifts = [s * DIFFERENCE * kernel[:, k] for k in (0, 1) for s in (1.0, -1.0)]
-        spaces = [self, *(self.moved(shift) for shift in shifts)]
+        spaces = [self, *(self.moved(DIFFERENCE * kernel[:, k]) for k in (0, 1))]
         at = Critical(
             self.structure,
             np.concatenate([each.z for each in spaces]),
             np.concatenate([each.p for each in spaces]),
-            np.tile(self.b, (5, 1)),
+            np.tile(self.b, (3, 1)),
         )
-        values = np.array([test(at) for test in tests]).reshape(len(tests), 5, -1)
-        ahead, behind = values[:, 1::2], values[:, 2::2]
-        return values[:, 0], np.moveaxis(ahead - behind, 1, 2) / (2.0 * DIFFERENCE)
+        values = np.array([test(at) for test in tests]).reshape(len(tests), 3, -1)
+        slopes = (values[:, 1:] - values[:, :1]) / DIFFERENCE
+        return values[:, 0], np.moveaxis(slopes, 1, 2)
 
 
 def polished(
@@ -106,28 +110,39 @@ def polished(
     space = _Space(structure, z, p, free, null_border(structure, z, p))
     waves = np.cos(np.outer([1, 2], 1.7 * np.arange(structure.size + 2)) + 0.4)
     _, kernel = space.frame(np.tile(waves, (len(z), 1, 1)))
-    size = np.full(len(z), np.inf)
-    alive = np.ones(len(z), bool)
+    end_z, end_p, found = z.copy(), p.copy(), np.zeros(len(z), bool)
+    lanes = np.arange(len(z))
     for _ in range(ITERATIONS):
-        kernel = _orthonormal(kernel, space.weights)
-        onto, kernel = space.frame(kernel * space.weights[:, None])
-        kernel = _orthonormal(kernel, space.weights)
-        values, slopes = space.moved(onto).tests(tests, kernel)
-        matrix = np.moveaxis(slopes, 1, 0)
-        alive &= np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(onto).all(axis=1)
-        alive[alive] = np.abs(np.linalg.det(matrix[alive])) > 0.0
-        share = np.zeros((len(z), 2))
-        share[alive] = np.linalg.solve(matrix[alive], -values.T[alive][..., None])[..., 0]
-        step = onto + np.einsum("lk,lki->li", share, kernel)
-        size = np.sqrt((step**2 * space.weights).sum(axis=1))
-        alive &= size < FARTHEST
-        step[~alive] = 0.0
-        space = space.moved(step)
-        if not (alive & (size > CONVERGED)).any():
+        space, kernel, size = _newton_step(space, kernel, tests)
+        done, open_ = size <= CONVERGED, (size > CONVERGED) & (size < FARTHEST)
+        end_z[lanes[done]], end_p[lanes[done]] = space.z[done], space.p[done]
+        found[lanes[done]] = True
+        left = np.flatnonzero(open_)
+        if not len(left):
             break
+        lanes, space, kernel = lanes[left], space.take(left), kernel[left]
         b = Critical(structure, space.z, space.p, space.b).v
-        space = _Space(structure, space.z, space.p, free, b / np.linalg.norm(b, axis=1)[:, None])
-    return space.z, space.p, alive & (size <= CONVERGED)
+        space = replace(space, b=b / np.linalg.norm(b, axis=1)[:, None])
+    return end_z, end_p, found
+
+
+def _newton_step(
+    space: _Space, kernel: Pairs, tests: tuple[Test, Test]
+) -> tuple[_Space, Pairs, Values]:
+    """Corrected lanes, their kernels, and lengths of the corrections; ∞ where there is none."""
+    kernel = _orthonormal(kernel, space.weights)
+    onto, kernel = space.frame(kernel * space.weights[:, None])
+    kernel = _orthonormal(kernel, space.weights)
+    values, slopes = space.moved(onto).tests(tests, kernel)
+    matrix = np.moveaxis(slopes, 1, 0)
+    able = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(onto).all(axis=1)
+    able[able] = np.abs(np.linalg.det(matrix[able])) > 0.0
+    share = np.zeros((len(able), 2))
+    share[able] = np.linalg.solve(matrix[able], -values.T[able][..., None])[..., 0]
+    step = onto + np.einsum("lk,lki->li", share, kernel)
+    step[~able] = 0.0
+    size = np.sqrt((step**2 * space.weights).sum(axis=1))
+    return space.moved(step), kernel, np.where(able, size, np.inf)
 
 
 def _orthonormal(kernel: Pairs, weights: Float[np.ndarray, "lanes extended"]) -> Pairs:
