@@ -53,7 +53,8 @@ def over_lanes(
     They need at least eight lanes: fewer are filled up with copies of the last one.
     """
     lanes = len(inputs[0])
-    shares = min(threads(), lanes // SMALLEST_SHARE)
+    shares = lanes // SMALLEST_SHARE
+    shares = min(threads(), shares) if shares > 1 else shares  # to ask the system takes a while
     if 0 < lanes < LANES:
         at = np.minimum(np.arange(LANES), lanes - 1)
         wide = [np.empty((LANES, *array.shape[1:]), array.dtype) for array in outputs]

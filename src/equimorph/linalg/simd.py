@@ -334,3 +334,19 @@ def sincos(angle):
     c = c * w + spread(4.16666666666666019037e-02)
     cosine = spread(1.0) - spread(0.5) * w + w * w * c
     return _quarter(shifted, x + x * w * s, cosine)
+
+
+@intrinsic
+def prefetch(typing_context, array, position):
+    """Ask for the cache line of a flat position of a C-ordered array ahead of its use."""
+    sig = types.void(array, types.intp)
+
+    def generate(context, builder, sig, args):
+        place = _pointer(context, builder, sig.args[0], args[0], args[1], ir.IntType(8))
+        kind = ir.FunctionType(ir.VoidType(), [place.type, *[_INDEX] * 3])
+        full = "llvm.prefetch.p0i8" if not place.type.is_opaque else "llvm.prefetch.p0"
+        function = cgutils.get_or_insert_function(builder.module, kind, full)
+        builder.call(function, [place, _INDEX(0), _INDEX(3), _INDEX(1)])
+        return context.get_dummy_value()
+
+    return sig, generate

@@ -51,19 +51,25 @@ class RodMechanics(Structure):
         """Stiffness, quadrature weights and load weights, as the kernels take them."""
         return self.layout.stiffness, self.mesh.weights, self.loads
 
+    @cached_property
+    def _step_data(self) -> tuple[np.ndarray, ...]:
+        """What the fused step shares among lanes."""
+        return self.layout.stiffness, self.layout.ends, self.mesh.weights, self.loads
+
     def _checked(self, *pairs: Direction) -> list[np.ndarray]:
         """States and directions (z, p) as contiguous arrays of the right widths, for the kernels.
 
         Kernels do not check what they read.
         """
-        lanes, widths = len(pairs[0][0]), (self.size, len(self.parameters))
+        lanes = len(pairs[0][0])
+        shapes = (lanes, self.size), (lanes, len(self.parameters))
         for pair in pairs:
-            for array, width, name in zip(pair, widths, ("z", "p"), strict=True):
-                if array.shape != (lanes, width):
-                    raise InputError(
-                        f"`{name}` must have shape ({lanes}, {width}); got {array.shape}. "
-                        "States belong to the rod, and the resolution, that made them."
-                    )
+            if (pair[0].shape, pair[1].shape) != shapes:
+                wrong = int(pair[0].shape == shapes[0])
+                raise InputError(
+                    f"`{'zp'[wrong]}` must have shape {shapes[wrong]}; got {pair[wrong].shape}. "
+                    "States belong to the rod, and the resolution, that made them."
+                )
         return [np.ascontiguousarray(array) for pair in pairs for array in pair]
 
     # --- fields -----------------------------------------------------------------------------
@@ -173,20 +179,15 @@ class RodMechanics(Structure):
         lanes = len(z)
         z, p, row, dp = self._checked((z, p), (row, dp))
         inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
-        out = Advance(
-            np.empty_like(inputs[0]),
-            np.empty(lanes),
-            np.empty_like(inputs[0]),
-            np.empty(lanes),
-            np.empty(lanes),
-            np.empty(lanes, dtype=np.int64),
-        )
-        ratio = np.empty(lanes)
-        shared = (self.layout.stiffness, self.layout.ends, self.mesh.weights, self.loads)
-        outputs = (out.dz, out.dt, out.tangent_z, out.tangent_t, out.residual, out.index, ratio)
-        over_lanes(advance_lanes, shared, inputs, outputs)
-        unsafe = ~(ratio >= PIVOT_GUARD)
-        if unsafe.any():
+        # one block each: what is freed at once stays with the process and is not mapped anew
+        dz, tangent_z = np.empty((2, lanes, self.size))
+        dt, tangent_t, residual, ratio = np.empty((4, lanes))
+        index = np.empty(lanes, dtype=np.int64)
+        outputs = (dz, dt, tangent_z, tangent_t, residual, index, ratio)
+        over_lanes(advance_lanes, self._step_data, inputs, outputs)
+        out = Advance(*outputs[:-1])
+        if not ratio.min(initial=1.0) >= PIVOT_GUARD:
+            unsafe = ~(ratio >= PIVOT_GUARD)
             again = super().advance(*(x[unsafe] for x in inputs))
             for name in ("dz", "dt", "tangent_z", "tangent_t", "residual", "index"):
                 getattr(out, name)[unsafe] = getattr(again, name)
