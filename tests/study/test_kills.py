@@ -1,0 +1,150 @@
+"""Runs that are killed and run again end with the results of an undisturbed run."""
+
+import os
+import random
+import re
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from equimorph.cli import main
+from runner import Runner
+from studies import ARCH, SPRING
+
+
+@dataclass
+class Trial:
+    """A study, its undisturbed results, how long they took, and whether figures are dots."""
+
+    runner: Runner
+    study: Path
+    dots: bool
+    expected: dict[str, bytes]
+    seconds: float
+
+    def survives(self, out: Path, ends: list[dict[str, float]]) -> int:
+        """Run until the end with these ends in between; return how many came in time."""
+        codes = [1]
+        for end in ends:
+            codes.append(self.runner.run(self.study, out, dots=self.dots, **end))
+            if codes[-1] == 0:
+                break
+        assert 1 not in codes[1:]
+        assert codes[-1] == 0 or self.runner.run(self.study, out, dots=self.dots) == 0
+        assert contents(out) == self.expected
+        assert {file.name for file in (out / ".equimorph").iterdir()} == {"checkpoints", "lock"}
+        return sum(code != 0 for code in codes[1:])
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    """All results; of the page and the manifest what does not tell how long the run took."""
+    found = {file.name: file.read_bytes() for file in out.iterdir() if file.is_file()}
+    found["index.html"] = re.sub(rb"Wall time: [^<]*", b"", found["index.html"])
+    found["equimorph.json"] = re.sub(rb'"index.html": "\w*"', b"", found["equimorph.json"])
+    return found
+
+
+@pytest.fixture(scope="module")
+def runner() -> Iterator[Runner]:
+    runner = Runner()
+    yield runner
+    runner.close()
+
+
+def _trial(runner: Runner, folder: Path, text: str, *, dots: bool) -> Trial:
+    study = folder / "study.toml"
+    study.write_text(text)
+    start = time.monotonic()
+    assert runner.run(study, folder / "undisturbed", dots=dots) == 0
+    seconds = time.monotonic() - start
+    return Trial(runner, study, dots, contents(folder / "undisturbed"), seconds)
+
+
+@pytest.fixture(scope="module")
+def dotted(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Trial:
+    """The spring, with dots in place of figures."""
+    return _trial(runner, tmp_path_factory.mktemp("dotted"), SPRING, dots=True)
+
+
+@pytest.fixture(scope="module")
+def spring(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Trial:
+    return _trial(runner, tmp_path_factory.mktemp("spring"), SPRING, dots=False)
+
+
+@pytest.fixture(scope="module")
+def arch(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Trial:
+    return _trial(runner, tmp_path_factory.mktemp("arch"), ARCH, dots=False)
+
+
+def _kill(trial: Trial, count: int, folder: Path, seed: int) -> None:
+    """Kill runs at random times, in a new folder whenever one got to its end."""
+    generator = random.Random(seed)
+    killed = series = 0
+    while killed < count:
+        assert series < 10 * count
+        moments = [generator.uniform(0.0, 0.5 * trial.seconds) for _ in range(count - killed)]
+        out = folder / f"out-{series}"
+        killed += trial.survives(out, [{"after": moment} for moment in moments])
+        series += 1
+
+
+def test_some_kills_at_random_times_change_nothing(dotted: Trial, tmp_path: Path):
+    _kill(dotted, 5, tmp_path, seed=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_kills_at_random_times_change_nothing(seed: int, spring: Trial, tmp_path: Path):
+    """100 kills together."""
+    _kill(spring, 25, tmp_path, seed)
+
+
+@pytest.mark.slow
+def test_kills_of_an_arch_change_nothing(arch: Trial, tmp_path: Path):
+    _kill(arch, 10, tmp_path, seed=0)
+
+
+def test_death_at_some_operations_on_files_changes_nothing(dotted: Trial, tmp_path: Path):
+    assert dotted.survives(tmp_path / "out", [{"at": at} for at in (0, 3, 10, 29, 41)]) == 5
+
+
+@pytest.mark.slow
+def test_death_at_operations_on_files_changes_nothing(dotted: Trial, tmp_path: Path):
+    """Every operation up to the first figures; figures arrive one like the other."""
+    for at in (*range(100), *range(100, 220, 7)):
+        assert dotted.survives(tmp_path / f"out-{at}", [{"at": at}]) == 1
+
+
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_other_ways_to_end_a_run_change_nothing(by: int, dotted: Trial, tmp_path: Path):
+    ends = [{"after": share * dotted.seconds, "by": by} for share in (0.2, 0.5)]
+    dotted.survives(tmp_path / "out", ends)
+
+
+def test_two_runs_do_not_share_a_folder_and_a_dead_one_does_not_keep_it(
+    dotted: Trial,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """The first run is stopped while it has the folder, then killed."""
+    out = tmp_path / "out"
+    process = dotted.runner.start(dotted.study, out)
+    lock = out / ".equimorph" / "lock"
+    while not (lock.exists() and lock.read_text()):
+        time.sleep(0.001)
+    os.kill(process, signal.SIGSTOP)
+    monkeypatch.setattr("sys.argv", ["equimorph", "run", str(dotted.study), "--out", str(out)])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1
+    assert f"got one that process {process} on " in complaint
+    os.kill(process, signal.SIGKILL)
+    assert dotted.runner.wait() == -signal.SIGKILL
+    assert dotted.survives(out, []) == 0
