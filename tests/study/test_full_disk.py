@@ -82,7 +82,7 @@ def test_a_full_disk_at_some_operations(
 ):
     """A prime step, so that all kinds of operations take their turn."""
     assert operations > 100
-    _check(spring_file, tmp_path, range(0, operations, 37), known_set)
+    _check(spring_file, tmp_path, range(0, operations, 67), known_set)
 
 
 @pytest.mark.slow

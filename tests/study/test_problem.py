@@ -68,7 +68,7 @@ WRONG = {
     "load not finite": (
         '"uniform"',
         "[[0, 1], [1, inf]]",
-        r"`structure\.load` must be .* finite numbers; got \[\[0, 1\], \[1, Infinity\]\]",
+        r"`structure\.load` must be .* finite numbers .*; got \[\[0, 1\], \[1, Infinity\]\]",
     ),
     "load unknown": ('"uniform"', '"snow"', r'`structure\.load` must be "uniform".*got "snow"'),
     "load no table": ('"uniform"', "[1, 2]", r"`structure\.load` must be"),

@@ -13,6 +13,7 @@ import typer
 from equimorph.errors import InputError
 
 BAD_INPUT = 2
+LONGEST_LINE = 450
 INTERRUPTED = 130
 """What shells say of a program that was ended by Ctrl-C."""
 
@@ -47,7 +48,9 @@ def main() -> None:
 def _complain(message: str) -> None:
     """Write one line, fit for a terminal: names from a file may hold any character."""
     printable = "".join(each if each.isprintable() else " " for each in message)
-    sys.stderr.write(f"equimorph: {' '.join(printable.split())}\n")
+    line = " ".join(printable.split())
+    line = line if len(line) <= LONGEST_LINE else line[: LONGEST_LINE - 3] + "..."
+    sys.stderr.write(f"equimorph: {line}\n")
 
 
 def _show_version(wanted: bool) -> bool:

@@ -10,6 +10,9 @@ from pydantic_core import ErrorDetails
 
 from equimorph.errors import InputError
 
+LONGEST = 60
+"""Characters of a key or value in a message."""
+
 # Requirement for each kind of finding that pydantic names; {braces} are filled from its context.
 _REQUIREMENTS = {
     "missing": "be given",
@@ -24,9 +27,11 @@ _REQUIREMENTS = {
     "greater_than": "be greater than {gt}",
     "greater_than_equal": "be at least {ge}",
     "less_than": "be less than {lt}",
+    "less_than_equal": "be at most {le}",
     "literal_error": "be {expected}",
     "too_short": "have at least {min_length} entries",
     "too_long": "have at most {max_length} entries",
+    "string_too_long": "have at most {max_length} characters",
     "string_pattern_mismatch": "be made of letters, digits, - and _",
 }
 
@@ -54,10 +59,14 @@ def complaint(error: ValidationError, model: type[BaseModel], file: str) -> Inpu
 def short(value: object) -> str:
     """Value as it would stand in the file, cut to a readable length."""
     try:
-        text = json.dumps(value, ensure_ascii=False)
-    except (TypeError, ValueError):
-        text = str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+        text = json.dumps(value, ensure_ascii=False, default=str)
+    except ValueError:
+        text = "a number of thousands of digits"
+    return _cut(text)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
 def key_path(location: tuple[int | str, ...]) -> str:
@@ -68,7 +77,7 @@ def key_path(location: tuple[int | str, ...]) -> str:
     >>> key_path(("route", 0, "start"))
     'route[0].start'
     """
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{_cut(part)}" for part in location)
     return path.removeprefix(".")
 
 
@@ -101,7 +110,8 @@ def _unknown_key(
     where = f"a key of `{place}`" if place else "a section of a study"
     close = difflib.get_close_matches(str(loc[-1]), allowed, n=1)
     remedy = f" Did you mean {close[0]}?" if close else ""
-    return f"`{key_path(location)}` must be {where} ({', '.join(allowed)}); got {loc[-1]}.{remedy}"
+    got = _cut(str(loc[-1]))
+    return f"`{key_path(location)}` must be {where} ({', '.join(allowed)}); got {got}.{remedy}"
 
 
 def _keys_at(loc: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:

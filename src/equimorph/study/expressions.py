@@ -11,6 +11,9 @@ from equimorph.errors import InputError
 from equimorph.model import Constraint
 from equimorph.structures import Structure
 
+LARGEST = 1e9
+"""Largest number of a study; all scales of a structure are near 1."""
+
 _FORM = re.compile(r"\s*([^<>=]*[^<>=\s])\s*(<=|>=)\s*([-+.\deE]+)\s*")
 
 
@@ -45,8 +48,9 @@ def parse_comparison(text: str) -> Comparison:
         bound = float(found[3]) if found else None
     except ValueError:
         bound = None
-    if found is None or bound is None:
+    if found is None or bound is None or not abs(bound) <= LARGEST:
         raise InputError(
-            f"`constraint` must read like max_curvature <= 20 or height(0.5) >= 0; got {text!r}."
+            f"`constraint` must read like max_curvature <= 20 or height(0.5) >= 0, with a number "
+            f"up to {LARGEST:g}; got {text!r}."
         )
     return Comparison(found[1], cast(Literal["<=", ">="], found[2]), bound)

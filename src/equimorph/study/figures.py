@@ -10,26 +10,8 @@ from matplotlib.axes import Axes
 from equimorph import plotting
 from equimorph.model import Progress
 from equimorph.study.folder import ResultsFolder
+from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE, route_figures
 from equimorph.study.outcome import Outcome, RouteOutcome
-
-SURFACE = "surface"
-PLANE = "parameter-plane"
-STABLE_PLANE = "stable-plane"
-
-
-@dataclass(frozen=True)
-class RouteFigures:
-    """File names of the figures of one route, without extension; the film's with it."""
-
-    plane: str
-    shapes: str
-    margins: str
-    film: str
-
-
-def route_figures(name: str) -> RouteFigures:
-    """File names of the figures of the route called `name`."""
-    return RouteFigures(f"{name}-plane", f"{name}-shapes", f"{name}-margins", f"{name}-film.gif")
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ A study is data only. It names a structure, a part of its equilibrium set, point
 are wanted, and routes between states. Types are strict and unknown keys are refused.
 """
 
-import math
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,7 +13,8 @@ from pydantic_core import PydanticCustomError
 
 from equimorph.errors import InputError
 from equimorph.study.complaint import complaint
-from equimorph.study.expressions import parse_comparison
+from equimorph.study.expressions import LARGEST, parse_comparison
+from equimorph.study.names import PLANE, STABLE_PLANE
 
 
 def _requirement(text: str) -> PydanticCustomError:
@@ -40,6 +40,13 @@ def _one(table: dict[str, Any]) -> dict[str, Any]:
     return table
 
 
+def _unused(name: str) -> str:
+    """Refuse names under which files of the set are stored."""
+    if f"{name}-plane" in (STABLE_PLANE, PLANE):
+        raise _requirement("be another name: figures of the set begin with it")
+    return name
+
+
 def _comparison(text: str) -> str:
     try:
         parse_comparison(text)
@@ -54,16 +61,20 @@ def _load(shape: Any) -> Any:
     table = len(rows) >= 2 and all(
         isinstance(row, list)
         and len(row) == 2
-        and all(type(x) in (int, float) and math.isfinite(x) for x in row)
+        and all(type(x) in (int, float) and abs(x) <= LARGEST for x in row)
         for row in rows
     )
     if shape not in ("uniform", "left-half") and not table:
-        raise _requirement('be "uniform", "left-half" or a table [[s, Q], ...] of finite numbers')
+        raise _requirement(
+            'be "uniform", "left-half" or a table [[s, Q], ...] of finite numbers '
+            f"up to {LARGEST:g}"
+        )
     return shape
 
 
-Interval = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
-Point = dict[str, float]
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Interval = Annotated[list[Number], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
+Point = dict[str, Number]
 ComparisonText = Annotated[str, AfterValidator(_comparison)]
 
 
@@ -79,15 +90,15 @@ class RodSection(_Section):
     kind: Literal["rod"]
     load: Annotated[Any, AfterValidator(_load)] = "uniform"
     span: float | None = Field(default=None, gt=0, lt=1)
-    elements: int | None = Field(default=None, gt=0)
-    degree: int | None = Field(default=None, gt=0)
+    elements: int | None = Field(default=None, ge=2, le=1000)
+    degree: int | None = Field(default=None, ge=3, le=16)
 
 
 class SpringSection(_Section):
     """The constrained spring."""
 
     kind: Literal["spring"]
-    stiffness: float = Field(default=1.0, gt=0)
+    stiffness: float = Field(default=1.0, gt=0, le=LARGEST)
 
 
 class SetSection(_Section):
@@ -96,7 +107,7 @@ class SetSection(_Section):
     box: Annotated[dict[str, Interval], AfterValidator(_two)]
     fixed: Point = Field(default_factory=dict)
     within: list[ComparisonText] = Field(default_factory=list)
-    intervals: list[Annotated[int, Field(ge=2)]] | None = Field(
+    intervals: list[Annotated[int, Field(ge=2, le=int(LARGEST))]] | None = Field(
         default=None, min_length=2, max_length=2
     )
 
@@ -113,7 +124,7 @@ class StateSection(_Section):
     at: Point = Field(min_length=1)
     highest: str | None = None
     lowest: str | None = None
-    near: Annotated[dict[str, float], AfterValidator(_one)] | None = None
+    near: Annotated[Point, AfterValidator(_one)] | None = None
 
     @model_validator(mode="after")
     def _one_choice(self) -> "StateSection":
@@ -125,12 +136,14 @@ class StateSection(_Section):
 class RouteSection(_Section):
     """A route between two states, along way-points or planned freely."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+    name: Annotated[
+        str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=80), AfterValidator(_unused)
+    ]
     start: StateSection
     goal: StateSection
     via: list[Annotated[Point, Field(min_length=1)]] | None = Field(default=None, min_length=1)
     within: list[ComparisonText] = Field(default_factory=list)
-    margin: float = Field(default=0.0, ge=0)
+    margin: float = Field(default=0.0, ge=0, le=LARGEST)
 
 
 class Study(_Section):
@@ -181,8 +194,14 @@ def parse_study(text: str, name: str) -> Study:
         If `text` is no TOML or holds a key or value that is not allowed.
     """
     try:
-        return Study.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
+        content = tomllib.loads(text)
+    except RecursionError as error:
+        raise InputError(
+            f"`{name}` must be a study; got lists or tables nested too deep."
+        ) from error
+    except ValueError as error:  # TOML that is malformed, or a number of thousands of digits
         raise InputError(f"`{name}` must be valid TOML; got an error: {error}.") from error
+    try:
+        return Study.model_validate(content)
     except ValidationError as error:
         raise complaint(error, Study, name) from error

@@ -9,7 +9,8 @@ from jaxtyping import Float, Int
 
 from equimorph.model import Descriptor
 from equimorph.structures import States
-from equimorph.study import figures, html
+from equimorph.study import html
+from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE, route_figures, schedule_table
 from equimorph.study.outcome import Outcome, RouteOutcome
 from equimorph.study.prepare import Problem
 
@@ -57,7 +58,7 @@ def _question(problem: Problem) -> str:
 
 
 def _route(each: RouteOutcome, folder: Path) -> list[str]:
-    names = figures.route_figures(each.name)
+    names = route_figures(each.name)
     heading = f"<h2>Route {escape(each.name)}</h2>"
     plane = _still(folder, names.plane, "The route on the plane of the free parameters.")
     if not each.arrived:
@@ -81,7 +82,8 @@ def _route(each: RouteOutcome, folder: Path) -> list[str]:
 
 
 def _schedule_links(name: str) -> str:
-    table, sidecar = f"{name}-schedule.csv", f"{name}-schedule.json"
+    table = schedule_table(name)
+    sidecar = table.replace(".csv", ".json")
     return (
         f'<p>Actuator schedule: <a href="{table}">{table}</a>, with the structure, the first state '
         f'and the loads in <a href="{sidecar}">{sidecar}</a>.</p>'
@@ -134,16 +136,16 @@ def _set(outcome: Outcome, folder: Path) -> list[str]:
     word = "clean" if audit.clean else "not clean: do not rely on the set where it says so"
     pictures = [
         html.figure(
-            folder / f"{figures.SURFACE}.png",
+            folder / f"{SURFACE}.png",
             "The equilibrium set, coloured by index, with its folds.",
-            larger=f"{figures.SURFACE}.svg",
+            larger=f"{SURFACE}.svg",
             wide=True,
         ),
-        _still(folder, figures.STABLE_PLANE, "Number of stable equilibria."),
+        _still(folder, STABLE_PLANE, "Number of stable equilibria."),
     ]
     if not outcome.routes:
         caption = "Number of equilibria over the free parameters."
-        pictures.append(_still(folder, figures.PLANE, caption))
+        pictures.append(_still(folder, PLANE, caption))
     rows = [[escape(what), escape(value)] for what, value in audit.rows()]
     return [
         "<h2>Equilibrium set</h2>",

@@ -18,15 +18,12 @@ from equimorph.study.choose import choose_state
 from equimorph.study.figures import draw_figures
 from equimorph.study.folder import ResultsFolder, open_results_folder
 from equimorph.study.memory import MemoryWatch, check_memory
+from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, schedule_table
 from equimorph.study.outcome import Outcome, RouteOutcome
 from equimorph.study.prepare import Problem, Task, at_key, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
 from equimorph.study.report import report
 from equimorph.tasks import plan
-
-INPUT_COPY = "study.toml"
-RESULTS = "results.h5"
-REPORT = "index.html"
 
 
 def run_study(
@@ -167,7 +164,7 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
         (staging / INPUT_COPY).write_text(text, encoding="utf-8")
         for each in outcome.routes:
             if each.route.schedule is not None:
-                write_schedule(each.route.schedule, staging / f"{each.name}-schedule.csv")
+                write_schedule(each.route.schedule, staging / schedule_table(each.name))
         if not folder.holds([RESULTS]):
             routes = {each.name: each.route for each in outcome.routes}
             eset, height = outcome.equilibrium_set, outcome.problem.height

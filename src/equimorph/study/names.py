@@ -1,0 +1,31 @@
+"""What the files of a results folder are called."""
+
+from dataclasses import dataclass
+
+INPUT_COPY = "study.toml"
+RESULTS = "results.h5"
+REPORT = "index.html"
+
+SURFACE = "surface"
+PLANE = "parameter-plane"
+STABLE_PLANE = "stable-plane"
+
+
+@dataclass(frozen=True)
+class RouteFigures:
+    """File names of the figures of one route, without extension; the film's with it."""
+
+    plane: str
+    shapes: str
+    margins: str
+    film: str
+
+
+def route_figures(name: str) -> RouteFigures:
+    """File names of the figures of the route called `name`."""
+    return RouteFigures(f"{name}-plane", f"{name}-shapes", f"{name}-margins", f"{name}-film.gif")
+
+
+def schedule_table(name: str) -> str:
+    """File name of the schedule of the route called `name`; its sidecar ends in ``.json``."""
+    return f"{name}-schedule.csv"

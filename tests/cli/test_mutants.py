@@ -1,0 +1,105 @@
+"""Study files that are wrong in any way get one line; those that are sound can be run."""
+
+import shutil
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, event, example, given, settings
+
+from equimorph.cli import main
+from mutants import MUTANTS, plausible_mutants
+from studies import ARCH, SPRING, draw_dots
+from typecheck import unchecked
+
+
+def _command(*words: str) -> tuple[int, str, str]:
+    """Exit code, output and complaint of the command line."""
+    out, err = StringIO(), StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", ["equimorph", *words])
+        try:
+            main()
+            code: object = 0
+        except SystemExit as stop:
+            code = stop.code or 0
+    assert isinstance(code, int)
+    return code, out.getvalue(), err.getvalue()
+
+
+def _is_one_line(complaint: str) -> bool:
+    line = complaint.removesuffix("\n")
+    return line.startswith("equimorph: ") and line.isprintable() and 20 < len(line) < 500
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("mutants")
+
+
+def _check(content: bytes, file: Path) -> bool:
+    """Whether a study is sound; if it is not, there is one line."""
+    file.write_bytes(content)
+    with unchecked():
+        code, said, complaint = _command("check", str(file))
+    event("sound" if code == 0 else "refused")
+    if code == 0:
+        assert "is a sound study with" in said
+        assert complaint == ""
+    else:
+        assert code == 2
+        assert _is_one_line(complaint), complaint
+    return code == 0
+
+
+ARBITRARY = settings(deadline=None, suppress_health_check=list(HealthCheck))
+
+
+@settings(ARBITRARY, max_examples=120)
+@given(content=MUTANTS)
+@example(content=b"")
+@example(content=b"a = " + b"[" * 5000)
+@example(content=b"a = " + b"{a=" * 5000)
+@example(content=b"[" + b"a." * 5000 + b"a]")
+@example(content=SPRING.encode() + b"\x00")
+@example(content=b"\xef\xbb\xbf" + SPRING.encode())
+@example(content=SPRING.replace("\n", "\r\n").encode())
+@example(content=SPRING.replace("11, 11", "1" * 5000 + ", 11").encode())
+@example(content=ARCH.replace('"uniform"', "[[0, 1e308], [1, -1e308]]").encode())
+@example(content=ARCH.replace('load = "uniform"', "elements = 1000000000").encode())
+def test_a_mutated_study_is_sound_or_gets_one_line(content: bytes, folder: Path):
+    _check(content, folder / "study.toml")
+
+
+@pytest.mark.slow
+@settings(ARBITRARY, max_examples=1000)
+@given(content=MUTANTS)
+def test_a_mutated_study_is_run_or_gets_one_line(content: bytes, folder: Path):
+    """On tiny grids, which are no less sound than fine ones."""
+    if _check(content, folder / "study.toml"):
+        _run(folder / "study.toml", folder / "out")
+
+
+@pytest.mark.slow
+@settings(ARBITRARY, max_examples=50)
+@given(content=plausible_mutants())
+def test_a_plausible_study_is_run_or_gets_one_line(content: bytes, folder: Path):
+    if _check(content, folder / "study.toml"):
+        _run(folder / "study.toml", folder / "out")
+
+
+def _run(file: Path, out: Path) -> None:
+    shutil.rmtree(out, ignore_errors=True)
+    with unchecked(), pytest.MonkeyPatch.context() as patch:
+        draw_dots(patch)
+        code, said, complaint = _command("run", str(file), "--out", str(out))
+    event("run" if code == 0 else "refused while running")
+    if code == 0:
+        assert "Equilibrium set computed" in said
+        assert (out / "index.html").is_file()
+    else:
+        assert code == 2
+        assert _is_one_line(complaint.splitlines()[-1] + "\n"), complaint
+        assert not (out / "index.html").exists()

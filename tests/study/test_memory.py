@@ -1,0 +1,91 @@
+"""Memory is estimated before a run, and watched while it lasts."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from equimorph.errors import InputError
+from equimorph.structures import Rod
+from equimorph.study import check_memory, memory, parse_study, prepare
+from equimorph.study.template import template
+
+MEASURE = """
+import resource, sys
+from pathlib import Path
+from equimorph.study import run_study
+run_study(Path(sys.argv[1]), Path(sys.argv[2]))
+print(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def _with_intervals(kind: str, intervals: tuple[int, int]) -> str:
+    return re.sub("intervals = .*", f"intervals = {list(intervals)}", template(kind))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("intervals", [(12, 21), (24, 41), (47, 81), (93, 161)])
+def test_the_estimate_is_above_the_peak_and_below_twice_the_peak(
+    intervals: tuple[int, int], tmp_path: Path
+):
+    """The whole run of the arch in a process of its own, figures and film included."""
+    study = tmp_path / "arch.toml"
+    study.write_text(_with_intervals("arch", intervals))
+    words = [sys.executable, "-c", MEASURE, str(study), str(tmp_path / "out")]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    peak = float(done.stdout.split()[-1])
+    assert peak <= memory.estimated_memory(Rod().size, intervals) <= 2.0 * peak
+
+
+def test_a_study_that_needs_too_much_is_refused_with_the_numbers():
+    problem = prepare(parse_study(_with_intervals("arch", (100_000, 100_000)), "arch.toml"))
+    line = (
+        r"`set\.intervals` must fit into memory; got \[100000, 100000\], for which about "
+        r"\d\.\de\+05 GB are needed and \d+\.\d\d GB are available\. Reduce `set\.intervals`\."
+    )
+    with pytest.raises(InputError, match=line):
+        check_memory(problem)
+
+
+def test_numbers_beyond_all_floats_are_refused():
+    text = _with_intervals("spring", (10**400, 2))
+    with pytest.raises(InputError, match=r"`set\.intervals\[0\]` must be at most"):
+        parse_study(text, "spring.toml")
+
+
+def test_what_is_available_is_what_linux_says():
+    """MemAvailable of the machine bounds it from above; it changes while the test runs."""
+    lines = Path("/proc/meminfo").read_text().splitlines()
+    total = 1024.0 * float(lines[0].split()[1])
+    assert 0.0 < memory.available_memory() <= total
+
+
+@pytest.mark.parametrize("names", [("memory.max", "memory.current"), ("limit", "usage")])
+def test_the_limit_of_a_control_group_counts(
+    names: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Cached files count as used there, but give way."""
+    (tmp_path / names[0]).write_text("3000000\n")
+    (tmp_path / names[1]).write_text("2500000\n")
+    (tmp_path / "memory.stat").write_text("active_file 7\ninactive_file 200000\n")
+    monkeypatch.setattr(memory, "_GROUP_FILES", ((tmp_path, *names),))
+    assert memory.available_memory() == 700_000.0
+    (tmp_path / names[0]).write_text("max\n")
+    assert memory.available_memory() > 700_000.0
+
+
+def test_a_run_ends_before_the_system_kills_it(monkeypatch: pytest.MonkeyPatch):
+    reports: list[str] = []
+
+    class Sink:
+        def report(self, stage: str, done: int, total: int | None) -> None:
+            reports.append(stage)
+
+    watch = memory.MemoryWatch(Sink())
+    watch.report("seeds", 0, 1)
+    monkeypatch.setattr(memory, "available_memory", lambda: 0.9 * memory.RESERVE)
+    with pytest.raises(InputError, match=r"got 0\.14 GB left while lifting edges.*is kept"):
+        watch.report("lifting edges", 1, None)
+    assert reports == ["seeds"]
