@@ -28,12 +28,15 @@ LANE, STAGE, ITERATION, INDEX, NEW_INDEX, WHAT, STEPS, MOST, LEVEL = range(9)
 the step; events in the step; steps so far and their limit; number of retries."""
 COUNTS = 9
 
-CORRECTING, CONVERGED, REFUSED, ENDED, SHORT, LONG = range(6)
+CORRECTING, CONVERGED, REFUSED, ENDED, SHORT, LONG, STUCK = range(7)
 """Stages: in Newton's iteration; step converged; step refused; lane finished; given up because its
-step is too short, or took too many."""
+step is too short, it took too many, or its start is singular."""
 
 ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT = 1, 2, 4, 8, 16
 """Bits of what can happen in a step."""
+
+LEVEL_SLOPE = 1e-6
+"""Slope dt/ds of a start that counts as zero: it lies on a fold, and leads nowhere in t."""
 
 ACCEPTED, EXACT = 1e-7, 1e-10
 """Size of the last correction on the way, and where events are: Newton is quadratic, so that the
@@ -128,9 +131,14 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
         numbers[TURN, i] = np.arccos(min(1.0 / norm, 1.0))
 
 
-@njit(**SUMS)
+@njit(**{**SUMS, "_nrt": True})
 def judge(index, numbers, counts, active, smallest, locates):
-    """Tell what happened in steps that converged, and refuse those that hide something."""
+    """Tell what happened in steps that converged, and refuse those that hide something.
+
+    Returns how many steps are good, and in how many of them something happened that only a branch
+    point explains.
+    """
+    good, doubtful = 0, 0
     for i in range(active):
         if counts[STAGE, i] != CONVERGED:
             continue
@@ -153,6 +161,10 @@ def judge(index, numbers, counts, active, smallest, locates):
         bad = changed > 1 or (flipped and hidden) or _turns_twice(old, new, end - start, length)
         if bad or (flipped and not fold and not locates):
             counts[STAGE, i] = REFUSED
+            continue
+        good += 1
+        doubtful += (what & BRANCH) != 0
+    return good, doubtful
 
 
 @njit(**SUMS)
@@ -173,11 +185,58 @@ def _turns_twice(old, new, gain, length):
 
 
 @njit(**SUMS)
+def file_events(new_tangent, stops, places, numbers, counts, active, buffer, filled):
+    """Copy the steps in which something happened behind others; end lanes; return how many."""
+    _, _, z, tangent, trial, _ = places
+    z0, tangent0, z1, tangent1, values, names = buffer
+    for i in range(active):
+        what = counts[WHAT, i]
+        if counts[STAGE, i] != CONVERGED or what == 0:
+            continue
+        norm = 1.0 / numbers[NORM, i]
+        for j in range(z.shape[1]):
+            z0[filled, j], tangent0[filled, j] = z[i, j], tangent[i, j]
+        for j in range(z.shape[1]):
+            z1[filled, j], tangent1[filled, j] = trial[i, j], new_tangent[i, j] * norm
+        values[0, filled], values[1, filled] = numbers[T, i], numbers[SLOPE, i]
+        values[2, filled], values[3, filled] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
+        values[4, filled], values[5, filled] = numbers[LENGTH, i], numbers[TRAVELLED, i]
+        names[0, filled], names[1, filled] = counts[LANE, i], what
+        names[2, filled], names[3, filled] = counts[INDEX, i], counts[NEW_INDEX, i]
+        filled += 1
+        if what & stops:
+            counts[STAGE, i] = ENDED
+    return filled
+
+
+@njit(**SUMS)
+def file_points(trial, numbers, counts, active, buffer, filled):
+    """Copy the ends of good steps of lanes that go on behind other points; return how many."""
+    z, values, names = buffer
+    for i in range(active):
+        if counts[STAGE, i] != CONVERGED:
+            continue
+        for j in range(trial.shape[1]):
+            z[filled, j] = trial[i, j]
+        values[0, filled] = numbers[TRAVELLED, i] + numbers[LENGTH, i]
+        values[1, filled] = numbers[TRIAL, i]
+        names[0, filled], names[1, filled] = counts[LANE, i], counts[NEW_INDEX, i]
+        names[2, filled] = counts[LEVEL, i]
+        filled += 1
+    return filled
+
+
+@njit(**{**SUMS, "_nrt": True})
 def proceed(new_tangent, mass, places, numbers, counts, active, smallest):
-    """Take over accepted steps, shorten refused ones, and try the next step of each lane."""
+    """Take over accepted steps, shorten refused ones, and try the next step of each lane.
+
+    Returns how many lanes are finished, and how many of them are given up.
+    """
+    finished, given_up = 0, 0
     for i in range(active):
         stage = counts[STAGE, i]
         if stage not in (CONVERGED, REFUSED):
+            finished += stage == ENDED
             continue
         if stage == CONVERGED:
             _take_over(i, new_tangent, mass, places, numbers, counts)
@@ -190,6 +249,9 @@ def proceed(new_tangent, mass, places, numbers, counts, active, smallest):
             counts[STAGE, i] = LONG
         else:
             predict(i, mass, places, numbers, counts)
+            continue
+        finished, given_up = finished + 1, given_up + 1
+    return finished, given_up
 
 
 @njit(**SUMS)
@@ -201,9 +263,15 @@ def _take_over(i, new_tangent, mass, places, numbers, counts):
     for j in range(n):
         dz = trial[i, j] - z[i, j]
         chord += mass[j] * dz * dz
+    # loops over few arrays, so that the compiler can tell that they do not overlap
     for j in range(z.shape[1]):
-        z_old[i, j], tangent_old[i, j] = z[i, j], tangent[i, j]
-        z[i, j], tangent[i, j] = trial[i, j], new_tangent[i, j] * norm
+        z_old[i, j] = z[i, j]
+    for j in range(z.shape[1]):
+        z[i, j] = trial[i, j]
+    for j in range(z.shape[1]):
+        tangent_old[i, j] = tangent[i, j]
+    for j in range(z.shape[1]):
+        tangent[i, j] = new_tangent[i, j] * norm
     dt = numbers[TRIAL, i] - numbers[T, i]
     chord = np.sqrt(chord + numbers[WEIGHT, i] * dt * dt)
     half, length = 0.5 * numbers[TURN, i], numbers[LENGTH, i]
@@ -230,8 +298,9 @@ def predict(i, mass, places, numbers, counts):
         a = 2 * s * s * s - 3 * s * s + 1
         c, d = (s * s * s - 2 * s * s + s) * arc, (s * s * s - s * s) * arc
         for j in range(size):
-            step = a * (z_old[i, j] - z[i, j]) + c * tangent_old[i, j] + d * tangent[i, j]
-            trial[i, j] = z[i, j] + step
+            trial[i, j] = z[i, j] + a * (z_old[i, j] - z[i, j])
+        for j in range(size):
+            trial[i, j] += c * tangent_old[i, j] + d * tangent[i, j]
         step = a * (numbers[T_OLD, i] - numbers[T, i]) + c * numbers[SLOPE_OLD, i]
         numbers[TRIAL, i] = numbers[T, i] + step + d * numbers[SLOPE, i]
     else:
@@ -241,6 +310,7 @@ def predict(i, mass, places, numbers, counts):
     along = 0.0
     for j in range(n):
         row[i, j] = mass[j] * tangent[i, j]
+    for j in range(n):
         along += row[i, j] * (trial[i, j] - z[i, j])
     for j in range(n, size):
         row[i, j] = 0.0
@@ -251,11 +321,40 @@ def predict(i, mass, places, numbers, counts):
     counts[ITERATION, i], counts[STAGE, i] = 0, CORRECTING
 
 
-@njit(**SUMS)
-def predict_all(mass, places, numbers, counts, start, stop):
-    """`predict` for lanes from `start` to `stop`."""
-    for i in range(start, stop):
-        predict(i, mass, places, numbers, counts)
+@njit(**{**SUMS, "_nrt": True})
+def seat(lanes, levels, knobs, start, move, mass, weight, places, numbers, counts, active):
+    """Start lanes behind the active ones at t = 0; return how many cannot be started.
+
+    `start`: their points, already corrected tangents and index as (z, dz, tangent, slope, index);
+    `knobs`: first and largest step, turning and most steps for each level of retries.
+    """
+    dz, tangent, slope, index = move
+    _, _, z_here, tangent_here, _, _ = places
+    n, size, stuck = mass.shape[0], start.shape[1], 0
+    for k in range(lanes.shape[0]):
+        i, level = active + k, levels[k]
+        total = 0.0
+        for j in range(n):
+            total += mass[j] * tangent[k, j] * tangent[k, j]
+        squared = weight[k] * weight[k]
+        norm = 1.0 / np.sqrt(total + squared * slope[k] * slope[k])
+        for j in range(size):
+            z_here[i, j] = start[k, j] + dz[k, j]
+            tangent_here[i, j] = tangent[k, j] * norm
+        for row in range(NUMBERS):
+            numbers[row, i] = 0.0
+        for row in range(COUNTS):
+            counts[row, i] = 0
+        numbers[SLOPE, i], numbers[WEIGHT, i] = slope[k] * norm, squared
+        numbers[LENGTH, i], numbers[LARGEST, i] = knobs[0, level], knobs[1, level]
+        numbers[TURNING, i], counts[MOST, i] = knobs[2, level], int(knobs[3, level])
+        counts[LANE, i], counts[INDEX, i], counts[LEVEL, i] = lanes[k], index[k], level
+        if np.isfinite(total) and numbers[SLOPE, i] > LEVEL_SLOPE:
+            predict(i, mass, places, numbers, counts)
+        else:
+            counts[STAGE, i] = STUCK
+            stuck += 1
+    return stuck
 
 
 @njit(**SUMS)

@@ -159,7 +159,7 @@ def locate_fold(curve: Curve, bracket: Bracket) -> Located:
     under = np.maximum(bend**2 - 3 * bow * a, 0.0)
     share = np.clip(a / (-bend + np.sign(a) * np.sqrt(under)), 1e-3, 1.0 - 1e-3)
     root = root_inside(curve, bracket, lambda _, front: front.tangent_t, (a, b), share)
-    return Located(root.front.z, root.front.t, root.at, root.found)
+    return Located(root.z, root.t, root.at, root.found)
 
 
 def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
@@ -240,4 +240,4 @@ def locate_root(
         return function(some, front.z, front.t)
 
     root = root_inside(curve, bracket, scalar, (low, high), share)
-    return Located(root.front.z, root.front.t, root.at, root.found)
+    return Located(root.z, root.t, root.at, root.found)

@@ -10,9 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.equilibria.curves import Curve
-from equimorph.equilibria.fronts import Bracket
 from equimorph.equilibria.happenings import Happenings, locate_all
-from equimorph.equilibria.march import Block, News
+from equimorph.equilibria.march import Block, Loss
 from equimorph.equilibria.tracing import (
     ARRIVAL,
     BRANCH,
@@ -41,7 +40,7 @@ KINDS = {
 }
 LANES_PER_THREAD = 128
 """A second thread is not worth its start for fewer lanes than this on each."""
-EVENTS_AT_ONCE = 128
+EVENTS_AT_ONCE = 256
 REPORT_EVERY = 0.2
 """Seconds."""
 
@@ -98,7 +97,8 @@ def follow(
     ledger = _Ledger.of(z)
     capacity = min(batching.capacity, -(-len(z) // count))
     jobs = [
-        _Job(Block(curve, constraints, options, capacity), queue, ledger, z) for _ in range(count)
+        _Job(Block(curve, constraints, options, capacity, EVENTS_AT_ONCE), queue, ledger, z)
+        for _ in range(count)
     ]
     _run(jobs, queue, progress or Silent())
     return _outcome(ledger, jobs)
@@ -154,10 +154,8 @@ class _Job:
     queue: _Queue
     ledger: _Ledger
     z: Lanes
-    brackets: list[Bracket] = field(default_factory=list)
     again: list[int] = field(default_factory=list)
     passed: list[tuple[Happenings, Some]] = field(default_factory=list)
-    points: list[tuple[Points, Some]] = field(default_factory=list)
     missed: dict[int, str] = field(default_factory=dict)
 
     def run(self, report: Callable[[], None] = lambda: None) -> None:
@@ -175,33 +173,33 @@ class _Job:
         if block.active == 0 or block.room >= max(block.capacity // 4, 1):
             self._fill()
         if block.active:
-            self._take(block.tick())
-        if sum(len(b.lanes) for b in self.brackets) >= (EVENTS_AT_ONCE if block.active else 1):
+            self._lose(block.tick())
+        if block.events.count >= (EVENTS_AT_ONCE if block.active else 1):
             self._locate()
         return bool(block.active or self.again or self.queue.handed < self.queue.total)
 
     def _fill(self) -> None:
         room = self.block.room
         old, self.again = self.again[:room], self.again[room:]
-        lanes = np.concatenate([np.array(old, int), self.queue.take(room - len(old))])
+        lanes = self.queue.take(room - len(old))
+        if old:
+            lanes = np.concatenate([np.array(old), lanes])
         if len(lanes):
-            self._take(self.block.admit(lanes, self.z[lanes], self.ledger.retries[lanes]))
+            self._lose(self.block.admit(lanes, self.z[lanes], self.ledger.retries[lanes]))
 
-    def _take(self, news: News) -> None:
-        """Take up what a round has brought."""
-        self.brackets.extend(news.brackets)
+    def _lose(self, lost: list[Loss]) -> None:
+        """Note lanes that cannot go on."""
         ledger = self.ledger
-        self.points.extend((part, ledger.retries[part.lanes]) for part in news.points)
-        for loss in news.lost:
+        for loss in lost:
             lane, front = loss.lane, loss.front
             ledger.z[lane], ledger.t[lane] = front.z[0], front.t[0]
             ledger.index[lane], ledger.why[lane] = front.index[0], loss.why
-        self.queue.finish(len(news.lost))
+        self.queue.finish(len(lost))
 
     def _locate(self) -> None:
         """Locate everything that is pending; settle lanes that ended, retry where it failed."""
         block, ledger = self.block, self.ledger
-        brackets, self.brackets = self.brackets, []
+        brackets = [block.events.drain()]
         events = locate_all(block.curve, brackets, block.constraints, block.options)
         bad = np.unique(events.lanes[~events.found])
         again = bad[ledger.retries[bad] < block.options.retries]
@@ -272,7 +270,11 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Outcome:
         ledger.code[lane], ledger.why[lane] = LOST, reason
     size = ledger.z.shape[1]
     passed = [part.take(ledger.retries[part.lanes] == t) for job in jobs for part, t in job.passed]
-    points = [part.take(ledger.retries[part.lanes] == t) for job in jobs for part, t in job.points]
+    parts = [part for job in jobs for part in job.block.points.parts()]
+    points = [
+        part if (last := ledger.retries[part.lanes] == tries).all() else part.take(last)
+        for part, tries in parts
+    ]
     return Outcome(
         ledger.code,
         ledger.z,

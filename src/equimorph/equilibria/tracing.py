@@ -51,6 +51,14 @@ class TraceOptions:
         """Whether branch points have to be located."""
         return self.locate_passed or not self.through_branch_points
 
+    def table(self) -> Float[np.ndarray, "4 levels"]:
+        """First and largest step, turning and number of steps, for the first try and retries."""
+        levels = [self]
+        for _ in range(self.retries):
+            levels.append(levels[-1].finer())
+        knobs = [(x.first_step, x.largest_step, x.turning, x.steps) for x in levels]
+        return np.array(knobs, float).T.copy()
+
     def finer(self) -> "TraceOptions":
         """Return the options of a retry."""
         return replace(
@@ -80,8 +88,18 @@ class Points:
     @classmethod
     def joined(cls, parts: list["Points"], size: int) -> "Points":
         """All points of some parts, sorted by lane and then by length."""
-        none = np.zeros(0, int)
-        nothing = cls(none, np.zeros(0), np.zeros((0, size)), np.zeros(0), none)
-        columns = zip(*(vars(part).values() for part in (nothing, *parts)), strict=True)
-        whole = cls(*(np.concatenate(column) for column in columns))
-        return whole.take(np.lexsort((whole.travelled, whole.lanes)))
+        count = sum(len(part.t) for part in parts)
+        lanes, index, travelled, t = np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0)
+        lanes = np.concatenate([lanes, *(part.lanes for part in parts)])
+        index = np.concatenate([index, *(part.index for part in parts)])
+        travelled = np.concatenate([travelled, *(part.travelled for part in parts)])
+        t = np.concatenate([t, *(part.t for part in parts)])
+        order = np.lexsort((travelled, lanes))
+        place = np.empty(count, int)
+        place[order] = np.arange(count)
+        # by far the most bytes: each part goes to its places at once
+        z, start = np.empty((count, size)), 0
+        for part in parts:
+            stop = start + len(part.t)
+            z[place[start:stop]], start = part.z, stop
+        return cls(lanes[order], travelled[order], z, t[order], index[order])

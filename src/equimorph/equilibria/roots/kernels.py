@@ -1,0 +1,167 @@
+"""Compiled kernels of root finding inside steps: one lane a row, beside those of the march.
+
+The scalar is known at both ends of a bracket and at the point before; a trial point between them is
+predicted by the cubic through the ends and corrected like any step, then the bracket shrinks.
+"""
+
+import numpy as np
+from numba import njit
+
+from equimorph.equilibria.kernels import (
+    CONVERGED,
+    CORNER,
+    CORRECTING,
+    DEFECT,
+    ENDED,
+    ITERATION,
+    LANE,
+    LAST,
+    LENGTH,
+    NEW_SLOPE,
+    NORM,
+    REFUSED,
+    STAGE,
+    STEPS,
+    SUMS,
+    TRIAL,
+    WEIGHT,
+)
+
+(
+    X1, F1, T1, SLOPE1, RATE1, X2, F2, T2, SLOPE2, RATE2, X3, F3, SHARE, SMALL, T0,
+) = range(15)  # fmt: skip
+"""Rows of `ends`: length from the start of the step, scalar, t, dt/ds and length along the first
+tangent per arclength, at the newest and the other end; length and scalar at the third point; next
+trial as a share of the way from the newest end to the other; scalar that counts as zero; t at the
+start of the step."""
+ENDS = 15
+
+TRIALS = 60
+PLACE = 1e-14
+"""Width of a bracket that ends the iteration."""
+
+
+@njit(**SUMS)
+def begin(weight, mass, places, numbers, counts, ends, active):
+    """Prepare lanes whose ends are set: their closing equation, and the first trial."""
+    _, one, slope_one, two, slope_two, _, row = places
+    n = mass.shape[0]
+    for i in range(active):
+        numbers[WEIGHT, i] = weight[i] * weight[i]
+        numbers[CORNER, i] = numbers[WEIGHT, i] * ends[SLOPE2, i]
+        for j in range(n):
+            row[i, j] = mass[j] * slope_two[i, j]
+        for j in range(n, row.shape[1]):
+            row[i, j] = 0.0
+        corner = numbers[CORNER, i]
+        rate = 0.0
+        for j in range(n):
+            rate += row[i, j] * slope_one[i, j]
+        ends[RATE1, i], ends[RATE2, i] = rate + corner * ends[SLOPE1, i], 1.0
+        ends[X3, i], ends[F3, i] = ends[X2, i], ends[F2, i]
+        if ends[F2, i] == 0.0:
+            _copy(i, one, two)
+            _copy(i, slope_one, slope_two)
+            for a, b in ((X1, X2), (F1, F2), (T1, T2), (SLOPE1, SLOPE2)):
+                ends[a, i] = ends[b, i]
+        if abs(ends[F1, i]) > ends[SMALL, i]:
+            _propose(i, mass, places, numbers, counts, ends)
+        else:
+            counts[STAGE, i] = ENDED
+
+
+@njit(**SUMS)
+def _copy(i, target, source):
+    for j in range(source.shape[1]):
+        target[i, j] = source[i, j]
+
+
+@njit(**SUMS)
+def _propose(i, mass, places, numbers, counts, ends):
+    """Predict the trial point of lane i by the cubic through both ends."""
+    start, one, slope_one, two, slope_two, trial, row = places
+    s, width = ends[SHARE, i], ends[X2, i] - ends[X1, i]
+    x = ends[X1, i] + s * width
+    b, a = s * s * (3 - 2 * s), (1 - s) * (1 - s) * (1 + 2 * s)
+    # derivatives by the length, which is measured along the tangent at the start of the step
+    c = s * (1 - s) * (1 - s) * width / ends[RATE1, i]
+    d = -s * s * (1 - s) * width / ends[RATE2, i]
+    for j in range(trial.shape[1]):
+        trial[i, j] = a * one[i, j] + b * two[i, j]
+    for j in range(trial.shape[1]):
+        trial[i, j] += c * slope_one[i, j] + d * slope_two[i, j]
+    t = a * ends[T1, i] + b * ends[T2, i] + c * ends[SLOPE1, i] + d * ends[SLOPE2, i]
+    along = 0.0
+    for j in range(mass.shape[0]):
+        along += row[i, j] * (trial[i, j] - start[i, j])
+    numbers[TRIAL, i] = t
+    numbers[DEFECT, i] = along + numbers[CORNER, i] * (t - ends[T0, i]) - x
+    numbers[LENGTH, i], numbers[LAST, i] = x, np.inf
+    counts[ITERATION, i], counts[STAGE, i] = 0, CORRECTING
+
+
+@njit(**SUMS)
+def shrink(values, new_tangent, mass, places, numbers, counts, ends, active):
+    """Shrink the brackets of lanes whose trial converged, with the scalar there, and go on."""
+    for i in range(active):
+        if counts[STAGE, i] == CONVERGED:
+            _replace_end(i, values[i], new_tangent, places, numbers, ends)
+            counts[STEPS, i] += 1
+            close = abs(ends[X1, i] - ends[X2, i]) <= PLACE or abs(values[i]) <= ends[SMALL, i]
+            if close:
+                counts[STAGE, i] = ENDED
+            elif counts[STEPS, i] == TRIALS:
+                counts[STAGE, i] = REFUSED
+            else:
+                ends[SHARE, i] = _next_share(i, ends)
+                _propose(i, mass, places, numbers, counts, ends)
+
+
+@njit(**SUMS)
+def _replace_end(i, value, new_tangent, places, numbers, ends):
+    """Make the trial point the newest end of the bracket; the old one may become the other."""
+    _, one, slope_one, two, slope_two, trial, _ = places
+    same = np.sign(value) == np.sign(ends[F1, i])
+    third = (X1, F1) if same else (X2, F2)
+    ends[X3, i], ends[F3, i] = ends[third[0], i], ends[third[1], i]
+    if not same:
+        _copy(i, two, one)
+        _copy(i, slope_two, slope_one)
+        for k in range(5):
+            ends[X2 + k, i] = ends[X1 + k, i]
+    _copy(i, one, trial)
+    norm = 1.0 / numbers[NORM, i]
+    for j in range(trial.shape[1]):
+        slope_one[i, j] = new_tangent[i, j] * norm
+    ends[X1, i], ends[F1, i] = numbers[LENGTH, i], value
+    ends[T1, i], ends[SLOPE1, i] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
+    # the row times the tangent is 1 before the tangent is made a unit vector
+    ends[RATE1, i] = norm
+
+
+@njit(**SUMS)
+def _next_share(i, ends):
+    """Inverse quadratic interpolation where the three points allow it, else bisection."""
+    x1, f1, x2, f2 = ends[X1, i], ends[F1, i], ends[X2, i], ends[F2, i]
+    x3, f3 = ends[X3, i], ends[F3, i]
+    xi, phi = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
+    if not 1 - np.sqrt(1 - xi) < phi < np.sqrt(xi):
+        return 0.5
+    share = f1 / (f2 - f1) * f3 / (f2 - f3)
+    share += (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
+    return min(max(share, 1e-6), 1.0 - 1e-6) if np.isfinite(share) else 0.5
+
+
+@njit(**SUMS)
+def hand_out(places, counts, ends, active, z, t, at, found):
+    """Write down the newest ends of lanes that are finished."""
+    one = places[1]
+    for i in range(active):
+        stage = counts[STAGE, i]
+        if stage in (CORRECTING, CONVERGED):
+            continue
+        lane = counts[LANE, i]
+        for j in range(one.shape[1]):
+            z[lane, j] = one[i, j]
+        t[lane], at[lane], found[lane] = ends[T1, i], ends[X1, i], stage == ENDED
+        counts[STAGE, i] = ENDED
