@@ -71,3 +71,11 @@ def test_shape_runs_from_the_actuator_to_the_line():
 def test_bad_input_is_refused(call, text):
     with pytest.raises(InputError, match=text):
         call()
+
+
+@pytest.mark.parametrize("x_l", [0.5, 0.8, 1.0])
+def test_margin_at_the_boundary_of_stability_is_zero(x_l):
+    """x_l = cos³δ: the Hessian itself is singular there."""
+    delta = np.arccos(x_l ** (1 / 3))
+    fold = States(Spring(), np.array([[delta]]), np.array([[x_l, np.sin(delta) ** 3, 1.0]]))
+    assert fold.margin[0] == pytest.approx(0.0, abs=1e-11)

@@ -17,6 +17,7 @@ from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.pools import distinct
 from equimorph.equilibria.search import FoundStates, find_equilibria, search_points
+from equimorph.equilibria.snap import Landing, snap_landing
 from equimorph.equilibria.switching import Branch, branches
 from equimorph.equilibria.tracing import TraceOptions
 
@@ -26,6 +27,7 @@ __all__ = [
     "CriticalCurve",
     "Event",
     "FoundStates",
+    "Landing",
     "LimitLoad",
     "NewtonHomotopy",
     "Outcome",
@@ -47,5 +49,6 @@ __all__ = [
     "limit_load",
     "newton",
     "search_points",
+    "snap_landing",
     "way_points",
 ]

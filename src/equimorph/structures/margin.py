@@ -67,7 +67,9 @@ def _polish(
     """Inverse iteration from a shift just below the smallest eigenvalue."""
     n, mass = structure.unknowns, structure.mass
     vector = np.tile(np.cos(1.7 * np.arange(n)) + 1.3, (len(z), 1))
-    value, shift = 0.5 * (low + high), low.copy()
+    # an eigenvalue of zero lies on the bracket's end, where the matrix is singular
+    bottom = low - 0.5 * (high - low)
+    value, shift = 0.5 * (low + high), bottom.copy()
     for sweep in range(40):
         rhs = np.zeros((len(z), 1, structure.size))
         rhs[:, 0, :n] = mass * vector
@@ -80,9 +82,9 @@ def _polish(
         if sweep > 1 and _settled(value, previous).all():
             break
         # a shift equal to the eigenvalue would be singular: stay a little below
-        near = (value > low) & (value < high + 0.5 * (high - low))
+        near = (value > bottom) & (value < high + 0.5 * (high - low))
         closer = value - 1e-3 * (high - low)
-        shift = np.where(near & (sweep > 2), np.maximum(closer, low), low)
+        shift = np.where(near & (sweep > 2), np.maximum(closer, bottom), bottom)
     return np.asarray(value)
 
 
