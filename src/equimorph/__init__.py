@@ -11,7 +11,15 @@ __version__ = "0.1.0"
 _HOMES = {
     "equimorph.errors": ("EquimorphError", "InputError"),
     "equimorph.model": ("Box", "Constraint", "Descriptor", "Grid", "Parameter", "Schedule"),
-    "equimorph.structures": ("Rod", "Spring", "State", "States", "Structure"),
+    "equimorph.structures": (
+        "EnergyStructure",
+        "Rod",
+        "Spring",
+        "State",
+        "States",
+        "Structure",
+        "Unknown",
+    ),
     "equimorph.equilibria": (
         "Branch",
         "CriticalCurve",

@@ -1,45 +1,18 @@
-"""Derivatives of energies, and the promises that every structure makes, for Rod and Spring."""
+"""Derivatives of energies, and the promises that every structure makes, for every structure."""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from equimorph.errors import InputError
 from equimorph.structures import Rod, Spring, Structure, from_identity
+from oracles.specimens import SPECIMENS, closed_chain, written_spring
 
 STEP = 1e-30
-
-
-def some_states(structure, lanes=5, seed=0):
-    """Random states far from equilibrium, and directions (dz, dp)."""
-    generator = np.random.default_rng(seed)
-    if isinstance(structure, Rod):
-        p = np.array([1.0, 0.2, 1.5, 0.8]) + 0.2 * generator.normal(size=(lanes, 4))
-    else:
-        p = np.array([0.9, 0.1, 1.3]) + 0.1 * generator.normal(size=(lanes, 3))
-    z = structure.sample(p, generator)
-    return z, p, generator.normal(size=z.shape), generator.normal(size=p.shape)
-
-
-@pytest.fixture(
-    params=["uniform", "left-half", "spring"],
-    ids=["rod under uniform load", "rod loaded on the left half", "spring"],
-)
-def structure(request):
-    if request.param == "spring":
-        return Spring(1.3)
-    return Rod(request.param, elements=4, degree=5)
-
-
-def lagrangian(structure, z, p):
-    """L = E + λ·c, complex arguments allowed."""
-    if isinstance(structure, Spring):
-        delta, (x, force, k) = z[:, 0], p.T
-        return 0.5 * k * (1 - x / np.cos(delta)) ** 2 + force * x * np.tan(delta)
-    theta = np.concatenate([p[:, 1:2] + p[:, :1], z[:, :-2], p[:, 1:2] - p[:, :1]], axis=1)
-    energy = 0.5 * np.einsum("li,ij,lj->l", theta, structure.layout.assembled, theta)
-    energy = energy - p[:, 2] * (np.sin(theta) @ structure.loads)
-    along = np.cos(theta) @ structure.mesh.weights - p[:, 3]
-    return energy + z[:, -2] * along + z[:, -1] * (np.sin(theta) @ structure.mesh.weights)
+DRAWN = settings(max_examples=5, deadline=None, derandomize=True, database=None)
+every_structure = pytest.mark.parametrize("specimen", SPECIMENS, ids=lambda each: each.name)
+any_seed = st.integers(0, 2**32 - 1)
 
 
 def gradient(function, x):
@@ -66,31 +39,46 @@ def full_matrix(structure, z, p):
     return np.linalg.inv(structure.solve(z, p, unit).x.transpose(0, 2, 1))
 
 
-def test_residual_is_the_gradient_of_the_lagrangian(structure):
+@every_structure
+@given(seed=any_seed)
+@DRAWN
+def test_residual_is_the_gradient_of_the_lagrangian(specimen, seed):
     """Complex step of an independent L. 1e-12: sums of a hundred terms of order one."""
-    z, p, _, _ = some_states(structure)
-    exact = gradient(lambda at: lagrangian(structure, at, p), z)
+    structure = specimen.structure
+    z, p, _, _ = specimen.states(seed=seed)
+    exact = gradient(lambda at: specimen.lagrangian(at, p), z)
     np.testing.assert_allclose(structure.residual(z, p), exact, rtol=1e-11, atol=1e-12)
 
 
-def test_effort_is_the_derivative_by_the_parameters(structure):
+@every_structure
+@given(seed=any_seed)
+@DRAWN
+def test_effort_is_the_derivative_by_the_parameters(specimen, seed):
     """Complex step of an independent L. 1e-12 as above."""
-    z, p, _, _ = some_states(structure)
-    exact = gradient(lambda at: lagrangian(structure, z, at), p)
+    structure = specimen.structure
+    z, p, _, _ = specimen.states(seed=seed)
+    exact = gradient(lambda at: specimen.lagrangian(z, at), p)
     np.testing.assert_allclose(structure.effort(z, p), exact, rtol=1e-11, atol=1e-12)
 
 
-def test_energy_is_the_lagrangian_without_its_constraints(structure):
+@every_structure
+@given(seed=any_seed)
+@DRAWN
+def test_energy_is_the_lagrangian_without_its_constraints(specimen, seed):
     """1e-13: round-off."""
-    z, p, _, _ = some_states(structure)
-    if isinstance(structure, Rod):
-        z[:, -2:] = 0.0
-    np.testing.assert_allclose(structure.energy(z, p), lagrangian(structure, z, p), rtol=1e-13)
+    structure = specimen.structure
+    z, p, _, _ = specimen.states(seed=seed)
+    z[:, structure.unknowns :] = 0.0
+    np.testing.assert_allclose(structure.energy(z, p), specimen.lagrangian(z, p), rtol=1e-13)
 
 
-def test_matrix_is_symmetric_and_the_derivative_of_the_residual(structure):
+@every_structure
+@given(seed=any_seed)
+@DRAWN
+def test_matrix_is_symmetric_and_the_derivative_of_the_residual(specimen, seed):
     """Central differences, step 1e-3: error 1e-12 of the fifth derivative, 1e-13 of round-off."""
-    z, p, v, _ = some_states(structure)
+    structure = specimen.structure
+    z, p, v, _ = specimen.states(seed=seed)
     matrix = full_matrix(structure, z, p)
     scale = np.abs(matrix).max()
     np.testing.assert_allclose(matrix, matrix.transpose(0, 2, 1), atol=1e-9 * scale)
@@ -99,17 +87,25 @@ def test_matrix_is_symmetric_and_the_derivative_of_the_residual(structure):
     np.testing.assert_allclose(product, slope, rtol=1e-7, atol=1e-8 * np.abs(product).max())
 
 
-def test_parameter_derivative_is_that_of_the_residual(structure):
+@every_structure
+@given(seed=any_seed)
+@DRAWN
+def test_parameter_derivative_is_that_of_the_residual(specimen, seed):
     """Central differences as above."""
-    z, p, _, dp = some_states(structure)
+    structure = specimen.structure
+    z, p, _, dp = specimen.states(seed=seed)
     slope = differenced(lambda t: structure.residual(z, p + t * dp), 1e-3)
     found = structure.parameter_derivative(z, p, dp)
     np.testing.assert_allclose(found, slope, rtol=1e-8, atol=1e-9 * np.abs(slope).max())
 
 
-def test_second_derivative_is_that_of_the_residual_along_a_line(structure):
+@every_structure
+@given(seed=any_seed)
+@DRAWN
+def test_second_derivative_is_that_of_the_residual_along_a_line(specimen, seed):
     """Second differences, step 1e-3, of fourth order: 1e-6 from round-off over step squared."""
-    z, p, dz, dp = some_states(structure)
+    structure = specimen.structure
+    z, p, dz, dp = specimen.states(seed=seed)
 
     def along(t):
         return structure.residual(z + t * dz, p + t * dp)
@@ -121,10 +117,14 @@ def test_second_derivative_is_that_of_the_residual_along_a_line(structure):
     np.testing.assert_allclose(found, second, rtol=1e-6, atol=1e-6 * np.abs(second).max())
 
 
-def test_second_derivative_is_bilinear_and_symmetric(structure):
+@every_structure
+@given(seed=any_seed)
+@DRAWN
+def test_second_derivative_is_bilinear_and_symmetric(specimen, seed):
     """Polarisation: 4 B(v, w) = B(v+w, v+w) − B(v−w, v−w). 1e-12: round-off."""
-    z, p, dz, dp = some_states(structure)
-    _, _, ez, ep = some_states(structure, seed=1)
+    structure = specimen.structure
+    z, p, dz, dp = specimen.states(seed=seed)
+    _, _, ez, ep = specimen.states(seed=seed + 1)
 
     def square(sign):
         both = (dz + sign * ez, dp + sign * ep)
@@ -137,10 +137,12 @@ def test_second_derivative_is_bilinear_and_symmetric(structure):
     np.testing.assert_allclose(4 * mixed, square(1.0) - square(-1.0), atol=1e-12 * scale)
 
 
-def test_fused_step_equals_the_plain_route(structure):
+@every_structure
+def test_fused_step_equals_the_plain_route(specimen):
     """`Structure.advance` by the general bordered solve. 1e-10: conditioning of random states."""
+    structure = specimen.structure
     for lanes in (1, 5, 8, 21):
-        z, p, row, dp = some_states(structure, lanes)
+        z, p, row, dp = specimen.states(lanes)
         generator = np.random.default_rng(2)
         corner, defect = generator.normal(size=lanes), generator.normal(size=lanes)
         fused = structure.advance(z, p, dp, row, corner, defect)
@@ -152,8 +154,10 @@ def test_fused_step_equals_the_plain_route(structure):
             np.testing.assert_allclose(getattr(fused, name), exact, rtol=1e-9, atol=bound)
 
 
-def test_a_lane_that_is_no_number_leaves_the_other_steps_alone(structure):
-    z, p, row, dp = some_states(structure, 9)
+@every_structure
+def test_a_lane_that_is_no_number_leaves_the_other_steps_alone(specimen):
+    structure = specimen.structure
+    z, p, row, dp = specimen.states(9)
     one, none = np.ones(9), np.zeros(9)
     clean = structure.advance(z, p, dp, row, one, none)
     z = z.copy()
@@ -166,9 +170,11 @@ def test_a_lane_that_is_no_number_leaves_the_other_steps_alone(structure):
     assert np.isnan(dirty.residual[4])
 
 
-def test_symmetries_map_residuals_to_residuals(structure):
+@every_structure
+def test_symmetries_map_residuals_to_residuals(specimen):
     """|F| is the same at the image, and the symmetry is an involution. 1e-12: round-off."""
-    z, p, _, _ = some_states(structure)
+    structure = specimen.structure
+    z, p, _, _ = specimen.states()
     for symmetry in structure.symmetries():
         image_z, image_p = symmetry.apply(z, p)
         np.testing.assert_allclose(image_p, p * symmetry.signs, rtol=1e-15)
@@ -195,13 +201,17 @@ def test_only_a_symmetric_load_has_the_mirror():
         Rod("left-half", 0.7, elements=6, degree=5),
         Rod([[0.0, 1.0], [0.3, 1.0], [0.3, 0.0], [1.0, 2.0]]),
         Spring(2.0),
+        written_spring(),
+        closed_chain(),
     ],
-    ids=["default", "resolution", "table", "spring"],
+    ids=["default", "resolution", "table", "spring", "energy", "constraints"],
 )
 def test_a_structure_is_rebuilt_from_its_identity(made):
     """Bit for bit: the identity is data."""
     again = from_identity(made.identity())
-    z, p, _, _ = some_states(made)
+    generator = np.random.default_rng(0)
+    p = np.array([[parameter.default or 0.5 for parameter in made.parameters]])
+    z = made.sample(p, generator)
     np.testing.assert_array_equal(again.residual(z, p), made.residual(z, p))
     assert again.identity() == made.identity()
 
@@ -209,8 +219,8 @@ def test_a_structure_is_rebuilt_from_its_identity(made):
 @pytest.mark.parametrize(
     ("identity", "text"),
     [
-        ({"kind": "plate"}, "`kind` must be one of rod, spring; got 'plate'"),
-        ({}, "`kind` must be one of rod, spring; got None"),
+        ({"kind": "plate"}, "`kind` must be one of rod, spring, energy; got 'plate'"),
+        ({}, "`kind` must be one of rod, spring, energy; got None"),
         ({"kind": "rod", "colour": "red"}, "`structure` must have the data of a rod"),
     ],
 )

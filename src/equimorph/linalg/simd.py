@@ -252,7 +252,7 @@ def _call(name, *operands):
     return sig, generate
 
 
-absolute = _function("fabs", 1)
+absolute, square_root = _function("fabs", 1), _function("sqrt", 1)
 smaller, larger = _function("minimum", 2), _function("maximum", 2)  # NaN if one of them is
 
 

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle
 from matplotlib.quiver import Quiver
 
 from equimorph.plotting import style
-from equimorph.structures import Rod, Spring, States, Structure
+from equimorph.structures import Rod, Spring, States
 
 _HUB = 0.026  # radius of a rotary actuator, in lengths of the rod
 _STATIONS = np.linspace(0.05, 0.95, 13)
@@ -24,7 +24,8 @@ _GROUND = "#d9d9d9"
 def frame_shapes(ax: Axes, outlines: Float[np.ndarray, "lanes points 2"], room: float) -> None:
     """Equal aspect, and limits around all outlines with `room`, a share of their width."""
     points = outlines.reshape(-1, 2)
-    low, high = points.min(axis=0), points.max(axis=0)
+    # a row of NaN breaks the line
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     margin = room * max(high - low)
     ax.set_xlim(low[0] - margin, high[0] + margin)
     ax.set_ylim(low[1] - margin, high[1] + margin)
@@ -37,11 +38,6 @@ def draw_supports(ax: Axes, states: States) -> None:
         _draw_rotary_actuators(ax, states)
     elif isinstance(states.structure, Spring):
         _draw_guides(ax, states)
-
-
-def length_unit(structure: Structure) -> str:
-    """Unit of the coordinates of a structure's shape."""
-    return "L" if isinstance(structure, Rod) else "natural length"
 
 
 @dataclass(frozen=True)

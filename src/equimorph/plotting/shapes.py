@@ -12,7 +12,7 @@ from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along
-from equimorph.plotting.furniture import draw_supports, frame_shapes, length_unit
+from equimorph.plotting.furniture import draw_supports, frame_shapes
 from equimorph.plotting.symbols import with_unit
 from equimorph.tasks import Route
 
@@ -50,7 +50,7 @@ def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None)
         if ax is None:
             ax = style.new_axes(style.SINGLE_COLUMN, _height(outlines), _MARGINS)
         frame_shapes(ax, outlines, room=_ROOM)
-        unit = length_unit(states.structure)
+        unit = states.structure.length_unit
         ax.set_xlabel(with_unit("$x$", unit))
         ax.set_ylabel(with_unit("$y$", unit))
         ax.xaxis.set_major_locator(style.few_ticks())

@@ -1,25 +1,32 @@
 """Structures: what can be bent, and the states it can be in."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from equimorph.errors import InputError
 from equimorph.structures.contract import Advance, Structure, Symmetry, bordered_advance
+from equimorph.structures.energy import EnergyStructure, Unknown
 from equimorph.structures.rod import Rod
 from equimorph.structures.spring import Spring
 from equimorph.structures.states import State, States
 
-KINDS: dict[str, type[Rod] | type[Spring]] = {"rod": Rod, "spring": Spring}
+KINDS: dict[str, Callable[..., Structure]] = {
+    "rod": Rod,
+    "spring": Spring,
+    "energy": EnergyStructure,
+}
 
 __all__ = [
     "KINDS",
     "Advance",
+    "EnergyStructure",
     "Rod",
     "Spring",
     "State",
     "States",
     "Structure",
     "Symmetry",
+    "Unknown",
     "bordered_advance",
     "from_identity",
 ]

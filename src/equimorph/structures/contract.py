@@ -4,7 +4,7 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +17,12 @@ from equimorph.model import Descriptor, Parameter, names_of
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Direction = tuple[Lanes, Parameters]
+Border = tuple[
+    Float[np.ndarray, "lanes k size"],
+    Float[np.ndarray, "lanes k size"],
+    Float[np.ndarray, "lanes k k"],
+]
+Closing = tuple[Lanes, Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,8 @@ class Structure(ABC):
     constraints: int
     mass: Float[np.ndarray, " unknowns"]
     """Diagonal of the mass matrix: the metric of margins, distances and lengths."""
+    length_unit: str = "1"
+    """Unit of the coordinates to draw."""
 
     @property
     def size(self) -> int:
@@ -111,12 +119,7 @@ class Structure(ABC):
         z: Lanes,
         p: Parameters,
         rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: tuple[
-            Float[np.ndarray, "lanes k size"],
-            Float[np.ndarray, "lanes k size"],
-            Float[np.ndarray, "lanes k k"],
-        ]
-        | None = None,
+        border: Border | None = None,
         shift: Float[np.ndarray, " lanes"] | None = None,
     ) -> BorderedSolution:
         """Solve with the KKT matrix F_z − shift·mass, bordered by (columns, rows, corner)."""
@@ -153,6 +156,11 @@ class Structure(ABC):
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written as `text`, like ``height(0.5)``."""
 
+    @property
+    def elevation(self) -> Descriptor:
+        """Descriptor that tells states apart in figures of the set: the energy by default."""
+        return Descriptor("energy", "energy", self.energy, "E", self.signature)
+
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Symmetries of the equilibrium set; none unless the structure says so."""
         return ()
@@ -187,14 +195,26 @@ def bordered_advance(
     p: Parameters,
     residual: Lanes,
     column: Lanes,
-    closing: tuple[Lanes, Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]],
+    closing: Closing,
 ) -> Advance:
     """`Advance` for any residual and column, by the structure's general bordered solve."""
+    solve = partial(structure.solve, z, p)
+    return solved_advance(solve, residual, column, closing, structure.constraints)
+
+
+def solved_advance(
+    solve: Callable[[Float[np.ndarray, "lanes 2 bordered"], Border], BorderedSolution],
+    residual: Lanes,
+    column: Lanes,
+    closing: Closing,
+    constraints: int,
+) -> Advance:
+    """`Advance` by a solver of the bordered system that knows its matrix."""
     row, corner, defect = closing
-    rhs = np.zeros((len(z), 2, structure.size + 1))
+    rhs = np.zeros((len(row), 2, row.shape[1] + 1))
     rhs[:, 0, :-1], rhs[:, 0, -1], rhs[:, 1, -1] = -residual, -defect, 1.0
     border = (column[:, None], row[:, None], corner[:, None, None])
-    solution = structure.solve(z, p, rhs, border)
+    solution = solve(rhs, border)
     step, tangent = solution.x[:, 0], solution.x[:, 1]
     return Advance(
         np.ascontiguousarray(step[:, :-1]),
@@ -202,5 +222,5 @@ def bordered_advance(
         np.ascontiguousarray(tangent[:, :-1]),
         tangent[:, -1].copy(),
         np.abs(residual).max(axis=1),
-        solution.negative - structure.constraints,
+        solution.negative - constraints,
     )

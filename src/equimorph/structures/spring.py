@@ -39,6 +39,7 @@ class Spring(Structure):
     kind: ClassVar[str] = "spring"
     unknowns = 1
     constraints = 0
+    length_unit = "natural length"
 
     def __init__(self, stiffness: float = 1.0) -> None:
         self.mass = np.ones(1)
@@ -190,6 +191,11 @@ class Spring(Structure):
             return np.asarray(p[:, 0] * np.tan(z[:, 0]))
 
         return Descriptor("height", "natural length", value, "y_B", self.signature)
+
+    @property
+    def elevation(self) -> Descriptor:
+        """δ."""
+        return self.angle
 
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written as ``angle``, ``height`` or ``energy``."""

@@ -82,12 +82,12 @@ def key_path(location: tuple[int | str, ...]) -> str:
 
 
 def _sentence(finding: ErrorDetails, model: type[BaseModel]) -> str:
-    location = tuple(part for part in finding["loc"] if part not in ("rod", "spring"))
+    location = _as_written(finding["loc"])
     kind = finding["type"]
     if kind == "extra_forbidden":
         return _unknown_key(finding["loc"], location, model)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        return _unknown_kind(finding, location)
+        return _unknown_kind(finding, location, model)
     name = f"`{key_path(location)}`" if location else "the study"
     requirement = _REQUIREMENTS.get(kind, finding["msg"])
     requirement = requirement.format_map(_Forgiving(finding.get("ctx", {})))
@@ -95,9 +95,17 @@ def _sentence(finding: ErrorDetails, model: type[BaseModel]) -> str:
     return f"{name} must {requirement}; got {got}."
 
 
-def _unknown_kind(finding: ErrorDetails, location: tuple[int | str, ...]) -> str:
+def _as_written(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """Location without the kind that pydantic puts behind the key of the structure."""
+    return location[:1] + location[2:] if location[:1] == ("structure",) else location
+
+
+def _unknown_kind(
+    finding: ErrorDetails, location: tuple[int | str, ...], model: type[BaseModel]
+) -> str:
+    key = model.model_json_schema(by_alias=True)["properties"][location[-1]]
+    allowed = ", ".join(f'"{kind}"' for kind in key["discriminator"]["mapping"])
     context = finding.get("ctx", {})
-    allowed = str(context.get("expected_tags", "'rod', 'spring'")).replace("'", '"')
     got = short(context["tag"]) if "tag" in context else "nothing"
     return f"`{key_path((*location, 'kind'))}` must be one of {allowed}; got {got}."
 

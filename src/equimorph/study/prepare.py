@@ -10,14 +10,13 @@ import numpy as np
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box, Constraint, Descriptor, parameter_vector, position
-from equimorph.structures import Rod, Spring, Structure
+from equimorph.structures import Structure, from_identity
 from equimorph.study.expressions import parse_comparison
 from equimorph.study.problem import (
-    RodSection,
     RouteSection,
     SetSection,
-    SpringSection,
     StateSection,
+    StructureSection,
     Study,
 )
 
@@ -78,14 +77,13 @@ def prepare(study: Study) -> Problem:
         intervals=_intervals(wanted),
         points=tuple(point.at for point in study.equilibria),
         tasks=tuple(_task(structure, box, route, i) for i, route in enumerate(study.routes)),
-        height=structure.descriptor("height(0.5)" if structure.kind == "rod" else "angle"),
+        height=structure.elevation,
     )
 
 
-def build_structure(section: RodSection | SpringSection) -> Structure:
+def build_structure(section: StructureSection) -> Structure:
     """Structure that a section describes; what it leaves out takes the structure's default."""
-    given = section.model_dump(exclude={"kind"}, exclude_none=True)
-    return Rod(**given) if isinstance(section, RodSection) else Spring(**given)
+    return from_identity(section.model_dump(exclude_none=True))
 
 
 @contextmanager

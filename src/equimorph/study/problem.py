@@ -72,6 +72,13 @@ def _load(shape: Any) -> Any:
     return shape
 
 
+def _formula(given: Any) -> Any:
+    if not (isinstance(given, str) or (type(given) in (int, float) and abs(given) <= LARGEST)):
+        raise _requirement(f"be a formula in quotes, or a finite number up to {LARGEST:g}")
+    return given
+
+
+Formula = Annotated[Any, AfterValidator(_formula)]
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Interval = Annotated[list[Number], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
 Point = dict[str, Number]
@@ -99,6 +106,45 @@ class SpringSection(_Section):
 
     kind: Literal["spring"]
     stiffness: float = Field(default=1.0, gt=0, le=LARGEST)
+
+
+class UnknownSection(_Section):
+    """An unknown of an energy; see `equimorph.Unknown`."""
+
+    name: str
+    natural: Formula = 0.0
+    guesses: Interval | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+    mass: float = Field(default=1.0, gt=0, le=LARGEST)
+    unit: str = "1"
+
+
+class ParameterSection(_Section):
+    """A parameter of an energy; see `equimorph.Parameter`."""
+
+    name: str
+    unit: str = "1"
+    scale: float = Field(default=1.0, gt=0, le=LARGEST)
+    role: Literal["actuator", "load", "fixed"] = "actuator"
+    default: Number | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+
+
+class EnergySection(_Section):
+    """A structure given by its energy; see `equimorph.EnergyStructure`."""
+
+    kind: Literal["energy"]
+    energy: Formula
+    unknowns: list[UnknownSection] = Field(min_length=1)
+    parameters: list[ParameterSection]
+    constraints: list[Formula] = Field(default_factory=list)
+    definitions: dict[str, Formula] = Field(default_factory=dict)
+    descriptors: dict[str, Formula] = Field(default_factory=dict)
+    draw: list[Annotated[list[Formula], Field(min_length=2, max_length=2)]] = Field(
+        default_factory=list
+    )
 
 
 class SetSection(_Section):
@@ -146,11 +192,16 @@ class RouteSection(_Section):
     margin: float = Field(default=0.0, ge=0, le=LARGEST)
 
 
+StructureSection = Annotated[
+    RodSection | SpringSection | EnergySection, Field(discriminator="kind")
+]
+
+
 class Study(_Section):
     """A whole study file."""
 
     title: str | None = None
-    structure: Annotated[RodSection | SpringSection, Field(discriminator="kind")]
+    structure: StructureSection
     equilibrium_set: SetSection = Field(alias="set")
     equilibria: list[PointSection] = Field(default_factory=list)
     routes: list[RouteSection] = Field(default_factory=list, alias="route")

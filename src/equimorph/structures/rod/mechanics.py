@@ -35,6 +35,7 @@ class RodMechanics(Structure):
     """
 
     kind: ClassVar[str] = "rod"
+    length_unit = "L"
     constraints = 2
 
     def __init__(self, mesh: Mesh, load: LoadShape) -> None:

@@ -219,6 +219,11 @@ class Rod(RodMechanics):
         """Couple of the actuator at end 0 or 1: ∂L/∂θ(end), in units of 4π²B/L."""
         return descriptors.end_moment(self, end)
 
+    @property
+    def elevation(self) -> Descriptor:
+        """y(½)."""
+        return self.height(0.5)
+
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
         return descriptors.named(self, text)

@@ -1,0 +1,65 @@
+"""Times of Newton steps of discrete structures, through the contract; compilation apart.
+
+The step is what continuation takes: residual, parameter column, matrix, inertia, and the bordered
+solution for two right sides. `extra_info` records lanes and size.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from equimorph.model import Parameter
+from equimorph.structures import EnergyStructure, Unknown
+
+
+def chain(links):
+    """Hinged links of length 1/n with hinge springs between turned ends a span nu apart."""
+    n, angles = links, [f"phi{i}" for i in range(links)]
+    inner = " + ".join(f"({b} - {a})**2" for a, b in pairwise(angles))
+    along, across = (" + ".join(f"{f}({angle})" for angle in angles) for f in ("cos", "sin"))
+    load = " + ".join(f"{n - i}*sin({angle})" for i, angle in enumerate(angles))
+    return EnergyStructure(
+        f"{n}*(bend/2 + (phi0 - Theta)**2 + (phi{n - 1} + Theta)**2) + q*({load})/{n}**2",
+        [Unknown(a, f"Theta*({n - 1 - 2 * i})/{n}", (-2.0, 2.0)) for i, a in enumerate(angles)],
+        [
+            Parameter("Theta", "rad", 1.0, "actuator", 1.0),
+            Parameter("q", "1", 10.0, "load"),
+            Parameter("nu", "L", 1.0, "actuator", 0.8414, 0.0, 1.0),
+        ],
+        constraints=[f"({along})/{n} - nu", f"({across})/{n}"],
+        definitions={"bend": inner},
+    )
+
+
+def dense_energy(unknowns):
+    """Every unknown with every other one: no sparsity at all."""
+    names = [f"x{i}" for i in range(unknowns)]
+    total = " + ".join(names)
+    squares = " + ".join(f"{name}**2" for name in names)
+    return EnergyStructure(
+        f"({squares})/2 + exp(-({total})**2/{unknowns}) - F*x0",
+        names,
+        [Parameter("F", "1", 1.0, "load")],
+    )
+
+
+@pytest.mark.parametrize("lanes", [100, 4096])
+@pytest.mark.parametrize("make", [chain, dense_energy], ids=["chain", "dense"])
+def bench_newton_step_of_an_energy(benchmark, make, lanes):
+    structure = make(40)
+    generator = np.random.default_rng(0)
+    p = np.tile([parameter.default for parameter in structure.parameters], (lanes, 1))
+    z = 0.3 * structure.sample(p, generator)
+    dp, row, one = np.ones_like(p), generator.normal(size=z.shape), np.ones(lanes)
+    step = benchmark.pedantic(
+        structure.advance, (z, p, dp, row, one, one), rounds=40, warmup_rounds=2
+    )
+    assert np.isfinite(step.dz).all()
+    time = benchmark.stats.stats.median if benchmark.stats else np.nan
+    benchmark.extra_info |= {
+        "lanes": lanes,
+        "size": structure.size,
+        "us per lane": 1e6 * time / lanes,
+        "largest residual": float(step.residual.max()),
+    }

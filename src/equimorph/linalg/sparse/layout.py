@@ -1,0 +1,147 @@
+"""The sparse layout: symmetric matrices of one pattern, in batches of lanes."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.linalg.dense import BorderedSolution, solve_bordered
+from equimorph.linalg.lanes import over_lanes
+from equimorph.linalg.sparse.kernels import solve_sparse
+
+GROWTH = 1e5
+"""Largest growth of diagonal entries, relative to the matrix, of a factorisation that is trusted.
+
+Without pivoting the backward error is this factor times round-off: eleven digits remain.
+"""
+
+
+@dataclass(frozen=True)
+class _Elimination:
+    """An order of elimination and the places that it touches; see `kernels.eliminate`."""
+
+    order: Int[np.ndarray, " size"]
+    start: Int[np.ndarray, " starts"]
+    rows: Int[np.ndarray, " below"]
+    target: Int[np.ndarray, " pairs"]
+    scatter: Int[np.ndarray, " entries"]
+
+
+@dataclass(frozen=True, eq=False)
+class SparseLayout:
+    """Symmetric matrices of one sparsity pattern, many lanes at a time.
+
+    Parameters
+    ----------
+    rows, columns
+        Places of the entries of the lower triangle, row ≥ column, each once; the diagonal must be
+        complete. A lane's matrix is the array of its entries in this order.
+    size
+        Number of rows.
+    multipliers
+        How many rows at the end have a zero diagonal (Lagrange multipliers): they are eliminated
+        after all others.
+    """
+
+    rows: Int[np.ndarray, " entries"]
+    columns: Int[np.ndarray, " entries"]
+    size: int
+    multipliers: int = 0
+
+    @cached_property
+    def diagonal(self) -> Int[np.ndarray, " size"]:
+        """Numbers of the entries on the diagonal, by row."""
+        entries = np.flatnonzero(self.rows == self.columns)
+        return entries[np.argsort(self.rows[entries])]
+
+    @cached_property
+    def elimination(self) -> _Elimination:
+        """Order and places of the elimination."""
+        below = _eliminated(self.rows, self.columns, self.size, self.size - self.multipliers)
+        order = np.array([variable for variable, _ in below])
+        place = np.empty(self.size, int)
+        place[order] = np.arange(self.size)
+        columns = [sorted(place[i] for i in others) for _, others in below]
+        start = np.concatenate([[0], np.cumsum([len(column) for column in columns])])
+        slot = {(k, k): k for k in range(self.size)}
+        for k, column in enumerate(columns):
+            slot |= {(i, k): self.size + start[k] + n for n, i in enumerate(column)}
+        target = [
+            slot[column[i], column[j]]
+            for column in columns
+            for i in range(len(column))
+            for j in range(i + 1)
+        ]
+        ends = np.sort(np.stack([place[self.rows], place[self.columns]]), axis=0)
+        scatter = [slot[high, low] for low, high in ends.T.tolist()]
+        rows = [i for column in columns for i in column]
+        return _Elimination(
+            *(np.array(a, dtype=int) for a in (order, start, rows, target, scatter))
+        )
+
+    def dense(self, values: Float[np.ndarray, "lanes entries"]) -> Float[np.ndarray, "lanes n n"]:
+        """Return the matrices in full."""
+        full = np.zeros((len(values), self.size, self.size))
+        full[:, self.rows, self.columns] = values
+        full[:, self.columns, self.rows] = values
+        return full
+
+    def solve(
+        self,
+        values: Float[np.ndarray, "lanes entries"],
+        border: tuple[
+            Float[np.ndarray, "lanes k size"],
+            Float[np.ndarray, "lanes k size"],
+            Float[np.ndarray, "lanes k k"],
+        ]
+        | None,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+    ) -> BorderedSolution:
+        """Solve ``[A Cᵀ; R D] x = rhs`` with border (C, R, D), and count A's inertia.
+
+        LDLᵀ without pivoting, but the last pivot, which shows a singular A at folds, is eliminated
+        together with the border by Gauss with partial pivoting. Lanes whose entries grow by more
+        than `GROWTH` (or are no numbers) are solved again by the pivoted dense factorisation.
+        """
+        lanes = len(values)
+        if border is None:
+            nothing = np.zeros((lanes, 0, self.size))
+            border = (nothing, nothing, np.zeros((lanes, 0, 0)))
+        arrays = [np.ascontiguousarray(a) for a in (values, *border, rhs)]
+        x, growth = np.empty(rhs.shape), np.empty(lanes)
+        negative = np.empty(lanes, dtype=np.int64)
+        how = self.elimination
+        shared = (how.start, how.rows, how.target, how.scatter, how.order)
+        if lanes:
+            over_lanes(solve_sparse, shared, arrays, [x, negative, growth])
+        pivoted = ~(growth <= GROWTH)
+        if pivoted.any():
+            again = solve_bordered(self.dense(values[pivoted]), *(a[pivoted] for a in arrays[1:]))
+            x[pivoted], negative[pivoted] = again.x, again.negative
+        return BorderedSolution(x, negative, 1.0 / np.maximum(growth, 1.0), pivoted)
+
+
+def _eliminated(
+    rows: Int[np.ndarray, " entries"], columns: Int[np.ndarray, " entries"], size: int, first: int
+) -> list[tuple[int, set[int]]]:
+    """Variables in the order of elimination, each with the later ones in its column of L.
+
+    Minimum degree; the variables from `first` on come last.
+    """
+    near: list[set[int]] = [set() for _ in range(size)]
+    for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
+        if i != j:
+            near[i].add(j)
+            near[j].add(i)
+    left = set(range(size))
+    below = []
+    while left:
+        variable = min(left, key=lambda i: (i >= first, len(near[i]), i))
+        others = near[variable]
+        left.remove(variable)
+        for other in others:
+            near[other] |= others
+            near[other] -= {variable, other}
+        below.append((variable, others))
+    return below

@@ -1,0 +1,155 @@
+"""Structures of finitely many unknowns whose KKT matrix is sparse."""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from equimorph.errors import InputError
+from equimorph.linalg import BorderedSolution
+from equimorph.linalg.sparse import SparseLayout
+from equimorph.model import parameter_vector
+from equimorph.structures.contract import Advance, Border, Structure, solved_advance
+from equimorph.structures.natural import continued, corrected
+from equimorph.structures.states import State
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+Entries = Float[np.ndarray, "lanes entries"]
+
+BLOCK = 512
+"""Lanes that take a Newton step together: the entries of their matrices stay in the cache."""
+NEAR = 0.1
+"""Correction, relative to the unknowns, that a natural state may need: values may be rounded."""
+
+
+class DiscreteStructure(Structure):
+    """Structure with a sparse KKT matrix and a natural state known at the default parameters.
+
+    What remains to be said: `layout`, `entries`, `linearised` and `natural_guess`, besides the rest
+    of the contract.
+    """
+
+    @property
+    @abstractmethod
+    def layout(self) -> SparseLayout:
+        """Sparsity of F_z."""
+
+    @abstractmethod
+    def entries(self, z: Lanes, p: Parameters) -> Entries:
+        """Entries of F_z in the order of `layout`."""
+
+    @abstractmethod
+    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
+        """F, F_p·dp and the entries of F_z."""
+
+    @abstractmethod
+    def natural_guess(self, p: Parameters) -> Lanes:
+        """Natural states with all loads at zero, exact at the default parameters at least."""
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with the KKT matrix F_z − shift·mass, bordered, by sparse LDLᵀ."""
+        entries = self.entries(z, p)
+        if shift is not None:
+            entries[:, self.layout.diagonal[: self.unknowns]] -= shift[:, None] * self.mass
+        return self.layout.solve(entries, border, rhs)
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step; residual, column and matrix are computed together."""
+        given = (z, p, dp, row, corner, defect)
+        starts = range(0, max(len(z), 1), BLOCK)
+        parts = [self._advance(*(array[i : i + BLOCK] for array in given)) for i in starts]
+        if len(parts) == 1:
+            return parts[0]
+        names = [field.name for field in fields(Advance)]
+        return Advance(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+    def _advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        residual, column, entries = self.linearised(z, p, dp)
+
+        def solve(rhs: Float[np.ndarray, "lanes 2 bordered"], border: Border) -> BorderedSolution:
+            return self.layout.solve(entries, border, rhs)
+
+        return solved_advance(solve, residual, column, (row, corner, defect), self.constraints)
+
+    # --- the natural state ----------------------------------------------------------------------
+
+    @cached_property
+    def _reference(self) -> Float[np.ndarray, " parameters"]:
+        """Parameters at which the natural state is known: defaults, NaN where there is none."""
+        loads = self.unloaded()
+        defaults = [
+            loads.get(each.name, np.nan if each.default is None else each.default)
+            for each in self.parameters
+        ]
+        return np.array(defaults)
+
+    def check_natural_state(self, names: Sequence[str]) -> None:
+        """Refuse a guess at the default parameters that is no equilibrium.
+
+        `names` are those of the unknowns.
+        """
+        p = self._reference[None]
+        if np.isnan(p).any():
+            return
+        guess = self.natural_guess(p)
+        force = self.residual(guess, p)[0]
+        if np.isfinite(force).all():
+            z, found = corrected(self, guess, p)
+            before, after = guess[0, : self.unknowns], z[0, : self.unknowns]
+            allowed = NEAR * (1.0 + np.abs(before).max())
+            if found[0] and np.abs(after - before).max() <= allowed:
+                return
+        worst = int(np.argmax(np.where(np.isfinite(force), np.abs(force), np.inf)))
+        broken = worst >= self.unknowns
+        name = f"constraints[{worst - self.unknowns}]" if broken else f"dE/d{names[worst]}"
+        raise InputError(
+            "`natural` must be an equilibrium with all loads at zero; got "
+            f"{name} = {force[worst]:.3g}. Give natural values closer to one."
+        )
+
+    def natural(self, p: Parameters) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+        """Natural state, continued from the default parameters."""
+        start = np.where(np.isnan(self._reference), p, self._reference)
+        return continued(self, self.natural_guess, start, p)
+
+    def unloaded(self) -> Mapping[str, float]:
+        """All loads zero."""
+        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
+
+    def natural_state(self, **values: float) -> State:
+        """Natural state at given parameters, all loads at zero.
+
+        Raises
+        ------
+        InputError
+            For unknown or meaningless parameters, a load that is not zero, or where the
+            continuation from the default parameters does not converge.
+        """
+        for name in self.unloaded():
+            if values.get(name, 0.0) != 0.0:
+                raise InputError(f"`{name}` must be 0 in the natural state; got {values[name]!r}.")
+        p = parameter_vector(self.parameters, {**values, **self.unloaded()})
+        z, found = self.natural(p[None])
+        if not found[0]:
+            settings = ", ".join(f"{name}={value:g}" for name, value in values.items())
+            raise InputError(
+                f"`{self.kind}` must have a natural state; none is found at "
+                f"{settings or 'the defaults'}, coming from the defaults."
+            )
+        return State(self, z[0], p)

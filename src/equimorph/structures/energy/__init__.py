@@ -1,0 +1,6 @@
+"""Structures given by an energy and constraints, as formulas."""
+
+from equimorph.structures.energy.declared import Unknown
+from equimorph.structures.energy.structure import EnergyStructure
+
+__all__ = ["EnergyStructure", "Unknown"]

@@ -1,0 +1,264 @@
+"""What the author of an energy declares: unknowns, parameters, and expressions in them."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from equimorph.errors import InputError
+from equimorph.model import Parameter
+from equimorph.structures.energy.expressions import CONSTANTS, FUNCTIONS, expression, written
+from equimorph.structures.energy.tape import casadi, rough_operations
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One unknown of an energy.
+
+    Parameters
+    ----------
+    name
+        As it stands in the expressions: letters, digits and underscores.
+    natural
+        Its value in the natural state: a number, or an expression in the parameters.
+    guesses
+        Range from which guesses are drawn. None: between `lower` and `upper` if both are finite,
+        else within 1 of the natural value.
+    lower, upper
+        Open limits of its meaning: states beyond them, behind a singularity of the energy say, do
+        not count. A part of the set is cut out by constraints of the problem, not by these.
+    mass
+        Its weight in the metric; positive.
+    unit
+        Unit of the descriptor of its name.
+    """
+
+    name: str
+    natural: Any = 0.0
+    guesses: Sequence[float] | None = None
+    lower: float = -np.inf
+    upper: float = np.inf
+    mass: float = 1.0
+    unit: str = "1"
+
+    def __post_init__(self) -> None:
+        """Check ranges and mass."""
+        if self.guesses is not None and not _increasing(self.guesses, finite=True):
+            raise InputError(
+                f"`guesses` of {self.name} must be finite (lower, upper); got {self.guesses!r}."
+            )
+        if not _increasing((self.lower, self.upper), finite=False):
+            raise InputError(
+                f"`lower` of {self.name} must be less than `upper`; got {self.lower!r} and "
+                f"{self.upper!r}."
+            )
+        if not (isinstance(self.mass, int | float) and 0.0 < self.mass < np.inf):
+            raise InputError(f"`mass` of {self.name} must be positive; got {self.mass!r}.")
+
+    @property
+    def range(self) -> tuple[float, float] | None:
+        """Range of guesses; None for a neighbourhood of the natural value."""
+        if self.guesses is not None:
+            return float(self.guesses[0]), float(self.guesses[1])
+        bounded = np.isfinite(self.lower) and np.isfinite(self.upper)
+        return (self.lower, self.upper) if bounded else None
+
+
+def _increasing(pair: Any, *, finite: bool) -> bool:
+    try:
+        low, high = (float(x) for x in pair)
+    except (TypeError, ValueError):
+        return False
+    return low < high and not (finite and (np.isinf(low) or np.isinf(high)))
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """Scalar expressions: texts, numbers or CasADi graphs as given, or graphs as read."""
+
+    energy: Any
+    constraints: tuple[Any, ...]
+    natural: tuple[Any, ...]
+    draw: tuple[tuple[Any, Any], ...]
+    descriptors: Mapping[str, Any]
+
+    def flat(self) -> list[Any]:
+        """All of them, one after the other."""
+        points = [coordinate for point in self.draw for coordinate in point]
+        rest = (*self.natural, *points, *self.descriptors.values())
+        return [self.energy, *self.constraints, *rest]
+
+    def refilled(self, flat: Sequence[Any]) -> "Formulas":
+        """Return the same with others, in the order of `flat`."""
+        each = iter(flat)
+        return Formulas(
+            next(each),
+            tuple(next(each) for _ in self.constraints),
+            tuple(next(each) for _ in self.natural),
+            tuple((next(each), next(each)) for _ in self.draw),
+            {name: next(each) for name in self.descriptors},
+        )
+
+    def labels(self, unknowns: Sequence[Unknown]) -> list[str]:
+        """Name of each for messages, in the order of `flat`."""
+        points = [f"draw[{i}][{k}]" for i in range(len(self.draw)) for k in (0, 1)]
+        named = [f"natural of {unknown.name}" for unknown in unknowns]
+        constraints = [f"constraints[{i}]" for i in range(len(self.constraints))]
+        described = [f"descriptors.{name}" for name in self.descriptors]
+        return ["energy", *constraints, *named, *points, *described]
+
+
+def unknowns_of(given: Any) -> tuple[Unknown, ...]:
+    """Unknowns from names, symbols, `Unknown`s or their data."""
+    unknowns: list[Unknown] = []
+    for each in given if isinstance(given, list | tuple) else [given]:
+        if isinstance(each, Unknown):
+            unknowns.append(each)
+        elif isinstance(each, Mapping):
+            unknowns.append(_built(Unknown, each, "unknowns"))
+        else:
+            unknowns += [Unknown(name) for name in _symbol_names(each)]
+    if not unknowns:
+        raise InputError("`unknowns` must name at least one unknown; got none.")
+    return tuple(unknowns)
+
+
+def parameters_of(given: Iterable[Any]) -> tuple[Parameter, ...]:
+    """Parameters from `Parameter`s or their data."""
+    made = []
+    for each in given:
+        one: Parameter = (
+            each if isinstance(each, Parameter) else _built(Parameter, each, "parameters")
+        )
+        if one.role not in ("actuator", "load", "fixed"):
+            raise InputError(
+                f"`role` of {one.name} must be actuator, load or fixed; got {one.role!r}."
+            )
+        default = one.default
+        if one.role == "load" and default is None:
+            default = 0.0
+        made.append(replace(one, default=None if default is None else one.check(default)))
+    return tuple(made)
+
+
+def data_of(one: Parameter | Unknown) -> dict[str, Any]:
+    """Return the data of a parameter or unknown, without infinite limits."""
+    return {
+        key: value
+        for key, value in asdict(one).items()
+        if value is not None and not (isinstance(value, float) and np.isinf(value))
+    }
+
+
+def _built(kind: Any, data: Any, what: str) -> Any:
+    defaults = {"unit": "1", "scale": 1.0, "role": "actuator"} if kind is Parameter else {}
+    try:
+        return kind(**{**defaults, **data})
+    except TypeError:
+        fields = ", ".join(kind.__dataclass_fields__)
+        raise InputError(f"`{what}` must hold {kind.__name__}s ({fields}); got {data!r}.") from None
+
+
+def _symbol_names(given: Any) -> list[str]:
+    if isinstance(given, str):
+        return [given]
+    ca = casadi()
+    if isinstance(given, ca.SX) and given.is_valid_input():
+        return [entry.name() for entry in given.elements()]
+    raise InputError(
+        f"`unknowns` must be names, symbols of casadi.SX or Unknowns; got {type(given).__name__}."
+    )
+
+
+class Symbols:
+    """The symbols of all unknowns and parameters, and formulas read with them."""
+
+    def __init__(
+        self,
+        unknowns: Sequence[Unknown],
+        parameters: Sequence[Parameter],
+        definitions: Mapping[str, Any],
+        formulas: Formulas,
+    ) -> None:
+        ca = casadi()
+        names = [unknown.name for unknown in unknowns] + [each.name for each in parameters]
+        _check_names([*names, *definitions])
+        given = [*definitions.values(), *formulas.flat()]
+        graphs = [each for each in given if isinstance(each, ca.SX)]
+        found: dict[str, Any] = {}
+        for symbol in ca.symvar(ca.vertcat(*graphs)) if graphs else ():
+            if symbol.name() in found:
+                raise InputError(
+                    f"`energy` must use one symbol per name; got two of {symbol.name()}."
+                )
+            found[symbol.name()] = symbol
+        unknown = sorted(set(found) - set(names))
+        if unknown:
+            raise InputError(
+                f"`energy` must use unknowns and parameters only; got the symbol {unknown[0]}. "
+                "Name it in `unknowns` or `parameters`."
+            )
+        self.all = [found[name] if name in found else ca.SX.sym(name) for name in names]
+        self.u = ca.vertcat(*self.all[: len(unknowns)])
+        self.p = ca.vertcat(*self.all[len(unknowns) :])
+        known = dict(zip(names, self.all, strict=True))
+        for name, text in definitions.items():
+            known[name] = expression(text, known, f"definitions.{name}")
+        labels = formulas.labels(unknowns)
+        graphs = [
+            expression(each, known, label)
+            for each, label in zip(formulas.flat(), labels, strict=True)
+        ]
+        self.formulas = formulas.refilled(graphs)
+        self._check(names)
+
+    def _check(self, names: Sequence[str]) -> None:
+        """Refuse energies that are rough, and symbols that have no effect."""
+        ca = casadi()
+        physics = ca.vertcat(self.formulas.energy, *self.formulas.constraints)
+        everything = ca.vertcat(*self.all)
+        rough = rough_operations(physics, everything)
+        if rough:
+            raise InputError(
+                "`energy` and `constraints` must be twice differentiable; got "
+                f"{', '.join(rough)}. Replace fabs(x) by sqrt(x**2 + small**2), for example."
+            )
+        used = ca.which_depends(physics, everything, 1, False)
+        for name, counts in zip(names, used, strict=True):
+            if not counts:
+                raise InputError(
+                    f"`{name}` must appear in the energy or a constraint; it does not."
+                )
+        free = {symbol.name() for symbol in ca.symvar(ca.vertcat(*self.formulas.natural))}
+        wrong = sorted(free & {symbol.name() for symbol in self.u.elements()})
+        if wrong:
+            raise InputError(f"`natural` must depend on parameters only; got {wrong[0]}.")
+        for i, constraint in enumerate(self.formulas.constraints):
+            if not any(ca.which_depends(constraint, self.u, 1, False)):
+                raise InputError(f"`constraints[{i}]` must depend on an unknown; it does not.")
+        if len(self.formulas.constraints) >= self.u.numel():
+            raise InputError(
+                f"`constraints` must be fewer than the {self.u.numel()} unknowns; "
+                f"got {len(self.formulas.constraints)}."
+            )
+
+    def texts(self) -> tuple[dict[str, str], Formulas]:
+        """Definitions and formulas as texts."""
+        definitions, flat = written(self.formulas.flat(), self.all)
+        return definitions, self.formulas.refilled(flat)
+
+
+def _check_names(names: Sequence[str]) -> None:
+    taken = {*CONSTANTS, *FUNCTIONS}
+    for name in names:
+        if not (isinstance(name, str) and _NAME.fullmatch(name)):
+            raise InputError(
+                f"`name` must be a letter, then letters, digits and underscores; got {name!r}."
+            )
+        if name in taken:
+            raise InputError(f"`name` must be given once, and be no function; got {name} again.")
+        taken.add(name)

@@ -1,0 +1,273 @@
+"""Structures given by the energy alone."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from equimorph.errors import InputError
+from equimorph.linalg.sparse import SparseLayout
+from equimorph.model import Descriptor, position
+from equimorph.structures.contract import Direction
+from equimorph.structures.discrete import DiscreteStructure
+from equimorph.structures.energy.declared import (
+    Formulas,
+    Symbols,
+    data_of,
+    parameters_of,
+    unknowns_of,
+)
+from equimorph.structures.energy.derivatives import Derivatives
+from equimorph.structures.energy.tape import Tape, casadi, tape
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+
+
+class EnergyStructure(DiscreteStructure):
+    """Structure with an energy E(u; p) and constraints c(u; p) = 0 that its author writes down.
+
+    All derivatives are exact: CasADi [Andersson2019]_ forms the graphs of residual, KKT matrix, and
+    their derivatives, and they run as tapes of instructions on eight lanes at a time. The matrix is
+    kept sparse.
+
+    Parameters
+    ----------
+    energy
+        Formula as text, like ``"k*(1 - cos(phi)) - M*phi"``, or a scalar ``casadi.SX``.
+    unknowns
+        Names, symbols or `Unknown`s (with natural value, range of guesses, mass, unit).
+    parameters
+        `Parameter`s; their names are the symbols of the energy. A load is 0 by default.
+    constraints
+        Expressions that vanish.
+    draw
+        Points [x, y] of the line to draw. Without them the unknowns are drawn over their numbers.
+    descriptors
+        More descriptors by name; every unknown and ``energy`` are there anyway. The first one is
+        the height of figures of the set.
+    definitions
+        Parts of formulas by name, each in terms of the ones before.
+
+    Raises
+    ------
+    InputError
+        For a formula that cannot be read, an unknown symbol, an unknown or parameter without
+        effect, an energy that is not twice differentiable, a wrong shape, a natural state that is
+        no equilibrium with all loads at zero, or if CasADi is not installed.
+
+    Examples
+    --------
+    `Spring`, from its energy:
+
+    >>> from equimorph import EnergyStructure, Parameter, Unknown, lift
+    >>> spring = EnergyStructure(
+    ...     "k/2*(1 - x_l/cos(delta))**2 + F*x_l*tan(delta)",
+    ...     [Unknown("delta", "acos(fmin(x_l, 1))", lower=-1.57, upper=1.57)],
+    ...     [
+    ...         Parameter("x_l", "natural length", 1.0, "actuator", 1.0, 0.0),
+    ...         Parameter("F", "k", 1.0, "load", 0.0),
+    ...         Parameter("k", "force/length", 1.0, "fixed", 1.0, 0.0),
+    ...     ],
+    ...     draw=[["x_l", 0], [0, "x_l*tan(delta)"]],
+    ...     descriptors={"height": "x_l*tan(delta)"},
+    ... )
+
+    Pulled down, it snaps at the fold load k (1 − x_l^⅔)^(3/2):
+
+    >>> path = lift(spring.natural_state(x_l=0.8), to={"F": 1.0})
+    >>> path.end.kind, round(path.end.state["F"], 8), round((1 - 0.8 ** (2 / 3)) ** 1.5, 8)
+    ('fold', 0.05139078, 0.05139078)
+    """
+
+    kind: ClassVar[str] = "energy"
+
+    def __init__(  # noqa: PLR0913  # all but three have defaults
+        self,
+        energy: Any,
+        unknowns: Any,
+        parameters: Iterable[Any],
+        *,
+        constraints: Sequence[Any] = (),
+        draw: Sequence[Sequence[Any]] = (),
+        descriptors: Mapping[str, Any] | None = None,
+        definitions: Mapping[str, Any] | None = None,
+    ) -> None:
+        self._unknowns, self.parameters = unknowns_of(unknowns), parameters_of(parameters)
+        self.unknowns, self.constraints = len(self._unknowns), len(constraints)
+        self.mass = np.array([float(unknown.mass) for unknown in self._unknowns])
+        natural = tuple(unknown.natural for unknown in self._unknowns)
+        given = Formulas(
+            energy, tuple(constraints), natural, _points(draw), dict(descriptors or {})
+        )
+        self._given, self._definitions = given, dict(definitions or {})
+        self._symbols = Symbols(self._unknowns, self.parameters, self._definitions, given)
+        formulas = self._symbols.formulas
+        graph = (formulas.energy, formulas.constraints)
+        self._graphs = Derivatives(self._symbols.u, self._symbols.p, *graph)
+        self.check_natural_state([unknown.name for unknown in self._unknowns])
+
+    def identity(self) -> dict[str, Any]:
+        """Kind, and all formulas as texts."""
+        ca = casadi()
+        definitions, formulas = self._definitions, self._given
+        if any(isinstance(each, ca.SX) for each in (*definitions.values(), *formulas.flat())):
+            definitions, formulas = self._symbols.texts()
+        unknowns = [
+            data_of(replace(unknown, natural=natural))
+            for unknown, natural in zip(self._unknowns, formulas.natural, strict=True)
+        ]
+        return {
+            "kind": self.kind,
+            "energy": formulas.energy,
+            "unknowns": unknowns,
+            "parameters": [data_of(parameter) for parameter in self.parameters],
+            "constraints": list(formulas.constraints),
+            "draw": [list(point) for point in formulas.draw],
+            "descriptors": dict(formulas.descriptors),
+            "definitions": dict(definitions),
+        }
+
+    # --- derivatives ----------------------------------------------------------------------------
+
+    @property
+    def layout(self) -> SparseLayout:
+        """Sparsity of the KKT matrix."""
+        return self._graphs.layout
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """Potential energy E."""
+        return self._graphs.energy(z, p)[:, 0].copy()
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+        return self._graphs.residual(z, p)
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return self._graphs.column(z, p, dp)
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        return self._graphs.second(z, p, *v, *w)
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p."""
+        return self._graphs.effort(z, p)
+
+    def entries(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes entries"]:
+        """Entries of F_z in the order of `layout`."""
+        return self._graphs.matrix(z, p)
+
+    def linearised(
+        self, z: Lanes, p: Parameters, dp: Parameters
+    ) -> tuple[Lanes, Lanes, Float[np.ndarray, "lanes entries"]]:
+        """F, F_p·dp and the entries of F_z, from one tape."""
+        values = self._graphs.step(z, p, dp)
+        residual, column, entries = np.split(values, [self.size, 2 * self.size], axis=1)
+        return residual, column, entries
+
+    # --- states ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _natural(self) -> Tape:
+        return tape((self._symbols.p,), casadi().vertcat(*self._symbols.formulas.natural))
+
+    def natural_guess(self, p: Parameters) -> Lanes:
+        """Natural values of the unknowns, and the multipliers that balance them best."""
+        return self._balanced(self._natural(p), p)
+
+    def _balanced(self, u: Float[np.ndarray, "lanes n"], p: Parameters) -> Lanes:
+        n = self.unknowns
+        z = np.concatenate([u, np.zeros((len(u), self.constraints))], axis=1)
+        if self.constraints:
+            gradients = self.layout.dense(self.entries(z, p))[:, :n, n:]
+            usable = np.isfinite(gradients).all(axis=(1, 2))
+            inverse = np.linalg.pinv(gradients[usable])
+            force = self.residual(z, p)[usable, :n]
+            z[usable, n:] = -np.einsum("lmn,ln->lm", inverse, force)
+        return z
+
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Unknowns within their ranges of guesses, with the multipliers that balance them best."""
+        u = self._natural(p) + generator.uniform(-1.0, 1.0, (len(p), self.unknowns))
+        for i, unknown in enumerate(self._unknowns):
+            if unknown.range is not None:
+                u[:, i] = generator.uniform(*unknown.range, len(p))
+        return self._balanced(u, p)
+
+    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """Unknowns are numbers within the limits of their meaning."""
+        lower, upper = np.array([(each.lower, each.upper) for each in self._unknowns]).T
+        u = z[:, : self.unknowns]
+        good = np.isfinite(z).all(axis=1) & ((lower < u) & (u < upper)).all(axis=1)
+        return np.asarray(good)
+
+    @cached_property
+    def _corners(self) -> Tape:
+        ca = casadi()
+        draw = self._symbols.formulas.draw
+        if not draw:
+            heights = (*self._symbols.u.elements(), *([0.0] if self.unknowns == 1 else []))
+            draw = tuple((float(i), height) for i, height in enumerate(heights))
+        coordinates = [ca.SX(coordinate) for point in draw for coordinate in point]
+        return self._graphs.tape(ca.vertcat(*coordinates))
+
+    def shape(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "lanes points 2"]:
+        """Points of the line to draw; `s` runs from 0 to 1 from the first to the last."""
+        corners = self._corners(z, p).reshape(len(z), -1, 2)
+        if s is None:
+            return corners
+        last = corners.shape[1] - 1
+        place = np.clip(np.asarray(s, dtype=float), 0.0, 1.0) * last
+        at = np.minimum(place.astype(int), last - 1)
+        share = (place - at)[:, None]
+        return np.asarray((1.0 - share) * corners[:, at] + share * corners[:, at + 1])
+
+    # --- descriptors ----------------------------------------------------------------------------
+
+    @property
+    def elevation(self) -> Descriptor:
+        """The first descriptor of the author, or else the first unknown."""
+        return self.descriptor(next(iter((*self._given.descriptors, self._unknowns[0].name))))
+
+    def descriptor(self, text: str) -> Descriptor:
+        """Return the descriptor written as its name, or as ``effort(name)`` of a parameter."""
+        name = text.replace(" ", "")
+        formulas = self._symbols.formulas
+        units = {unknown.name: unknown.unit for unknown in self._unknowns}
+        if name in formulas.descriptors:
+            program = self._graphs.tape(formulas.descriptors[name])
+            return self._described(name, "1", lambda z, p: program(z, p)[:, 0].copy())
+        if name in units:
+            at = list(units).index(name)
+            return self._described(name, units[name], lambda z, p: z[:, at].copy())
+        if name == "energy":
+            return self._described(name, "energy", self.energy)
+        if name.startswith("effort(") and name.endswith(")"):
+            column = position(self.parameters, name[7:-1])
+            return self._described(name, "1", lambda z, p: self.effort(z, p)[:, column].copy())
+        known = ", ".join((*formulas.descriptors, *units, "energy", "effort(parameter)"))
+        raise InputError(f"`descriptor` must be one of {known}; got {text!r}.")
+
+    def _described(self, name: str, unit: str, function: Any) -> Descriptor:
+        return Descriptor(name, unit, function, name, self.signature)
+
+
+def _points(draw: Sequence[Sequence[Any]]) -> tuple[tuple[Any, Any], ...]:
+    """Points to draw: none, or at least two, of two coordinates each."""
+    points = []
+    for i, point in enumerate(draw):
+        pair = () if isinstance(point, str) else tuple(point)
+        if len(pair) != 2:
+            raise InputError(f"`draw[{i}]` must be two expressions [x, y]; got {point!r}.")
+        points.append((pair[0], pair[1]))
+    if len(points) == 1:
+        raise InputError("`draw` must have at least two points; got one.")
+    return tuple(points)

@@ -1,0 +1,118 @@
+"""Specimens of every structure with independent Lagrangians, for the tests of the contract."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from equimorph.model import Parameter
+from equimorph.structures import EnergyStructure, Rod, Spring, Structure, Unknown
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A structure, parameters to test it at, and L = E + λ·c (complex arguments allowed)."""
+
+    name: str
+    structure: Structure
+    centre: tuple[float, ...]
+    spread: float
+    reach: float
+    lagrangian: Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+    def states(self, lanes=5, seed=0):
+        """Random states far from equilibrium, and directions (dz, dp)."""
+        generator = np.random.default_rng(seed)
+        shape = (lanes, len(self.centre))
+        p = np.array(self.centre) + self.spread * generator.uniform(-1.0, 1.0, shape)
+        z = self.reach * self.structure.sample(p, generator)
+        return z, p, generator.normal(size=z.shape), generator.normal(size=p.shape)
+
+
+def _rod(load):
+    rod = Rod(load, elements=4, degree=5)
+
+    def lagrangian(z, p):
+        theta = np.concatenate([p[:, 1:2] + p[:, :1], z[:, :-2], p[:, 1:2] - p[:, :1]], axis=1)
+        energy = 0.5 * np.einsum("li,ij,lj->l", theta, rod.layout.assembled, theta)
+        energy = energy - p[:, 2] * (np.sin(theta) @ rod.loads)
+        along = np.cos(theta) @ rod.mesh.weights - p[:, 3]
+        return energy + z[:, -2] * along + z[:, -1] * (np.sin(theta) @ rod.mesh.weights)
+
+    return Specimen(f"rod, {load}", rod, (1.0, 0.2, 1.5, 0.8), 0.19, 1.0, lagrangian)
+
+
+def _spring_energy(z, p):
+    delta, (x, force, k) = z[:, 0], p.T
+    return 0.5 * k * (1 - x / np.cos(delta)) ** 2 + force * x * np.tan(delta)
+
+
+SPRING_PARAMETERS = (
+    Parameter("x_l", "natural length", 1.0, "actuator", 1.0, 0.0),
+    Parameter("F", "k", 1.0, "load", 0.0),
+    Parameter("k", "force/length", 1.0, "fixed", 1.3, 0.0),
+)
+
+
+def written_spring():
+    """The spring, from its energy."""
+    return EnergyStructure(
+        "k/2*(1 - x_l/cos(delta))**2 + F*x_l*tan(delta)",
+        [Unknown("delta", "acos(fmin(x_l, 1))", lower=-np.pi / 2, upper=np.pi / 2)],
+        SPRING_PARAMETERS,
+        draw=[["x_l", 0], [0, "x_l*tan(delta)"]],
+        descriptors={"height": "x_l*tan(delta)"},
+    )
+
+
+LINKS = 5
+
+
+def closed_chain():
+    """Five hinged links of length 1/5 between supports a span apart, with hinge springs.
+
+    E = ½ k Σ (φᵢ₊₁ − φᵢ)² + ½ k a (φ₁ − φ₅)² − w Σ yᵢ, with the ends held by two constraints.
+    """
+    angles = [f"phi{i}" for i in range(LINKS)]
+    pairs = list(zip(angles[1:], angles, strict=False))
+    bends = " + ".join(f"({b} - {a})**2" for b, a in pairs)
+    heights = " + ".join(f"{LINKS - i}*sin({angle})" for i, angle in enumerate(angles))
+    start = np.arccos(0.9) * np.array([1.0, 0.8, 0.0, -0.8, -1.0])
+    return EnergyStructure(
+        "bending - w*load",
+        [
+            Unknown(angle, float(v), (-1.5, 1.5), mass=0.2)
+            for angle, v in zip(angles, start, strict=True)
+        ],
+        [
+            Parameter("span", "L", 1.0, "actuator", None, 0.0, 1.0),
+            Parameter("a", "1", 1.0, "actuator", 0.3),
+            Parameter("w", "1", 1.0, "load"),
+        ],
+        constraints=[
+            "(" + " + ".join(f"cos({angle})" for angle in angles) + f")/{LINKS} - span",
+            "(" + " + ".join(f"sin({angle})" for angle in angles) + f")/{LINKS}",
+        ],
+        definitions={
+            "bending": f"({bends} + a*({angles[0]} - {angles[-1]})**2)/2",
+            "load": f"({heights})/{LINKS}",
+        },
+    )
+
+
+def _chain_lagrangian(z, p):
+    phi, (span, a, w) = z[:, :LINKS], p.T
+    bending = 0.5 * (np.diff(phi, axis=1) ** 2).sum(axis=1)
+    bending = bending + 0.5 * a * (phi[:, 0] - phi[:, -1]) ** 2
+    load = np.cumsum(np.sin(phi), axis=1).sum(axis=1) / LINKS
+    along = np.cos(phi).mean(axis=1) - span
+    return bending - w * load + z[:, -2] * along + z[:, -1] * np.sin(phi).mean(axis=1)
+
+
+SPECIMENS = (
+    _rod("uniform"),
+    _rod("left-half"),
+    Specimen("spring", Spring(1.3), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
+    Specimen("spring by its energy", written_spring(), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
+    Specimen("chain by its energy", closed_chain(), (0.8, 0.3, 0.5), 0.15, 1.0, _chain_lagrangian),
+)
