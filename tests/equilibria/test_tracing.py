@@ -54,6 +54,17 @@ def test_one_lost_lane_does_not_sink_the_batch():
     assert outcome.z[0, 0] == pytest.approx(2.0, rel=1e-14)
 
 
+def test_every_goal_is_arrived_at_wherever_the_last_step_ends():
+    """x² = a from 1 to 2000 goals: Newton's last correction takes any size below its tolerance."""
+    goals = np.linspace(1.2, 9.0, 2000)[:, None]
+    ones = np.ones_like(goals)
+    curve, z = lines(fold_form(), ones, ones, goals)
+    outcome = follow(curve, z, options=TraceOptions(record=False, retries=0))
+    assert (outcome.code == ARRIVAL).all()
+    assert outcome.why == {}
+    assert outcome.z == pytest.approx(np.sqrt(goals), rel=1e-14)
+
+
 def test_recorded_points_keep_the_names_of_their_lanes():
     curve, z = lines(pitchfork_form(1.0), [[0.0], [1.0]], [[-1.0, 0], [1, 0]], [[1.0, 0], [4, 0]])
     outcome = follow(curve, z)

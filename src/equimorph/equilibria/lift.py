@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.equilibria.curves import ParameterLine
+from equimorph.equilibria.hidden import with_hidden_events
 from equimorph.equilibria.normal_form import criticality
 from equimorph.equilibria.outcome import KINDS, Outcome, follow
-from equimorph.equilibria.probing import with_hidden_events
 from equimorph.equilibria.tracing import BRANCH, CONSTRAINT, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector

@@ -27,8 +27,8 @@ Values = Float[np.ndarray, " lanes"]
 Flags = Bool[np.ndarray, " lanes"]
 Some = Int[np.ndarray, " lanes"]
 
-NEWTON_STEPS = 12
-POLISHED = 1e-8
+NEWTON_STEPS = 24
+POLISHED = 1e-9
 """Correction after which a point is exact to round-off: Newton is quadratic."""
 FAR = 1e6
 """A larger correction, in any unknown, is no step towards an event near by: the lane has failed."""
@@ -84,7 +84,7 @@ def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:
         todo = todo[new[better] > POLISHED]
         if len(todo) == 0:
             break
-    return z, np.asarray(size < 1e-9)
+    return z, np.asarray(size <= POLISHED)
 
 
 def _inside(curve: Curve, bracket: Bracket, z: Lanes, t: Values) -> Flags:

@@ -1,0 +1,269 @@
+"""Events that neither index nor direction betray: eigenvalues that touch zero, or cross it twice.
+
+Between neighbouring points of a path the eigenvalue of F_z nearest to zero is the cubic through its
+values and slopes. Where that comes close to zero, the step is looked into. For many lanes, a test
+function that costs one solve for each point tells before where the eigenvalue is worth its price.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria.cubics import least_inside
+from equimorph.equilibria.curves import ParameterLine, dual
+from equimorph.equilibria.fronts import Front
+from equimorph.equilibria.happenings import Happenings, locate_all
+from equimorph.equilibria.outcome import LOST, Outcome
+from equimorph.equilibria.probing import CLOSE, look_inside, probed, step_between
+from equimorph.equilibria.tracing import (
+    ARRIVAL,
+    CONSTRAINT,
+    FOLD,
+    RETURN,
+    Points,
+    TraceOptions,
+)
+
+Values = Float[np.ndarray, " points"]
+Flags = Bool[np.ndarray, " points"]
+Some = Int[np.ndarray, " some"]
+
+DOUBTFUL = 0.4
+"""Least value of the test function between two points, as a share of those at its ends, from which
+on the eigenvalue is looked at."""
+AT_EVENT = 1e-6
+"""Value at one end of a step over that at the other below which the end is itself an event."""
+COLUMNS = 3
+"""Right-hand sides of the solve for the test function: the smallest eigenvalues that it sees."""
+AT_ONCE = 1024
+"""Points whose test functions are evaluated together: they stay in the cache."""
+REGULAR_ENDS = (ARRIVAL, RETURN, CONSTRAINT)
+
+
+def with_hidden_events(
+    curve: ParameterLine,
+    z: Float[np.ndarray, "lanes size"],
+    outcome: Outcome,
+    options: TraceOptions,
+    *,
+    thorough: bool = True,
+) -> Outcome:
+    """Outcome of recorded lanes, started at z, completed by what their steps did not show.
+
+    The first hidden event that stops a lane becomes its end. See `hidden_events`.
+    """
+    points = _points(curve, z, outcome)
+    inside = hidden_events(curve, points, options, thorough=thorough)
+    last_ones = _before_ends(curve, points, outcome)
+    hidden = Happenings.joined([inside, last_ones], z.shape[1])
+    if len(hidden.code) == 0:
+        return outcome
+    stops = np.flatnonzero((hidden.code & options.stops != 0) | ~hidden.found)
+    stops = stops[np.unique(hidden.lanes[stops], return_index=True)[1]]
+    end = hidden.take(stops)
+    lanes, located = end.lanes, end.found
+    code, index = outcome.code.copy(), outcome.index.copy()
+    places, t = outcome.z.copy(), outcome.t.copy()
+    travelled, last = outcome.travelled.copy(), np.full(len(code), np.inf)
+    index[last_ones.lanes] = last_ones.index[:, 1]
+    code[lanes], index[lanes] = np.where(located, end.code, LOST), end.index[:, 0]
+    places[lanes], t[lanes] = end.z, end.t
+    travelled[lanes] = last[lanes] = end.travelled
+    passed = Happenings.joined([outcome.passed, hidden], z.shape[1])
+    why = outcome.why | {int(end.lanes[i]): _why(end, i) for i in range(len(lanes))}
+    return replace(
+        outcome,
+        code=code,
+        z=places,
+        t=t,
+        index=index,
+        travelled=travelled,
+        why={lane: reason for lane, reason in why.items() if reason},
+        passed=passed.take(passed.travelled < last[passed.lanes]),
+    )
+
+
+def _why(end: Happenings, i: int) -> str:
+    if not end.found[i]:
+        return "a hidden pair of events could not be located"
+    touching = end.index[i, 0] == end.index[i, 1] and end.code[i] == FOLD
+    return "the path touches a fold and goes on" if touching else ""
+
+
+def _before_ends(curve: ParameterLine, points: Points, outcome: Outcome) -> Happenings:
+    """Events between the last point of a lane and its end, inside a longer step with two of them.
+
+    They show where the index at the end is another than the steps tell.
+    """
+    size, found = curve.structure.size, list[Happenings]()
+    last = np.flatnonzero(np.append(np.diff(points.lanes) != 0, True))
+    last = last[np.isin(outcome.code[points.lanes[last]], REGULAR_ENDS)]
+    lanes = points.lanes[last]
+    p = curve.take(lanes).parameters(points.t[last])
+    index = curve.structure.index(np.ascontiguousarray(points.z[last]), p)
+    for i in np.flatnonzero(index != points.index[last]):
+        ends, one = np.array([last[i] - 1, last[i]]), curve.take(lanes[i : i + 1])
+        both = curve.take(np.repeat(lanes[i], 2))
+        probe = probed(both, _fronts(both, points, ends), points.travelled[ends])
+        if np.abs(probe.value[1]) <= AT_EVENT * np.abs(probe.value[0]):
+            continue
+        front = replace(probe.front, index=np.array([points.index[last[i]], index[i]]))
+        probe = replace(probe, front=front)
+        pair = probe.at(np.array([0])), probe.at(np.array([1]))
+        events = locate_all(one, [step_between(pair, None)], (), TraceOptions())
+        found.append(replace(events, lanes=lanes[i : i + 1]))
+    return Happenings.joined(found, size)
+
+
+def _points(curve: ParameterLine, z: Float[np.ndarray, "lanes size"], outcome: Outcome) -> Points:
+    """Starts, recorded points, and the ends that are regular ones."""
+    lanes, none = np.arange(len(z)), np.zeros(len(z))
+    index = curve.structure.index(z, curve.parameters(none))
+    start = Points(lanes, none, z, none, index)
+    end = Points(lanes, outcome.travelled, outcome.z, outcome.t, outcome.index)
+    regular = end.take(np.isin(outcome.code, REGULAR_ENDS))
+    return Points.joined([start, outcome.points, regular], z.shape[1])
+
+
+def hidden_events(
+    curve: ParameterLine, points: Points, options: TraceOptions, *, thorough: bool = True
+) -> Happenings:
+    """Folds and branch points between the points of traced paths that their steps do not show.
+
+    An eigenvalue that touches zero is one event that leaves the index as it is; one that crosses
+    zero twice between two points gives two events.
+
+    Parameters
+    ----------
+    curve
+        The curves of all lanes.
+    points
+        Their points, from the start on, sorted by lane and length.
+    thorough
+        Look at the eigenvalue nearest to zero at every point, by six solves each. Else only where
+        `gaps`, by one solve each, leaves a doubt: enough for rods, whose lowest modes are smooth,
+        but an eigenvalue that is small in a mode unlike its columns may touch zero unseen.
+    """
+    found = list[Happenings]()
+    near = np.arange(len(points.t)) if thorough else _doubtful_points(points, gaps(curve, points))
+    if len(near) < 2:
+        return Happenings.joined(found, curve.structure.size)
+    lanes, index = points.lanes[near], points.index[near]
+    many = curve.take(lanes)
+    probe = probed(many, _fronts(many, points, near), points.travelled[near])
+    low = _lowest(np.abs(probe.value), _neighbours(points, near), CLOSE)
+    kept = np.flatnonzero(~low)
+    few, sign = probe.at(kept), np.sign(probe.value[kept])
+    values, slopes = sign * few.value, sign * few.slope
+    ends = values[:-1], values[1:]
+    least = least_inside(ends, (slopes[:-1], slopes[1:]), np.diff(few.length))[1]
+    smaller, larger = np.minimum(*ends), np.maximum(*ends)
+    # a path may start or arrive right at an event: that is no hidden one
+    close = (least < CLOSE * smaller) & (smaller > AT_EVENT * larger)
+    skips = np.diff(kept) > 1
+    same = (np.diff(near[kept]) == 1 + skips) & (np.diff(lanes[kept]) == 0)
+    for i in np.flatnonzero((close | skips) & same & (np.diff(index[kept]) == 0)):
+        pair = (few.at(np.array([i])), few.at(np.array([i + 1])))
+        first = float(probe.length[kept[i] + 1]) if skips[i] else None
+        lane = lanes[kept[i] : kept[i] + 1]
+        inside = look_inside(curve.take(lane), pair, first, options)
+        found += [replace(each, lanes=np.full(len(each.code), lane[0])) for each in inside]
+    return Happenings.joined(found, curve.structure.size)
+
+
+def gaps(curve: ParameterLine, points: Points) -> Values:
+    """Test function ``1 / det(BᵀF_z⁻¹B)``: zero where F_z is singular.
+
+    By the formula of Cauchy and Binet it is close to a multiple of the product of the smallest
+    eigenvalues, as many as B has columns, which are smooth and do not act on the multipliers. As
+    long as the index is zero it has no poles.
+    """
+    structure, out = curve.structure, np.empty(len(points.t))
+    n, count = structure.unknowns, min(COLUMNS, structure.unknowns)
+    place, wave = (np.arange(n) + 0.5) / n, np.arange(count)[:, None]
+    b = np.zeros((count, structure.size))
+    b[:, :n] = structure.mass * np.cos(np.pi * (wave + 0.37) * place + 0.6 * wave)
+    rhs = np.tile(b, (min(AT_ONCE, len(out)), 1, 1))
+    for start in range(0, len(out), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
+        lanes = points.lanes[some]
+        p = curve.start[lanes] + points.t[some, None] * curve.velocity[lanes]
+        y = structure.solve(np.ascontiguousarray(points.z[some]), p, rhs[: len(lanes)]).x
+        with np.errstate(all="ignore"):
+            small = y.reshape(-1, structure.size) @ b.T
+            out[some] = 1.0 / np.linalg.det(small.reshape(-1, count, count))
+    return out
+
+
+def _doubtful_points(points: Points, gap: Values) -> Some:
+    """Ends of all steps inside which the test function may come close to zero, and neighbours."""
+    lanes, length = points.lanes, points.travelled
+    steps = (lanes[1:] == lanes[:-1]) & (points.index[1:] == points.index[:-1])
+    sign = np.sign(gap)
+    slopes = _slopes(lanes, length, gap)
+    ends = sign[:-1] * gap[:-1], sign[1:] * gap[1:]
+    rates = sign[:-1] * slopes[:-1], sign[1:] * slopes[1:]
+    least = least_inside(ends, rates, np.diff(length))[1]
+    # not <: what is not a number is doubtful; an odd number of poles or zeros changes the sign
+    doubtful = ~(least >= DOUBTFUL * np.minimum(*ends)) | (sign[:-1] != sign[1:])
+    near = np.zeros(len(gap), bool)
+    for shift in (0, 1):
+        near[shift : len(gap) - 1 + shift] |= doubtful & steps
+    low = _lowest(np.abs(gap), _neighbours(points, np.arange(len(gap))), DOUBTFUL)
+    for shift in (-1, 0, 1):
+        near |= np.roll(low, shift)
+    return np.flatnonzero(near)
+
+
+def _slopes(lanes: Int[np.ndarray, " points"], length: Values, value: Values) -> Values:
+    """Slopes of parabolas through three neighbours on a lane; nan on lanes of fewer points."""
+    out, along = np.full(len(value), np.nan), lanes[1:] == lanes[:-1]
+    step = np.diff(length)
+    rise = np.diff(value) / np.where(along, np.maximum(step, 1e-300), 1.0)
+    inner = 1 + np.flatnonzero(along[1:] & along[:-1])
+    before, after = step[inner - 1], step[inner]
+    out[inner] = (after * rise[inner - 1] + before * rise[inner]) / (before + after)
+    starts = along & np.append(True, ~along[:-1])
+    first = np.flatnonzero(starts & np.append(along[1:], False))
+    out[first] = 2.0 * rise[first] - out[first + 1]
+    last = 1 + np.flatnonzero(along & np.append(~along[1:], True))
+    last = last[np.isin(last - 1, inner)]
+    out[last] = 2.0 * rise[last - 1] - out[last - 1]
+    return out
+
+
+def _neighbours(points: Points, near: Some) -> Bool[np.ndarray, " some"]:
+    """Which of the points have both neighbours among them, on one lane and with one index."""
+    out = np.zeros(len(near), bool)
+    lanes, index = points.lanes[near], points.index[near]
+    whole = near[2:] - near[:-2] == 2
+    for column in (lanes, index):
+        whole &= (column[2:] == column[1:-1]) & (column[:-2] == column[1:-1])
+    out[1:-1] = whole
+    return out
+
+
+def _lowest(
+    value: Float[np.ndarray, " some"], inner: Bool[np.ndarray, " some"], share: float
+) -> Bool[np.ndarray, " some"]:
+    """Points that lie near a least value themselves, lest it hide between two steps."""
+    out = np.zeros(len(value), bool)
+    out[1:-1] = inner[1:-1] & ~(value[1:-1] >= share * np.minimum(value[:-2], value[2:]))
+    return out
+
+
+def _fronts(curve: ParameterLine, points: Points, near: Some) -> Front:
+    """Unit tangents at points of paths, along them."""
+    lanes = points.lanes
+    # the chord to the next point, or from the one before, tells the direction and closes the system
+    ahead = np.append(lanes[1:] == lanes[:-1], False)[near]
+    one, two = np.where(ahead, near, near - 1), np.where(ahead, near + 1, near)
+    dz, dt = points.z[two] - points.z[one], points.t[two] - points.t[one]
+    row, corner = dual(curve.structure, curve.weight, dz, dt)
+    z, t = np.ascontiguousarray(points.z[near]), points.t[near]
+    move = curve.advance(z, t, row, corner, np.zeros(len(t)))
+    along, alongside = dual(curve.structure, curve.weight, move.tangent_z, move.tangent_t)
+    norm = np.sqrt((along * move.tangent_z).sum(axis=1) + alongside * move.tangent_t)
+    tangent = move.tangent_z / norm[:, None], move.tangent_t / norm
+    return Front(z, t, *tangent, points.index[near])

@@ -1,0 +1,150 @@
+"""Events that neither the index nor the direction of a step betrays."""
+
+import numpy as np
+import pytest
+from hypothesis import Phase, example, given, settings
+from hypothesis import strategies as st
+
+import equimorph as em
+from equimorph.equilibria import ParameterLine, TraceOptions, follow
+from equimorph.equilibria.hidden import with_hidden_events
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH
+from oracles.polynomial import Polynomial, slaved
+from typecheck import unchecked
+
+PHASES = (Phase.explicit, Phase.generate)  # to shrink takes minutes
+QUICK = settings(max_examples=25, deadline=None, derandomize=True, phases=PHASES)
+
+factors = st.floats(0.2, 5.0)
+stiff = st.floats(0.5, 4.0)
+slopes = st.floats(-1.0, 1.0)
+places = st.floats(-0.6, 0.6)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _fast():
+    with unchecked():
+        yield
+
+
+def dipping(depth, centre, c=1.0):
+    """x³ + ((a − centre)² − depth) x = 0: on x = 0 the eigenvalue dips by `depth` below zero."""
+    return Polynomial(
+        lambda x, a: c * (x**4 * 0.25 + ((a - centre) ** 2 - depth) * x**2 * 0.5), 1, ("a",)
+    )
+
+
+@QUICK
+@example(power=-6.0, centre=0.0, c=1.0, k=1.0, m=0.5)
+@example(power=-7.8, centre=-0.55, c=0.24, k=2.6, m=-0.6)  # a point right between the two
+@given(power=st.floats(-8.0, -1.0), centre=places, c=factors, k=stiff, m=slopes)
+def test_two_branch_points_in_one_step_are_separated(power, centre, c, k, m):
+    """At a = centre ± √depth the eigenvalue crosses zero: steps are 0.5 long."""
+    depth = 10.0**power
+    form = slaved(dipping(depth, centre, c), k, m)
+    start = form.state(0.0, 0.0, a=-1.0)
+    path = em.lift(start, {"a": 1.0}, through_folds=True)
+    assert [event.kind for event in path.events] == ["branch point", "branch point", "arrived"]
+    places = [event.state["a"] for event in path.events[:2]]
+    assert places == pytest.approx([centre - np.sqrt(depth), centre + np.sqrt(depth)], abs=1e-10)
+    end = em.lift(start, {"a": 1.0}).end
+    assert (end.kind, end.criticality) == ("branch point", "supercritical")
+    assert end.state["a"] == pytest.approx(centre - np.sqrt(depth), abs=1e-10)
+
+
+@QUICK
+@example(centre=0.393, c=0.26, k=1.54, m=-0.98)  # a point so near that its index is round-off's
+@given(centre=places, c=factors, k=stiff, m=slopes)
+def test_eigenvalue_that_touches_zero_is_a_degenerate_branch_point(centre, c, k, m):
+    """depth = 0: the index is zero on both sides."""
+    form = slaved(dipping(0.0, centre, c), k, m)
+    path = em.lift(form.state(0.0, 0.0, a=-1.0), {"a": 1.0}, through_folds=True)
+    assert [event.kind for event in path.events] == ["branch point", "arrived"]
+    assert path.events[0].state["a"] == pytest.approx(centre, abs=1e-10)
+    assert (path.index == 0).all()
+    end = em.lift(form.state(0.0, 0.0, a=-1.0), {"a": 1.0}).end
+    assert end.kind == "branch point"
+    assert end.state["a"] == pytest.approx(centre, abs=1e-10)
+
+
+@QUICK
+@given(power=st.floats(-6.0, -1.0), centre=places)
+def test_eigenvalue_that_stays_above_zero_is_no_event(power, centre):
+    form = dipping(-(10.0**power), centre)
+    path = em.lift(form.state(0.0, a=-1.0), {"a": 1.0})
+    assert path.arrived
+    assert len(path.events) == 1
+
+
+@QUICK
+@example(c=2.0, k=1.61, m=0.38, a=-0.853, b=0.111)  # a step ends close by the fold
+@example(c=1.2, k=1.49, m=0.0, a=-0.695, b=1.196)  # a trial hits it
+@given(c=factors, k=stiff, m=slopes, a=st.floats(-2.0, -0.1), b=st.floats(0.1, 2.0))
+def test_hysteresis_point_is_a_fold_in_which_the_path_does_not_turn(c, k, m, a, b):
+    """x³ = a: a cusp met in its own direction.
+
+    Tolerance of x: points between steps are corrected to 1e-11, relative to steps of 1e-2.
+    """
+    form = slaved(Polynomial(lambda x, a: c * (x**4 * 0.25 - a * x), 1, ("a",)), k, m)
+    start = form.state(np.cbrt(a), m * np.cbrt(a) ** 2, a=a)
+    path = em.lift(start, {"a": b}, through_folds=True)
+    assert [event.kind for event in path.events] == ["fold", "arrived"]
+    assert path.events[0].state["a"] == pytest.approx(0.0, abs=1e-10)
+    assert path.events[0].state.z == pytest.approx([0.0, 0.0], abs=1e-9)
+    end = em.lift(start, {"a": b}).end
+    assert (end.kind, end.detail) == ("fold", "the path touches a fold and goes on")
+
+
+@pytest.mark.parametrize("thorough", [True, False])
+def test_many_lanes_are_probed_together_each_as_if_alone(thorough):
+    """Lane by lane: the two branch points of `dipping(1e-3, 0)`, one of them, none of them."""
+    form = dipping(1e-3, 0.0)
+    stop = np.array([1.0, 0.01, -0.5, 0.9, 0.7])
+    curve = ParameterLine(form, np.full((5, 1), -1.0), stop[:, None] + 1.0)
+    z, options = np.zeros((5, 1)), TraceOptions(through_folds=True, through_branch_points=True)
+    outcome = with_hidden_events(
+        curve, z, follow(curve, z, options=options), options, thorough=thorough
+    )
+    assert outcome.code.tolist() == [ARRIVAL] * 5
+    root = np.sqrt(1e-3)
+    places = curve.parameters(np.zeros(5))[outcome.passed.lanes, 0]
+    places = places + outcome.passed.t * curve.velocity[outcome.passed.lanes, 0]
+    assert outcome.passed.lanes.tolist() == [0, 0, 1, 3, 3, 4, 4]
+    assert places == pytest.approx([-root, root, -root, -root, root, -root, root], abs=1e-10)
+    assert outcome.index.tolist() == [0, 1, 0, 0, 0]
+    options = TraceOptions()
+    outcome = with_hidden_events(
+        curve, z, follow(curve, z, options=options), options, thorough=thorough
+    )
+    assert outcome.code.tolist() == [BRANCH, BRANCH, ARRIVAL, BRANCH, BRANCH]
+    assert outcome.why == {}
+    assert -1.0 + outcome.t * (stop + 1.0) == pytest.approx([-root, -root, -0.5, -root, -root])
+
+
+@settings(QUICK, max_examples=5)
+@given(power=st.floats(-8.0, -2.0), centre=places, seed=st.integers(0, 2**20))
+def test_pair_of_branch_points_shows_among_many_stiff_unknowns(power, centre, seed):
+    """Eight unknowns with eigenvalues 1 to 30 in a random basis beside the one that dips."""
+    generator, n = np.random.default_rng(seed), 9
+    basis = np.linalg.qr(generator.normal(size=(n, n)))[0]
+    stiffness = np.geomspace(1.0, 30.0, n - 1)
+
+    def energy(*args):
+        *x, a = args
+        u = [sum(float(b) * xi for b, xi in zip(row, x, strict=True)) for row in basis]
+        dip = ((a - centre) ** 2 - 10.0**power) * u[0] ** 2 * 0.5 + u[0] ** 2 * u[0] ** 2 * 0.25
+        return dip + sum(0.5 * float(k) * v**2 for k, v in zip(stiffness, u[1:], strict=True))
+
+    form = Polynomial(energy, n, ("a",))
+    path = em.lift(form.state(*np.zeros(n), a=-1.0), {"a": 1.0}, through_folds=True)
+    assert [event.kind for event in path.events] == ["branch point", "branch point", "arrived"]
+    root = 10.0 ** (0.5 * power)
+    found = [event.state["a"] for event in path.events[:2]]
+    assert found == pytest.approx([centre - root, centre + root], abs=1e-10)
+
+
+def test_paths_of_the_arch_hide_nothing():
+    """Regular events are met once: no probe reports them again."""
+    arch = em.Rod()
+    path = em.lift(arch.natural_state(Theta=0.9, Delta=0.02), {"q": 8.0}, through_folds=True)
+    assert [event.kind for event in path.events] == ["fold", "fold", "arrived"]
