@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equimorph.manifold.mesh import SHIFT, BaseMesh, bisect, grid_mesh
-from equimorph.manifold.topology import euler_characteristic, projected_area, surface
+from equimorph.manifold.bisection import bisect
+from equimorph.manifold.mesh import SHIFT, BaseMesh, grid_mesh
+from equimorph.manifold.topology import adjacency, euler_characteristic, projected_volume
 from equimorph.model import Box
 
 BOX = Box(a=(-1.0, 2.0), b=(-2.0, 2.0))
@@ -14,13 +15,13 @@ BOX = Box(a=(-1.0, 2.0), b=(-2.0, 2.0))
 
 def assert_conforming(mesh: BaseMesh) -> None:
     """Positive areas that fill the box, every inner edge with two triangles, a disc."""
-    areas = projected_area(mesh.vertices, mesh.triangles)
+    areas = projected_volume(mesh.vertices, mesh.triangles)
     assert areas.min() > 0
     assert areas.sum() == pytest.approx(12.0, rel=1e-13)
-    whole = surface(mesh.triangles)
+    whole = adjacency(mesh.triangles)
     assert whole.counts.max() == 2
     assert euler_characteristic(mesh.triangles) == 1
-    once = mesh.vertices[whole.edges[whole.counts == 1]]
+    once = mesh.vertices[whole.facets[whole.counts == 1]]
     on_side = (once == BOX.lower).all(axis=1) | (once == BOX.upper).all(axis=1)
     assert on_side.any(axis=1).all()
     for k in range(3):

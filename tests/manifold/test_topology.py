@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from equimorph.manifold.topology import (
+    adjacency,
     chains,
     euler_characteristic,
     flags_of,
     labels,
     orientation,
-    projected_area,
-    surface,
+    projected_volume,
 )
 
 OCTAHEDRON = np.array(
@@ -48,7 +48,7 @@ def test_orientable_surface_is_oriented_without_contradiction(cells):
     turned = cells.copy()
     flipped = np.random.default_rng(3).random(len(cells)) < 0.5
     turned[flipped] = turned[flipped][:, [0, 2, 1]]
-    signs, contradictions = orientation(turned, surface(turned))
+    signs, contradictions = orientation(turned, adjacency(turned))
     assert contradictions == 0
     want = np.where(flipped, -1, 1)
     assert np.array_equal(signs, want) or np.array_equal(signs, -want)
@@ -57,45 +57,46 @@ def test_orientable_surface_is_oriented_without_contradiction(cells):
 @pytest.mark.parametrize("length", [5, 7, 21])
 def test_moebius_strip_contradicts_every_orientation(length):
     cells = moebius(length)
-    assert orientation(cells, surface(cells))[1] == 1
+    assert orientation(cells, adjacency(cells))[1] == 1
 
 
-def test_surface_counts_the_cells_of_every_edge():
-    whole = surface(STRIP)
-    assert len(whole.edges) == 9
+def test_adjacency_counts_the_cells_of_every_edge():
+    whole = adjacency(STRIP)
+    assert len(whole.facets) == 9
     assert sorted(whole.counts.tolist()) == [1] * 6 + [2] * 3
-    assert np.array_equal(np.sort(STRIP[:, [0, 1]], axis=1), whole.edges[whole.cell_edges[:, 0]])
-    for (a, b), edge in zip(whole.neighbours, whole.shared, strict=True):
-        assert set(whole.edges[edge]) <= set(STRIP[a]) & set(STRIP[b])
+    assert np.array_equal(np.sort(STRIP[:, [0, 1]], axis=1), whole.facets[whole.cell_facets[:, 2]])
+    for (a, b), edge in zip(whole.links, whole.across, strict=True):
+        assert set(whole.facets[edge]) <= set(STRIP[a]) & set(STRIP[b])
 
 
-def test_edge_of_three_cells_is_counted_but_joins_none():
+def test_edge_of_three_cells_links_them_but_is_no_manifold():
     book = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
-    whole = surface(book)
+    whole = adjacency(book)
     assert whole.counts.max() == 3
-    assert len(whole.neighbours) == 0
+    assert labels(3, whole.links).tolist() == [0, 0, 0]
+    assert not whole.manifold.any()
 
 
 def test_labels_number_the_pieces_by_size():
     cells = np.concatenate([[[10, 11, 12]], STRIP])
-    assert labels(5, surface(cells).neighbours).tolist() == [1, 0, 0, 0, 0]
+    assert labels(5, adjacency(cells).links).tolist() == [1, 0, 0, 0, 0]
 
 
 def test_labels_stop_at_edges_that_are_not_to_be_crossed():
-    whole = surface(STRIP)
-    crossed = ~flags_of(whole.edges, {(2, 3)})[whole.shared]
-    assert labels(4, whole.neighbours, crossed).tolist() == [0, 0, 1, 1]
+    whole = adjacency(STRIP)
+    crossed = ~flags_of(whole.facets, np.array([[3, 2]]))[whole.across]
+    assert labels(4, whole.links[crossed]).tolist() == [0, 0, 1, 1]
 
 
 def test_labels_of_nothing_are_empty():
     none = np.zeros((0, 3), int)
-    assert len(labels(0, surface(none).neighbours)) == 0
+    assert len(labels(0, adjacency(none).links)) == 0
 
 
 def test_flags_ignore_pairs_that_are_no_edges():
-    whole = surface(STRIP)
-    flags = flags_of(whole.edges, {(1, 2), (0, 5), (77, 99)})
-    assert whole.edges[flags].tolist() == [[1, 2]]
+    whole = adjacency(STRIP)
+    flags = flags_of(whole.facets, np.array([[1, 2], [0, 5], [77, 99]]))
+    assert whole.facets[flags].tolist() == [[1, 2]]
 
 
 def test_chains_join_edges_to_open_and_closed_lines():
@@ -128,4 +129,4 @@ def test_chains_of_nothing_are_none():
 def test_projected_area_is_signed():
     corners = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 3.0]])
     cells = np.array([[0, 1, 2], [0, 2, 1]])
-    assert projected_area(corners, cells).tolist() == [3.0, -3.0]
+    assert projected_volume(corners, cells).tolist() == [3.0, -3.0]

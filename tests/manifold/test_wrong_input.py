@@ -13,11 +13,10 @@ from equimorph.structures import Rod, Spring
 @pytest.mark.parametrize(
     ("box", "options", "message"),
     [
-        (Box(F=(-1, 1)), {}, "`box` must have two parameters; got 1 (F)."),
         (
-            Box(F=(-1, 1), x_l=(0.5, 1), k=(1, 2)),
+            Box(F=(-1, 1), x_l=(0.5, 1), k=(1, 2), m=(0, 1)),
             {},
-            "`box` must have two parameters; got 3 (F, x_l, k).",
+            "`box` must have one or two parameters; got 4 (F, x_l, k, m).",
         ),
         (
             Box(F=(-1, 1), Theta=(0, 1)),
@@ -48,6 +47,11 @@ from equimorph.structures import Rod, Spring
             Box(F=(-1, 1), x_l=(0.5, 1)),
             {"intervals": (1, 5)},
             "`intervals` must be two whole numbers >= 2; got (1, 5).",
+        ),
+        (
+            Box(F=(-1, 1)),
+            {"intervals": (4, 5)},
+            "`intervals` must be one whole number >= 2; got (4, 5).",
         ),
     ],
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.topology import orientation, projected_area, surface
+from equimorph.manifold.topology import adjacency, flags_of, orientation, projected_volume
 
 REGULAR = (0, 3)
 FOLDED = (1, 4)
@@ -49,49 +49,48 @@ def assert_index_of_cells(eset: EquilibriumSet) -> None:
     index = eset.structure.index(eset.points.z, eset.points.p)
     regular = ~np.isin(eset.kinds, FOLDED)
     assert np.array_equal(index[regular], eset.index[regular])
-    for k in range(3):
-        corner = eset.cells[:, k]
+    for corner in eset.cells.T:
         own = regular[corner]
         assert np.array_equal(index[corner[own]], eset.cell_index[own])
     # and on folds the lower of both sides
     folded = np.flatnonzero(~regular)
     low = np.full(len(eset.points), 99)
-    np.minimum.at(low, eset.cells.ravel(), np.repeat(eset.cell_index, 3))
+    np.minimum.at(low, eset.cells.ravel(), np.repeat(eset.cell_index, eset.cells.shape[1]))
     assert np.array_equal(low[folded], eset.index[folded])
 
 
 def assert_orientation_alternates(eset: EquilibriumSet) -> None:
-    """Oriented coherently, the projected area of a cell changes sign with the parity of its index.
+    """Oriented coherently, projected volumes of cells change sign with the parity of the index.
 
     Slivers at folds, where straight cells cut the corners of a curved fold, may be overturned.
     """
-    signs, contradictions = orientation(eset.cells, surface(eset.cells))
+    signs, contradictions = orientation(eset.cells, adjacency(eset.cells))
     assert contradictions == 0
-    area = projected_area(eset.coordinates, eset.cells) * signs * (-1) ** eset.cell_index
+    volume = projected_volume(eset.coordinates, eset.cells) * signs * (-1) ** eset.cell_index
     for k in range(eset.audit.components):
-        own = area[eset.component == k] * np.sign(area[eset.component == k].sum())
+        own = volume[eset.component == k] * np.sign(volume[eset.component == k].sum())
         assert -own[own < 0].sum() < 0.01 * own.sum()
         assert (own < 0).sum() < 0.05 * len(own)
 
 
+def facets_of(piece: np.ndarray, d: int) -> np.ndarray:
+    """Facets of a connected piece: a point, a polyline, or triangles one a row."""
+    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+
+
 def assert_folds_part_indices(eset: EquilibriumSet) -> None:
-    """Cells on both sides of an edge differ in index by one on folds, and nowhere else."""
-    whole = surface(eset.cells)
-    a, b = whole.neighbours.T
+    """Cells on both sides of a facet differ in index by one on folds, and nowhere else."""
+    whole, d = adjacency(eset.cells), len(eset.names)
+    a, b = whole.links.T
     jump = np.abs(eset.cell_index[a] - eset.cell_index[b])
-    on_fold = {
-        tuple(sorted(pair))
-        for fold in eset.folds
-        for pair in zip(fold[:-1].tolist(), fold[1:].tolist(), strict=True)
-    }
+    folded = np.concatenate([np.zeros((0, d), int), *(facets_of(piece, d) for piece in eset.folds)])
     assert jump.max(initial=0) <= 1
-    for edge, differs in zip(whole.edges[whole.shared].tolist(), jump, strict=True):
-        assert (tuple(edge) in on_fold) == bool(differs)
-    assert np.isin(eset.kinds[[v for fold in eset.folds for v in fold]], FOLDED).all()
+    assert np.array_equal(flags_of(whole.facets, folded)[whole.across], jump == 1)
+    assert np.isin(eset.kinds[folded], FOLDED).all()
 
 
 def assert_boundaries(eset: EquilibriumSet) -> None:
-    """Loops are closed and simple; the vertices lie on the box or on a constraint."""
+    """Pieces are closed; their vertices lie on the box or on a constraint."""
     size = eset.box.upper - eset.box.lower
     x = eset.coordinates
     low, high = np.abs(x - eset.box.lower), np.abs(x - eset.box.upper)
@@ -100,10 +99,19 @@ def assert_boundaries(eset: EquilibriumSet) -> None:
     for constraint in eset.constraints:
         excess = np.maximum(excess, constraint.excess(eset.points.z, eset.points.p))
     for loop in eset.boundaries:
-        assert loop.vertices[0] == loop.vertices[-1]
-        assert len(set(loop.vertices.tolist())) == len(loop.vertices) - 1
-        capped = np.abs(excess[loop.vertices]) < 1e-8
-        assert (on_box[loop.vertices] | capped).all()
+        own = np.unique(loop.vertices)
+        capped = np.abs(excess[own]) < 1e-8
+        assert_closed(loop.vertices, len(eset.names))
+        assert (on_box[own] | capped).all()
         assert loop.kind in {"box", "cap", "mixed"}
-        assert loop.kind != "box" or on_box[loop.vertices].all()
+        assert loop.kind != "box" or on_box[own].all()
         assert loop.kind != "cap" or capped.all()
+
+
+def assert_closed(piece: np.ndarray, d: int) -> None:
+    """A point, a simple loop, or a surface without boundary."""
+    if d == 2:
+        assert piece[0] == piece[-1]
+        assert len(np.unique(piece)) == len(piece) - 1
+    if d == 3:
+        assert (adjacency(piece).counts == 2).all()

@@ -1,12 +1,12 @@
-"""From numbered triangles to an equilibrium set: pieces, curves, boundary loops and the audit."""
+"""From numbered cells to an equilibrium set: pieces, folds, boundaries and the audit."""
 
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.assembly import Cells
 from equimorph.manifold.audit import Audit
+from equimorph.manifold.cells import Cells
 from equimorph.manifold.equilibrium_set import (
     Boundary,
     Component,
@@ -15,14 +15,15 @@ from equimorph.manifold.equilibrium_set import (
 )
 from equimorph.manifold.pairing import Pairing, abandoned
 from equimorph.manifold.topology import (
-    Surface,
-    chains,
+    Adjacency,
+    adjacency,
     euler_characteristic,
     flags_of,
+    keys_of,
     labels,
     orientation,
-    projected_area,
-    surface,
+    pieces,
+    projected_volume,
 )
 from equimorph.model import Box
 from equimorph.structures import States
@@ -31,32 +32,29 @@ from equimorph.structures import States
 def account(
     pairing: Pairing,
     cells: Cells,
-    given: tuple[Box, Mapping[str, float], tuple[int, int]],
+    given: tuple[Box, Mapping[str, float], tuple[int, ...]],
     bisected: int,
 ) -> EquilibriumSet:
-    """Number the used points, find pieces, curves and loops, and write the audit."""
+    """Number the used points, find pieces, folds and boundaries, and write the audit."""
     box, fixed, intervals = given
-    corners = np.array(cells.corners, int).reshape(-1, 3)
-    used, renumbered = np.unique(corners, return_inverse=True)
-    corners = renumbered.reshape(-1, 3)
-    number = {int(old): new for new, old in enumerate(used)}
-    store = pairing.points
+    used = np.unique(cells.corners)
+    number = np.full(pairing.points.count, -1)
+    number[used] = np.arange(len(used))
+    corners, store = number[cells.corners], pairing.points
     points = States(pairing.setting.structure, store.z[used].copy(), store.p[used].copy())
-    whole = surface(corners)
-    fold_edges = flags_of(whole.edges, _renumber(cells.folds, number))
-    cap_edges = flags_of(whole.edges, _renumber(cells.caps, number))
-    component = labels(len(corners), whole.neighbours)
-    stratum = labels(len(corners), whole.neighbours, ~fold_edges[whole.shared])
-    cell_index = np.array(cells.index, int)
-    boundaries = _boundaries(whole, cap_edges)
-    components = _components(corners, cell_index, component, boundaries)
+    whole = adjacency(corners)
+    folds = flags_of(whole.facets, _kept(number[cells.folds]))
+    caps = flags_of(whole.facets, _kept(number[cells.caps]))
+    component = labels(len(corners), whole.links)
+    stratum = labels(len(corners), whole.links[whole.manifold & ~folds[whole.across]])
+    boundaries = _boundaries(whole, caps)
     strata = tuple(
-        Stratum(int(cell_index[own[0]]), len(own), int(component[own[0]]))
+        Stratum(int(cells.index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
     coordinates = points.p[:, pairing.setting.free]
     audit = _audit(
-        pairing, cells, bisected, (corners, cell_index, component, whole, coordinates), boundaries
+        pairing, cells, bisected, (corners, cells.index, component, whole, coordinates), boundaries
     )
     return EquilibriumSet(
         structure=pairing.setting.structure,
@@ -68,12 +66,12 @@ def account(
         kinds=store.kind[used].copy(),
         index=store.index[used].copy(),
         cells=corners,
-        cell_index=cell_index,
+        cell_index=cells.index,
         component=component,
         stratum=stratum,
-        folds=tuple(chains(whole.edges[fold_edges])),
+        folds=tuple(pieces(whole.facets[folds])),
         boundaries=boundaries,
-        components=components,
+        components=_components(corners, cells.index, component, boundaries),
         strata=strata,
         audit=audit,
         mesh=pairing.mesh,
@@ -81,25 +79,31 @@ def account(
     )
 
 
-def _renumber(pairs: set[tuple[int, int]], number: dict[int, int]) -> set[tuple[int, int]]:
-    kept = [(number[a], number[b]) for a, b in pairs if a in number and b in number]
-    return {(min(pair), max(pair)) for pair in kept}
+def _kept(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:
+    """Facets whose points are all in use."""
+    return facets[(facets >= 0).all(axis=1)]
 
 
-def _boundaries(whole: Surface, cap_edges: np.ndarray) -> tuple[Boundary, ...]:
-    once = np.flatnonzero(whole.counts == 1)
-    capped = {tuple(pair) for pair in whole.edges[cap_edges].tolist()}
+def _boundaries(whole: Adjacency, caps: Bool[np.ndarray, " F"]) -> tuple[Boundary, ...]:
+    once = whole.counts == 1
+    base = int(whole.facets.max(initial=0)) + 1
+    capped = set(keys_of(whole.facets[once & caps], base).tolist())
     out = []
-    for line in chains(whole.edges[once]):
-        sides = np.sort(np.stack([line[:-1], line[1:]], 1), axis=1).tolist()
-        on_cap = sum(tuple(side) in capped for side in sides)
-        kind = "cap" if on_cap == len(sides) else ("box" if on_cap == 0 else "mixed")
-        out.append(Boundary(line, kind))
+    for piece in pieces(whole.facets[once]):
+        facets = _facets_of(piece, whole.facets.shape[1])
+        on_cap = sum(key in capped for key in keys_of(facets, base).tolist())
+        kind = "cap" if on_cap == len(facets) else ("box" if on_cap == 0 else "mixed")
+        out.append(Boundary(piece, kind))
     return tuple(out)
 
 
+def _facets_of(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+    """Facets of a piece of the boundary: a point, a polyline or triangles."""
+    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+
+
 def _components(
-    corners: Int[np.ndarray, "C 3"],
+    corners: Int[np.ndarray, "C corners"],
     cell_index: Int[np.ndarray, " C"],
     component: Int[np.ndarray, " C"],
     boundaries: tuple[Boundary, ...],
@@ -112,7 +116,7 @@ def _components(
             Component(
                 int(own.sum()),
                 euler_characteristic(corners[own]),
-                sum(int(b.vertices[0]) in vertices for b in boundaries),
+                sum(int(b.vertices.flat[0]) in vertices for b in boundaries),
                 tuple(np.unique(cell_index[own]).tolist()),
             )
         )
@@ -123,15 +127,21 @@ def _audit(
     pairing: Pairing,
     cells: Cells,
     bisected: int,
-    parts: tuple[np.ndarray, np.ndarray, np.ndarray, Surface, np.ndarray],
+    parts: tuple[
+        Int[np.ndarray, "C corners"],
+        Int[np.ndarray, " C"],
+        Int[np.ndarray, " C"],
+        Adjacency,
+        Float[np.ndarray, "V d"],
+    ],
     boundaries: tuple[Boundary, ...],
 ) -> Audit:
     corners, cell_index, component, whole, coordinates = parts
     signs, contradictions = orientation(corners, whole)
     demanded = np.where(cell_index % 2 == 0, 1, -1) * signs
-    area = projected_area(coordinates, corners) * demanded
-    total = np.bincount(component, weights=area) if len(area) else np.zeros(0)
-    overturned = int((area * np.sign(total)[component] < 0).sum()) if len(area) else 0
+    volume = projected_volume(coordinates, corners) * demanded
+    total = np.bincount(component, weights=volume) if len(volume) else np.zeros(0)
+    overturned = int((volume * np.sign(total)[component] < 0).sum()) if len(volume) else 0
     kinds = [boundary.kind for boundary in boundaries]
     points = np.unique(corners)
     store = pairing.points
@@ -145,7 +155,7 @@ def _audit(
         conflicts=sum(int(pairing.effort[edge]) >= 4 for _, edge in lost),
         retraced=pairing.conflicts,
         parity_violations=_parity_violations(pairing),
-        undecided=len(cells.undecided),
+        undecided=cells.doubtful,
         bisected=bisected,
         non_manifold=int((whole.counts > 2).sum()),
         contradictions=contradictions,

@@ -1,4 +1,4 @@
-"""Sheet lifting, part three: polygons become triangles of a conforming complex."""
+"""Sheet lifting, part three: polygons become triangulated discs that fit together."""
 
 from dataclasses import dataclass, field
 
@@ -13,26 +13,45 @@ from equimorph.manifold.cutting import (
     match_folds,
     triangulate,
 )
+from equimorph.manifold.embedding import embed
 from equimorph.manifold.normals import existence_normals
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.pins import pin
 from equimorph.manifold.points import CAP, CORNER, FOLD
 from equimorph.manifold.polygons import Loops, Polygon, edges_at
+from equimorph.manifold.simplices import plane_bases
 
 SAME_SIDE = 0.3
 """Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
 
 
+@dataclass(frozen=True)
+class Discs:
+    """Triangulated discs over the grid triangles.
+
+    corners (n, 3): points; index: of each triangle; owner: the grid triangle below it; folds,
+    caps: their sides on folds and on constraints; doubtful: grid triangles whose polygons could
+    not be closed and cut without doubt.
+    """
+
+    corners: Int[np.ndarray, "n 3"]
+    index: Int[np.ndarray, " n"]
+    owner: Int[np.ndarray, " n"]
+    folds: Int[np.ndarray, "f 2"]
+    caps: Int[np.ndarray, "c 2"]
+    doubtful: Int[np.ndarray, " k"]
+
+
 @dataclass
-class Cells:
-    """Triangles of points with their index, and the sides that lie on folds or constraints."""
+class _Found:
+    """What is known of the discs that are not plain triangles."""
 
     corners: list[tuple[int, int, int]] = field(default_factory=list)
     index: list[int] = field(default_factory=list)
+    owner: list[int] = field(default_factory=list)
     folds: set[Chord] = field(default_factory=set)
     caps: set[Chord] = field(default_factory=set)
-    undecided: list[int] = field(default_factory=list)
-    """Grid triangles whose polygons could not be cut without doubt."""
+    undecided: set[int] = field(default_factory=set)
 
 
 @dataclass
@@ -47,18 +66,24 @@ class _Plan:
     middle: dict[Chord, int] = field(default_factory=dict)
 
 
-def assemble(pairing: Pairing, loops: Loops) -> Cells:
+def assemble(pairing: Pairing, loops: Loops) -> Discs:
     """Triangulate all polygons; plain ones are triangles already."""
-    cells = Cells()
-    cells.corners = [tuple(row) for row in loops.plain.tolist()]
-    cells.index = pairing.points.index[loops.plain[:, 0]].tolist() if len(loops.plain) else []
+    found = _Found()
+    found.undecided.update(loops.ambiguous, loops.broken)
     plans = [_plan(pairing, polygon) for polygon in loops.polygons]
-    _close(pairing, plans, cells)
-    plans = [plan for plan in plans if _join_folds(pairing, plan, cells)]
-    _split_chords(pairing, plans, cells)
+    _close(pairing, plans, found)
+    plans = _join_folds(pairing, plans, found)
+    _split_chords(pairing, plans, found)
     for plan in plans:
-        _fill(pairing, plan, cells)
-    return cells
+        _fill(pairing, plan, found)
+    return Discs(
+        np.concatenate([loops.plain, np.array(found.corners, int).reshape(-1, 3)]),
+        np.concatenate([pairing.points.index[loops.plain[:, 0]], np.array(found.index, int)]),
+        np.concatenate([loops.plain_triangle, np.array(found.owner, int)]),
+        np.array(sorted(found.folds), int).reshape(-1, 2),
+        np.array(sorted(found.caps), int).reshape(-1, 2),
+        np.array(sorted(found.undecided), int),
+    )
 
 
 def _plan(pairing: Pairing, polygon: Polygon) -> _Plan:
@@ -84,7 +109,7 @@ def _is_fold(pairing: Pairing, point: int) -> bool:
     return int(pairing.points.kind[point]) in {FOLD, CORNER}
 
 
-def _close(pairing: Pairing, plans: list[_Plan], cells: Cells) -> None:
+def _close(pairing: Pairing, plans: list[_Plan], found: _Found) -> None:
     """Close open polygons along the constraint, through a corner if a fold leaves there."""
     wanted: list[tuple[_Plan, int]] = []
     for plan in plans:
@@ -97,51 +122,83 @@ def _close(pairing: Pairing, plans: list[_Plan], cells: Cells) -> None:
         elif _same_side(plan, (first, last)):
             wanted.append((plan, CAP))
         else:
-            cells.caps.add(_chord(first, last))
-    pairs = [(plan.points[0], plan.points[-1]) for plan, _ in wanted]
-    extra = _pinned(pairing, pairs, [kind for _, kind in wanted])
+            found.caps.add(_chord(first, last))
+    pairs = [(plan, (plan.points[0], plan.points[-1]), kind) for plan, kind in wanted]
+    extra = _pinned(pairing, pairs)
     for (plan, _), point in zip(wanted, extra, strict=True):
         if point is None:
-            cells.undecided.append(plan.polygon.triangle)
+            found.undecided.add(plan.polygon.triangle)
             continue
-        cells.caps.update({_chord(plan.points[0], point), _chord(plan.points[-1], point)})
+        found.caps.update({_chord(plan.points[0], point), _chord(plan.points[-1], point)})
         plan.points.append(point)
 
 
-def _join_folds(pairing: Pairing, plan: _Plan, cells: Cells) -> bool:
-    """Decide which folds of the polygon belong together; False if that is not certain."""
+def _join_folds(pairing: Pairing, plans: list[_Plan], found: _Found) -> list[_Plan]:
+    """Decide which folds of each polygon belong together; return plans where that is certain."""
     index = pairing.points.index
-    ways = match_folds(
-        plan.points, lambda point: _is_fold(pairing, point), lambda point: int(index[point])
-    )
-    if len(ways) > 1:
-        ways = _continuous(pairing, ways)
-    if len(ways) != 1:
-        cells.undecided.append(plan.polygon.triangle)
-        return False
-    plan.chords = ways[0]
-    return True
+    ways = [
+        match_folds(
+            plan.points, lambda point: _is_fold(pairing, point), lambda point: int(index[point])
+        )
+        for plan in plans
+    ]
+    several = [k for k, each in enumerate(ways) if len(each) > 1]
+    continuous = _continuous(pairing, [(plans[k], ways[k]) for k in several])
+    for k, each in zip(several, continuous, strict=True):
+        ways[k] = each
+    decided = []
+    for plan, each in zip(plans, ways, strict=True):
+        if len(each) == 1:
+            plan.chords = each[0]
+            decided.append(plan)
+        else:
+            found.undecided.add(plan.polygon.triangle)
+    return decided
 
 
-def _continuous(pairing: Pairing, ways: list[list[Chord]]) -> list[list[Chord]]:
+def _continuous(
+    pairing: Pairing, choices: list[tuple[_Plan, list[list[Chord]]]]
+) -> list[list[list[Chord]]]:
     """Ways in which every chord joins folds whose sheets lie on the same side.
 
     In the narrow wedge behind a cusp two fold curves run side by side at every scale: there only
     the side on which the sheets exist tells them apart.
     """
-    folds = sorted({fold for way in ways for chord in way for fold in chord})
-    normals = existence_normals(pairing.setting, pairing.points, np.array(folds))
-    normal = dict(zip(folds, normals, strict=True))
-    return [way for way in ways if all(normal[a] @ normal[b] > SAME_SIDE for a, b in way)]
+    at = [
+        (number, fold)
+        for number, (_, ways) in enumerate(choices)
+        for fold in sorted({fold for way in ways for chord in way for fold in chord})
+    ]
+    if not at:
+        return []
+    normals = existence_normals(pairing.setting, pairing.points, np.array([fold for _, fold in at]))
+    bases = _planes(pairing, [choices[number][0].polygon.triangle for number, _ in at])
+    flat = np.einsum("nkd,nd->nk", bases, normals)
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    normal = dict(zip(at, flat, strict=True))
+    return [
+        [
+            way
+            for way in ways
+            if all(normal[number, a] @ normal[number, b] > SAME_SIDE for a, b in way)
+        ]
+        for number, (_, ways) in enumerate(choices)
+    ]
 
 
-def _split_chords(pairing: Pairing, plans: list[_Plan], cells: Cells) -> None:
+def _planes(pairing: Pairing, triangles: list[int]) -> Float[np.ndarray, "n 2 d"]:
+    """Orthonormal bases of the planes of grid triangles, in scaled parameters."""
+    mesh = pairing.mesh
+    return plane_bases(mesh.vertices[mesh.triangles[triangles]] / pairing.setting.scales)
+
+
+def _split_chords(pairing: Pairing, plans: list[_Plan], found: _Found) -> None:
     """Put an exact fold point on chords that would lie on a grid edge, or block triangulation."""
     wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
-    extra = _pinned(pairing, [chord for _, chord in wanted], [FOLD] * len(wanted))
+    extra = _pinned(pairing, [(plan, chord, FOLD) for plan, chord in wanted])
     for (plan, chord), point in zip(wanted, extra, strict=True):
         if point is None:
-            cells.undecided.append(plan.polygon.triangle)
+            found.undecided.add(plan.polygon.triangle)
         else:
             plan.middle[chord] = point
 
@@ -167,54 +224,48 @@ def _sides_of(plan: _Plan, piece: Piece) -> list[frozenset[int]]:
     return [plan.sides.get(point, frozenset()) for point in piece]
 
 
-def _pinned(pairing: Pairing, pairs: list[Chord], kinds: list[int]) -> list[int | None]:
-    """Numbers of new exact points between pairs; None where none was found."""
-    if not pairs:
-        return []
-    found = pin(pairing.setting, pairing.points, np.array(pairs), np.array(kinds))
-    index = pairing.points.index
-    out: list[int | None] = []
-    for lane, (pair, kind) in enumerate(zip(pairs, kinds, strict=True)):
-        if not found.found[lane]:
-            out.append(None)
+def _pinned(pairing: Pairing, wanted: list[tuple[_Plan, Chord, int]]) -> list[int | None]:
+    """Numbers of new exact points of some kind between pairs; None where none was found."""
+    out: list[int | None] = [None] * len(wanted)
+    for kind in (FOLD, CAP, CORNER):
+        own = [k for k, each in enumerate(wanted) if each[2] == kind]
+        if not own:
             continue
-        low = int(min(index[pair[0]], index[pair[1]]))
-        out.append(pairing.points.add(found.z[lane], found.p[lane], low, kind))
+        pairs = [wanted[k][1] for k in own]
+        planes = _planes(pairing, [wanted[k][0].polygon.triangle for k in own])
+        pinned = pin(pairing.setting, pairing.points, pairs, kind, planes)
+        for lane in np.flatnonzero(pinned.found):
+            low = int(pairing.points.index[list(pairs[lane])].min())
+            out[own[lane]] = pairing.points.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out
 
 
-def _fill(pairing: Pairing, plan: _Plan, cells: Cells) -> None:
+def _fill(pairing: Pairing, plan: _Plan, found: _Found) -> None:
     """Cut a polygon and triangulate its pieces."""
     for chord in plan.chords:
         if chord in plan.middle:
-            cells.folds.update(_chord(end, plan.middle[chord]) for end in chord)
+            found.folds.update(_chord(end, plan.middle[chord]) for end in chord)
         else:
-            cells.folds.add(chord)
+            found.folds.add(chord)
     for piece in cut(plan.points, plan.chords, plan.middle):
         index = {
             int(pairing.points.index[point]) for point in piece if not _is_fold(pairing, point)
         }
         triangles = _triangles(pairing, plan, piece)
         if len(index) != 1 or triangles is None:
-            cells.undecided.append(plan.polygon.triangle)
+            found.undecided.add(plan.polygon.triangle)
             continue
-        cells.corners.extend(triangles)
-        cells.index.extend([index.pop()] * len(triangles))
+        found.corners.extend(triangles)
+        found.index.extend([index.pop()] * len(triangles))
+        found.owner.extend([plan.polygon.triangle] * len(triangles))
 
 
 def _triangles(pairing: Pairing, plan: _Plan, piece: Piece) -> list[tuple[int, int, int]] | None:
     if len(piece) <= 3:
         return [(piece[0], piece[1], piece[2])] if len(piece) == 3 else None
-    place = embedding(pairing, np.array(piece))
+    own = np.array(piece)
+    place = embed(pairing.setting, pairing.points.z[own], pairing.points.p[own])
     return triangulate(piece, _sides_of(plan, piece), place)
-
-
-def embedding(pairing: Pairing, points: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n dims"]:
-    """Configuration in the metric and scaled free parameters: Euclidean distances measure."""
-    structure, free = pairing.setting.structure, pairing.setting.free
-    u = pairing.points.z[points, : structure.unknowns] * np.sqrt(structure.mass)
-    x = pairing.points.p[points][:, free] / pairing.setting.scales
-    return np.concatenate([u, x], axis=1)
 
 
 def _chord(a: int, b: int) -> Chord:

@@ -8,12 +8,12 @@ from jaxtyping import Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import account
-from equimorph.manifold.assembly import Cells, assemble
+from equimorph.manifold.bisection import bisect
+from equimorph.manifold.cells import Cells, find_cells
 from equimorph.manifold.completeness import check, seeds_from
 from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.mesh import bisect, grid_mesh
+from equimorph.manifold.mesh import grid_mesh
 from equimorph.manifold.pairing import Pairing, Setting, flood, start_pairing
-from equimorph.manifold.polygons import find_loops
 from equimorph.manifold.seeds import seeds
 from equimorph.model import (
     Box,
@@ -29,7 +29,10 @@ BISECTIONS = 12
 SEARCHES = 4
 """Rounds of independent checks; what one round finds missing is lifted before the next."""
 HOPELESS = 50
-"""Doubtful triangles, and four times what there were at first, beyond which bisection ends."""
+"""Doubtful grid cells, and four times what there were at first, beyond which bisection ends."""
+
+INTERVALS = {1: (200,), 2: (47, 81)}
+"""Of the grid, by the number of free parameters, if not given."""
 
 
 def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by keyword
@@ -38,12 +41,12 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     *,
     fixed: Mapping[str, float] | None = None,
     within: Sequence[Constraint] = (),
-    intervals: tuple[int, int] = (47, 81),
+    intervals: tuple[int, ...] | None = None,
     seed: int = 0,
     checks: int = 2,
     progress: Progress | None = None,
 ) -> EquilibriumSet:
-    """All equilibria over a box in two parameters that are connected to the seeds.
+    """All equilibria over a box in one or two parameters that are connected to the seeds.
 
     Sheet lifting: equilibria at both ends of every grid edge are paired by lifting the edge;
     around each triangle the curves close into loops that bound discs of the set. Folds and
@@ -52,13 +55,13 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     Parameters
     ----------
     box
-        Ranges of the two free parameters.
+        Ranges of the one or two free parameters.
     fixed
         Values of other parameters; those not named keep their defaults.
     within
         Constraints that cut the set off, like ``[arch.max_curvature <= 20]``.
     intervals
-        Grid intervals along the two parameters.
+        Grid intervals along each parameter; see `INTERVALS` for the defaults.
     seed
         Of the random generator; the result is deterministic.
     checks
@@ -75,13 +78,13 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     Raises
     ------
     InputError
-        For a box that is not two-dimensional, unknown names, parameters both free and fixed, or
+        For a box in more than two parameters, unknown names, parameters both free and fixed, or
         values without meaning.
     """
     progress = progress or Silent()
-    setting = _setting(structure, box, fixed or {}, tuple(within), intervals)
-    mirrored = _mirrored(setting)
-    mesh = grid_mesh(box, (intervals[0], intervals[1]), mirrored)
+    intervals = _intervals(box, intervals)
+    setting = _setting(structure, box, fixed or {}, tuple(within))
+    mesh = grid_mesh(box, intervals, _mirrored(setting))
     progress.report("seeds", 0, 1)
     pairing = start_pairing(setting, mesh)
     pairing.points.over_vertices(*seeds(setting, mesh, seed))
@@ -100,19 +103,26 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     return replace(eset, audit=audit)
 
 
+def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:
+    d = len(box.names)
+    if d not in INTERVALS:
+        raise InputError(
+            f"`box` must have one or two parameters; got {d} ({', '.join(box.names)})."
+        )
+    if intervals is None:
+        return INTERVALS[d]
+    if len(intervals) != d or any(int(n) != n or n < 2 for n in intervals):
+        number = ("one whole number", "two whole numbers")[d - 1]
+        raise InputError(f"`intervals` must be {number} >= 2; got {intervals!r}.")
+    return tuple(map(int, intervals))
+
+
 def _setting(
     structure: Structure,
     box: Box,
     fixed: Mapping[str, float],
     within: tuple[Constraint, ...],
-    intervals: tuple[int, int],
 ) -> Setting:
-    if len(box.names) != 2:
-        raise InputError(
-            f"`box` must have two parameters; got {len(box.names)} ({', '.join(box.names)})."
-        )
-    if len(intervals) != 2 or any(int(n) != n or n < 2 for n in intervals):
-        raise InputError(f"`intervals` must be two whole numbers >= 2; got {intervals!r}.")
     both = set(box.names) & set(fixed)
     if both:
         raise InputError(f"`fixed` must not name a parameter of the box; got {', '.join(both)}.")
@@ -123,11 +133,10 @@ def _setting(
     return Setting(structure, base, free, within)
 
 
-def _mirrored(setting: Setting) -> tuple[bool, bool]:
+def _mirrored(setting: Setting) -> tuple[bool, ...]:
     """Whether a symmetry of the structure reverses each free parameter."""
     signs = [symmetry.signs[setting.free] for symmetry in setting.structure.symmetries()]
-    first, second = (any(sign[k] < 0 for sign in signs) for k in range(2))
-    return first, second
+    return tuple(any(bool(sign[k] < 0) for sign in signs) for k in range(len(setting.free)))
 
 
 def _lifted(pairing: Pairing, progress: Progress) -> tuple[Cells, int]:
@@ -136,22 +145,30 @@ def _lifted(pairing: Pairing, progress: Progress) -> tuple[Cells, int]:
     for number in range(BISECTIONS):
         flood(pairing, progress)
         progress.report("closing loops", 0, 1)
-        loops = find_loops(pairing)
-        cells = assemble(pairing, loops)
-        doubtful = sorted({*loops.ambiguous, *loops.broken, *cells.undecided})
-        first = len(doubtful) if number == 0 else first
+        cells = find_cells(pairing)
+        doubtful = cells.doubtful
+        first = doubtful if number == 0 else first
         # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
-        if not doubtful or len(doubtful) > max(HOPELESS, 4 * first):
+        hopeless = doubtful > max(HOPELESS, 4 * first)
+        if doubtful == 0 or hopeless or number == BISECTIONS - 1:
             break
-        bisected += len(doubtful)
-        longest = _longest_sides(pairing, np.array(doubtful))
+        bisected += doubtful
+        longest = _longest_edges(pairing, cells)
         pairing.use_mesh(bisect(pairing.mesh, longest, _mirrored(pairing.setting)))
-    cells.undecided = doubtful
     return cells, bisected
 
 
-def _longest_sides(pairing: Pairing, triangles: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
-    mesh, sides = pairing.mesh, pairing.mesh.sides[triangles]
-    ends = mesh.vertices[mesh.edges[sides]] / pairing.setting.scales
-    length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
-    return np.unique(sides[np.arange(len(triangles)), length.argmax(axis=1)])
+def _longest_edges(pairing: Pairing, cells: Cells) -> Int[np.ndarray, " n"]:
+    """Longest edge of each doubtful grid cell."""
+    mesh = pairing.mesh
+    around = mesh.faces[cells.doubtful_tetrahedra]
+    groups = [
+        mesh.sides[cells.doubtful_triangles],
+        mesh.sides[around].reshape(len(around), 12),
+    ]
+    longest = []
+    for sides in groups:
+        ends = mesh.vertices[mesh.edges[sides]] / pairing.setting.scales
+        length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
+        longest.append(sides[np.arange(len(sides)), length.argmax(axis=1)])
+    return np.unique(np.concatenate(longest))

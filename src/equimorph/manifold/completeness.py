@@ -56,12 +56,12 @@ def check(
     return Check(found, tuple(missing))
 
 
-def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " 2"]:
+def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:
     cell = eset.cells[generator.integers(len(eset.cells))]
-    return np.asarray(generator.dirichlet(np.ones(3)) @ eset.coordinates[cell])
+    return np.asarray(generator.dirichlet(np.ones(len(cell))) @ eset.coordinates[cell])
 
 
-def _in_the_box(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " 2"]:
+def _in_the_box(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:
     return np.asarray(generator.uniform(eset.box.lower, eset.box.upper))
 
 
@@ -74,11 +74,11 @@ def _lacking(found: States, known: States) -> States:
 
 
 def seeds_from(setting: Setting, mesh: BaseMesh, missing: tuple[States, ...]) -> Seeds:
-    """Equilibria over the corners of the triangles around states and around their mirror images."""
+    """Equilibria over the corners of grid cells around states and around their mirror images."""
     vertices, z = [np.zeros(0, int)], [np.zeros((0, setting.structure.size))]
     for states in missing:
         for image in (states, *_images(setting, states)):
-            for vertex in mesh.triangles[mesh.locate(image.p[0, setting.free])]:
+            for vertex in mesh.cells[mesh.locate(image.p[0, setting.free])]:
                 lifted = lift_to(
                     image, setting.parameters(mesh.vertices[[vertex]])[0], setting.constraints
                 )

@@ -1,4 +1,4 @@
-"""The equilibrium set over two free parameters: a simplicial complex of exact states."""
+"""The equilibrium set over one to three parameters: a simplicial complex of exact states."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.errors import InputError
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.mesh import BaseMesh
+from equimorph.manifold.simplices import barycentric
 from equimorph.model import Box, Constraint, parameter_vector
 from equimorph.structures import States, Structure
 
@@ -41,18 +42,22 @@ class Stratum:
 
 @dataclass(frozen=True)
 class Boundary:
-    """A boundary loop on the box, a constraint, or both: vertices in order, the first repeated."""
+    """A connected piece of the boundary on the box ("box"), a constraint ("cap") or both ("mixed").
 
-    vertices: Int[np.ndarray, " n"]
+    vertices: one point (d = 1), a loop with the first vertex repeated (d = 2), or triangles, one a
+    row (d = 3).
+    """
+
+    vertices: Int[np.ndarray, "..."]
     kind: str
 
 
 @dataclass(frozen=True, eq=False)
 class EquilibriumSet:
-    """Equilibria over a box in two free parameters, with their connections.
+    """Equilibria over a box in d = 1, 2 or 3 free parameters, with their connections.
 
-    Vertices are exact states: over the grid, on folds, on constraints. Cells are triangles of
-    constant index; folds are edges between cells of different index.
+    Vertices are exact states: over the grid, on folds, on constraints. Cells are segments,
+    triangles or tetrahedra of constant index; folds lie between cells of different index.
 
     Parameters
     ----------
@@ -60,24 +65,25 @@ class EquilibriumSet:
         States of the vertices.
     kinds
         0 over the grid, 1 on a fold, 2 on a constraint, 3 between folds of one grid edge, 4 where a
-        fold meets a constraint.
+        fold meets a constraint, 5 amid others over a grid tetrahedron.
     index
         Negative eigenvalues at the vertices; on folds that of the lower side.
     cells, cell_index, component, stratum
-        Triangles, their index, and the numbers of the pieces that they belong to.
+        Vertices of each cell, its index, and the numbers of the pieces that it belongs to.
     folds
-        Vertices along each fold curve; closed ones repeat the first.
+        Connected folds: points (d = 1), vertices along each fold curve, closed ones with the first
+        repeated (d = 2), or fold surfaces as triangles, one a row (d = 3).
     """
 
     structure: Structure
     box: Box
     fixed: Mapping[str, float]
     constraints: tuple[Constraint, ...]
-    intervals: tuple[int, int]
+    intervals: tuple[int, ...]
     points: States
     kinds: Int[np.ndarray, " V"]
     index: Int[np.ndarray, " V"]
-    cells: Int[np.ndarray, "C 3"]
+    cells: Int[np.ndarray, "C corners"]
     cell_index: Int[np.ndarray, " C"]
     component: Int[np.ndarray, " C"]
     stratum: Int[np.ndarray, " C"]
@@ -101,7 +107,7 @@ class EquilibriumSet:
         return self.box.names
 
     @cached_property
-    def coordinates(self) -> Float[np.ndarray, "V 2"]:
+    def coordinates(self) -> Float[np.ndarray, "V d"]:
         """Free parameters of the vertices."""
         return np.stack([self.points[name] for name in self.names], axis=1)
 
@@ -126,13 +132,13 @@ class EquilibriumSet:
     def at(self, **at: float) -> States:
         """Exact states over one point of the box, sorted by energy.
 
-        Lifted from all known equilibria over the corners of the grid triangle around the point,
+        Lifted from all known equilibria over the corners of the grid cell around the point,
         through folds, and corrected from the cells above it; distinct ends are the states.
         """
         p = self.parameters_at(at)
         point = np.array([float(at[name]) for name in self.names])
-        triangle = self.mesh.locate(point)
-        starts = np.flatnonzero(np.isin(self.grid_vertex, self.mesh.triangles[triangle]))
+        around = self.mesh.cells[self.mesh.locate(point)]
+        starts = np.flatnonzero(np.isin(self.grid_vertex, around))
         lifted = lift_to(self.points[starts], p, self.constraints)
         # a sheet that a constraint or a curved fold hides from the corners is still under a cell
         z = np.concatenate([lifted, self._corrected(point, p)])
@@ -141,7 +147,7 @@ class EquilibriumSet:
         return states[np.argsort(states.energy, kind="stable")]
 
     def _corrected(
-        self, point: Float[np.ndarray, " 2"], p: Float[np.ndarray, " P"]
+        self, point: Float[np.ndarray, " d"], p: Float[np.ndarray, " P"]
     ) -> Float[np.ndarray, "n size"]:
         """Unknowns of equilibria over a point, by Newton from the cells above it, nearby only."""
         weights = barycentric(self.coordinates[self.cells], point)
@@ -157,22 +163,6 @@ class EquilibriumSet:
         for constraint in self.constraints:
             good &= constraint.excess(z, everywhere) <= 0.0
         return np.asarray(z[good])
-
-
-def barycentric(
-    corners: Float[np.ndarray, "n 3 2"], point: Float[np.ndarray, " 2"]
-) -> Float[np.ndarray, "n 3"]:
-    """Barycentric coordinates of a point in triangles; −∞ in those without area."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-
-    def cross(v: Float[np.ndarray, "n 2"], w: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-        return np.asarray(v[:, 0] * w[:, 1] - v[:, 1] * w[:, 0])
-
-    area = cross(b - a, c - a)
-    parts = np.stack([cross(b - point, c - point), cross(c - point, a - point)], axis=1)
-    first_two = np.full_like(parts, -np.inf)
-    np.divide(parts, area[:, None], out=first_two, where=area[:, None] != 0.0)
-    return np.concatenate([first_two, 1.0 - first_two.sum(axis=1, keepdims=True)], axis=1)
 
 
 def lift_to(

@@ -1,41 +1,60 @@
 """Triangulation of the parameter box on which the equilibrium set is lifted."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import permutations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from equimorph.manifold.simplices import barycentric
+from equimorph.manifold.topology import keys_of, rows_of
 from equimorph.model import Box
 
 SHIFT = 0.02
 """Largest shift of a grid line off its regular place, in intervals."""
 
 
+def _none(corners: int) -> Int[np.ndarray, "0 corners"]:
+    return np.zeros((0, corners), int)
+
+
 @dataclass(frozen=True)
 class BaseMesh:
-    """A conforming triangulation of a box in the plane of two free parameters.
+    """A conforming triangulation of a box in the space of one, two or three free parameters.
 
     edges (E, 2): vertex numbers; triangles (T, 3): corners a, b, c; sides (T, 3): edges ab, bc,
-    ca. Edges keep their numbers when others are bisected; bisected ones stay, unused.
+    ca; tetrahedra (N, 4): corners a, b, c, d; faces (N, 4): triangles bcd, acd, abd, abc. Edges
+    keep their numbers when others are bisected; bisected ones stay, unused. Triangles and
+    tetrahedra leave their numbers to one of their halves.
     """
 
-    vertices: Float[np.ndarray, "V 2"]
+    vertices: Float[np.ndarray, "V d"]
     edges: Int[np.ndarray, "E 2"]
-    triangles: Int[np.ndarray, "T 3"]
-    sides: Int[np.ndarray, "T 3"]
+    triangles: Int[np.ndarray, "T 3"] = field(default_factory=lambda: _none(3))
+    sides: Int[np.ndarray, "T 3"] = field(default_factory=lambda: _none(3))
+    tetrahedra: Int[np.ndarray, "N 4"] = field(default_factory=lambda: _none(4))
+    faces: Int[np.ndarray, "N 4"] = field(default_factory=lambda: _none(4))
 
-    def locate(self, point: Float[np.ndarray, " 2"]) -> int:
-        """Triangle that contains a point; the nearest one by barycentric coordinates."""
-        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
-        inverse = 1.0 / _cross(b - a, c - a)
-        u, v = _cross(point - a, c - a) * inverse, _cross(b - a, point - a) * inverse
-        return int(np.argmax(np.minimum(np.minimum(u, v), 1.0 - u - v)))
+    @property
+    def dimension(self) -> int:
+        """Number of free parameters."""
+        return int(self.vertices.shape[1])
 
+    @property
+    def cells(self) -> Int[np.ndarray, "C corners"]:
+        """Simplices that fill the box: edges, triangles or tetrahedra."""
+        return (self.edges, self.triangles, self.tetrahedra)[self.dimension - 1]
 
-def _cross(
-    a: Float[np.ndarray, "... 2"], b: Float[np.ndarray, "... 2"]
-) -> Float[np.ndarray, "..."]:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+    @property
+    def edges_in_use(self) -> Bool[np.ndarray, " E"]:
+        """Which edges have not been bisected."""
+        used = np.full(len(self.edges), self.dimension == 1)
+        used[self.sides] = True
+        return used
+
+    def locate(self, point: Float[np.ndarray, " d"]) -> int:
+        """Cell that contains a point; the nearest one by barycentric coordinates."""
+        return int(np.argmax(barycentric(self.vertices[self.cells], point).min(axis=1)))
 
 
 def _lines(low: float, high: float, count: int, mirrored: bool) -> Float[np.ndarray, " lines"]:
@@ -55,74 +74,43 @@ def _lines(low: float, high: float, count: int, mirrored: bool) -> Float[np.ndar
     return lines
 
 
-def grid_mesh(box: Box, intervals: tuple[int, int], mirrored: tuple[bool, bool]) -> BaseMesh:
-    """Kuhn triangulation of a regular grid: every rectangle cut by its rising diagonal."""
-    axes = [_lines(box.lower[k], box.upper[k], intervals[k], mirrored[k]) for k in range(2)]
-    first, second = np.meshgrid(*axes, indexing="ij")
-    vertices = np.stack([first.ravel(), second.ravel()], axis=1)
-    i, j = (x.ravel() for x in np.meshgrid(*map(np.arange, intervals), indexing="ij"))
-    row = intervals[1] + 1
-    corner = i * row + j
-    right, up, across = corner + row, corner + 1, corner + row + 1
-    triangles = np.concatenate(
-        [np.stack([corner, right, across], 1), np.stack([corner, across, up], 1)]
-    )
-    return mesh_of(vertices, triangles)
+def grid_mesh(box: Box, intervals: tuple[int, ...], mirrored: tuple[bool, ...]) -> BaseMesh:
+    """Kuhn triangulation of a regular grid: every box cut along its rising diagonal.
 
-
-def mesh_of(vertices: Float[np.ndarray, "V 2"], triangles: Int[np.ndarray, "T 3"]) -> BaseMesh:
-    """Mesh with its edges numbered."""
-    pairs = np.stack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]], 1)
-    ordered = np.sort(pairs.reshape(-1, 2), axis=1)
-    edges, inverse = np.unique(ordered, axis=0, return_inverse=True)
-    return BaseMesh(vertices, edges, triangles, inverse.reshape(-1, 3))
-
-
-def _between(
-    a: Float[np.ndarray, " 2"], b: Float[np.ndarray, " 2"], mirrored: tuple[bool, bool]
-) -> Float[np.ndarray, " 2"]:
-    """Middle of an edge, or a point beside it if the middle lies on a line of symmetry."""
-    middle = 0.5 * (a + b)
-    on_line = np.array(mirrored) & (np.abs(middle) < 1e-9 * np.abs(b - a).max())
-    return np.asarray(0.6 * a + 0.4 * b if on_line.any() else middle)
-
-
-def bisect(
-    mesh: BaseMesh, chosen: Int[np.ndarray, " some"], mirrored: tuple[bool, bool]
-) -> BaseMesh:
-    """Split edges at their midpoints, and the triangles on both sides of them.
-
-    Where the midpoint lies on a line of symmetry the edge is split off it.
-
-    Edges are split one after the other; one that shares a triangle with an earlier one of the same
-    call waits for another call, so that every triangle is split at most once.
+    Its simplices climb from the lowest to the highest corner along the axes in any order.
     """
-    vertices, edges = [mesh.vertices], [mesh.edges]
-    triangles, sides = mesh.triangles.copy(), mesh.sides.copy()
-    more: list[tuple[list[int], list[int]]] = []
-    touched = np.zeros(len(triangles), bool)
-    new_vertex, new_edge = len(mesh.vertices), len(mesh.edges)
-    for edge in chosen:
-        around = np.flatnonzero((mesh.sides == edge).any(axis=1))
-        if touched[around].any():
-            continue
-        touched[around] = True
-        a, b = mesh.edges[edge]
-        vertices.append(_between(mesh.vertices[a], mesh.vertices[b], mirrored)[None])
-        edges.append(np.array([[a, new_vertex], [b, new_vertex]]))
-        half = {int(a): new_edge, int(b): new_edge + 1}
-        middle, new_vertex, new_edge = new_vertex, new_vertex + 1, new_edge + 2
-        for t in around:
-            k = int(np.flatnonzero(mesh.sides[t] == edge)[0])
-            first, second, apex = (int(mesh.triangles[t, (k + m) % 3]) for m in range(3))
-            to_apex, from_apex = int(mesh.sides[t, (k + 1) % 3]), int(mesh.sides[t, (k + 2) % 3])
-            edges.append(np.array([[apex, middle]]))
-            cut, new_edge = new_edge, new_edge + 1
-            triangles[t], sides[t] = [first, middle, apex], [half[first], cut, from_apex]
-            more.append(([middle, second, apex], [half[second], to_apex, cut]))
-    return BaseMesh(
-        np.concatenate(vertices),
-        np.concatenate(edges),
-        np.concatenate([triangles, *(np.array([row[0]]) for row in more)]),
-        np.concatenate([sides, *(np.array([row[1]]) for row in more)]),
-    )
+    d = len(intervals)
+    axes = [_lines(box.lower[k], box.upper[k], intervals[k], mirrored[k]) for k in range(d)]
+    vertices = np.stack([line.ravel() for line in np.meshgrid(*axes, indexing="ij")], axis=1)
+    strides = [int(np.prod([n + 1 for n in intervals[k + 1 :]])) for k in range(d)]
+    places = np.meshgrid(*map(np.arange, intervals), indexing="ij")
+    corner = sum(strides[k] * places[k].ravel() for k in range(d))
+    climbs = []
+    for order in permutations(range(d)):
+        steps = np.cumsum([0, *(strides[axis] for axis in order)])
+        if sum(order[i] > order[j] for i in range(d) for j in range(i + 1, d)) % 2:
+            steps[-2:] = steps[:-3:-1]  # an odd order would turn the simplex over
+        climbs.append(np.asarray(corner)[:, None] + steps)
+    return mesh_of(vertices, np.concatenate(climbs))
+
+
+def mesh_of(vertices: Float[np.ndarray, "V d"], cells: Int[np.ndarray, "C corners"]) -> BaseMesh:
+    """Mesh with its edges and triangles numbered."""
+    if cells.shape[1] == 2:
+        return BaseMesh(vertices, np.sort(cells, axis=1))
+    triangles, faces = cells, _none(4)
+    if cells.shape[1] == 4:
+        triangles, faces = _numbered([np.delete(cells, k, axis=1) for k in range(4)], len(vertices))
+    pairs = [triangles[:, list(pair)] for pair in ((0, 1), (1, 2), (2, 0))]
+    edges, sides = _numbered(pairs, len(vertices))
+    tetrahedra = cells if cells.shape[1] == 4 else _none(4)
+    return BaseMesh(vertices, edges, triangles, sides, tetrahedra, faces)
+
+
+def _numbered(
+    columns: list[Int[np.ndarray, "C k"]], vertices: int
+) -> tuple[Int[np.ndarray, "F k"], Int[np.ndarray, "C columns"]]:
+    """Distinct faces with sorted corners, and the number of each cell's."""
+    keys = np.stack([keys_of(column, vertices) for column in columns], axis=1)
+    distinct, inverse = np.unique(keys.ravel(), return_inverse=True)
+    return rows_of(distinct, vertices, columns[0].shape[1]), inverse.reshape(keys.shape)

@@ -28,21 +28,21 @@ CHUNK = 4096
 
 @dataclass(frozen=True)
 class Setting:
-    """The structure and how points of the plane become its parameters."""
+    """The structure and how points of the box become its parameters."""
 
     structure: Structure
     base: Float[np.ndarray, " parameters"]
-    free: Int[np.ndarray, " 2"]
+    free: Int[np.ndarray, " d"]
     constraints: tuple[Constraint, ...]
 
-    def parameters(self, points: Float[np.ndarray, "some 2"]) -> Float[np.ndarray, "some P"]:
-        """All parameters over points of the plane."""
+    def parameters(self, points: Float[np.ndarray, "some d"]) -> Float[np.ndarray, "some P"]:
+        """All parameters over points of the box."""
         p = np.tile(self.base, (len(points), 1))
         p[:, self.free] = points
         return p
 
     @property
-    def scales(self) -> Float[np.ndarray, " 2"]:
+    def scales(self) -> Float[np.ndarray, " d"]:
         """Scales of the free parameters."""
         return np.asarray(self.structure.scales[self.free])
 
@@ -395,8 +395,7 @@ def _between(
 
 def abandoned(pairing: Pairing) -> list[tuple[int, int]]:
     """Rays that could not be traced: (point, edge) on edges that are in use."""
-    used = np.zeros(len(pairing.mesh.edges) + 1, bool)
-    used[pairing.mesh.sides] = True
+    used = np.append(pairing.mesh.edges_in_use, False)
     count = pairing.points.count
     vertex = pairing.points.vertex[:count]
     points, slots = np.nonzero((pairing.rays[:count] < 0) & (vertex >= 0)[:, None])

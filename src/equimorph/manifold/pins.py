@@ -1,25 +1,30 @@
-"""Exact points with two conditions: on a fold and a constraint, or on one of them midway."""
+"""Exact points amid others: on a fold, on a constraint, on both, or just on the set."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.equilibria.critical import null_border
+from equimorph.manifold.embedding import embed, principal_directions
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.points import CAP, CORNER, FOLD, Points
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
-Place = tuple[Lanes, Parameters]
+Span = Float[np.ndarray, "lanes k d"]
 Values = Float[np.ndarray, " lanes"]
 
 NEWTON_STEPS = 15
 DIFFERENCE = 1e-6
+REACH = 3.0
+"""How far a point may lie from the middle, relative to the farthest one around it."""
 
 
 @dataclass(frozen=True)
 class Pinned:
-    """Points found between pairs of points, with their parameters, and which can be trusted."""
+    """Points found amid groups, with their parameters, and which can be trusted."""
 
     z: Lanes
     p: Parameters
@@ -28,99 +33,127 @@ class Pinned:
 
 @dataclass(frozen=True)
 class _Condition:
-    """Scalar conditions with their gradients with respect to z and the two free parameters."""
+    """Scalar condition with its gradients with respect to z and to steps along the span."""
 
     value: Values
     by_z: Lanes
-    by_x: Float[np.ndarray, "lanes 2"]
+    by_step: Float[np.ndarray, "lanes k"]
+
+
+@dataclass(frozen=True)
+class _Aim:
+    """What is solved for: conditions, and the normal space through the middle of each group."""
+
+    setting: Setting
+    fold: bool
+    cap: bool
+    span: Span
+    """Orthonormal directions, in scaled free parameters, in which the parameters may move."""
+    middle: Float[np.ndarray, "lanes coordinates"]
+    rows: Float[np.ndarray, "lanes m coordinates"]
+
+    def take(self, some: Int[np.ndarray, " some"]) -> "_Aim":
+        """Return some of the lanes."""
+        span, middle, rows = self.span[some], self.middle[some], self.rows[some]
+        return _Aim(self.setting, self.fold, self.cap, span, middle, rows)
+
+    def moved(self, p: Parameters, step: Float[np.ndarray, "lanes k"]) -> Parameters:
+        """Return parameters after a step along the span."""
+        p = p.copy()
+        p[:, self.setting.free] += np.einsum("lk,lkd->ld", step, self.span) * self.setting.scales
+        return p
+
+    def direction(self, k: int) -> Parameters:
+        """Change of the parameters along one direction of the span."""
+        dp = np.zeros((len(self.span), len(self.setting.base)))
+        dp[:, self.setting.free] = self.span[:, k] * self.setting.scales
+        return dp
 
 
 def pin(
     setting: Setting,
     points: Points,
-    pairs: Int[np.ndarray, "lanes 2"],
-    kinds: Int[np.ndarray, " lanes"],
+    groups: Sequence[Sequence[int]],
+    kind: int,
+    span: Span,
 ) -> Pinned:
-    """Newton on F = 0 with two conditions, from the middle of each pair.
+    """Newton on F = 0 with further conditions, from the middle of each group of points.
 
-    kinds: `CORNER` (det F_z = 0 and the constraint active), `FOLD` (det F_z = 0, midway) or `CAP`
-    (constraint active, midway). Midway: in the plane through the middle, normal to the pair in the
-    embedding.
+    Parameters
+    ----------
+    groups
+        Numbers of the points around the wanted one.
+    kind
+        `FOLD` (det F_z = 0), `CAP` (a constraint is active), `CORNER` (both), others: neither.
+    span
+        The k orthonormal directions, in scaled free parameters, in which the parameters may move.
+        As many conditions as are left put the point into the normal space of the group through
+        its middle, so that it lies amid the group.
     """
-    structure, free = setting.structure, setting.free
-    first, second = points.z[pairs[:, 0]], points.z[pairs[:, 1]]
-    p_first, p_second = points.p[pairs[:, 0]], points.p[pairs[:, 1]]
-    z, p = 0.5 * (first + second), 0.5 * (p_first + p_second)
-    middle = (z.copy(), p.copy())
-    b = _difference(first, second)
-    size = np.full(len(z), np.inf)
+    z, p, deviations = _middles(setting, points, groups)
+    fold, cap = kind in {FOLD, CORNER}, kind in {CAP, CORNER}
+    rows = principal_directions(deviations, span.shape[1] - fold - cap)
+    aim = _Aim(setting, fold, cap, span, embed(setting, z, p), rows)
+    b = null_border(setting.structure, z, p) if fold else np.zeros_like(z)
+    size, todo = np.full(len(z), np.inf), np.arange(len(z))
     for _ in range(NEWTON_STEPS):
-        fold, b = _fold_condition(setting, z, p, b)
-        cap = _cap_condition(setting, z, p)
-        half = _middle_condition(setting, (z, p), middle, (first - second, p_first - p_second))
-        one = _choose(kinds == CAP, cap, fold)
-        two = _choose(kinds == CORNER, cap, half)
-        residual = structure.residual(z, p)
-        rhs = np.concatenate([-residual, -one.value[:, None], -two.value[:, None]], axis=1)
-        columns = np.stack([_by_parameter(setting, z, p, k) for k in range(2)], axis=1)
-        border = (columns, np.stack([one.by_z, two.by_z], 1), np.stack([one.by_x, two.by_x], 1))
-        step = structure.solve(z, p, rhs[:, None], border).x[:, 0]
-        size = np.abs(step).max(axis=1)
-        share = np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
-        z = z + share[:, None] * step[:, :-2]
-        p[:, free] += share[:, None] * step[:, -2:]
-        if (size < 1e-12).all():
+        step, null = _newton_step(aim.take(todo), z[todo], p[todo], b[todo])
+        size[todo] = np.abs(step).max(axis=1)
+        share = np.minimum(1.0, 0.5 / np.maximum(size[todo], 1e-300))[:, None] * step
+        z[todo] += share[:, : z.shape[1]]
+        p[todo] = aim.take(todo).moved(p[todo], share[:, z.shape[1] :])
+        b[todo] = null
+        todo = todo[(size[todo] >= 1e-12) & np.isfinite(z[todo]).all(axis=1)]
+        if len(todo) == 0:
             break
-    return Pinned(z, p, _trusted(setting, (z, p), middle, (first, p_first), size))
+    around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
+    gap = np.linalg.norm(embed(setting, z, p) - aim.middle, axis=1)
+    return Pinned(z, p, np.asarray((size < 1e-8) & (gap <= REACH * around + 1e-3)))
 
 
-def _trusted(
-    setting: Setting,
-    found: Place,
-    middle: Place,
-    end: Place,
-    size: Values,
-) -> Bool[np.ndarray, " lanes"]:
-    """Converged, and not farther from the middle than three half-lengths of the pair."""
-
-    def gap(a: Place, b: Place) -> Values:
-        n = setting.structure.unknowns
-        square = (a[0] - b[0])[:, :n] ** 2 @ setting.structure.mass
-        by_scale = (a[1] - b[1]) / setting.structure.scales
-        return np.asarray(np.sqrt(square + (by_scale**2).sum(axis=1)))
-
-    near = gap(found, middle) <= 3.0 * gap(end, middle) + 1e-3
-    return np.asarray((size < 1e-8) & near)
+def _middles(
+    setting: Setting, points: Points, groups: Sequence[Sequence[int]]
+) -> tuple[Lanes, Parameters, Float[np.ndarray, "lanes points coordinates"]]:
+    """Middles of groups, and where their points lie relative to them."""
+    sizes = np.array([len(group) for group in groups])
+    inside = np.arange(sizes.max(initial=0)) < sizes[:, None]
+    members = np.zeros(inside.shape, int)
+    members[inside] = [point for group in groups for point in group]
+    share = inside / sizes[:, None]
+    z = np.einsum("lm,lmi->li", share, points.z[members])
+    p = np.einsum("lm,lmi->li", share, points.p[members])
+    flat = members.ravel()
+    places = embed(setting, points.z[flat], points.p[flat]).reshape(*members.shape, -1)
+    middle = embed(setting, z, p)
+    return z, p, (places - middle[:, None]) * inside[:, :, None]
 
 
-def _difference(first: Lanes, second: Lanes) -> Lanes:
-    b = first - second
-    return np.asarray(b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-300))
-
-
-def _choose(which: Bool[np.ndarray, " lanes"], yes: _Condition, no: _Condition) -> _Condition:
-    return _Condition(
-        np.where(which, yes.value, no.value),
-        np.where(which[:, None], yes.by_z, no.by_z),
-        np.where(which[:, None], yes.by_x, no.by_x),
+def _newton_step(
+    aim: _Aim, z: Lanes, p: Parameters, b: Lanes
+) -> tuple[Float[np.ndarray, "lanes bordered"], Lanes]:
+    """Step in z and along the span, and the null vector for the next round."""
+    structure, k = aim.setting.structure, aim.span.shape[1]
+    conditions = []
+    if aim.fold:
+        fold, b = _fold_condition(aim, z, p, b)
+        conditions.append(fold)
+    if aim.cap:
+        conditions.append(_cap_condition(aim, z, p))
+    conditions += _amid(aim, z, p)
+    values = np.stack([each.value for each in conditions], axis=1)
+    rhs = -np.concatenate([structure.residual(z, p), values], axis=1)
+    columns = [structure.parameter_derivative(z, p, aim.direction(i)) for i in range(k)]
+    border = (
+        np.stack(columns, axis=1),
+        np.stack([each.by_z for each in conditions], axis=1),
+        np.stack([each.by_step for each in conditions], axis=1),
     )
+    return structure.solve(z, p, rhs[:, None], border).x[:, 0], b
 
 
-def _unit_parameter(setting: Setting, lanes: int, k: int) -> Float[np.ndarray, "lanes P"]:
-    dp = np.zeros((lanes, len(setting.base)))
-    dp[:, setting.free[k]] = 1.0
-    return dp
-
-
-def _by_parameter(setting: Setting, z: Lanes, p: Parameters, k: int) -> Lanes:
-    return setting.structure.parameter_derivative(z, p, _unit_parameter(setting, len(z), k))
-
-
-def _fold_condition(
-    setting: Setting, z: Lanes, p: Parameters, b: Lanes
-) -> tuple[_Condition, Lanes]:
+def _fold_condition(aim: _Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[_Condition, Lanes]:
     """Test function g of ``[F_z b; bᵀ 0] [v; g] = [0; 1]``, and v for the next round."""
-    structure, lanes = setting.structure, len(z)
+    structure, lanes = aim.setting.structure, len(z)
     rhs = np.zeros((lanes, 1, structure.size + 1))
     rhs[:, 0, -1] = 1.0
     border = (b[:, None], b[:, None], np.zeros((lanes, 1, 1)))
@@ -128,50 +161,43 @@ def _fold_condition(
     v, g = np.ascontiguousarray(solved[:, :-1]), solved[:, -1]
     none_z, none_p = np.zeros_like(z), np.zeros_like(p)
     by_z = -structure.second_derivative(z, p, (v, none_p), (v, none_p))
-    by_x = np.empty((lanes, 2))
-    for k in range(2):
-        mixed = structure.second_derivative(
-            z, p, (v, none_p), (none_z, _unit_parameter(setting, lanes, k))
-        )
-        by_x[:, k] = -np.einsum("li,li->l", v, mixed)
-    return _Condition(g, by_z, by_x), v / np.linalg.norm(v, axis=1, keepdims=True)
+    directions = aim.span.shape[1]
+    by_step = np.empty((lanes, directions))
+    for k in range(directions):
+        mixed = structure.second_derivative(z, p, (v, none_p), (none_z, aim.direction(k)))
+        by_step[:, k] = -np.einsum("li,li->l", v, mixed)
+    return _Condition(g, by_z, by_step), v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def _cap_condition(setting: Setting, z: Lanes, p: Parameters) -> _Condition:
+def _cap_condition(aim: _Aim, z: Lanes, p: Parameters) -> _Condition:
     """Largest excess over the constraints, its gradients by central differences."""
     lanes, size = z.shape
 
     def worst(z: Lanes, p: Parameters) -> Values:
-        return np.asarray(np.max([c.excess(z, p) for c in setting.constraints], axis=0))
+        return np.asarray(np.max([c.excess(z, p) for c in aim.setting.constraints], axis=0))
 
-    if not setting.constraints:
-        return _Condition(np.zeros(lanes), np.zeros_like(z), np.zeros((lanes, 2)))
     shift = DIFFERENCE * np.eye(size)
     many = np.repeat(p, size, axis=0)
     up = worst((z[:, None] + shift).reshape(-1, size), many)
     down = worst((z[:, None] - shift).reshape(-1, size), many)
     by_z = (up - down).reshape(lanes, size) / (2 * DIFFERENCE)
-    by_x = np.empty((lanes, 2))
-    for k in range(2):
-        dp = DIFFERENCE * _unit_parameter(setting, lanes, k)
-        by_x[:, k] = (worst(z, p + dp) - worst(z, p - dp)) / (2 * DIFFERENCE)
-    return _Condition(worst(z, p), by_z, by_x)
+    directions = aim.span.shape[1]
+    by_step = np.empty((lanes, directions))
+    for k in range(directions):
+        dp = DIFFERENCE * aim.direction(k)
+        by_step[:, k] = (worst(z, p + dp) - worst(z, p - dp)) / (2 * DIFFERENCE)
+    return _Condition(worst(z, p), by_z, by_step)
 
 
-def _middle_condition(
-    setting: Setting,
-    at: Place,
-    middle: Place,
-    along: Place,
-) -> _Condition:
-    """Inner product of the pair's direction with the distance from its middle."""
-    n, free = setting.structure.unknowns, setting.free
-    by_z = np.zeros_like(at[0])
-    by_z[:, :n] = along[0][:, :n] * setting.structure.mass
-    by_x = along[1][:, free] / setting.scales**2
-    value = np.einsum("li,li->l", by_z, at[0] - middle[0])
-    value = value + np.einsum("lk,lk->l", by_x, (at[1] - middle[1])[:, free])
-    return _Condition(value, by_z, by_x)
-
-
-__all__ = ["CAP", "CORNER", "FOLD", "Pinned", "pin"]
+def _amid(aim: _Aim, z: Lanes, p: Parameters) -> list[_Condition]:
+    """Distances from the middle along the directions of each group."""
+    setting, n = aim.setting, aim.setting.structure.unknowns
+    away = embed(setting, z, p) - aim.middle
+    conditions = []
+    for k in range(aim.rows.shape[1]):
+        row = aim.rows[:, k]
+        by_z = np.zeros_like(z)
+        by_z[:, :n] = row[:, :n] * np.sqrt(setting.structure.mass)
+        by_step = np.einsum("ld,lkd->lk", row[:, n:], aim.span)
+        conditions.append(_Condition(np.einsum("li,li->l", row, away), by_z, by_step))
+    return conditions

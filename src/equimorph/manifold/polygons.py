@@ -45,8 +45,9 @@ def find_loops(pairing: Pairing) -> Loops:
     polygons: list[Polygon] = []
     ambiguous: list[int] = []
     broken: list[int] = []
-    for triangle in special.tolist():
-        found = list(_around(pairing, triangle))
+    ends = np.searchsorted(owner, np.stack([special, special + 1]))
+    for triangle, start, stop in zip(special.tolist(), *ends.tolist(), strict=True):
+        found = list(_around(pairing, triangle, set(plain[start:stop].ravel().tolist())))
         chains = sum(polygon.open for polygon in found if polygon is not None)
         if any(polygon is None for polygon in found):
             broken.append(triangle)
@@ -60,45 +61,40 @@ def find_loops(pairing: Pairing) -> Loops:
 def _plain(
     pairing: Pairing,
 ) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " P"], Int[np.ndarray, " S"]]:
-    """Loops of triangles over which all curves go straight across; the other triangles."""
-    mesh, points, curves = pairing.mesh, pairing.points, pairing.curves
-    count = points.count
-    start, end = np.array(curves.start, int), np.array(curves.end, int)
-    simple = end >= 0
-    simple[list(curves.inner)] = False
-    simple &= points.vertex[start] != points.vertex[end]
-    curve = pairing.rays[:count]
-    straight = np.where(curve >= 0, simple[curve], False)
-    own = np.arange(count)[:, None]
-    partner = np.where(start[curve] == own, end[curve], start[curve])
-    partner = np.where(straight, partner, -1)
-    # a triangle is plain if no point over its corners has a special ray over one of its sides
-    vertex = points.vertex[:count]
-    bad_point, bad_slot = np.nonzero(~straight & (vertex >= 0)[:, None])
-    bad_edges = pairing.incident[vertex[bad_point], bad_slot]
-    special_edge = np.zeros(len(mesh.edges) + 1, bool)
-    special_edge[bad_edges] = True
-    special_edge[-1] = False
-    special = special_edge[mesh.sides].any(axis=1)
+    """Loops of three curves that go straight across; triangles over which there are others."""
+    mesh, points = pairing.mesh, pairing.points
+    partner = _partners(pairing)
+    vertex = points.vertex[: points.count]
     order = np.argsort(vertex, kind="stable")
     order = order[vertex[order] >= 0]
     amount = np.bincount(vertex[order], minlength=len(mesh.vertices))
     first = np.concatenate([[0], np.cumsum(amount)])
-    easy = np.flatnonzero(~special)
-    corner = mesh.triangles[easy, 0]
-    owner = np.repeat(easy, amount[corner])
-    offset = np.arange(len(owner)) - np.repeat(
-        np.cumsum(amount[corner]) - amount[corner], amount[corner]
-    )
+    here = amount[mesh.triangles[:, 0]]
+    owner = np.repeat(np.arange(len(mesh.triangles)), here)
+    offset = np.arange(len(owner)) - np.repeat(np.cumsum(here) - here, here)
     a = order[first[mesh.triangles[owner, 0]] + offset]
     b = _across(pairing, partner, a, mesh.sides[owner, 0])
     c = _across(pairing, partner, a, mesh.sides[owner, 2])
-    closed = _across(pairing, partner, b, mesh.sides[owner, 1]) == c
-    twisted = np.zeros(len(mesh.triangles), bool)
-    twisted[owner[~closed]] = True
-    keep = ~twisted[owner]
-    cells = np.stack([a, b, c], axis=1)[keep]
-    return cells, owner[keep], np.flatnonzero(special | twisted)
+    closed = (b >= 0) & (c >= 0)
+    closed[closed] = _across(pairing, partner, b[closed], mesh.sides[owner[closed], 1]) == c[closed]
+    loops = np.bincount(owner[closed], minlength=len(mesh.triangles))
+    special = (amount[mesh.triangles] > loops[:, None]).any(axis=1)
+    return np.stack([a, b, c], axis=1)[closed], owner[closed], np.flatnonzero(special)
+
+
+def _partners(pairing: Pairing) -> Int[np.ndarray, "count slots"]:
+    """Point at the other end of each point's curves that go straight across; −1 for others."""
+    points, curves = pairing.points, pairing.curves
+    if not curves.edge:
+        return np.full((points.count, pairing.rays.shape[1]), -1)
+    start, end = np.array(curves.start, int), np.array(curves.end, int)
+    simple = end >= 0
+    simple[list(curves.inner)] = False
+    simple &= points.vertex[start] != points.vertex[end]
+    curve = pairing.rays[: points.count]
+    own = np.arange(points.count)[:, None]
+    other = np.where(start[curve] == own, end[curve], start[curve])
+    return np.where((curve >= 0) & simple[curve], other, -1)
 
 
 def _across(
@@ -111,11 +107,11 @@ def _across(
     return np.asarray(partner[point, pairing.slots[edge, side]])
 
 
-def _around(pairing: Pairing, triangle: int) -> Iterator[Polygon | None]:
-    """Polygons over one triangle; None where curves are missing or go around twice."""
+def _around(pairing: Pairing, triangle: int, plain: set[int]) -> Iterator[Polygon | None]:
+    """Polygons over one triangle that are not plain; None where curves are missing or go twice."""
     points, at = pairing.points, edges_at(pairing, triangle)
     corners = pairing.mesh.triangles[triangle].tolist()
-    todo = {point for corner in corners for point in points.over(corner)}
+    todo = {point for corner in corners for point in points.over(corner)} - plain
     ends = [
         (point, edge)
         for point in sorted(todo)

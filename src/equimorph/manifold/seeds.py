@@ -12,7 +12,7 @@ from equimorph.manifold.pairing import Setting
 from equimorph.model import names_of, position
 
 COARSE = 5
-"""Natural states are lifted at about COARSE × COARSE vertices."""
+"""Natural states are lifted at about so many vertices along each parameter."""
 SEARCHED = 3
 """Vertices at which a random search looks for equilibria that no natural path reaches."""
 
@@ -48,19 +48,20 @@ def polished(
     return vertices[good], direct.z[good], p[good], index[good]
 
 
-def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 2"]]:
-    """About COARSE² vertices spread over the box, off its lines of symmetry."""
+def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n d"]]:
+    """About `COARSE` vertices along each parameter, off the lines of symmetry of the box."""
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     share = (np.arange(COARSE) + 0.5) / COARSE
-    grid = np.stack(np.meshgrid(share, share, indexing="ij"), -1).reshape(-1, 2)
+    lines = np.meshgrid(*[share] * mesh.dimension, indexing="ij")
+    grid = np.stack(lines, axis=-1).reshape(-1, mesh.dimension)
     wanted = low + grid * (high - low)
-    gap = (mesh.vertices[None] - wanted[:, None]) / (high - low)
-    chosen = np.unique((gap**2).sum(axis=2).argmin(axis=1))
+    nearest = [(((mesh.vertices - w) / (high - low)) ** 2).sum(axis=1).argmin() for w in wanted]
+    chosen = np.unique(nearest)
     return chosen, mesh.vertices[chosen]
 
 
 def _from_natural_states(
-    setting: Setting, chosen: tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 2"]]
+    setting: Setting, chosen: tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n d"]]
 ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
     vertices, points = chosen
     structure = setting.structure

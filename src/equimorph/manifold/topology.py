@@ -1,6 +1,7 @@
-"""Topology of a triangulated surface: edges, components, strata, loops, orientation."""
+"""Topology of simplicial complexes: facets, components, strata, boundary pieces, orientation."""
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -8,54 +9,89 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from equimorph.manifold.kernels import orient
+from equimorph.manifold.simplices import volumes
 
 Pairs = Int[np.ndarray, "n 2"]
+Cells = Int[np.ndarray, "C corners"]
 
 
 @dataclass(frozen=True)
-class Surface:
-    """Edges of a triangulation and how cells hang together across them.
+class Adjacency:
+    """Facets of cells, and how cells hang together across them.
 
-    edges (E, 2) with their cell counts; cell_edges (C, 3); neighbours: pairs of cells that share
-    an edge of exactly two cells, with that edge.
+    facets (F, d), sorted, with their cell counts; cell_facets (C, d + 1): facet opposite to each
+    corner; links: pairs of cells that share a facet (where more than two do, a chain of them), with
+    that facet.
     """
 
-    edges: Int[np.ndarray, "E 2"]
-    counts: Int[np.ndarray, " E"]
-    cell_edges: Int[np.ndarray, "C 3"]
-    neighbours: Int[np.ndarray, "N 2"]
-    shared: Int[np.ndarray, " N"]
+    facets: Int[np.ndarray, "F d"]
+    counts: Int[np.ndarray, " F"]
+    cell_facets: Int[np.ndarray, "C corners"]
+    links: Int[np.ndarray, "N 2"]
+    across: Int[np.ndarray, " N"]
+
+    @property
+    def manifold(self) -> Bool[np.ndarray, " N"]:
+        """Links across facets of exactly two cells."""
+        return np.asarray(self.counts[self.across] == 2)
 
 
-def surface(cells: Int[np.ndarray, "C 3"]) -> Surface:
-    """Edges and adjacency of triangles."""
-    pairs = np.stack([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]], 1).reshape(-1, 2)
+def keys_of(rows: Int[np.ndarray, "n k"], base: int) -> Int[np.ndarray, " n"]:
+    """One number per sorted row of vertices below `base`."""
+    assert base ** rows.shape[1] < 2**63, "more vertices than fit into a key"
+    keys = np.zeros(len(rows), np.int64)
+    for column in np.sort(rows, axis=1).T:
+        keys = keys * base + column
+    return keys
+
+
+def rows_of(keys: Int[np.ndarray, " n"], base: int, length: int) -> Int[np.ndarray, "n k"]:
+    """Rows of vertices that `keys_of` made keys of."""
+    columns = []
+    for _ in range(length):
+        keys, column = np.divmod(keys, base)
+        columns.append(column)
+    return np.stack(columns[::-1], axis=1)
+
+
+def faces_of(cells: Cells, size: int) -> Int[np.ndarray, "n size"]:
+    """All distinct faces of cells with so many corners."""
     base = int(cells.max(initial=0)) + 1
+    sides = [cells[:, list(chosen)] for chosen in combinations(range(cells.shape[1]), size)]
+    keys = np.unique(np.concatenate([keys_of(side, base) for side in sides]))
+    return rows_of(keys, base, size)
+
+
+def adjacency(cells: Cells) -> Adjacency:
+    """Facets and links of segments, triangles or tetrahedra."""
+    corners = cells.shape[1]
+    base = int(cells.max(initial=0)) + 1
+    opposite = [keys_of(np.delete(cells, k, axis=1), base) for k in range(corners)]
     keys, inverse, counts = np.unique(
-        pairs.min(axis=1) * base + pairs.max(axis=1), return_inverse=True, return_counts=True
+        np.stack(opposite, axis=1).ravel(), return_inverse=True, return_counts=True
     )
-    edges = np.stack(np.divmod(keys, base), axis=1)
     order = np.argsort(inverse, kind="stable")
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    twice = np.flatnonzero(counts == 2)
-    neighbours = np.stack([order[first[twice]] // 3, order[first[twice] + 1] // 3], axis=1)
-    return Surface(edges, counts, inverse.reshape(-1, 3), neighbours, twice)
+    same = np.flatnonzero(inverse[order[1:]] == inverse[order[:-1]])
+    links = np.stack([order[same], order[same + 1]], axis=1) // corners
+    return Adjacency(
+        rows_of(keys, base, corners - 1),
+        counts,
+        inverse.reshape(-1, corners),
+        links,
+        inverse[order[same]],
+    )
 
 
-def flags_of(edges: Int[np.ndarray, "E 2"], chosen: set[tuple[int, int]]) -> Bool[np.ndarray, " E"]:
-    """Which of the edges are among the chosen pairs (low, high)."""
-    if not chosen:
-        return np.zeros(len(edges), bool)
-    base = int(edges.max()) + 1
-    keys = np.array([a * base + b for a, b in chosen if a < base and b < base], dtype=np.int64)
-    return np.isin(edges[:, 0].astype(np.int64) * base + edges[:, 1], keys)
+def flags_of(
+    facets: Int[np.ndarray, "F d"], chosen: Int[np.ndarray, "n d"]
+) -> Bool[np.ndarray, " F"]:
+    """Which of the facets are among the chosen ones."""
+    base = max(int(facets.max(initial=0)), int(chosen.max(initial=0))) + 1
+    return np.isin(keys_of(facets, base), keys_of(chosen, base))
 
 
-def labels(
-    cells: int, neighbours: Pairs, across: Bool[np.ndarray, " N"] | None = None
-) -> Int[np.ndarray, " C"]:
-    """Connected pieces of cells, over shared edges (those in `across` only), largest first."""
-    links = neighbours if across is None else neighbours[across]
+def labels(cells: int, links: Pairs) -> Int[np.ndarray, " C"]:
+    """Connected pieces of cells over links, largest first."""
     graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(cells, cells))
     _, label = connected_components(graph, directed=False)
     sizes = np.bincount(label)
@@ -64,13 +100,28 @@ def labels(
     return np.asarray(rank[label])
 
 
-def euler_characteristic(cells: Int[np.ndarray, "C 3"]) -> int:
-    """Vertices − edges + cells."""
-    whole = surface(cells)
-    return len(np.unique(cells)) - len(whole.edges) + len(cells)
+def euler_characteristic(cells: Cells) -> int:
+    """Vertices − edges + triangles − tetrahedra."""
+    corners = cells.shape[1]
+    numbers = [len(np.unique(cells)), *(len(faces_of(cells, k)) for k in range(2, corners))]
+    signs = (-1) ** np.arange(corners)
+    return int(signs @ [*numbers, len(cells)])
 
 
-def chains(pairs: Pairs) -> list[Int[np.ndarray, " vertices"]]:
+def pieces(facets: Int[np.ndarray, "n d"]) -> list[Int[np.ndarray, "..."]]:
+    """Connected pieces of points, edges or triangles.
+
+    Points come one by one, edges as polylines (see `chains`), triangles as arrays of them.
+    """
+    if facets.shape[1] == 1:
+        return list(facets)
+    if facets.shape[1] == 2:
+        return chains(facets)
+    label = labels(len(facets), adjacency(facets).links) if len(facets) else np.zeros(0, int)
+    return [facets[label == k] for k in range(label.max(initial=-1) + 1)]
+
+
+def chains(pairs: Pairs) -> list[Int[np.ndarray, "..."]]:
     """Polylines along edges, split where other than two meet; closed ones repeat the start."""
     if len(pairs) == 0:
         return []
@@ -99,12 +150,13 @@ def chains(pairs: Pairs) -> list[Int[np.ndarray, " vertices"]]:
     return out
 
 
-def orientation(cells: Int[np.ndarray, "C 3"], whole: Surface) -> tuple[Int[np.ndarray, " C"], int]:
+def orientation(cells: Cells, whole: Adjacency) -> tuple[Int[np.ndarray, " C"], int]:
     """Signs that orient all cells coherently, and the number of contradictions."""
     count = len(cells)
-    a, b = whole.neighbours.T
-    coherent = _runs_forward(cells, whole, a) != _runs_forward(cells, whole, b)
-    sign = np.where(coherent, 1, -1)
+    induced = _induced_signs(cells)
+    a, b = whole.links[whole.manifold].T
+    shared = whole.across[whole.manifold]
+    sign = -_sign_at(whole, induced, a, shared) * _sign_at(whole, induced, b, shared)
     both = np.concatenate([np.stack([a, b, sign], 1), np.stack([b, a, sign], 1)])
     both = both[np.argsort(both[:, 0], kind="stable")]
     starts = np.concatenate([[0], np.cumsum(np.bincount(both[:, 0], minlength=count))])
@@ -113,19 +165,31 @@ def orientation(cells: Int[np.ndarray, "C 3"], whole: Surface) -> tuple[Int[np.n
     return signs, int(orient(count, starts, columns[0], columns[1], signs)) // 2
 
 
-def _runs_forward(
-    cells: Int[np.ndarray, "C 3"], whole: Surface, cell: Int[np.ndarray, " N"]
-) -> Bool[np.ndarray, " N"]:
-    """Whether the shared edge runs from its lower to its higher vertex in the cell's order."""
-    low, high = whole.edges[whole.shared].T
-    corners = cells[cell]
-    at_low = (corners == low[:, None]).argmax(axis=1)
-    return np.asarray(corners[np.arange(len(cell)), (at_low + 1) % 3] == high)
+def _induced_signs(cells: Cells) -> Int[np.ndarray, "C corners"]:
+    """Orientation that each cell gives its facets, relative to their vertices in order."""
+    corners = cells.shape[1]
+    signs = np.empty(cells.shape, np.int64)
+    for k in range(corners):
+        rest = np.delete(cells, k, axis=1)
+        turned = sum(
+            (rest[:, i] > rest[:, j]).astype(int) for i, j in combinations(range(corners - 1), 2)
+        )
+        signs[:, k] = (-1) ** (k + np.asarray(turned))
+    return signs
 
 
-def projected_area(
-    coordinates: Float[np.ndarray, "V 2"], cells: Int[np.ndarray, "C 3"]
+def _sign_at(
+    whole: Adjacency,
+    induced: Int[np.ndarray, "C corners"],
+    cell: Int[np.ndarray, " N"],
+    facet: Int[np.ndarray, " N"],
+) -> Int[np.ndarray, " N"]:
+    corner = (whole.cell_facets[cell] == facet[:, None]).argmax(axis=1)
+    return np.asarray(induced[cell, corner])
+
+
+def projected_volume(
+    coordinates: Float[np.ndarray, "V d"], cells: Cells
 ) -> Float[np.ndarray, " C"]:
-    """Signed areas of the cells over the plane of the free parameters."""
-    a, b, c = (coordinates[cells[:, k]] for k in range(3))
-    return np.asarray(0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]))
+    """Signed volumes of the cells over the space of the free parameters."""
+    return volumes(coordinates[cells])

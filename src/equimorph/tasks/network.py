@@ -11,6 +11,7 @@ from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.topology import faces_of
 from equimorph.model import Constraint
 from equimorph.structures import State, States
 from equimorph.tasks.route import Corners
@@ -85,8 +86,7 @@ def _network(
 ) -> _Network:
     """Edges of stable cells between allowed vertices, and the ends linked to their neighbours."""
     cells = eset.cells[eset.cell_index == 0]
-    pairs = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
-    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
+    pairs = faces_of(cells, 2)
     pairs = pairs[allowed[pairs].all(axis=1)]
     states = States(
         eset.structure,
@@ -120,11 +120,10 @@ def _neighbours(
     constraints: tuple[Constraint, ...],
     margin: float,
 ) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Allowed vertices over the grid triangle around a state that a straight lift reaches."""
-    triangle = eset.mesh.locate(np.array([end[name] for name in eset.names]))
-    around = np.unique(
-        eset.mesh.triangles[np.isin(eset.mesh.triangles, eset.mesh.triangles[triangle]).any(axis=1)]
-    )
+    """Allowed vertices over the grid cells around a state that a straight lift reaches."""
+    cells = eset.mesh.cells
+    own = eset.mesh.locate(np.array([end[name] for name in eset.names]))
+    around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
     near = np.flatnonzero(allowed & np.isin(eset.grid_vertex, around))
     source = States(eset.structure, np.tile(end.z, (len(near), 1)), np.tile(end.p, (len(near), 1)))
     linked, length = _link(source, eset.points[near], constraints, margin)

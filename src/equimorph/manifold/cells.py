@@ -1,0 +1,65 @@
+"""Sheet lifting, part four: the cells of the set, of any dimension."""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Int
+
+from equimorph.manifold.assembly import assemble
+from equimorph.manifold.pairing import Pairing
+from equimorph.manifold.points import CAP, FOLD
+from equimorph.manifold.polygons import find_loops
+
+
+def _nothing() -> Int[np.ndarray, " 0"]:
+    return np.zeros(0, int)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Segments, triangles or tetrahedra of points with their index, and facets of two kinds.
+
+    corners (C, d + 1), index (C,); folds, caps: facets on folds and on constraints; the doubtful:
+    grid cells over which the set could not be closed and cut without doubt.
+    """
+
+    corners: Int[np.ndarray, "C corners"]
+    index: Int[np.ndarray, " C"]
+    folds: Int[np.ndarray, "f d"]
+    caps: Int[np.ndarray, "c d"]
+    doubtful_triangles: Int[np.ndarray, " t"] = field(default_factory=_nothing)
+    doubtful_tetrahedra: Int[np.ndarray, " n"] = field(default_factory=_nothing)
+
+    @property
+    def doubtful(self) -> int:
+        """Number of grid cells in doubt."""
+        return len(self.doubtful_triangles) + len(self.doubtful_tetrahedra)
+
+
+def find_cells(pairing: Pairing) -> Cells:
+    """Cells of the set over a mesh whose edges are all lifted."""
+    if pairing.mesh.dimension == 1:
+        return _segments(pairing)
+    discs = assemble(pairing, find_loops(pairing))
+    return Cells(discs.corners, discs.index, discs.folds, discs.caps, discs.doubtful)
+
+
+def _segments(pairing: Pairing) -> Cells:
+    """Pieces of the lifted edges between their points."""
+    points, curves = pairing.points, pairing.curves
+    pairs: list[tuple[int, int]] = []
+    for curve, (edge, start, end) in enumerate(
+        zip(curves.edge, curves.start, curves.end, strict=True)
+    ):
+        if pairing.ray(start, edge) == curve:
+            line = [start, *curves.inner.get(curve, []), *([end] if end >= 0 else [])]
+            pairs.extend(pairwise(line))
+    corners = np.array(pairs, int).reshape(-1, 2)
+    kind, index = points.kind[: points.count], points.index[: points.count]
+    # of two neighbours on a curve at most one is a fold
+    regular = np.where(kind[corners[:, 0]] == FOLD, corners[:, 1], corners[:, 0])
+    used = np.unique(corners)
+    return Cells(
+        corners, index[regular], used[kind[used] == FOLD, None], used[kind[used] == CAP, None]
+    )

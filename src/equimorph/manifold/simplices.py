@@ -1,0 +1,36 @@
+"""Geometry of simplices in the space of the free parameters, in one to three dimensions."""
+
+import numpy as np
+from jaxtyping import Float
+
+
+def volumes(corners: Float[np.ndarray, "n corners d"]) -> Float[np.ndarray, " n"]:
+    """Signed lengths, areas or volumes of d-simplices in d dimensions, with d + 1 corners."""
+    sides = corners[:, 1:] - corners[:, :1]
+    d = sides.shape[1]
+    if d == 1:
+        return np.asarray(sides[:, 0, 0])
+    if d == 2:
+        return np.asarray(0.5 * (sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]))
+    normal = np.cross(sides[:, 1], sides[:, 2])
+    return np.asarray(np.einsum("ni,ni->n", sides[:, 0], normal) / 6.0)
+
+
+def barycentric(
+    corners: Float[np.ndarray, "n corners d"], point: Float[np.ndarray, " d"]
+) -> Float[np.ndarray, "n corners"]:
+    """Barycentric coordinates of a point in simplices; −∞ in those without volume."""
+    whole, count = volumes(corners), corners.shape[1]
+    weights = np.full(corners.shape[:2], -np.inf)
+    for k in range(count - 1):
+        part = corners.copy()
+        part[:, k] = point
+        np.divide(volumes(part), whole, out=weights[:, k], where=whole != 0.0)
+    weights[:, -1] = np.where(whole != 0.0, 1.0 - weights[:, :-1].sum(axis=1), -np.inf)
+    return weights
+
+
+def plane_bases(corners: Float[np.ndarray, "n 3 d"]) -> Float[np.ndarray, "n 2 d"]:
+    """Orthonormal vectors along the planes of triangles in d dimensions."""
+    sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    return np.ascontiguousarray(np.swapaxes(np.linalg.qr(sides)[0], 1, 2))
