@@ -1,8 +1,8 @@
 """The equilibrium set of the arch under its own weight at q = 2.5, max |κ| ≤ 20.
 
 Topology: sheet lifting on 12×21 to 93×161 intervals in an independent prototype; there a second
-component of index 4 to 6 was met by many random starts, which a set need not have found. Equilibria
-at (Θ, Δ) = (1, 0): computed independently by two or three methods to the digits given.
+component of index 4 to 6 was met by many random starts. Equilibria at (Θ, Δ) = (1, 0): computed
+independently by two or three methods to the digits given.
 """
 
 import numpy as np
@@ -18,6 +18,20 @@ def test_main_component_has_characteristic_minus_one_and_three_loops(arch_set):
     main = arch_set.components[0]
     assert (main.euler_characteristic, main.loops) == (-1, 3)
     assert main.indices == (0, 1, 2, 3, 4)
+
+
+def test_second_component_is_seeded_from_beyond_the_box(arch_set):
+    """A disc of index 4 to 6, all of it with max |κ| > 15.9: it joins the main one beyond the box.
+
+    Together the Euler characteristic is 0, with four loops.
+    """
+    assert arch_set.audit.recovered == 0
+    assert (arch_set.audit.components, arch_set.audit.euler_characteristic) == (2, 0)
+    assert len(arch_set.boundaries) == 4
+    second = arch_set.components[1]
+    assert (second.euler_characteristic, second.loops, second.indices) == (1, 1, (4, 5, 6))
+    own = np.unique(arch_set.cells[arch_set.component == 1])
+    assert arch_set.structure.max_curvature(arch_set.points[own]).min() > 15.9
 
 
 def test_arch_set_is_exact_and_its_cells_agree_with_the_index(arch_set):

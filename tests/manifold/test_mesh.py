@@ -6,11 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from equimorph.manifold.bisection import bisect
-from equimorph.manifold.mesh import SHIFT, BaseMesh, grid_mesh
+from equimorph.manifold.mesh import MARGIN, SHIFT, BaseMesh, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.topology import adjacency, euler_characteristic, projected_volume
 from equimorph.model import Box
 
 BOX = Box(a=(-1.0, 2.0), b=(-2.0, 2.0))
+
+
+def regular(intervals: tuple[int, int], mirrored: tuple[bool, bool]) -> BaseMesh:
+    return grid_mesh(grid_lines(BOX, intervals, mirrored))
 
 
 def assert_conforming(mesh: BaseMesh) -> None:
@@ -31,7 +35,7 @@ def assert_conforming(mesh: BaseMesh) -> None:
 
 @given(st.integers(2, 9), st.integers(2, 9), st.booleans(), st.booleans())
 def test_grid_mesh_conforms(n, m, first, second):
-    mesh = grid_mesh(BOX, (n, m), (first, second))
+    mesh = regular((n, m), (first, second))
     assert len(mesh.triangles) == 2 * n * m
     assert_conforming(mesh)
 
@@ -41,7 +45,7 @@ def test_grid_mesh_conforms(n, m, first, second):
 def test_bisected_mesh_conforms(seed):
     """Also after many bisections of random edges."""
     generator = np.random.default_rng(seed)
-    mesh = grid_mesh(BOX, (3, 4), (False, True))
+    mesh = regular((3, 4), (False, True))
     for _ in range(5):
         used = np.unique(mesh.sides)
         mesh = bisect(mesh, generator.choice(used, 6, replace=False), (False, True))
@@ -49,7 +53,7 @@ def test_bisected_mesh_conforms(seed):
 
 
 def test_bisected_edges_keep_the_numbers_of_the_others():
-    mesh = grid_mesh(BOX, (3, 4), (False, False))
+    mesh = regular((3, 4), (False, False))
     finer = bisect(mesh, np.array([5]), (False, False))
     assert np.array_equal(finer.edges[: len(mesh.edges)], mesh.edges)
     assert np.array_equal(finer.vertices[: len(mesh.vertices)], mesh.vertices)
@@ -57,12 +61,12 @@ def test_bisected_edges_keep_the_numbers_of_the_others():
 
 
 def test_grid_lines_keep_off_a_line_of_symmetry():
-    mesh = grid_mesh(BOX, (4, 8), (False, True))
+    mesh = regular((4, 8), (False, True))
     assert np.abs(mesh.vertices[:, 1]).min() > 0.05
 
 
 def test_bisection_keeps_off_a_line_of_symmetry():
-    mesh = grid_mesh(BOX, (3, 3), (False, True))
+    mesh = regular((3, 3), (False, True))
     ends = mesh.vertices[mesh.edges][:, :, 1]
     across = np.flatnonzero(np.abs(ends.sum(axis=1)) < 1e-12)
     assert len(across)
@@ -71,22 +75,37 @@ def test_bisection_keeps_off_a_line_of_symmetry():
 
 
 def test_grid_lines_of_a_symmetric_range_are_mirror_images():
-    mesh = grid_mesh(BOX, (4, 9), (False, True))
+    mesh = regular((4, 9), (False, True))
     lines = np.unique(mesh.vertices[:, 1])
     assert np.abs(lines + lines[::-1]).max() < 1e-15
 
 
 def test_grid_lines_are_shifted_a_little_but_not_the_sides_of_the_box():
-    lines = np.unique(grid_mesh(BOX, (6, 9), (False, False)).vertices[:, 0])
-    regular = np.linspace(-1.0, 2.0, 7)
-    shift = np.abs(lines - regular)
+    lines = np.unique(regular((6, 9), (False, False)).vertices[:, 0])
+    shift = np.abs(lines - np.linspace(-1.0, 2.0, 7))
     assert shift[0] == shift[-1] == 0.0
     assert 0.0 <= shift[1:-1].min() <= shift.max() <= SHIFT * 0.5
 
 
 @given(st.floats(-1.0, 2.0), st.floats(-2.0, 2.0))
 def test_locate_finds_the_triangle_around_a_point(a, b):
-    mesh = grid_mesh(BOX, (5, 6), (False, False))
+    mesh = regular((5, 6), (False, False))
     corners = mesh.vertices[mesh.triangles[mesh.locate(np.array([a, b]))]]
     weights = np.linalg.solve(np.vstack([corners.T, np.ones(3)]), np.array([a, b, 1.0]))
     assert weights.min() > -1e-12
+
+
+@given(st.integers(2, 40), st.integers(2, 40), st.integers(1, 15))
+def test_coarse_grid_shares_vertices_with_the_grid_and_reaches_beyond_it(n, m, intervals):
+    """By a fifth of the box, but not beyond half the way to a limit of a parameter's meaning."""
+    lines = grid_lines(BOX, (n, m), (False, False))
+    limits = np.array([[-1.1, -np.inf], [np.inf, np.inf]])
+    coarse, number = coarse_grid(lines, intervals, limits)
+    fine = grid_mesh(lines)
+    shared = number >= 0
+    assert np.array_equal(coarse.vertices[shared], fine.vertices[number[shared]])
+    own = (min(n, intervals) + 1) * (min(m, intervals) + 1)
+    assert np.count_nonzero(shared) == len(np.unique(number[shared])) == own
+    assert np.allclose(coarse.vertices.min(axis=0), [-1.05, -2.0 - 4.0 * MARGIN])
+    assert np.allclose(coarse.vertices.max(axis=0), [2.0 + 3.0 * MARGIN, 2.0 + 4.0 * MARGIN])
+    assert projected_volume(coarse.vertices, coarse.triangles).min() > 0

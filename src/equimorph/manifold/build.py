@@ -12,9 +12,10 @@ from equimorph.manifold.bisection import bisect
 from equimorph.manifold.cells import Cells, find_cells
 from equimorph.manifold.completeness import check, seeds_from
 from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.mesh import grid_mesh
-from equimorph.manifold.pairing import Pairing, Setting, flood, start_pairing
-from equimorph.manifold.seeds import seeds
+from equimorph.manifold.flooding import flood
+from equimorph.manifold.mesh import Lines, coarse_grid, grid_lines, grid_mesh
+from equimorph.manifold.pairing import Pairing, Setting, start_pairing
+from equimorph.manifold.seeds import Seeds, seeds
 from equimorph.model import (
     Box,
     Constraint,
@@ -25,6 +26,8 @@ from equimorph.model import (
 )
 from equimorph.structures import Structure
 
+COARSE = 12
+"""Most intervals along each parameter of the coarse grid over which seeds are spread."""
 BISECTIONS = 12
 SEARCHES = 4
 """Rounds of independent checks; what one round finds missing is lifted before the next."""
@@ -84,10 +87,10 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     progress = progress or Silent()
     intervals = _intervals(box, intervals)
     setting = _setting(structure, box, fixed or {}, tuple(within))
-    mesh = grid_mesh(box, intervals, _mirrored(setting))
+    lines = grid_lines(box, intervals, _mirrored(setting))
     progress.report("seeds", 0, 1)
-    pairing = start_pairing(setting, mesh)
-    pairing.points.over_vertices(*seeds(setting, mesh, seed))
+    pairing = start_pairing(setting, grid_mesh(lines))
+    pairing.points.over_vertices(*_spread(setting, lines, seed, progress))
     generator = np.random.default_rng([seed, 1])
     recovered = 0
     for number in range(SEARCHES):
@@ -156,6 +159,22 @@ def _lifted(pairing: Pairing, progress: Progress) -> tuple[Cells, int]:
         longest = _longest_edges(pairing, cells)
         pairing.use_mesh(bisect(pairing.mesh, longest, _mirrored(pairing.setting)))
     return cells, bisected
+
+
+def _spread(setting: Setting, lines: Lines, seed: int, progress: Progress) -> Seeds:
+    """Seeds, spread over a coarse grid in a box somewhat larger than that of the fine grid.
+
+    So the flood of the fine grid starts everywhere at once, with many edges at a time, and on
+    pieces, too, that hang together only beyond the box.
+    """
+    mesh, number = coarse_grid(lines, COARSE, setting.limits)
+    pairing = start_pairing(setting, mesh)
+    pairing.points.over_vertices(*seeds(setting, mesh, np.flatnonzero(number >= 0), seed))
+    flood(pairing, progress)
+    store = pairing.points
+    vertex = store.vertex[: store.count]
+    found = np.flatnonzero((vertex >= 0) & (number[vertex] >= 0))
+    return number[vertex[found]], store.z[found], store.p[found], store.index[found]
 
 
 def _longest_edges(pairing: Pairing, cells: Cells) -> Int[np.ndarray, " n"]:

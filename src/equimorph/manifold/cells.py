@@ -1,4 +1,4 @@
-"""Sheet lifting, part four: the cells of the set, of any dimension."""
+"""Sheet lifting, part five: the cells of the set, of any dimension."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise

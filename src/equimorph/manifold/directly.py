@@ -27,13 +27,35 @@ def lift_directly(
     z: Float[np.ndarray, "lanes size"],
     index: Int[np.ndarray, " lanes"],
     constraints: tuple[Constraint, ...],
+    steps: int = 1,
 ) -> Direct:
-    """Tangent predictor over the whole edge, Newton at its end, and the tests of a safe step.
+    """Tangent predictor over the edge, Newton at its end, and the tests of a safe step.
 
-    A lane is good if the first correction is below a quarter of the step, later ones shrink at
-    least by half, the index is that of the start, the tangents differ by less than acos 0.9, and no
-    constraint is violated. Points are polished to round-off.
+    An edge can be cut into equal `steps`; each must be safe. A lane is good if the first correction
+    is below a quarter of the step, later ones shrink at least by half, the index is that of the
+    start, the tangents differ by less than acos 0.9, and no constraint is violated. Points are
+    polished to round-off.
     """
+    if steps == 1:
+        return _step(line, z, index, constraints)
+    lanes, out, good = np.arange(len(z)), z.copy(), np.zeros(len(z), bool)
+    for number in range(steps):
+        start = line.start[lanes] + (number / steps) * line.velocity[lanes]
+        part = ParameterLine(line.structure, start, line.velocity[lanes] / steps)
+        direct = _step(part, out[lanes], index[lanes], constraints)
+        lanes = lanes[direct.good]
+        out[lanes] = direct.z[direct.good]
+    good[lanes] = True
+    return Direct(out, index, good)
+
+
+def _step(
+    line: ParameterLine,
+    z: Float[np.ndarray, "lanes size"],
+    index: Int[np.ndarray, " lanes"],
+    constraints: tuple[Constraint, ...],
+) -> Direct:
+    """One step over each line, verified."""
     lanes = len(z)
     structure, weight = line.structure, line.weight
     still, one, none = np.zeros_like(z), np.ones(lanes), np.zeros(lanes)

@@ -13,6 +13,12 @@ from equimorph.model import Box
 SHIFT = 0.02
 """Largest shift of a grid line off its regular place, in intervals."""
 
+MARGIN = 0.2
+"""How far the coarse grid reaches beyond the box, in ranges of the parameters."""
+
+Lines = tuple[Float[np.ndarray, " _"], ...]
+"""Places of grid lines along each free parameter."""
+
 
 def _none(corners: int) -> Int[np.ndarray, "0 corners"]:
     return np.zeros((0, corners), int)
@@ -74,16 +80,22 @@ def _lines(low: float, high: float, count: int, mirrored: bool) -> Float[np.ndar
     return lines
 
 
-def grid_mesh(box: Box, intervals: tuple[int, ...], mirrored: tuple[bool, ...]) -> BaseMesh:
-    """Kuhn triangulation of a regular grid: every box cut along its rising diagonal.
+def grid_lines(box: Box, intervals: tuple[int, ...], mirrored: tuple[bool, ...]) -> Lines:
+    """Places of the grid lines along each free parameter."""
+    return tuple(
+        _lines(box.lower[k], box.upper[k], count, mirrored[k]) for k, count in enumerate(intervals)
+    )
+
+
+def grid_mesh(lines: Lines) -> BaseMesh:
+    """Kuhn triangulation of a grid: every box cut along its rising diagonal.
 
     Its simplices climb from the lowest to the highest corner along the axes in any order.
     """
-    d = len(intervals)
-    axes = [_lines(box.lower[k], box.upper[k], intervals[k], mirrored[k]) for k in range(d)]
-    vertices = np.stack([line.ravel() for line in np.meshgrid(*axes, indexing="ij")], axis=1)
-    strides = [int(np.prod([n + 1 for n in intervals[k + 1 :]])) for k in range(d)]
-    places = np.meshgrid(*map(np.arange, intervals), indexing="ij")
+    d = len(lines)
+    vertices = np.stack([line.ravel() for line in np.meshgrid(*lines, indexing="ij")], axis=1)
+    strides = [int(np.prod([len(line) for line in lines[k + 1 :]])) for k in range(d)]
+    places = np.meshgrid(*(np.arange(len(line) - 1) for line in lines), indexing="ij")
     corner = sum(strides[k] * places[k].ravel() for k in range(d))
     climbs = []
     for order in permutations(range(d)):
@@ -92,6 +104,29 @@ def grid_mesh(box: Box, intervals: tuple[int, ...], mirrored: tuple[bool, ...]) 
             steps[-2:] = steps[:-3:-1]  # an odd order would turn the simplex over
         climbs.append(np.asarray(corner)[:, None] + steps)
     return mesh_of(vertices, np.concatenate(climbs))
+
+
+def coarse_grid(
+    lines: Lines, intervals: int, limits: Float[np.ndarray, "2 d"]
+) -> tuple[BaseMesh, Int[np.ndarray, " vertices"]]:
+    """Mesh on some of the lines of a grid, and on a few beyond it, within limits.
+
+    It has at most so many intervals along each parameter of the grid. Returned with it are the
+    grid's numbers of its vertices, −1 for those beyond the grid.
+    """
+    counts = [len(line) - 1 for line in lines]
+    chosen, wide = [], []
+    for count, line, (low, high) in zip(counts, lines, limits.T, strict=True):
+        own = np.linspace(0, count, min(count, intervals) + 1).round().astype(int)
+        margin = MARGIN * (line[-1] - line[0])
+        first = max(line[0] - margin, 0.5 * (line[0] + low))
+        last = min(line[-1] + margin, 0.5 * (line[-1] + high))
+        before, after = np.linspace(first, line[0], 3)[:-1], np.linspace(line[-1], last, 3)[1:]
+        wide.append(np.concatenate([before, line[own], after]))
+        chosen.append(np.concatenate([[-1, -1], own, [-1, -1]]))
+    places = np.stack([place.ravel() for place in np.meshgrid(*chosen, indexing="ij")])
+    number = np.ravel_multi_index(list(np.maximum(places, 0)), tuple(n + 1 for n in counts))
+    return grid_mesh(tuple(wide)), np.where((places >= 0).all(axis=0), number, -1)
 
 
 def mesh_of(vertices: Float[np.ndarray, "V d"], cells: Int[np.ndarray, "C corners"]) -> BaseMesh:

@@ -14,7 +14,8 @@ from equimorph.model import names_of, position
 COARSE = 5
 """Natural states are lifted at about so many vertices along each parameter."""
 SEARCHED = 3
-"""Vertices at which a random search looks for equilibria that no natural path reaches."""
+"""Vertices, beside the middle one, at which a random search looks for equilibria that no natural
+path reaches."""
 
 Seeds = tuple[
     Int[np.ndarray, " n"],
@@ -24,10 +25,15 @@ Seeds = tuple[
 ]
 
 
-def seeds(setting: Setting, mesh: BaseMesh, seed: int) -> Seeds:
-    """Vertices, unknowns, parameters and index of first equilibria; deterministic for a `seed`."""
+def seeds(
+    setting: Setting, mesh: BaseMesh, searchable: Int[np.ndarray, " some"], seed: int
+) -> Seeds:
+    """Vertices, unknowns, parameters and index of first equilibria; deterministic for a `seed`.
+
+    Random search looks over some of the `searchable` vertices only.
+    """
     vertices, z = _from_natural_states(setting, _spread(mesh))
-    searched_v, searched_z = _from_search(setting, mesh, seed)
+    searched_v, searched_z = _from_search(setting, mesh, searchable, seed)
     vertices, z = np.concatenate([vertices, searched_v]), np.concatenate([z, searched_z])
     return polished(setting, mesh, vertices, z)
 
@@ -85,12 +91,14 @@ def _from_natural_states(
 
 
 def _from_search(
-    setting: Setting, mesh: BaseMesh, seed: int
+    setting: Setting, mesh: BaseMesh, searchable: Int[np.ndarray, " some"], seed: int
 ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
     generator = np.random.default_rng(seed)
     names = names_of(setting.structure.parameters)
     vertices, z = [np.zeros(0, int)], [np.zeros((0, setting.structure.size))]
-    for vertex in generator.integers(0, len(mesh.vertices), SEARCHED):
+    away = (mesh.vertices[searchable] - mesh.vertices[searchable].mean(axis=0)) / setting.scales
+    middle = searchable[(away**2).sum(axis=1).argmin()]
+    for vertex in (middle, *generator.choice(searchable, SEARCHED)):
         p = setting.parameters(mesh.vertices[[vertex]])[0]
         found = find_equilibria(
             setting.structure,

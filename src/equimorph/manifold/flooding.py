@@ -1,0 +1,77 @@
+"""Sheet lifting, part two: lift edges from all known points until nothing new appears.
+
+From each known equilibrium over an edge's end, the edge is lifted: the curve ends over the other
+end, or turns at folds and comes back as another equilibrium over the same end, or leaves through a
+constraint. New ends are new equilibria.
+"""
+
+import numpy as np
+
+from equimorph.manifold.directly import lift_directly
+from equimorph.manifold.hard import trace
+from equimorph.manifold.pairing import HARD, LONG, UNTRACED, Pairing, Rays
+from equimorph.manifold.points import GRID
+from equimorph.model import Progress
+
+STEPS = 4
+"""Into so many equal steps long edges are cut before they count as hard."""
+CHUNK = 4096
+
+
+def flood(pairing: Pairing, progress: Progress) -> None:
+    """Lift edges from all known points until every ray is traced or given up.
+
+    All rays that one step can lift go first, then those that a few equal steps can; the others wait
+    and are traced many at a time.
+    """
+    while True:
+        flood_directly(pairing, progress)
+        long = pairing.marked(LONG)
+        if len(long.points):
+            _lift(pairing, long, STEPS)
+            continue
+        hard = _one_of_each_pair(pairing, pairing.marked(HARD))
+        if len(hard.points) == 0:
+            return
+        for at in range(0, len(hard.points), CHUNK):
+            trace(pairing, hard.take(slice(at, at + CHUNK)))
+
+
+def flood_directly(pairing: Pairing, progress: Progress) -> None:
+    """Lift edges from all known points as far as single steps lead."""
+    pairing.fit()
+    while len((rays := pairing.marked(UNTRACED)).points):
+        _lift(pairing, rays, 1)
+        live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == GRID)
+        progress.report("lifting edges", int(live), None)
+
+
+def _one_of_each_pair(pairing: Pairing, rays: Rays) -> Rays:
+    """Rays of even index on edges that have such: one that turns at a fold comes back odd."""
+    even = pairing.points.index[rays.points] % 2 == 0
+    has_even = np.zeros(len(pairing.mesh.edges), bool)
+    has_even[rays.edges[even]] = True
+    return rays.take(even | ~has_even[rays.edges])
+
+
+def _lift(pairing: Pairing, rays: Rays, steps: int) -> None:
+    """Enter the curves of rays that so many steps lift; mark the others for more effort."""
+    pairing.mark(rays, LONG if steps == 1 else HARD)
+    difficult = pairing.effort[rays.edges] > 0
+    pairing.mark(rays.take(difficult), HARD)
+    rays = rays.take(~difficult)
+    for at in range(0, len(rays.points), CHUNK):
+        _lift_some(pairing, rays.take(slice(at, at + CHUNK)), steps)
+
+
+def _lift_some(pairing: Pairing, rays: Rays, steps: int) -> None:
+    store, setting, mesh = pairing.points, pairing.setting, pairing.mesh
+    line = pairing.line(rays)
+    z, index = store.z[rays.points], store.index[rays.points]
+    direct = lift_directly(line, z, index, setting.constraints, steps)
+    done = rays.take(direct.good)
+    vertices = mesh.edges[done.edges, 1 - done.sides]
+    p = setting.parameters(mesh.vertices[vertices])
+    ids, _ = store.over_vertices(vertices, direct.z[direct.good], p, direct.index[direct.good])
+    pairing.fit()
+    pairing.enter_many(done, ids)
