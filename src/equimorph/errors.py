@@ -1,5 +1,8 @@
 """Errors that a caller can cause. Numerical failures are values with a status, never exceptions."""
 
+import difflib
+from collections.abc import Sequence
+
 
 class EquimorphError(Exception):
     """Base of all errors raised by equimorph."""
@@ -7,3 +10,18 @@ class EquimorphError(Exception):
 
 class InputError(EquimorphError, ValueError):
     """The caller's mistake: what is wrong, which value was given, what is allowed."""
+
+
+def suggestion(written: str, allowed: Sequence[str]) -> str:
+    """Sentence to end a message with when an allowed name is close to what was written, or nothing.
+
+    Examples
+    --------
+    >>> suggestion("intervalls", ["box", "intervals"])
+    ' Did you mean intervals?'
+    >>> suggestion("x", ["box", "intervals"])
+    ''
+    """
+    known = {name.lower(): name for name in allowed}
+    close = difflib.get_close_matches(written.lower(), known, n=1)
+    return f" Did you mean {known[close[0]]}?" if close else ""

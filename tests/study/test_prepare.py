@@ -34,7 +34,17 @@ WRONG = {
     "free parameter unknown": (
         "Delta = [-2.0",
         "Delt = [-2.0",
-        r"in `set\.box`: .*Theta, Delta, q",
+        r"in `set\.box`: .*Theta, Delta, q.*Did you mean Delta\?",
+    ),
+    "degrees for the box": (
+        "Theta = [0.2, 2.5]",
+        "Theta = [10, 140]",
+        r"in `set\.box`: `Theta` must be an angle in radians, within ±20; got 140\. .*write 2\.443",
+    ),
+    "degrees fixed": (
+        "{ Theta = [0.2, 2.5], Delta = [-2.0, 2.0] }\nfixed = { q = 2.5 }",
+        "{ Theta = [0.2, 2.5], q = [-2.0, 2.0] }\nfixed = { Delta = 30 }",
+        r"in `set\.fixed`: `Delta` must be an angle in radians",
     ),
     "fixed parameter unknown": ("q = 2.5", "w = 2.5", r"in `set\.fixed`: `w` must be a parameter"),
     "parameter free and fixed": ("q = 2.5", "Theta = 1.0", r"`set\.fixed` must not name .*Theta"),
@@ -44,7 +54,7 @@ WRONG = {
     "constraint on an unknown descriptor": (
         "max_curvature <= 20",
         "max_kurvature <= 20",
-        r"in `set\.within\[0\]`: `descriptor` must be one of .*max_kurvature",
+        r"in `set\.within\[0\]`: `descriptor` must be one of .*Did you mean max_curvature\?",
     ),
     "choice by an unknown descriptor": (
         'highest = "height(0.5)"',
@@ -79,7 +89,7 @@ WRONG = {
     "load that jumps backward": (
         '"uniform"',
         "[[0, 1], [0.7, 1], [0.3, 1], [1, 1]]",
-        r"in `structure`: `load` must be",
+        r"in `structure`: `load` must be .*got s falling from 0\.7 to 0\.3",
     ),
 }
 

@@ -93,9 +93,38 @@ WRONG = {
         '"../inside-out"',
         r"`route\[0\]\.name` must be made of letters, digits, - and _",
     ),
-    "one route for a list": ("[[route]]", "[route]", r"`route` must be a list"),
+    "one route for a list": (
+        "[[route]]",
+        "[route]",
+        r"`route` must be a list; .* Write \[\[route\]\]",
+    ),
     "no way-points": ("via = [{ Theta = 1.3 }, { Delta = 1.3 }]", "via = []", r"`route\[0\]\.via`"),
-    "malformed TOML": ("[set]", "[set", r"`arch\.toml` must be valid TOML; .*line 5"),
+    "malformed TOML": ("[set]", "[set", r"^arch\.toml: line 5 must be valid TOML; got \[set \("),
+    "text without quotes": (
+        'kind = "rod"',
+        "kind = rod",
+        r"line 2 must be valid TOML; got kind = rod \(.*column 8\)\. Text stands in quotes",
+    ),
+    "capital truth": ("margin = 0.1", "margin = True", r"got margin = True \(.*no capitals"),
+    "decimal comma": ("q = 2.5 }", "q = 2,5 }", r"line 7 .*decimals have a point"),
+    "quote not closed": ('"uniform"', '"uniform', r"line 3 .*got load = .uniform \(.*quote"),
+    "list not closed": ("[5, 9]", "[5, 9", r"line 11 .*Close what this line, or one above"),
+    "section given twice": ("[set]", "[structure]", r"line 5 .*Begin each section once"),
+    "key given twice": (
+        "intervals = [5, 9]",
+        "intervals = [5, 9]\nintervals = [5, 9]",
+        r"line 10 .*Give each key once",
+    ),
+    "number with a unit": (
+        "[0.2, 2.5]",
+        '["10 deg", 2.5]',
+        r'must be a number; got "10 deg"\. Write numbers without quotes and units; angles are in r',
+    ),
+    "constraint not in a list": (
+        'within = ["max_curvature <= 20"]\nintervals',
+        'within = "max_curvature <= 20"\nintervals',
+        r"`set\.within` must be a list; .*Put its entries in \[ \]",
+    ),
 }
 
 
@@ -135,6 +164,13 @@ def test_a_long_value_is_cut(arch_text: str):
 def test_a_missing_file_is_named(tmp_path: Path):
     with pytest.raises(InputError, match=r"none\.toml: No such file or directory"):
         read_study_text(tmp_path / "none.toml")
+
+
+def test_a_mark_at_the_beginning_and_other_line_ends_do_not_count(arch_text: str, tmp_path: Path):
+    """As editors on other systems leave them."""
+    (tmp_path / "arch.toml").write_bytes(b"\xef\xbb\xbf" + arch_text.replace("\n", "\r\n").encode())
+    text = read_study_text(tmp_path / "arch.toml")
+    assert parse_study(text, "arch.toml") == parse_study(arch_text, "arch.toml")
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path):

@@ -6,20 +6,22 @@ Everything heavy is imported inside the command that needs it, so that ``--help`
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from equimorph.errors import InputError
 
+PROGRAM = "equimorph"
 BAD_INPUT = 2
 LONGEST_LINE = 450
 INTERRUPTED = 130
 """What shells say of a program that was ended by Ctrl-C."""
+WrongUsage: Any = typer.BadParameter.__base__
+"""Class of all complaints about words on the command line; typer does not name it."""
 
 app = typer.Typer(
     add_completion=False,
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="Quasi-static shape control of soft, morphing structures.",
@@ -35,14 +37,22 @@ class Kind(StrEnum):
 
 def main() -> None:
     """Run the command line: what cannot be done is one line on stderr and exit code 2."""
+    words = sys.argv[1:]
     try:
-        app()
+        code = app(words or ["--help"], prog_name=PROGRAM, standalone_mode=False)
+    except WrongUsage as error:
+        command = error.ctx.command_path if error.ctx else PROGRAM
+        _complain(f"{error.format_message()} See {command} --help.")
+        sys.exit(BAD_INPUT)
     except InputError as error:
         _complain(str(error))
         sys.exit(BAD_INPUT)
+    except typer.Abort:
+        sys.exit(INTERRUPTED)
     except MemoryError:
         _complain("the computation must fit into memory; reduce `set.intervals` or `set.box`.")
         sys.exit(BAD_INPUT)
+    sys.exit((code or 0) if words else BAD_INPUT)
 
 
 def _complain(message: str) -> None:
@@ -87,12 +97,9 @@ def new(
 @app.command()
 def check(file: Annotated[Path, typer.Argument(help="Study file.")]) -> None:
     """Check a study file without computing anything."""
-    from equimorph.study import check_memory, parse_study, prepare, read_study_text
+    from equimorph.cli.show import check_and_show
 
-    study = parse_study(read_study_text(file), file.name)
-    check_memory(prepare(study))
-    points, routes = _count(len(study.equilibria), "point"), _count(len(study.routes), "route")
-    typer.echo(f"{file} is a sound study with {points} and {routes}.")
+    check_and_show(file)
 
 
 @app.command()
@@ -117,7 +124,3 @@ def run(
             err=True,
         )
         raise typer.Exit(INTERRUPTED) from None
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"

@@ -10,7 +10,25 @@ from rich.table import Table
 from equimorph.cli.progress import ScreenProgress
 from equimorph.model import Descriptor
 from equimorph.structures import States
-from equimorph.study import Outcome, RouteOutcome, run_study
+from equimorph.study import Outcome, Problem, RouteOutcome, read_problem, run_study
+from equimorph.study.memory import amount, estimated_memory
+
+
+def check_and_show(file: Path) -> None:
+    """Check a study, then print what running it would compute.
+
+    Parameters
+    ----------
+    file
+        Study file.
+    """
+    screen = Console(highlight=False)
+    _, study, problem = read_problem(file)
+    points, routes = _count(len(study.equilibria), "point"), _count(len(study.routes), "route")
+    screen.print(
+        f"{escape(str(file))} is a sound study with {points} and {routes}.", soft_wrap=True
+    )
+    screen.print(_extent(problem), soft_wrap=True)
 
 
 def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
@@ -32,6 +50,21 @@ def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
         outcome = run_study(file, out, replace=replace, progress=progress)
     _show(outcome, screen)
     screen.print(f"Report: {out / 'index.html'}", soft_wrap=True)
+
+
+def _extent(problem: Problem) -> str:
+    """Every parameter with its values, also those that the study leaves at their defaults."""
+    box, known = problem.box, problem.structure.parameters
+    limits = zip(box.names, box.lower, box.upper, problem.intervals, strict=True)
+    free = [f"{name} from {low:g} to {up:g} in {n} intervals" for name, low, up, n in limits]
+    values = {each.name: problem.fixed.get(each.name, each.default) for each in known}
+    fixed = [f"{name} = {value:g}" for name, value in values.items() if name not in box.names]
+    memory = amount(estimated_memory(problem.structure.size, problem.intervals))
+    return f"{', '.join(free)}; {', '.join(fixed)}. Memory: about {memory}."
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
 
 
 def _show(outcome: Outcome, screen: Console) -> None:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.errors import InputError
+from equimorph.errors import InputError, suggestion
 
 Role = Literal["actuator", "load", "fixed"]
 
@@ -58,7 +58,10 @@ def position(parameters: Sequence[Parameter], name: str) -> int:
     """Place of the parameter called `name`; `InputError` names the ones there are."""
     names = names_of(parameters)
     if name not in names:
-        raise InputError(f"`{name}` must be a parameter ({', '.join(names)}); got {name!r}.")
+        raise InputError(
+            f"`{name}` must be a parameter ({', '.join(names)}); got {name!r}."
+            f"{suggestion(name, names)}"
+        )
     return names.index(name)
 
 

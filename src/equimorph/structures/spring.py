@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Bool, Float
 
-from equimorph.errors import InputError
+from equimorph.errors import InputError, suggestion
 from equimorph.linalg import BorderedSolution, solve_bordered
 from equimorph.model import Descriptor, Parameter, parameter_vector
 from equimorph.structures.contract import Direction, Structure, Symmetry
@@ -203,5 +203,8 @@ class Spring(Structure):
         if name == "energy":
             return Descriptor("energy", "force·length", self.energy, "E", self.signature)
         if name not in {"angle", "height"}:
-            raise InputError(f"`descriptor` must be angle, height or energy; got {text!r}.")
+            raise InputError(
+                f"`descriptor` must be angle, height or energy; got {text!r}."
+                f"{suggestion(name, ('angle', 'height', 'energy'))}"
+            )
         return self.angle if name == "angle" else self.height

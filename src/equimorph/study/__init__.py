@@ -4,7 +4,7 @@ from equimorph.study.memory import check_memory
 from equimorph.study.outcome import Outcome, RouteOutcome
 from equimorph.study.prepare import Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
-from equimorph.study.run import run_study
+from equimorph.study.run import read_problem, run_study
 
 __all__ = [
     "Outcome",
@@ -14,6 +14,7 @@ __all__ = [
     "check_memory",
     "parse_study",
     "prepare",
+    "read_problem",
     "read_study_text",
     "run_study",
 ]

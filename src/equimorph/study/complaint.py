@@ -1,6 +1,5 @@
 """One line for a wrong study file: which key, which value, what is allowed."""
 
-import difflib
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from equimorph.errors import InputError
+from equimorph.errors import InputError, suggestion
 
 LONGEST = 60
 """Characters of a key or value in a message."""
@@ -62,10 +61,11 @@ def short(value: object) -> str:
         text = json.dumps(value, ensure_ascii=False, default=str)
     except ValueError:
         text = "a number of thousands of digits"
-    return _cut(text)
+    return cut(text)
 
 
-def _cut(text: str) -> str:
+def cut(text: str) -> str:
+    """Text, cut to a readable length."""
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
@@ -77,7 +77,7 @@ def key_path(location: tuple[int | str, ...]) -> str:
     >>> key_path(("route", 0, "start"))
     'route[0].start'
     """
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{_cut(part)}" for part in location)
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{cut(part)}" for part in location)
     return path.removeprefix(".")
 
 
@@ -92,7 +92,18 @@ def _sentence(finding: ErrorDetails, model: type[BaseModel]) -> str:
     requirement = _REQUIREMENTS.get(kind, finding["msg"])
     requirement = requirement.format_map(_Forgiving(finding.get("ctx", {})))
     got = "nothing" if kind == "missing" else short(finding["input"])
-    return f"{name} must {requirement}; got {got}."
+    return f"{name} must {requirement}; got {got}.{_remedy(kind, finding['input'], location)}"
+
+
+def _remedy(kind: str, given: object, location: tuple[int | str, ...]) -> str:
+    """How to write what was probably meant, as a sentence to end the line with."""
+    if kind in ("float_type", "int_type") and isinstance(given, str):
+        return " Write numbers without quotes and units; angles are in radians."
+    if kind == "list_type" and len(location) == 1:
+        return f" Write [[{location[0]}]] above each."
+    if kind == "list_type" and not isinstance(given, dict):
+        return " Put its entries in [ ]."
+    return ""
 
 
 def _as_written(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
@@ -116,10 +127,11 @@ def _unknown_key(
     allowed = sorted(_keys_at(loc[:-1], model))
     place = key_path(location[:-1])
     where = f"a key of `{place}`" if place else "a section of a study"
-    close = difflib.get_close_matches(str(loc[-1]), allowed, n=1)
-    remedy = f" Did you mean {close[0]}?" if close else ""
-    got = _cut(str(loc[-1]))
-    return f"`{key_path(location)}` must be {where} ({', '.join(allowed)}); got {got}.{remedy}"
+    written = str(loc[-1])
+    return (
+        f"`{key_path(location)}` must be {where} ({', '.join(allowed)}); got {cut(written)}."
+        f"{suggestion(written, allowed)}"
+    )
 
 
 def _keys_at(loc: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:

@@ -143,7 +143,8 @@ def writable(path: Path) -> Generator[None]:
     try:
         yield
     except OSError as error:
-        reason = error.strerror or str(error)
+        blocked = isinstance(error, FileExistsError | NotADirectoryError)
+        reason = "a file is in its place" if blocked else error.strerror or str(error)
         if error.errno in _FULL:
             raise InputError(
                 f"`results folder` must have room for the results; got {path}: {reason}. What is "

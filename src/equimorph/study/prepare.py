@@ -20,6 +20,9 @@ from equimorph.study.problem import (
     Study,
 )
 
+LARGEST_ANGLE = 20.0
+"""Radians; ends turned further against each other need curvatures above 40 everywhere."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -65,7 +68,7 @@ def prepare(study: Study) -> Problem:
     with at_key("set.box"):
         box = Box(**{name: (bounds[0], bounds[1]) for name, bounds in wanted.box.items()})
         for name, corner in zip(box.names * 2, [*box.lower, *box.upper], strict=True):
-            structure.parameters[position(structure.parameters, name)].check(corner)
+            _check_value(structure, name, corner)
     _check_fixed(structure, box, wanted.fixed)
     for i, point in enumerate(study.equilibria):
         check_point(box, point.at, f"equilibria[{i}].at")
@@ -122,11 +125,24 @@ def check_point(box: Box, point: Mapping[str, float], key: str, *, whole: bool =
             )
 
 
+def _check_value(structure: Structure, name: str, value: float) -> None:
+    """Refuse a value without meaning, and angles that must be degrees."""
+    parameter = structure.parameters[position(structure.parameters, name)]
+    parameter.check(value)
+    if parameter.unit == "rad" and abs(value) > LARGEST_ANGLE:
+        raise InputError(
+            f"`{name}` must be an angle in radians, within ±{LARGEST_ANGLE:g}; got {value:g}. "
+            f"If these are degrees, write {np.deg2rad(value):.4g}."
+        )
+
+
 def _check_fixed(structure: Structure, box: Box, fixed: Mapping[str, float]) -> None:
     both = sorted(set(box.names) & set(fixed))
     if both:
         raise InputError(f"`set.fixed` must not name what `set.box` frees; got {', '.join(both)}.")
     with at_key("set.fixed"):
+        for name, value in fixed.items():
+            _check_value(structure, name, value)
         middle = dict(zip(box.names, 0.5 * (box.lower + box.upper), strict=True))
         vector = parameter_vector(structure.parameters, {**middle, **fixed})
     assert np.isfinite(vector).all()

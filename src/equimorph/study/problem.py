@@ -4,7 +4,6 @@ A study is data only. It names a structure, a part of its equilibrium set, point
 are wanted, and routes between states. Types are strict and unknown keys are refused.
 """
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,6 +14,7 @@ from equimorph.errors import InputError
 from equimorph.study.complaint import complaint
 from equimorph.study.expressions import LARGEST, parse_comparison
 from equimorph.study.names import PLANE, STABLE_PLANE
+from equimorph.study.syntax import parse_toml
 
 
 def _requirement(text: str) -> PydanticCustomError:
@@ -223,7 +223,7 @@ def read_study_text(path: Path) -> str:
         If the file is missing or no text.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # some editors begin files with a mark
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
         raise InputError(f"`study file` must be a readable file; got {path}: {reason}.") from error
@@ -244,14 +244,7 @@ def parse_study(text: str, name: str) -> Study:
     InputError
         If `text` is no TOML or holds a key or value that is not allowed.
     """
-    try:
-        content = tomllib.loads(text)
-    except RecursionError as error:
-        raise InputError(
-            f"`{name}` must be a study; got lists or tables nested too deep."
-        ) from error
-    except ValueError as error:  # TOML that is malformed, or a number of thousands of digits
-        raise InputError(f"`{name}` must be valid TOML; got an error: {error}.") from error
+    content = parse_toml(text, name)
     try:
         return Study.model_validate(content)
     except ValidationError as error:

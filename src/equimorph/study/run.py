@@ -7,6 +7,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent
 from equimorph.storage import write_results, write_schedule
@@ -56,10 +57,7 @@ def run_study(
         stable equilibrium, or a folder that cannot be written, is in use, or holds something else.
     """
     sink = MemoryWatch(progress or Silent())
-    text = read_study_text(path)
-    study = parse_study(text, path.name)
-    problem = prepare(study)
-    check_memory(problem)
+    text, study, problem = read_problem(path)
     with open_results_folder(out, study, replace=replace) as folder:
         outcome = solve(study, problem, folder, sink)
         same_words = folder.holds([INPUT_COPY]) and read_text(out / INPUT_COPY) == text
@@ -72,6 +70,28 @@ def run_study(
                 page = report(outcome, folder.path, text, study.title or path.stem)
                 (staging / REPORT).write_text(page, encoding="utf-8")
     return outcome
+
+
+def read_problem(path: Path) -> tuple[str, Study, Problem]:
+    """Read a study file that can be run here.
+
+    Returns
+    -------
+    Its text, what it says, and the objects that it stands for.
+
+    Raises
+    ------
+    InputError
+        For a wrong study file, or one that needs more memory than there is.
+    """
+    text = read_study_text(path)
+    study = parse_study(text, path.name)
+    try:
+        problem = prepare(study)
+        check_memory(problem)
+    except InputError as error:
+        raise InputError(f"{path.name}: {error}") from error
+    return text, study, problem
 
 
 def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progress) -> Outcome:

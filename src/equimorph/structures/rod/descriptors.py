@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.errors import InputError
+from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
 from equimorph.structures.rod.mechanics import RodMechanics
 
@@ -15,8 +15,8 @@ Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
 
 WRITTEN = (
-    "height(s), x(s), angle(s), curvature(s), max_curvature, energy, support_force(lambda), "
-    "support_force(mu), end_moment(0), end_moment(1)"
+    *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy"),
+    *("support_force(lambda)", "support_force(mu)", "end_moment(0)", "end_moment(1)"),
 )
 REFINING = 6
 """Newton iterations on the finer rod, started from the interpolated state."""
@@ -132,7 +132,10 @@ def named(rod: RodMechanics, text: str) -> Descriptor:
         if name in {"height", "x"}:
             return coordinate(rod, s, int(name == "height"))
         return angle(rod, s) if name == "angle" else curvature(rod, s)
-    raise InputError(f"`descriptor` must be one of {WRITTEN}; got {text!r}.")
+    raise InputError(
+        f"`descriptor` must be one of {', '.join(WRITTEN)}; got {text!r}."
+        f"{suggestion(text, WRITTEN)}"
+    )
 
 
 def total_energy(rod: RodMechanics) -> Descriptor:

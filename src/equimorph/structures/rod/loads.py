@@ -77,9 +77,12 @@ def _from_table(identity: Any, table: Float[np.ndarray, "..."]) -> LoadShape:
     if not np.isfinite(table).all():
         raise InputError("`load` must be finite; got a table with NaN or infinite entries.")
     s, q = table[:, 0], table[:, 1]
-    if s[0] != 0.0 or s[-1] != 1.0 or (np.diff(s) < 0).any():
+    falls = np.flatnonzero(np.diff(s) < 0)
+    if s[0] != 0.0 or s[-1] != 1.0 or len(falls):
+        wrong = s[falls[0] : falls[0] + 2] if len(falls) else s[[0, -1]]
         raise InputError(
-            f"`load` must be a table with s rising from 0 to 1; got s from {s[0]:g} to {s[-1]:g}."
+            "`load` must be a table with s rising from 0 to 1; got s "
+            f"{'falling' if len(falls) else 'rising'} from {wrong[0]:g} to {wrong[1]:g}."
         )
     inside = np.unique(s[(s > 0) & (s < 1)])
 
