@@ -16,10 +16,12 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 SPAN = float(np.sin(1.0))
+FORCE = 4.0 * np.pi**2
 TOLERANCE = 1e-13
 
 
@@ -35,6 +37,26 @@ UNIFORM = Load(lambda s: s)
 LEFT_HALF = Load(lambda s: min(2.0 * s, 1.0), (0.0, 0.5, 1.0))
 
 
+@njit(cache=True)
+def _rates(state, rho, q, lam, mu):
+    """d/ds of θ, κ, x, y, E and of ∂(θ, κ, x, y)/∂(κ₀, λ, μ, q), quantity by quantity."""
+    theta, kappa = state[0], state[1]
+    sine, cosine, pull = np.sin(theta), np.cos(theta), q * rho - mu
+    slope = -FORCE * (lam * cosine - pull * sine)
+    rates = np.empty(21)
+    rates[0], rates[1] = kappa, -FORCE * (pull * cosine + lam * sine)
+    rates[2], rates[3] = cosine, sine
+    rates[4] = kappa**2 / (2.0 * FORCE) - q * rho * sine
+    for k in range(4):
+        dtheta = state[5 + k]
+        rates[5 + k], rates[9 + k] = state[9 + k], slope * dtheta
+        rates[13 + k], rates[17 + k] = -sine * dtheta, cosine * dtheta
+    rates[10] -= FORCE * sine  # by λ
+    rates[11] += FORCE * cosine  # by μ
+    rates[12] -= FORCE * rho * cosine  # by q
+    return rates
+
+
 @dataclass(frozen=True)
 class Rod:
     """One initial value problem: parameters and shooting unknowns."""
@@ -47,23 +69,7 @@ class Rod:
     w: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def _rates(self, s: float, state: np.ndarray) -> np.ndarray:
-        theta, kappa = state[:2]
-        _, lam, mu = self.w
-        sine, cosine, rho = np.sin(theta), np.cos(theta), self.load.rho(s)
-        pull = self.q * rho - mu
-        force = -4.0 * np.pi**2 * (pull * cosine + lam * sine)
-        slope = -4.0 * np.pi**2 * (lam * cosine - pull * sine)
-        dtheta, dkappa = state[5:9], state[9:13]
-        rates = np.empty(21)
-        rates[:5] = kappa, force, cosine, sine, kappa**2 / (8.0 * np.pi**2) - self.q * rho * sine
-        rates[5:9] = dkappa
-        rates[9:13] = slope * dtheta
-        rates[10] -= 4.0 * np.pi**2 * sine  # by λ
-        rates[11] += 4.0 * np.pi**2 * cosine  # by μ
-        rates[12] -= 4.0 * np.pi**2 * rho * cosine  # by q
-        rates[13:17] = -sine * dtheta
-        rates[17:21] = cosine * dtheta
-        return rates
+        return _rates(state, self.load.rho(s), self.q, self.w[1], self.w[2])
 
     def integrate(self, stop: float = 1.0, dense: bool = False) -> list:
         """Solutions from kink to kink: θ, κ, x, y, E and ∂(θ, κ, x, y)/∂(κ₀, λ, μ, q)."""

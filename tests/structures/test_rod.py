@@ -180,7 +180,7 @@ def test_error_estimate_bounds_the_error_of_curvature_and_height(elements, degre
     error = np.abs(rod.fields(z, p, s) - reference.fields(fine, p, s))[:, :, [1, 3]].max()
     peak = np.abs(rod.largest_curvature(z, p)[0] - reference.largest_curvature(fine, p)[0])[0]
     estimate = rod.error_estimate(z, p)[0]
-    assert max(error, peak) < 1.5 * estimate + 1e-11
+    assert max(error, peak) < estimate + 1e-11
     assert estimate < 30 * max(error, peak) + 1e-11
 
 

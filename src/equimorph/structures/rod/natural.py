@@ -14,7 +14,7 @@ Values = Float[np.ndarray, " lanes"]
 Flags = Bool[np.ndarray, " lanes"]
 
 FIRST_STEP = 0.25
-SMALLEST_STEP = 1e-4
+SMALLEST_STEP = 1e-8
 ITERATIONS = 7
 CONVERGED = 1e-6
 """Newton correction after which the error is below 1e-11, on the way."""

@@ -37,7 +37,10 @@ def _why_not(natural: Natural) -> str:
                 f"Continued from the free rod it ends at nu={natural.span[0]:.9g}. "
                 "Choose a span nearer to the free one."
             )
-    return "It bends too sharply for the elements. Choose more elements, or a smaller span."
+    return (
+        f"Pulled straighter than nu={natural.span[0]:.6f} it bends too sharply for the elements. "
+        "Choose a span up to that, or more elements."
+    )
 
 
 class Rod(RodMechanics):
@@ -55,12 +58,13 @@ class Rod(RodMechanics):
     load
         "uniform", "left-half", a table [[s, Q], ...] or a callable Q(s). q > 0 acts downward.
     span
-        Default of the parameter ν, distance of the ends, between 0 and 1.
+        Default of the parameter ν, distance of the ends, between 0 and 1. Near 1 the rod bends
+        within about 1 − ν of its ends: the default elements reach ν = 0.998 at Θ = 0.9.
     kinks
         Arclengths at which a callable Q is not smooth.
     elements, degree
-        Resolution: the default keeps limit loads, heights and curvature within 1e-8 for
-        max |κ| ≤ 10; `error_estimate` tells what it is worth beyond.
+        Resolution: the default, six elements of degree 9, keeps limit loads, heights and
+        curvature within 1e-8 for max |κ| ≤ 10; `error_estimate` bounds what it loses beyond.
 
     Raises
     ------
@@ -165,7 +169,7 @@ class Rod(RodMechanics):
         if natural.outcome[0] != Outcome.FOUND:
             raise InputError(
                 f"`Theta`, `Delta` must have a natural state; got Theta={p[0]:g}, Delta={p[1]:g} "
-                f"at nu={p[3]:g}. {_why_not(natural)}"
+                f"at nu={float(p[3])!r}. {_why_not(natural)}"
             )
         return State(self, natural.z[0], p)
 
@@ -175,11 +179,11 @@ class Rod(RodMechanics):
         return States(self, z, p), found
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
-        """Change of curvature and height when the state is solved again with a higher degree.
+        """Bound of the errors of curvature and height, by solving again with a higher degree.
 
-        The largest change of max |κ|, and of κ(s) and y(s) at 25 arclengths; the heights' part is
-        the smallest by far. Infinite where the finer rod has no equilibrium beside the state, as
-        may happen at a fold.
+        Twice the largest change of max |κ|, and of κ(s) and y(s) at 25 arclengths; the heights'
+        part is the smallest by far. Infinite where the finer rod has no equilibrium beside the
+        state, as may happen at a fold.
         """
         return descriptors.discretisation_error(self, self.refined(), z, p)
 
