@@ -70,7 +70,7 @@ def test_the_free_rod_really_folds_where_it_is_said_to():
 
 def _free_state(rod, p):
     """Free-span state at the end angles of p, by the package's own continuation."""
-    part = natural._Part(p * [0.0, 0.0, 0.0, 1.0], p, free=True)
+    part = natural._free_part(p)
     x = np.zeros((1, rod.size + 1))
     x[0, -1] = 1.0
     return np.ascontiguousarray(natural._follow(rod, part, x)[1][:, :-1])
@@ -104,3 +104,26 @@ def test_states_of_a_batch_do_not_depend_on_the_batch(monkeypatch):
     apart = natural_arch(rod, p)
     np.testing.assert_array_equal(together.outcome, apart.outcome)
     np.testing.assert_allclose(together.z, apart.z, atol=1e-9)
+
+
+@pytest.mark.parametrize("Theta", [0.001, 0.01, 0.05])
+def test_a_rod_that_is_all_but_straight_buckles_upward(Theta):
+    """As Θ → 0 the elastica with end angles zero: λ = 1.05299, rise 0.19492 at ν = 0.9.
+
+    [Love1927]_, §§ 262-263; terms of order Θ apart.
+    """
+    state = Rod().natural_state(Theta=Theta, nu=0.9)
+    assert state.stable
+    assert state.multipliers[0] == pytest.approx(1.05299, abs=1.2 * Theta)
+    assert Rod().height(0.5)(state) == pytest.approx(0.19492, abs=1.2 * Theta)
+
+
+def test_natural_states_pulled_too_straight_are_refused_up_to_the_span_named():
+    """The span in the message is resolved, with an error below 0.1 of a curvature near 50."""
+    rod = Rod()
+    with pytest.raises(InputError, match=r"Pulled straighter than nu=0\.99") as refusal:
+        rod.natural_state(Theta=0.9, nu=0.998)
+    span = float(str(refusal.value).split("straighter than nu=")[1].split()[0])
+    state = rod.natural_state(Theta=0.9, nu=span - 1e-5)
+    assert state.error_estimate < 0.1
+    assert rod.max_curvature(state) == pytest.approx(50.0, rel=0.1)

@@ -72,17 +72,17 @@ def _continue(
     stop = p[lanes] * [1.0, 1.0, 0.0, 1.0]
     x = np.zeros((len(lanes), rod.size + 1))
     x[:, -1] = 1.0
-    out.scale[lanes], x = _follow(rod, _Part(stop * [0.0, 0.0, 0.0, 1.0], stop, free=True), x)
+    out.scale[lanes], x = _follow(rod, _free_part(stop), x)
     out.span[lanes], free = x[:, -1], out.scale[lanes] >= 1.0
     out.outcome[lanes[~free]] = Outcome.FREE_FOLD
     lanes, x, stop = lanes[free], x[free], stop[free]
     start = stop.copy()
     start[:, 3] = x[:, -1]
-    last = _Part(start, stop, free=False)
+    # a rod that is pulled straighter cannot fold, but bends within ever shorter ends
+    stretched = stop[:, 3] > start[:, 3]
+    last = _Part(start, stop, False, stretched & rod.resolved(x[:, :-1], start))
     t, x = _follow(rod, last, x)
     out.span[lanes], there = x[:, -1], t >= 1.0
-    # a rod that is pulled straighter cannot fold
-    stretched = stop[:, 3] > start[:, 3]
     out.outcome[lanes[~there]] = np.where(stretched, Outcome.UNRESOLVED, Outcome.SPAN_FOLD)[~there]
     reached = np.flatnonzero(there)
     exact = _newton(rod, last, reached, np.ones(len(reached)), x[reached])[0].x[:, :-1]
@@ -91,11 +91,20 @@ def _continue(
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One part of the way, from `start` to `stop`: with λ = 0 and ν free, or with ν prescribed."""
+    """One part of the way, from `start` to `stop`: with λ = 0 and ν free, or with ν prescribed.
+
+    `sharpening` lanes end where the elements no longer resolve them.
+    """
 
     start: Parameters
     stop: Parameters
     free: bool
+    sharpening: Flags
+
+
+def _free_part(stop: Parameters) -> _Part:
+    """From the straight rod to the end angles, with the span free."""
+    return _Part(stop * [0.0, 0.0, 0.0, 1.0], stop, True, np.zeros(len(stop), bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,8 +169,8 @@ def _newton(
 ) -> tuple[_Point, Values]:
     """Solve at share t of the part; the point, and the second correction relative to the first.
 
-    Infinite where Newton does not converge or the equilibrium is not stable: the free span also
-    needs dν/dλ < 0.
+    Infinite where Newton does not converge, the equilibrium is not stable (the free span also needs
+    dν/dλ < 0), or the elements no longer resolve it.
     """
     change = part.stop[lanes] - part.start[lanes]
     at = part.start[lanes] + t[:, None] * change
@@ -181,7 +190,10 @@ def _newton(
         if not (size > CONVERGED).any():
             break
     stable = (step.index == 0) & ((step.tangent_t < 0.0) if part.free else True)
-    bend = np.where(stable & (size <= CONVERGED), worst / np.maximum(first, 1e-6), np.inf)
+    good = stable & (size <= CONVERGED)
+    if part.sharpening[lanes].any():
+        good &= rod.resolved(z, at) | ~part.sharpening[lanes]
+    bend = np.where(good, worst / np.maximum(first, 1e-6), np.inf)
     slope = np.zeros_like(guess)
     if not part.free:  # the last matrix is that of the point, but for a correction below 1e-6
         slope[:, :-1] = step.tangent_z * change[:, 3:]

@@ -59,7 +59,7 @@ class Rod(RodMechanics):
         "uniform", "left-half", a table [[s, Q], ...] or a callable Q(s). q > 0 acts downward.
     span
         Default of the parameter ν, distance of the ends, between 0 and 1. Near 1 the rod bends
-        within about 1 − ν of its ends: the default elements reach ν = 0.998 at Θ = 0.9.
+        within about 1 − ν of its ends: the default elements resolve it up to ν = 0.99 at Θ = 0.9.
     kinks
         Arclengths at which a callable Q is not smooth.
     elements, degree
