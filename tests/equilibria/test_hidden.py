@@ -1,5 +1,7 @@
 """Events that neither the index nor the direction of a step betrays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import Phase, example, given, settings
@@ -25,6 +27,35 @@ places = st.floats(-0.6, 0.6)
 def _fast():
     with unchecked():
         yield
+
+
+class Determined(Polynomial):
+    """Polynomial whose steps tell the determinant, as those of rods do."""
+
+    def advance(self, z, p, dp, row, corner, defect):
+        out = super().advance(z, p, dp, row, corner, defect)
+        return replace(out, determinant=np.linalg.det(self.second(z, p)[:, :, : self.size]))
+
+
+@QUICK
+@given(power=st.floats(-6.0, -1.0), centre=places, c=factors)
+def test_determinants_separate_pairs_of_branch_points_without_any_probe(power, centre, c):
+    """x (x² + (a − centre)² − depth) = 0 on x = 0, many lanes with their own ends."""
+    depth = 10.0**power
+
+    def energy(x, a):
+        return c * (x**4 * 0.25 + ((a - centre) ** 2 - depth) * x**2 * 0.5)
+
+    stop = np.linspace(centre + np.sqrt(depth) + 0.05, 1.0, 5)[:, None]
+    curve = ParameterLine(Determined(energy, 1, ("a",)), np.full((5, 1), -1.0), stop + 1.0)
+    through = TraceOptions(through_folds=True, through_branch_points=True, record=False)
+    passed = follow(curve, np.zeros((5, 1)), options=through).passed
+    assert passed.lanes.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
+    a = -1.0 + passed.t * curve.velocity[passed.lanes, 0]
+    root = np.sqrt(depth)
+    assert a.reshape(5, 2) == pytest.approx(np.tile([centre - root, centre + root], (5, 1)))
+    outcome = follow(curve, np.zeros((5, 1)), options=TraceOptions(record=False))
+    assert outcome.code.tolist() == [BRANCH] * 5
 
 
 def dipping(depth, centre, c=1.0):

@@ -154,6 +154,18 @@ def test_fused_step_equals_the_plain_route(specimen):
             np.testing.assert_allclose(getattr(fused, name), exact, rtol=1e-9, atol=bound)
 
 
+def test_determinant_that_the_fused_step_tells_is_that_of_the_matrix():
+    """Inverse by as many solves as columns. Tolerance: round-off times the condition."""
+    rod = Rod(elements=6, degree=4)
+    generator = np.random.default_rng(3)
+    p = np.array([rod.natural_state(Theta=0.9, Delta=0.1).p] * 4)
+    z = rod.sample(p, generator)
+    inverse = rod.solve(z, p, np.tile(np.eye(rod.size), (4, 1, 1))).x
+    one = np.ones(4)
+    told = rod.advance(z, p, p, z, one, one).determinant
+    assert told == pytest.approx(1.0 / np.linalg.det(inverse), rel=1e-9)
+
+
 @every_structure
 def test_a_lane_that_is_no_number_leaves_the_other_steps_alone(specimen):
     structure = specimen.structure

@@ -16,12 +16,13 @@ SUMS = {**FLAGS, "fastmath": {"contract", "reassoc"}, "_nrt": False}
 
 (
     T, SLOPE, T_OLD, SLOPE_OLD, ARC, TRIAL, CORNER, DEFECT, LENGTH, TRAVELLED, LAST, WEIGHT,
-    LARGEST, TURNING, NEW_SLOPE, NORM, TURN,
-) = range(17)  # fmt: skip
+    LARGEST, TURNING, NEW_SLOPE, NORM, TURN, DET_OLD, DET, NEW_DET,
+) = range(20)  # fmt: skip
 """Rows of `numbers`: t and dt/ds here and at the step before, its arclength; t, closing equation
 and length of the step that is tried; way so far; last correction; squared weight of dt; knobs;
-dt/ds at the end, length of the tangent and turning angle of a step that converged."""
-NUMBERS = 17
+dt/ds at the end, length of the tangent and turning angle of a step that converged; determinant of
+F_z at the step before, here and at the end."""
+NUMBERS = 20
 
 LANE, STAGE, ITERATION, INDEX, NEW_INDEX, WHAT, STEPS, MOST, LEVEL = range(9)
 """Rows of `counts`: number of the lane; stage; Newton steps so far; index here and at the end of
@@ -52,6 +53,9 @@ MULTIPLIER_WEIGHT = 1e-2
 """Weight of the multipliers' squares in the norm of corrections (they are not in the metric)."""
 BACK = 0.4
 """Factor of a step's length after a refusal."""
+DIP, WIDE = 0.1, 1e-3
+"""Least determinant inside a step, as a share of those at its ends, below which the step may hide
+two events; length from which on it is refused then."""
 
 
 @njit(**SUMS)
@@ -132,7 +136,7 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
 
 
 @njit(**{**SUMS, "_nrt": True})
-def judge(index, numbers, counts, active, smallest, locates):
+def judge(index, determinant, numbers, counts, active, smallest, locates):
     """Tell what happened in steps that converged, and refuse those that hide something.
 
     Returns how many steps are good, and in how many of them something happened that only a branch
@@ -142,7 +146,7 @@ def judge(index, numbers, counts, active, smallest, locates):
     for i in range(active):
         if counts[STAGE, i] != CONVERGED:
             continue
-        counts[NEW_INDEX, i] = index[i]
+        counts[NEW_INDEX, i], numbers[NEW_DET, i] = index[i], determinant[i]
         old, new, length = numbers[SLOPE, i], numbers[NEW_SLOPE, i], numbers[LENGTH, i]
         start, end = numbers[T, i], numbers[TRIAL, i]
         flipped = np.sign(new) != np.sign(old)
@@ -159,6 +163,7 @@ def judge(index, numbers, counts, active, smallest, locates):
         hidden = reach >= 1.0 if old > 0.0 else reach <= 0.0
         hidden = (hidden or (what & (ARRIVAL | RETURN)) != 0) and length > 10 * smallest
         bad = changed > 1 or (flipped and hidden) or _turns_twice(old, new, end - start, length)
+        bad = bad or (length > WIDE and changed == 0 and _dips(i, numbers))
         if bad or (flipped and not fold and not locates):
             counts[STAGE, i] = REFUSED
             continue
@@ -182,6 +187,27 @@ def _turns_twice(old, new, gain, length):
     bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
     share = min(max(-bend / (3 * bow), 0.0), 1.0) if bow > 0.0 else 0.0
     return a + 2 * share * bend + 3 * share * share * bow < 0.0
+
+
+@njit(**SUMS)
+def _dips(i, numbers):
+    """Whether the determinant may touch zero, or cross it twice, inside a step.
+
+    By the parabola through its values at both ends and at the end of the step before.
+    """
+    before, length = numbers[ARC, i], numbers[LENGTH, i]
+    here, there = numbers[DET, i], numbers[NEW_DET, i]
+    if not (before > 0.0 and here * there > 0.0):
+        return False
+    sign = np.sign(here)
+    last, here, there = sign * numbers[DET_OLD, i], sign * here, sign * there
+    rise, next_rise = (here - last) / before, (there - here) / length
+    bow = (next_rise - rise) / (before + length)
+    slope = rise + bow * before
+    # the least value lies inside if the parabola falls at the start and rises at the end
+    if not (slope < 0.0 and slope + 2.0 * bow * length > 0.0):
+        return False
+    return here - slope * slope / (4.0 * bow) < DIP * min(here, there)
 
 
 @njit(**SUMS)
@@ -280,6 +306,7 @@ def _take_over(i, new_tangent, mass, places, numbers, counts):
     numbers[T_OLD, i], numbers[SLOPE_OLD, i] = numbers[T, i], numbers[SLOPE, i]
     numbers[T, i], numbers[SLOPE, i] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
     counts[INDEX, i] = counts[NEW_INDEX, i]
+    numbers[DET_OLD, i], numbers[DET, i] = numbers[DET, i], numbers[NEW_DET, i]
     numbers[TRAVELLED, i] += length
     growth = numbers[TURNING, i] / max(numbers[TURN, i], 1e-3)
     numbers[LENGTH, i] = min(length * min(max(growth, 0.5), 2.0), numbers[LARGEST, i])
@@ -325,10 +352,10 @@ def predict(i, mass, places, numbers, counts):
 def seat(lanes, levels, knobs, start, move, mass, weight, places, numbers, counts, active):
     """Start lanes behind the active ones at t = 0; return how many cannot be started.
 
-    `start`: their points, already corrected tangents and index as (z, dz, tangent, slope, index);
+    `start`: their points; `move`: their corrections, tangents, dt/ds, index and determinants;
     `knobs`: first and largest step, turning and most steps for each level of retries.
     """
-    dz, tangent, slope, index = move
+    dz, tangent, slope, index, determinant = move
     _, _, z_here, tangent_here, _, _ = places
     n, size, stuck = mass.shape[0], start.shape[1], 0
     for k in range(lanes.shape[0]):
@@ -346,6 +373,7 @@ def seat(lanes, levels, knobs, start, move, mass, weight, places, numbers, count
         for row in range(COUNTS):
             counts[row, i] = 0
         numbers[SLOPE, i], numbers[WEIGHT, i] = slope[k] * norm, squared
+        numbers[DET, i] = determinant[k]
         numbers[LENGTH, i], numbers[LARGEST, i] = knobs[0, level], knobs[1, level]
         numbers[TURNING, i], counts[MOST, i] = knobs[2, level], int(knobs[3, level])
         counts[LANE, i], counts[INDEX, i], counts[LEVEL, i] = lanes[k], index[k], level

@@ -86,7 +86,7 @@ class Block:
         here, count = self.curve.take(lanes), len(lanes)
         none = np.zeros(count)
         move = here.advance(z, none, np.zeros_like(z), np.ones(count), none)
-        start = (move.dz, move.tangent_z, move.tangent_t, move.index)
+        start = (move.dz, move.tangent_z, move.tangent_t, move.index, move.determinant)
         state = (self.curve.structure.mass, here.weight, self._places, *self._scalars, self.active)
         stuck = kernels.seat(lanes, levels, self._knobs, z, start, *state)
         self.active += count
@@ -106,7 +106,7 @@ class Block:
         steps = (move.dz, move.dt, move.tangent_z, move.tangent_t)
         kernels.correct(*steps, mass, trial, *state, kernels.ACCEPTED, kernels.NEARLY)
         locates = self.options.locates_branch_points
-        good, doubtful = kernels.judge(move.index, *state, smallest, locates)
+        good, doubtful = kernels.judge(move.index, move.determinant, *state, smallest, locates)
         if good:
             self._constrain()
             if doubtful and locates:

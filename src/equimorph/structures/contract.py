@@ -31,6 +31,8 @@ class Advance:
 
     The bordered system is ``[F_z F_t; row corner] [dz; dt] = −[F; defect]`` with
     ``F_t = F_p·dp``; the tangent solves it for the right-hand side ``[0; 1]``.
+
+    determinant: that of F_z where it costs nothing, else nan.
     """
 
     dz: Float[np.ndarray, "lanes size"]
@@ -39,6 +41,7 @@ class Advance:
     tangent_t: Float[np.ndarray, " lanes"]
     residual: Float[np.ndarray, " lanes"]
     index: Int[np.ndarray, " lanes"]
+    determinant: Float[np.ndarray, " lanes"]
 
 
 @dataclass(frozen=True)
@@ -223,4 +226,5 @@ def solved_advance(
         tangent[:, -1].copy(),
         np.abs(residual).max(axis=1),
         solution.negative - constraints,
+        np.full(len(row), np.nan),
     )

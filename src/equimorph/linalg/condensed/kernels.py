@@ -49,7 +49,7 @@ def work_arrays(elements, inner, tiles):
     columns = work_rows(tiles * (elements * (inner + 1) + 1) * TILE)
     columns[:] = 0.0
     lower, vertices = work_rows(groups * inner * inner * GROUP), work_rows(2 * (elements + 1))
-    return lower, vertices, columns, work_rows(4)
+    return lower, vertices, columns, work_rows(5)
 
 
 @njit(**INNER)
@@ -114,19 +114,21 @@ def _reduce_tile(lower, base, inner, columns, ties, first):
 
 @njit(**INNER)
 def _note_pivots(lower, base, inner, extremes):
-    """Count negative pivots of an element; note smallest, largest and sum of the reciprocals."""
+    """Count negative pivots of an element; note extremes, sum and product of the reciprocals."""
     count, small, large = load(extremes, 0), load(extremes, 1), load(extremes, 2)
-    total, zero, one = load(extremes, 3), spread(0.0), spread(1.0)
+    total, product = load(extremes, 3), load(extremes, 4)
+    zero, one = spread(0.0), spread(1.0)
     for i in range(inner):
         value = load(lower, base + (i * inner + i) * GROUP)
         size = absolute(value)
         count = count + where_less(value, zero, one, zero)
         small, large = where_less(size, small, size, small), where_less(large, size, size, large)
-        total = total + value
+        total, product = total + value, product * value
     store(extremes, 0, count)
     store(extremes, 1, small)
     store(extremes, 2, large)
     store(extremes, 3, total)
+    store(extremes, 4, product)
 
 
 @njit(**INNER)
@@ -155,6 +157,7 @@ def start_block(diagonal, vertices, extremes):
     store(extremes, 1, spread(np.inf))
     store(extremes, 2, spread(0.0))
     store(extremes, 3, spread(0.0))
+    store(extremes, 4, spread(1.0))
     store(vertices, 0, load(diagonal, 0))
 
 
@@ -165,7 +168,7 @@ def reduce_group(stiffness, group, diagonal, ends, tiles, lower, vertices, colum
     stiffness (elements, degree + 1, degree + 1); diagonal (nodes, 8); ends: first and last vertex
     that is unknown; columns (tiles, nodes, TILE, 8), ties left to this function. Filled: lower
     (see `lower_row`); vertices (elements + 1, 2, 8), reciprocal pivot and factor to the next;
-    extremes (4, 8): see `_note_pivots`.
+    extremes (5, 8): see `_note_pivots`.
     """
     elements, degree = stiffness.shape[0], stiffness.shape[1] - 1
     inner, rows = degree - 1, columns.shape[0] // tiles

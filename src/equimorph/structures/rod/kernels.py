@@ -259,7 +259,7 @@ def _combine(columns, small, nodes, solution):
 @njit(**FLAGS)
 def advance_lanes(
     stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
-    dz, dt, tangent_z, tangent_t, residual, index, ratio,
+    dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Fused Newton step, tangent and inertia of the rod; see `structures.contract.Advance`.
 
@@ -294,6 +294,8 @@ def advance_lanes(
                 _prefetch_nodes(z, row, start + LANES, e * (inner + 1), inner + 1)
         _small_system(products, sums, closing, small)
         store(extremes, 0, load(extremes, 0) + negative_of_two(small, 0, SMALL_WIDTH))
+        square = load(small, 0) * load(small, 6) - load(small, 1) * load(small, 5)
+        store(extremes, 4, square / load(extremes, 4))
         solve_lanes(small, 3, 5)
         for e in range(elements, -1, -1):
             node = e * (inner + 1)
@@ -311,4 +313,4 @@ def advance_lanes(
             at = start + k
             dt[at], tangent_t[at] = small[13, k], small[14, k]
             residual[at], index[at] = sums[WORST, k], np.int64(extremes[0, k]) - 2
-            ratio[at] = pivot_ratio(extremes, k)
+            determinant[at], ratio[at] = extremes[4, k], pivot_ratio(extremes, k)

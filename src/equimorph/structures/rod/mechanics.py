@@ -182,16 +182,16 @@ class RodMechanics(Structure):
         inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
         # one block each: what is freed at once stays with the process and is not mapped anew
         dz, tangent_z = np.empty((2, lanes, self.size))
-        dt, tangent_t, residual, ratio = np.empty((4, lanes))
+        dt, tangent_t, residual, determinant, ratio = np.empty((5, lanes))
         index = np.empty(lanes, dtype=np.int64)
-        outputs = (dz, dt, tangent_z, tangent_t, residual, index, ratio)
+        outputs = (dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio)
         over_lanes(advance_lanes, self._step_data, inputs, outputs)
         out = Advance(*outputs[:-1])
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             unsafe = ~(ratio >= PIVOT_GUARD)
             again = super().advance(*(x[unsafe] for x in inputs))
-            for name in ("dz", "dt", "tangent_z", "tangent_t", "residual", "index"):
-                getattr(out, name)[unsafe] = getattr(again, name)
+            for name, column in vars(again).items():
+                getattr(out, name)[unsafe] = column
         return out
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
