@@ -12,7 +12,7 @@ import pytest
 
 from equimorph.model import Grid
 from equimorph.structures import Rod
-from equimorph.tasks import limit_load_map
+from equimorph.tasks import curvature_map, limit_load_map
 
 INTERVALS = (93, 160)
 LOADS = ["uniform", "left-half"]
@@ -47,3 +47,15 @@ def bench_limit_load_map(benchmark, load):
 
     run((10, 16))  # compiles, or loads, the kernels
     note(benchmark, benchmark.pedantic(run, rounds=3, warmup_rounds=1), run)
+
+
+@pytest.mark.parametrize("load", LOADS)
+def bench_curvature_map(benchmark, load):
+    """Over 47 × 80 intervals."""
+    arch = Rod(load=load)
+
+    def run(intervals=(47, 80)):
+        return curvature_map(arch, over(intervals), "q", 2.5, within=[arch.max_curvature <= 20])
+
+    run((10, 16))
+    note(benchmark, benchmark.pedantic(run, rounds=1), run)

@@ -40,7 +40,15 @@ _HOMES = {
         "snap_landing",
     ),
     "equimorph.manifold": ("Audit", "EquilibriumSet", "equilibrium_set"),
-    "equimorph.tasks": ("LimitLoadMap", "MapCurve", "Route", "limit_load_map", "plan"),
+    "equimorph.tasks": (
+        "CurvatureMap",
+        "LimitLoadMap",
+        "MapCurve",
+        "Route",
+        "curvature_map",
+        "limit_load_map",
+        "plan",
+    ),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 _LAYERS = ("errors", "linalg", "model", "structures", "equilibria", "manifold", "tasks",

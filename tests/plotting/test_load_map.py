@@ -64,3 +64,14 @@ def test_a_map_is_saved_in_both_formats(lmap, tmp_path):
     files = plotting.save(plotting.load_map(lmap), tmp_path, "map")
     assert [file.suffix for file in files] == [".png", ".svg"]
     assert all(file.stat().st_size > 10_000 for file in files)
+
+
+def test_a_curvature_map_dots_what_snaps_and_draws_barriers():
+    rod = em.Rod()
+    grid = em.Grid(Theta=(0.4, 1.2, 4), Delta=(-1.0, 1.0, 10))
+    cmap = em.curvature_map(rod, grid, "q", 2.5)
+    ax = plotting.curvature_map(cmap)
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert labels[0] == "barrier: fold"
+    assert labels[-1] == "snaps on the way"
+    assert any(axes.get_ylabel() == "max |κ| (1/L) at $q$ = 2.5" for axes in ax.figure.axes)

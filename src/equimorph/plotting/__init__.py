@@ -1,5 +1,6 @@
 """Figures and films of results; nothing else in the package draws."""
 
+from equimorph.plotting.curvature_map import curvature_map
 from equimorph.plotting.film import film
 from equimorph.plotting.load_map import load_map
 from equimorph.plotting.margins import margins
@@ -9,6 +10,7 @@ from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 
 __all__ = [
+    "curvature_map",
     "film",
     "house_style",
     "load_map",

@@ -58,6 +58,11 @@ def faces(
     return Faces(_triangles(whole), pieces, np.array(values))
 
 
+def corners(axes: tuple[Axis, Axis]) -> Float[np.ndarray, "vertices 2"]:
+    """Places of all vertices, row by row."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
 def _triangles(whole: Bool[np.ndarray, "_ _"]) -> Int[np.ndarray, "triangles 3"]:
     """Two triangles for each whole cell."""
     columns = whole.shape[1] + 1

@@ -98,7 +98,7 @@ class RodMechanics(Structure):
     def largest_curvature(
         self, z: Lanes, p: Parameters
     ) -> tuple[Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]:
-        """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
+        """max_s |κ(s)|, ends and interior extrema included, and the first arclength where it is."""
         z, p = self._checked((z, p))
         return self.recovery.largest_curvature(z, p)
 

@@ -16,6 +16,8 @@ PARTS = 8
 """Pairs are divided into so many parts at once: tracing one ray takes as long as tracing some."""
 SHRINKING = 0.6
 """A smooth map's differences shrink with the interval h like h; those like h^0.6 are sharp."""
+NEGLIGIBLE = 1e-3
+"""Smaller differences are nothing to look for: where an extremum lies is known less well."""
 ASIDE = (0.0, 0.4, -0.37)
 """Where to look around a dividing point that gives no answer, in lengths of the parts."""
 
@@ -87,6 +89,7 @@ def divided(structure: Structure, sampler: Sampler, pairs: Brackets) -> Brackets
     a, b = (cuts.take(np.arange(PARTS * count) + shift) for shift in (0, count))
     now = difference(structure, a, b)
     least = np.where(np.isfinite(before), PARTS**-SHRINKING * before, np.inf)
+    least = np.maximum(least, NEGLIGIBLE)
     sharp = np.isinf(now) | (now > np.tile(least, PARTS))
     return Brackets(a, b, np.tile(pairs.edge, PARTS)).take(np.flatnonzero(sharp))
 

@@ -1,14 +1,11 @@
-"""Curves on which a map of limit loads is not smooth: what kind they are, and exactly where."""
+"""Curves on which a map is not smooth: what kind they are, and exactly where."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
-from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.locus import Test
 from equimorph.structures import States
 from equimorph.tasks.maps.brackets import (
     PARTS,
@@ -20,23 +17,20 @@ from equimorph.tasks.maps.brackets import (
     narrowed,
     suspicious,
 )
+from equimorph.tasks.maps.causes import Paths
 from equimorph.tasks.maps.chains import chains
+from equimorph.tasks.maps.natural import NaturalSheet
 from equimorph.tasks.maps.polish import polished
-from equimorph.tasks.maps.rays import END_BRANCH, END_CONSTRAINT, END_FOLD, MISSING, UNDEFINED, Rays
 from equimorph.tasks.maps.samples import Samples, difference
 
 ROUNDS = 3
 """How often causes are looked for, in parts of parts of a pair."""
-DIVISIONS = 2
-"""Of what remains without a cause: it is known to 8⁻⁵ of an edge."""
+DIVISIONS = 1
+"""Of what remains without a cause: it is known to 8⁻⁴ of an edge."""
 BESIDE = 1.0 / PARTS**2
 """Distance from a place at which both sides are looked at, as a share of the pair."""
-JUMP = 5e-3
-"""Difference of limit loads on both sides of a curve that counts as a jump."""
 SLACK = 1e-3
 """How far outside its bracket, in lengths of it, an exact place may lie."""
-ALIKE = 0.1
-"""Cosine of null vectors whose signs can be compared: beside a pitchfork they turn fast."""
 SAME = 1e-7
 """Places closer than this, in units of the parameters' scales, are one."""
 
@@ -48,43 +42,21 @@ class MapCurve:
     Attributes
     ----------
     kind
-        "cusp": two folds of the path merge, and the limit load jumps; "branch point": the path
-        meets one; "grazing": the path touches a constraint; "exchange": loss of stability and a
-        constraint, or two constraints, exchange their roles; "place": the extremum that meets a
-        constraint is elsewhere on the structure; "edge": beyond it no unloaded state obeys the
-        constraints; "jump" and "kink": neither was found to be the reason.
+        What happens there; each map says which kinds it knows.
     states
-        States on the curve, in order, at its crossings with grid lines: exact for the first four
-        kinds, else one side of a narrow bracket; unloaded on an "edge".
+        States on the curve, in order, at its crossings with grid lines: exact where the kind has a
+        cause, else one side of a narrow bracket.
     points
         Their settings.
     values
-        Lower and higher limit load of both sides, close to the curve; not numbers where there is
-        none.
+        Lower and higher value of the map on both sides, close to the curve; not numbers where there
+        is none.
     """
 
     kind: str
     states: States
     points: Float[np.ndarray, "points 2"]
     values: Float[np.ndarray, "points 2"]
-
-
-@dataclass(frozen=True)
-class Cause:
-    """A reason why a map is not smooth at a place: two tests that vanish, tried from one side."""
-
-    kind: str
-    tests: tuple[Test, Test]
-    lanes: Int[np.ndarray, " some"]
-    start: Samples
-
-    @classmethod
-    def of(
-        cls, kind: str, tests: tuple[Test, Test], where: Bool[np.ndarray, " all"], side: Samples
-    ) -> "Cause":
-        """Cause for some of the lanes, tried from their states on one side."""
-        lanes = np.flatnonzero(where)
-        return cls(kind, tests, lanes, side.take(lanes))
 
 
 @dataclass(frozen=True)
@@ -112,7 +84,7 @@ class Places:
         return self.kind, self.setting, self.z, self.p
 
 
-def explained(rays: Rays, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
+def explained(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
     """Find the cause in each pair, and its exact place on the grid edge.
 
     A cause counts if Newton's method finds its state inside the pair, and the map differs on both
@@ -123,32 +95,32 @@ def explained(rays: Rays, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
     Places with narrow brackets around them; pairs without a cause; what is left of the others on
     both sides, where its ends differ in kind.
     """
-    count, structure = len(pairs), rays.sheet.structure
+    count, structure = len(pairs), paths.sheet.structure
     kind, found = np.full(count, "", dtype=object), np.zeros(count, bool)
     z, p = pairs.a.z.copy(), pairs.a.p.copy()
     moving = np.argmax(np.abs(pairs.b.setting - pairs.a.setting), axis=1)
-    for cause in _causes(rays, pairs):
+    for cause in paths.causes(pairs):
         open_ = ~found[cause.lanes]
         at, start = cause.lanes[open_], cause.start.take(np.flatnonzero(open_))
         if not len(at):
             continue
-        free = np.stack([rays.sheet.places[moving[at]], np.full(len(at), rays.load)], axis=1)
+        free = np.stack([paths.sheet.places[moving[at]], np.full(len(at), paths.load)], axis=1)
         new_z, new_p, good = polished(structure, start.z, start.p, free, cause.tests)
-        good &= _within(pairs.take(at), new_p[:, rays.sheet.places])
+        good &= _within(pairs.take(at), new_p[:, paths.sheet.places])
         hit = at[good]
         found[hit], kind[hit], z[hit], p[hit] = True, cause.kind, new_z[good], new_p[good]
-    return _confirmed(rays, pairs, Places(pairs, kind, p[:, rays.sheet.places], z, p), found)
+    return _confirmed(paths, pairs, Places(pairs, kind, p[:, paths.sheet.places], z, p), found)
 
 
 def _confirmed(
-    rays: Rays, pairs: Brackets, places: Places, found: Bool[np.ndarray, " pairs"]
+    paths: Paths, pairs: Brackets, places: Places, found: Bool[np.ndarray, " pairs"]
 ) -> tuple[Places, Brackets, Brackets]:
     """Look at the map close to places on both sides; see `explained`."""
-    structure = rays.sheet.structure
+    structure = paths.sheet.structure
     at = np.flatnonzero(found)
     here, wide = places.take(at), pairs.take(at)
     room = BESIDE * (wide.b.setting - wide.a.setting)
-    beside = rays(np.concatenate([here.setting - room, here.setting + room]))
+    beside = paths(np.concatenate([here.setting - room, here.setting + room]))
     left, right = beside.take(np.arange(len(at))), beside.take(np.arange(len(at), 2 * len(at)))
     # at an end of the pair the map is known
     low = np.abs(here.setting - wide.a.setting).sum(axis=1) < np.abs(room).sum(axis=1)
@@ -156,7 +128,7 @@ def _confirmed(
     left, right = wide.a.where(low, left), wide.b.where(high, right)
     now, before = difference(structure, left, right), difference(structure, wide.a, wide.b)
     sharp = np.isinf(now) | (np.isfinite(before) & (now > (2.0 * BESIDE) ** SHRINKING * before))
-    sharp &= ~_undefined(left) & ~_undefined(right)
+    sharp &= paths.known(left) & paths.known(right)
     rest = Brackets(wide.a, left, wide.edge).with_more(Brackets(right, wide.b, wide.edge))
     again = np.isinf(difference(structure, rest.a, rest.b)) & np.tile(sharp, 2)
     narrow = Brackets(left, right, wide.edge)
@@ -166,71 +138,46 @@ def _confirmed(
     return confirmed, pairs.take(open_), rest.take(np.flatnonzero(again))
 
 
-def places_on(rays: Rays, vertices: Samples, shape: tuple[int, int]) -> tuple[Places, Places]:
+def places_on(paths: Paths, vertices: Samples, shape: tuple[int, int]) -> tuple[Places, Places]:
     """Places on grid edges at which the map is not smooth: with their causes, and without.
 
     Suspicious edges are looked at first. Where a line of places ends inside the grid, the other
     edges of the cell that it enters are looked at, too, until nothing new is found.
     """
-    structure, edges = rays.sheet.structure, grid_edges(shape)
+    structure, edges = paths.sheet.structure, grid_edges(shape)
     ends = (vertices.take(edges[:, k]) for k in (0, 1))
-    # beyond the edge of definition, and where rays were lost, there is nothing to compare
-    known = np.isfinite(vertices.value[edges]).all(axis=1)
+    # beyond the edge of definition, and where paths were lost, there is nothing to compare
+    known = paths.known(vertices)[edges].all(axis=1)
     differences = np.where(known, difference(structure, *ends), 0.0)
-    fresh = np.flatnonzero(
-        suspicious(differences, shape) | branching_between(rays, vertices, edges)
-    )
+    fresh = np.flatnonzero(suspicious(differences, shape) | paths.suspects(vertices, edges))
     tried, seen = np.zeros(len(edges), bool), np.zeros(0, int)
     found: list[Places] = []
     left: list[Places] = []
     while len(fresh):
         tried[fresh] = True
         pairs = (vertices.take(edges[fresh, 0]), vertices.take(edges[fresh, 1]), fresh)
-        sure, open_ = _resolved(rays, Brackets(*pairs))
+        sure, open_ = _resolved(paths, Brackets(*pairs))
         found += sure
-        left.append(unexplained(open_))
+        left.append(unexplained(paths, open_))
         seen = np.concatenate([seen, *(each.brackets.edge for each in (*sure, left[-1]))])
         ahead = edges_ahead(seen, shape)
         fresh = ahead[~tried[ahead] & (differences[ahead] > 0.0)]
-    nothing = unexplained(
-        Brackets(vertices, vertices, np.arange(len(vertices.kind))).take(np.zeros(0, int))
-    )
+    none = np.zeros(0, int)
+    nothing = unexplained(paths, Brackets(vertices.take(none), vertices.take(none), none))
     return _together([nothing, *found]), _together([nothing, *left])
 
 
-def branching_between(
-    rays: Rays, vertices: Samples, edges: Int[np.ndarray, "edges 2"]
-) -> Bool[np.ndarray, " edges"]:
-    """Edges between folds with vᵀF_q of different sign: paths branch somewhere between.
-
-    The null vectors v of both ends must resemble each other, so that their signs can be compared.
-    """
-    structure = rays.sheet.structure
-    load = structure.parameters[rays.load].name
-    folds = np.flatnonzero(vertices.kind == END_FOLD)
-    z, p = vertices.z[folds], vertices.p[folds]
-    at = Critical(structure, z, p, null_border(structure, z, p))
-    n = structure.unknowns
-    v = np.zeros((len(vertices.kind), n))
-    v[folds] = at.v[:, :n] / np.sqrt(at.v[:, :n] ** 2 @ structure.mass)[:, None]
-    slope = np.zeros(len(v))
-    slope[folds] = branching(structure, load)(at)
-    a, b = edges.T
-    alike = np.einsum("li,li,i->l", v[a], v[b], structure.mass)
-    return np.asarray((np.abs(alike) > ALIKE) & (alike * slope[a] * slope[b] < 0.0))
-
-
-def _resolved(rays: Rays, pairs: Brackets) -> tuple[list[Places], Brackets]:
+def _resolved(paths: Paths, pairs: Brackets) -> tuple[list[Places], Brackets]:
     """Look for causes and divide in turn; what is never explained is divided further."""
-    structure = rays.sheet.structure
+    structure = paths.sheet.structure
     found: list[Places] = []
     for _ in range(ROUNDS):
         if not len(pairs):
             return found, pairs
-        places, rest, more = explained(rays, pairs)
+        places, rest, more = explained(paths, pairs)
         found.append(places)
-        pairs = divided(structure, rays, rest).with_more(more) if len(rest) else more
-    return found, narrowed(structure, rays, pairs, DIVISIONS)
+        pairs = divided(structure, paths, rest).with_more(more) if len(rest) else more
+    return found, narrowed(structure, paths, pairs, DIVISIONS)
 
 
 def _together(parts: list[Places]) -> Places:
@@ -238,37 +185,6 @@ def _together(parts: list[Places]) -> Places:
     for part in parts[1:]:
         whole = whole.with_more(part)
     return whole
-
-
-def _causes(rays: Rays, pairs: Brackets) -> Iterator[Cause]:
-    """Causes to try, from the states at both ends of the pairs, the most likely first."""
-    structure, sides = rays.sheet.structure, ((pairs.a, pairs.b), (pairs.b, pairs.a))
-    load = structure.parameters[rays.load].name
-    limits = [bound(constraint) for constraint in rays.within]
-    for one, other in sides:
-        for k, limit in enumerate(limits):
-            met = _meets(other, k)
-            yield Cause.of("exchange", (gap, limit), _is_critical(one) & met, one)
-            for j in range(k):
-                yield Cause.of("exchange", (limits[j], limit), _meets(one, j) & met, one)
-    # at a pitchfork both of the following hold: the first one counts
-    for kind, test in (("branch point", branching(structure, load)), ("cusp", quadratic)):
-        for one, _ in sides:
-            yield Cause.of(kind, (gap, test), _is_critical(one), one)
-    for k, constraint in enumerate(rays.within):
-        touching = (limits[k], grazing(structure, constraint, load))
-        for one, _ in sides:
-            yield Cause.of("grazing", touching, _meets(one, k), one)
-
-
-def _is_critical(side: Samples) -> Bool[np.ndarray, " pairs"]:
-    """Whether paths end where stability is lost."""
-    return np.asarray(np.isin(side.kind, (END_FOLD, END_BRANCH)))
-
-
-def _meets(side: Samples, k: int) -> Bool[np.ndarray, " pairs"]:
-    """Whether paths end at constraint number `k`."""
-    return np.asarray((side.kind == END_CONSTRAINT) & (side.place // 2 == k))
 
 
 def _within(
@@ -282,27 +198,21 @@ def _within(
     )
 
 
-def _undefined(side: Samples) -> Bool[np.ndarray, " pairs"]:
-    return np.asarray((side.kind == UNDEFINED) | (side.kind == MISSING))
-
-
-def unexplained(pairs: Brackets) -> Places:
+def unexplained(paths: Paths, pairs: Brackets) -> Places:
     """Places in the middle of pairs, with kinds by what their ends show."""
-    known = np.isfinite(pairs.a.value) & np.isfinite(pairs.b.value)
-    pairs = pairs.take(np.flatnonzero(known))
+    kind = paths.unexplained(pairs)
+    some = np.flatnonzero(kind != "")
+    pairs = pairs.take(some)
     a, b = pairs.a, pairs.b
-    moved = (a.kind == END_CONSTRAINT) & (b.kind == END_CONSTRAINT)
-    kind = np.where(np.abs(a.value - b.value) > JUMP, "jump", np.where(moved, "place", "kink"))
-    middle = 0.5 * (a.setting + b.setting)
-    return Places(pairs, kind.astype(object), middle, a.z, a.p)
+    return Places(pairs, kind[some], 0.5 * (a.setting + b.setting), a.z, a.p)
 
 
 def curves_through(
-    rays: Rays, groups: Sequence[Places], shape: tuple[int, int]
+    sheet: NaturalSheet, groups: Sequence[Places], shape: tuple[int, int]
 ) -> tuple[MapCurve, ...]:
     """Connect places of each kind to curves across the cells of the grid."""
-    structure = rays.sheet.structure
-    scales = structure.scales[rays.sheet.places]
+    structure = sheet.structure
+    scales = structure.scales[sheet.places]
     curves = []
     for places in groups:
         for kind in dict.fromkeys(places.kind.tolist()):

@@ -39,6 +39,9 @@ DISTANCE, WIDTH, CENTRE, STEPS, PART = range(5)
 """Rows of the moves: from a vertex to a place, how far off this may be, its arclength; steps."""
 NEWTON = 4
 """Iterations from a secant's root of κ' to round-off in κ, which is stationary there."""
+TIE = 1e-9
+"""Extrema that differ by less, relatively, are equal: the first one counts. Where no load acts all
+interior extrema of an inflectional rod are equal, and round-off would choose."""
 
 
 @njit(**INNER)
@@ -220,7 +223,7 @@ def _vertex_maximum(stiffness, pressures, breaks, theta, forces, ends, best):
             kappa = _vertex_curvature(stiffness, pressures, e, side, theta, force)
             store(ends, 2 * e + side, kappa)
             value = absolute(kappa)
-            where = where_less(most, value, spread(breaks[e + side]), where)
+            where = where_less(most * spread(1.0 + TIE), value, spread(breaks[e + side]), where)
             most = larger(most, value)
     store(best, 0, most)
     store(best, 1, where)
@@ -303,7 +306,9 @@ def _take_extremum(slopes, moves, best):
     kappa = spread(0.0)
     for k in range(ORDER, -1, -1):
         kappa = load(slopes, k) + at * kappa
-    kappa, most = absolute(kappa), load(best, 0)
-    better = where_less(spread(0.0), width, kappa, most)
-    store(best, 1, where_less(most, better, load(moves, CENTRE) + at, load(best, 1)))
-    store(best, 0, where_less(most, better, better, most))
+    most, old = load(best, 0), load(best, 1)
+    new = load(moves, CENTRE) + at
+    kappa = where_less(spread(0.0), width, absolute(kappa), spread(0.0))
+    first = where_less(most * spread(1.0 - TIE), kappa, where_less(new, old, new, old), old)
+    store(best, 1, where_less(most * spread(1.0 + TIE), kappa, new, first))
+    store(best, 0, larger(most, kappa))

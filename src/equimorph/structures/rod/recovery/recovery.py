@@ -63,7 +63,7 @@ class Recovery:
     def largest_curvature(
         self, z: Lanes, p: Parameters
     ) -> tuple[Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]:
-        """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
+        """max_s |κ(s)|, ends and interior extrema included, and the first arclength where it is."""
         out, place = np.empty(len(z)), np.empty(len(z))
         over_lanes(largest_lanes, self.extremum_data, [z, p], [out, place])
         return out, place

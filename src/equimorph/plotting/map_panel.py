@@ -1,0 +1,211 @@
+"""The parts that figures of maps share: filled faces, contours, marked settings, curves, legend."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import Triangulation
+from mpl_toolkits.axes_grid1 import make_axes_locatable
+
+from equimorph.plotting import style
+from equimorph.plotting.contour_labels import label_contours
+from equimorph.plotting.map_faces import Faces, corners, faces
+from equimorph.plotting.symbols import parameter_label
+from equimorph.tasks import CurvatureMap, LimitLoadMap
+
+ActuatorMap = LimitLoadMap | CurvatureMap
+Points = Float[np.ndarray, "_ 2"]
+
+_FRAME_HEIGHT = 2.3  # inches
+_LEFT, _BOTTOM, _RIGHT, _TOP = 0.5, 0.4, 0.5, 0.08  # inches around the frame
+_LEGEND_COLUMNS, _LEGEND_ROW, _LEGEND_GAP = 2, 0.15, 0.06
+_MARGIN = 0.06
+"""Room beyond the settings that have a natural state, as a share of their range."""
+
+# From low (light) to high (dark), in even steps of lightness: it reads in grey.
+_ANCHORS = ("#f6f1e1", "#d3dfe6", "#a5c3db", "#719fc6", "#417aac", "#1d527f")
+_LEVELS = 9
+_GROUND: dict[str, Any] = {
+    "facecolor": "#f4f4f4",
+    "edgecolor": "#c9c9c9",
+    "hatch": "////",
+    "linewidth": 0.0,
+}
+_MARK: dict[str, Any] = {
+    "facecolor": "none",
+    "edgecolor": style.INK,
+    "hatch": "....",
+    "linewidth": 0.0,
+    "alpha": 0.55,
+}
+_RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.2, foreground="white")]
+
+
+@dataclass(frozen=True)
+class CurveLook:
+    """How curves of one kind are drawn.
+
+    `label`: entry of the legend, none if empty; `cuts`: whether values or statuses differ on both
+    sides, so that nothing is interpolated across; `line`: looks.
+    """
+
+    label: str
+    cuts: bool
+    line: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """What a figure of a map shows besides the values.
+
+    Attributes
+    ----------
+    looks
+        Looks of the curves by kind; those of other kinds are left out.
+    bar
+        Label of the colour bar.
+    marked, mark_label
+        Settings that are dotted, and what that means.
+    ground_label
+        What is hatched.
+    from_zero
+        Whether colours begin at zero.
+    """
+
+    looks: Mapping[str, CurveLook]
+    bar: str
+    marked: Bool[np.ndarray, "rows columns"]
+    mark_label: str
+    ground_label: str
+    from_zero: bool
+
+
+def draw_map(amap: ActuatorMap, panel: Panel, ax: Axes | None) -> Axes:
+    """Draw a map into axes, or into a figure of its own one column wide."""
+    with style.house_style({"hatch.linewidth": 0.5}):
+        own = ax is None
+        if ax is None:
+            height = _BOTTOM + _FRAME_HEIGHT + _TOP
+            ax = style.new_axes(style.SINGLE_COLUMN, height, (_LEFT, _BOTTOM, _RIGHT, _TOP))
+        _frame(ax, amap)
+        first, second = amap.grid.axes()
+        axes, cuts = (first, second), _cuts(amap, panel)
+        if np.isfinite(amap.value).any():
+            _fill(ax, amap, panel, faces(axes, amap.value, cuts))
+        entries: list[Line2D | Patch] = list(_draw_curves(ax, amap, panel))
+        if panel.marked.any():
+            _mark(ax, faces(axes, panel.marked.astype(float), cuts), axes, panel.marked)
+            entries.append(Patch(label=panel.mark_label, **_MARK))
+        if not np.isfinite(amap.value).all():
+            entries.append(Patch(label=panel.ground_label, **_GROUND))
+        _write_legend(ax, entries, room=own)
+    return ax
+
+
+def _cuts(amap: ActuatorMap, panel: Panel) -> Points:
+    """All places on grid lines where values or statuses differ on both sides."""
+    cutting = [
+        curve.points
+        for curve in amap.curves
+        if curve.kind in panel.looks and panel.looks[curve.kind].cuts
+    ]
+    return np.concatenate([np.empty((0, 2)), *cutting])
+
+
+def _frame(ax: Axes, amap: ActuatorMap) -> None:
+    """Limits around the settings that have a natural state, labels, and the hatched ground."""
+    low, high = amap.grid.box.lower, amap.grid.box.upper
+    known = np.isfinite(amap.value)
+    limits = []
+    for axis, across in zip(amap.grid.axes(), (1, 0), strict=True):
+        some = axis[known.any(axis=across)] if known.any() else axis
+        room = _MARGIN * (some[-1] - some[0])
+        limits.append((max(axis[0], some[0] - room), min(axis[-1], some[-1] + room)))
+    ax.set_xlim(*limits[0])
+    ax.set_ylim(*limits[1])
+    ax.set_xlabel(parameter_label(amap.structure, amap.grid.names[0]))
+    ax.set_ylabel(parameter_label(amap.structure, amap.grid.names[1]))
+    ax.add_patch(Rectangle((low[0], low[1]), high[0] - low[0], high[1] - low[1], **_GROUND))
+
+
+def _colours() -> Colormap:
+    return LinearSegmentedColormap.from_list("load", list(_ANCHORS))
+
+
+def _fill(ax: Axes, amap: ActuatorMap, panel: Panel, found: Faces) -> None:
+    """Fill the faces, and draw contours over the smooth ones."""
+    known = amap.value[np.isfinite(amap.value)]
+    low, high = 0.0 if panel.from_zero else float(known.min()), float(known.max())
+    norm = Normalize(low, high)
+    look: dict[str, Any] = {"cmap": _colours(), "norm": norm, "zorder": 1.5, "rasterized": True}
+    pieces = PolyCollection(found.pieces, array=found.values, **look)
+    pieces.set(edgecolor="face", linewidth=0.3)
+    ax.add_collection(pieces, autolim=False)
+    if len(found.triangles):
+        x, y = (each.ravel() for each in np.meshgrid(*amap.grid.axes(), indexing="ij"))
+        values = np.where(np.isfinite(amap.value), amap.value, 0.0).ravel()
+        mesh = Triangulation(x, y, found.triangles)
+        ax.tripcolor(mesh, values, shading="gouraud", **look)
+        ticks = MaxNLocator(_LEVELS, steps=[1, 2, 2.5, 5, 10])
+        lines = ax.tricontour(
+            mesh, values, ticks.tick_values(low, high)[1:],
+            colors=[style.INK], linewidths=0.3, alpha=0.6, zorder=2,
+        )  # fmt: skip
+        drawn = [curve.points for curve in amap.curves if curve.kind in panel.looks]
+        label_contours(ax, lines, np.concatenate([np.empty((0, 2)), *drawn]))
+    beside = make_axes_locatable(ax).append_axes("right", size=0.08, pad=0.06)
+    bar = ax.figure.colorbar(ScalarMappable(norm, look["cmap"]), cax=beside)
+    bar.outline.set_linewidth(style.HAIRLINE)
+    bar.set_label(panel.bar)
+
+
+def _mark(
+    ax: Axes,
+    found: Faces,
+    axes: tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]],
+    marked: Bool[np.ndarray, "rows columns"],
+) -> None:
+    """Dot the faces whose corners are marked."""
+    inside = marked.ravel()[found.triangles].all(axis=1)
+    whole = list(corners(axes)[found.triangles[inside]])
+    cut = [piece for piece, value in zip(found.pieces, found.values, strict=True) if value > 0.5]
+    ax.add_collection(PolyCollection([*whole, *cut], zorder=3, rasterized=True, **_MARK))
+
+
+def _draw_curves(ax: Axes, amap: ActuatorMap, panel: Panel) -> list[Line2D]:
+    """Draw the curves; return one labelled line of every kind."""
+    kinds: dict[str, Line2D] = {}
+    for curve in amap.curves:
+        if len(curve.points) < 2 or curve.kind not in panel.looks:
+            continue
+        look = panel.looks[curve.kind]
+        line = Line2D(*curve.points.T, color=style.INK, zorder=5, label=look.label, **look.line)
+        if line.get_linewidth() > 1.0:
+            line.set_path_effects(_RIM)
+        ax.add_line(line)
+        if look.label:
+            kinds[curve.kind] = line
+    return [kinds[kind] for kind in panel.looks if kind in kinds]
+
+
+def _write_legend(ax: Axes, entries: list[Line2D | Patch], *, room: bool) -> None:
+    """Legend below the frame; with `room`, the figure grows by its height."""
+    if not entries:
+        return
+    if room:
+        style.grow_below(ax, _LEGEND_GAP + -(-len(entries) // _LEGEND_COLUMNS) * _LEGEND_ROW)
+    below = -(_BOTTOM + 0.5 * _LEGEND_GAP) / _FRAME_HEIGHT
+    ax.legend(
+        handles=entries, loc="upper center", bbox_to_anchor=(0.5, below), ncols=_LEGEND_COLUMNS,
+        borderaxespad=0.0, borderpad=0.0,
+    )  # fmt: skip

@@ -1,0 +1,117 @@
+"""What maps over a grid of actuator settings have in common."""
+
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.errors import InputError
+from equimorph.model import Constraint, Grid, parameter_vector, position
+from equimorph.structures import State, States, Structure
+from equimorph.tasks.maps.curves import MapCurve
+from equimorph.tasks.maps.natural import NaturalSheet
+
+
+@dataclass(frozen=True, eq=False)
+class ActuatorMap(ABC):
+    """Values at the vertices of a grid of settings, and the curves on which they jump or bend.
+
+    Attributes
+    ----------
+    structure, grid, load, within, fixed
+        What was asked.
+    value
+        Value at every vertex of the grid; not a number where there is none.
+    status
+        Number in `kinds` of what happened on the path.
+    states
+        States at the ends of the paths, row by row; not numbers where there is none.
+    curves
+        Where the map is not smooth.
+    sheet
+        Unloaded states.
+    """
+
+    kinds: ClassVar[tuple[str, ...]]
+
+    structure: Structure
+    grid: Grid
+    load: str
+    within: tuple[Constraint, ...]
+    fixed: Mapping[str, float]
+    value: Float[np.ndarray, "rows columns"]
+    status: Int[np.ndarray, "rows columns"]
+    states: States
+    curves: tuple[MapCurve, ...]
+    sheet: NaturalSheet
+
+    def __repr__(self) -> str:
+        """Size, how many of each status, and the curves."""
+        shape = " × ".join(map(str, self.value.shape))
+        counts = ", ".join(f"{n} {kind}" for kind, n in self.counts.items() if n)
+        name = type(self).__name__
+        return f"{name}({shape} settings: {counts}; {len(self.curves)} curves)"
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Settings of each status."""
+        return {kind: int((self.status == k).sum()) for k, kind in enumerate(self.kinds)}
+
+    def where(self, kind: str) -> Bool[np.ndarray, "rows columns"]:
+        """Whether settings have a status, by its name."""
+        return np.asarray(self.status == self.kinds.index(kind))
+
+    def rest(self, setting: Mapping[str, float]) -> State:
+        """Natural state at one setting of the grid's box.
+
+        Raises
+        ------
+        InputError
+            For names that are not those of the grid, a setting outside, or one without a natural
+            state.
+        """
+        point = _point(self.grid, setting)[None]
+        z, found = self.sheet.states(point)
+        if not found[0]:
+            raise InputError(f"`setting` must have a natural state; got {dict(setting)}.")
+        return State(self.structure, z[0], self.sheet.parameters(point)[0])
+
+
+def unloaded_base(
+    structure: Structure, grid: Grid, load: str, fixed: Mapping[str, float]
+) -> Float[np.ndarray, " parameters"]:
+    """All parameters unloaded, with the lower corner of the grid.
+
+    Raises
+    ------
+    InputError
+        For a grid that does not have two parameters, a load that is one of them or fixed, or
+        unknown names.
+    """
+    if len(grid.names) != 2:
+        raise InputError(f"`grid` must have two parameters; got {', '.join(grid.names)}.")
+    if load in grid.names or load in fixed:
+        raise InputError(f"`load` must be neither in `grid` nor in `fixed`; got {load!r}.")
+    position(structure.parameters, load)
+    corner = dict(zip(grid.names, map(float, grid.box.lower), strict=True))
+    return parameter_vector(structure.parameters, {**structure.unloaded(), **fixed, **corner})
+
+
+def settings_of(grid: Grid) -> tuple[Float[np.ndarray, "settings 2"], tuple[int, int]]:
+    """All vertices of a grid, row by row, and how many there are each way."""
+    axes = grid.axes()
+    settings = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    return settings, (len(axes[0]), len(axes[1]))
+
+
+def _point(grid: Grid, setting: Mapping[str, float]) -> Float[np.ndarray, " 2"]:
+    if set(setting) != set(grid.names):
+        names = ", ".join(setting) or "nothing"
+        raise InputError(f"`setting` must give {' and '.join(grid.names)}; got {names}.")
+    point = np.array([float(setting[name]) for name in grid.names])
+    if not grid.box.contains(point, slack=1e-12):
+        raise InputError(f"`setting` must lie in {grid.box}; got {dict(setting)}.")
+    return point
