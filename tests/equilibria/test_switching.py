@@ -74,6 +74,23 @@ def test_arch_leaves_its_pitchfork_on_asymmetric_states():
     assert arch.height(0.3)(left) == pytest.approx(arch.height(0.7)(right), rel=1e-11)
 
 
+def test_arms_of_the_arch_lead_back_to_its_two_states_of_index_one():
+    """PHYSICS §5: of the five states at q = 2.5, (1, 0) two have index 1; here by searching."""
+    arch = em.Rod()
+    kappa, rise = arch.max_curvature, arch.height(0.3)
+    with unchecked():
+        path = em.lift(arch.natural_state(Theta=1.0), {"q": 8.0})
+        assert path.end.criticality == "subcritical"
+        sides = em.branches(path.end.state, "q", path=path)
+        ends = [em.lift(side.state, {"q": 2.5}) for side in sides]
+        known = em.find_equilibria(arch, {"Theta": 1, "Delta": 0, "q": 2.5}, within=[kappa <= 20])
+    assert [end.arrived for end in ends] == [True, True]
+    assert [end.end.state.index for end in ends] == [1, 1]
+    found = sorted(rise(end.end.state) for end in ends)
+    assert found == pytest.approx(sorted(rise(s) for s in known if s.index == 1), abs=1e-9)
+    assert found[0] == pytest.approx(min(arch.height(0.7)(end.end.state) for end in ends), rel=1e-9)
+
+
 def test_states_without_crossing_paths_are_refused():
     fold = em.lift(fold_form().state(1.0, a=1.0), {"a": -1.0}).end.state
     with pytest.raises(InputError, match=r"`state` must be a branch point of paths along a; got"):

@@ -96,6 +96,8 @@ def both_ways(
     else:
         back = Spot(start.x, np.vstack([-start.basis[:1], start.basis[1:]]), start.b)
         backward = follow_side(locus, back, watches, options)
+        if backward.end.kind == "closed":
+            forward = Side([start], [0.0], [], backward.end)
     return _curve(kind, locus, _at_start(locus, start, watches), (backward, forward))
 
 
