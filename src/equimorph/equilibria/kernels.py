@@ -29,9 +29,9 @@ LANE, STAGE, ITERATION, INDEX, NEW_INDEX, WHAT, STEPS, MOST, LEVEL = range(9)
 the step; events in the step; steps so far and their limit; number of retries."""
 COUNTS = 9
 
-CORRECTING, CONVERGED, REFUSED, ENDED, SHORT, LONG, STUCK = range(7)
-"""Stages: in Newton's iteration; step converged; step refused; lane finished; given up because its
-step is too short, it took too many, or its start is singular."""
+CORRECTING, AIMING, CONVERGED, REFUSED, ENDED, SHORT, LONG, STUCK = range(8)
+"""Stages: in Newton's iteration; in that of a step to the end of t; step converged; step refused;
+lane finished; given up: step too short, too many steps, or a singular start."""
 
 ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT = 1, 2, 4, 8, 16
 """Bits of what can happen in a step."""
@@ -44,6 +44,8 @@ ACCEPTED, EXACT = 1e-7, 1e-10
 point itself is good to the square, but the tangent belongs to the point before."""
 NEARLY, NEXT = 1e-5, 1e-11
 """Last correction on the way if the next one, by the rate of the last two, would be below."""
+ARRIVED = 1e-9
+"""Last correction at the end of t, after which the point is exact to round-off."""
 MOST_ITERATIONS = 7
 FIRST_SHARE = 0.25
 """First correction over the step: more could lead to another branch."""
@@ -85,6 +87,18 @@ def row_sums(a, b):
 
 
 @njit(**SUMS)
+def _size(i, dz, dt, mass, weight):
+    """Length of a correction, with the multipliers included lightly."""
+    n = mass.shape[0]
+    total, extra = 0.0, 0.0
+    for j in range(n):
+        total += mass[j] * dz[i, j] * dz[i, j]
+    for j in range(n, dz.shape[1]):
+        extra += dz[i, j] * dz[i, j]
+    return np.sqrt(total + weight * dt * dt + MULTIPLIER_WEIGHT * extra)
+
+
+@njit(**SUMS)
 def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accepted, nearly):
     """Apply a Newton correction to each lane in its iteration; tell whether it converged.
 
@@ -96,13 +110,8 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
     for i in range(active):
         if counts[STAGE, i] != CORRECTING:
             continue
-        total, extra = 0.0, 0.0
-        for j in range(n):
-            total += mass[j] * dz[i, j] * dz[i, j]
-        for j in range(n, size):
-            extra += dz[i, j] * dz[i, j]
         weight, last = numbers[WEIGHT, i], numbers[LAST, i]
-        correction = np.sqrt(total + weight * dt[i] * dt[i] + MULTIPLIER_WEIGHT * extra)
+        correction = _size(i, dz, dt[i], mass, weight)
         first = counts[ITERATION, i] == 0
         limit = FIRST_SHARE * numbers[LENGTH, i] if first else 0.5 * last
         if not correction <= max(limit, accepted):
@@ -135,6 +144,47 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
         numbers[TURN, i] = np.arccos(min(1.0 / norm, 1.0))
 
 
+@njit(**SUMS)
+def correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active):
+    """`correct` for steps to the end of t, where t is fixed instead of the length."""
+    _, _, z, here, trial, _ = places
+    n = mass.shape[0]
+    for i in range(active):
+        if counts[STAGE, i] != AIMING:
+            continue
+        last, weight = numbers[LAST, i], numbers[WEIGHT, i]
+        first = counts[ITERATION, i] == 0
+        correction = _size(i, dz, 0.0, mass, weight)
+        limit = FIRST_SHARE * numbers[LENGTH, i] if first else 0.5 * last
+        if not correction <= max(limit, ARRIVED):
+            counts[STAGE, i] = REFUSED
+            continue
+        for j in range(trial.shape[1]):
+            trial[i, j] += dz[i, j]
+        if correction > ARRIVED:
+            counts[ITERATION, i] += 1
+            numbers[LAST, i] = correction
+            continue
+        total, along, way = 0.0, 0.0, 0.0
+        for j in range(n):
+            total += mass[j] * tangent[i, j] * tangent[i, j]
+        for j in range(n):
+            along += mass[j] * here[i, j] * tangent[i, j]
+        for j in range(n):
+            way += mass[j] * here[i, j] * (trial[i, j] - z[i, j])
+        along += weight * numbers[SLOPE, i] * slope[i]
+        norm = np.sqrt(total + weight * slope[i] * slope[i])
+        if not LEAST_COSINE * norm <= abs(along):
+            counts[STAGE, i] = REFUSED
+            continue
+        numbers[TURN, i] = np.arccos(min(abs(along) / norm, 1.0))
+        # the tangent of fixed t points towards growing t, that of the lane goes on as before
+        norm = norm if along > 0.0 else -norm
+        numbers[NORM, i], numbers[NEW_SLOPE, i] = norm, slope[i] / norm
+        way += weight * numbers[SLOPE, i] * (numbers[TRIAL, i] - numbers[T, i])
+        numbers[LENGTH, i], counts[STAGE, i] = way, CONVERGED
+
+
 @njit(**{**SUMS, "_nrt": True})
 def judge(index, determinant, numbers, counts, active, smallest, locates):
     """Tell what happened in steps that converged, and refuse those that hide something.
@@ -155,7 +205,7 @@ def judge(index, determinant, numbers, counts, active, smallest, locates):
         fold = flipped and changed == 1
         what = FOLD if fold else (BRANCH if flipped or changed == 1 else 0)
         what |= ARRIVAL if end >= 1.0 else 0
-        what |= RETURN if end < 0.0 else 0
+        what |= RETURN if end <= 0.0 else 0
         counts[WHAT, i] = what
         # a turn hides an arrival if t went beyond 1 (or below 0) and came back within the step;
         # a step this short cannot go beyond by more than round-off
@@ -208,181 +258,6 @@ def _dips(i, numbers):
     if not (slope < 0.0 and slope + 2.0 * bow * length > 0.0):
         return False
     return here - slope * slope / (4.0 * bow) < DIP * min(here, there)
-
-
-@njit(**SUMS)
-def file_events(new_tangent, stops, places, numbers, counts, active, buffer, filled):
-    """Copy the steps in which something happened behind others; end lanes; return how many."""
-    _, _, z, tangent, trial, _ = places
-    z0, tangent0, z1, tangent1, values, names = buffer
-    for i in range(active):
-        what = counts[WHAT, i]
-        if counts[STAGE, i] != CONVERGED or what == 0:
-            continue
-        norm = 1.0 / numbers[NORM, i]
-        for j in range(z.shape[1]):
-            z0[filled, j], tangent0[filled, j] = z[i, j], tangent[i, j]
-        for j in range(z.shape[1]):
-            z1[filled, j], tangent1[filled, j] = trial[i, j], new_tangent[i, j] * norm
-        values[0, filled], values[1, filled] = numbers[T, i], numbers[SLOPE, i]
-        values[2, filled], values[3, filled] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
-        values[4, filled], values[5, filled] = numbers[LENGTH, i], numbers[TRAVELLED, i]
-        names[0, filled], names[1, filled] = counts[LANE, i], what
-        names[2, filled], names[3, filled] = counts[INDEX, i], counts[NEW_INDEX, i]
-        filled += 1
-        if what & stops:
-            counts[STAGE, i] = ENDED
-    return filled
-
-
-@njit(**SUMS)
-def file_points(trial, numbers, counts, active, buffer, filled):
-    """Copy the ends of good steps of lanes that go on behind other points; return how many."""
-    z, values, names = buffer
-    for i in range(active):
-        if counts[STAGE, i] != CONVERGED:
-            continue
-        for j in range(trial.shape[1]):
-            z[filled, j] = trial[i, j]
-        values[0, filled] = numbers[TRAVELLED, i] + numbers[LENGTH, i]
-        values[1, filled] = numbers[TRIAL, i]
-        names[0, filled], names[1, filled] = counts[LANE, i], counts[NEW_INDEX, i]
-        names[2, filled] = counts[LEVEL, i]
-        filled += 1
-    return filled
-
-
-@njit(**{**SUMS, "_nrt": True})
-def proceed(new_tangent, mass, places, numbers, counts, active, smallest):
-    """Take over accepted steps, shorten refused ones, and try the next step of each lane.
-
-    Returns how many lanes are finished, and how many of them are given up.
-    """
-    finished, given_up = 0, 0
-    for i in range(active):
-        stage = counts[STAGE, i]
-        if stage not in (CONVERGED, REFUSED):
-            finished += stage == ENDED
-            continue
-        if stage == CONVERGED:
-            _take_over(i, new_tangent, mass, places, numbers, counts)
-        else:
-            numbers[LENGTH, i] *= BACK
-        counts[STEPS, i] += 1
-        if not numbers[LENGTH, i] >= smallest:
-            counts[STAGE, i] = SHORT
-        elif counts[STEPS, i] >= counts[MOST, i]:
-            counts[STAGE, i] = LONG
-        else:
-            predict(i, mass, places, numbers, counts)
-            continue
-        finished, given_up = finished + 1, given_up + 1
-    return finished, given_up
-
-
-@njit(**SUMS)
-def _take_over(i, new_tangent, mass, places, numbers, counts):
-    """Make the end of an accepted step the place of the lane, and choose the next length."""
-    z_old, tangent_old, z, tangent, trial, _ = places
-    n, norm = mass.shape[0], 1.0 / numbers[NORM, i]
-    chord = 0.0
-    for j in range(n):
-        dz = trial[i, j] - z[i, j]
-        chord += mass[j] * dz * dz
-    # loops over few arrays, so that the compiler can tell that they do not overlap
-    for j in range(z.shape[1]):
-        z_old[i, j] = z[i, j]
-    for j in range(z.shape[1]):
-        z[i, j] = trial[i, j]
-    for j in range(z.shape[1]):
-        tangent_old[i, j] = tangent[i, j]
-    for j in range(z.shape[1]):
-        tangent[i, j] = new_tangent[i, j] * norm
-    dt = numbers[TRIAL, i] - numbers[T, i]
-    chord = np.sqrt(chord + numbers[WEIGHT, i] * dt * dt)
-    half, length = 0.5 * numbers[TURN, i], numbers[LENGTH, i]
-    # arclength over chord, as on a circle
-    numbers[ARC, i] = chord * half / np.sin(half) if half > 1e-4 else chord
-    numbers[T_OLD, i], numbers[SLOPE_OLD, i] = numbers[T, i], numbers[SLOPE, i]
-    numbers[T, i], numbers[SLOPE, i] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
-    counts[INDEX, i] = counts[NEW_INDEX, i]
-    numbers[DET_OLD, i], numbers[DET, i] = numbers[DET, i], numbers[NEW_DET, i]
-    numbers[TRAVELLED, i] += length
-    growth = numbers[TURNING, i] / max(numbers[TURN, i], 1e-3)
-    numbers[LENGTH, i] = min(length * min(max(growth, 0.5), 2.0), numbers[LARGEST, i])
-
-
-@njit(**SUMS)
-def predict(i, mass, places, numbers, counts):
-    """Guess the end of the next step of lane i: the cubic through the last two points, continued.
-
-    At first the tangent. Prepares the closing equation of the pseudo-arclength as well.
-    """
-    z_old, tangent_old, z, tangent, trial, row = places
-    n, size, length, arc = mass.shape[0], z.shape[1], numbers[LENGTH, i], numbers[ARC, i]
-    if arc > 0.0:
-        s = 1.0 + length / arc
-        a = 2 * s * s * s - 3 * s * s + 1
-        c, d = (s * s * s - 2 * s * s + s) * arc, (s * s * s - s * s) * arc
-        for j in range(size):
-            trial[i, j] = z[i, j] + a * (z_old[i, j] - z[i, j])
-        for j in range(size):
-            trial[i, j] += c * tangent_old[i, j] + d * tangent[i, j]
-        step = a * (numbers[T_OLD, i] - numbers[T, i]) + c * numbers[SLOPE_OLD, i]
-        numbers[TRIAL, i] = numbers[T, i] + step + d * numbers[SLOPE, i]
-    else:
-        for j in range(size):
-            trial[i, j] = z[i, j] + length * tangent[i, j]
-        numbers[TRIAL, i] = numbers[T, i] + length * numbers[SLOPE, i]
-    along = 0.0
-    for j in range(n):
-        row[i, j] = mass[j] * tangent[i, j]
-    for j in range(n):
-        along += row[i, j] * (trial[i, j] - z[i, j])
-    for j in range(n, size):
-        row[i, j] = 0.0
-    numbers[CORNER, i] = numbers[WEIGHT, i] * numbers[SLOPE, i]
-    along += numbers[CORNER, i] * (numbers[TRIAL, i] - numbers[T, i])
-    numbers[DEFECT, i] = along - length
-    numbers[LAST, i] = np.inf
-    counts[ITERATION, i], counts[STAGE, i] = 0, CORRECTING
-
-
-@njit(**{**SUMS, "_nrt": True})
-def seat(lanes, levels, knobs, start, move, mass, weight, places, numbers, counts, active):
-    """Start lanes behind the active ones at t = 0; return how many cannot be started.
-
-    `start`: their points; `move`: their corrections, tangents, dt/ds, index and determinants;
-    `knobs`: first and largest step, turning and most steps for each level of retries.
-    """
-    dz, tangent, slope, index, determinant = move
-    _, _, z_here, tangent_here, _, _ = places
-    n, size, stuck = mass.shape[0], start.shape[1], 0
-    for k in range(lanes.shape[0]):
-        i, level = active + k, levels[k]
-        total = 0.0
-        for j in range(n):
-            total += mass[j] * tangent[k, j] * tangent[k, j]
-        squared = weight[k] * weight[k]
-        norm = 1.0 / np.sqrt(total + squared * slope[k] * slope[k])
-        for j in range(size):
-            z_here[i, j] = start[k, j] + dz[k, j]
-            tangent_here[i, j] = tangent[k, j] * norm
-        for row in range(NUMBERS):
-            numbers[row, i] = 0.0
-        for row in range(COUNTS):
-            counts[row, i] = 0
-        numbers[SLOPE, i], numbers[WEIGHT, i] = slope[k] * norm, squared
-        numbers[DET, i] = determinant[k]
-        numbers[LENGTH, i], numbers[LARGEST, i] = knobs[0, level], knobs[1, level]
-        numbers[TURNING, i], counts[MOST, i] = knobs[2, level], int(knobs[3, level])
-        counts[LANE, i], counts[INDEX, i], counts[LEVEL, i] = lanes[k], index[k], level
-        if np.isfinite(total) and numbers[SLOPE, i] > LEVEL_SLOPE:
-            predict(i, mass, places, numbers, counts)
-        else:
-            counts[STAGE, i] = STUCK
-            stuck += 1
-    return stuck
 
 
 @njit(**SUMS)

@@ -57,14 +57,22 @@ def hermite(bracket: Bracket, share: Values) -> tuple[Lanes, Values]:
 
 
 def locate_goal(curve: Curve, bracket: Bracket, goal: float) -> Located:
-    """Where t reaches `goal` (0 or 1): Newton at fixed parameters, from the cubic."""
-    old, new, share = bracket.before, bracket.after, np.empty(len(bracket.lanes))
-    cubic_shares(old.t - goal, new.t - goal, old.tangent_t, new.tangent_t, bracket.step, share)
-    z, _ = hermite(bracket, share)
-    t = np.full(len(z), goal)
-    z, found = polish(curve, z, t)
-    found &= _inside(curve, bracket, z, t)
-    return Located(z, t, share * bracket.step, found)
+    """Where t reaches `goal` (0 or 1): Newton at fixed parameters, from the cubic.
+
+    Most steps end there, exactly.
+    """
+    z, step = bracket.after.z.copy(), bracket.step.copy()
+    t, found = np.full(len(z), goal), np.ones(len(z), bool)
+    beyond = np.flatnonzero(bracket.after.t != goal)
+    if len(beyond):
+        curve, bracket = curve.take(beyond), bracket.take(beyond)
+        old, new, share = bracket.before, bracket.after, np.empty(len(beyond))
+        ends = (old.t - goal, new.t - goal, old.tangent_t, new.tangent_t, bracket.step)
+        cubic_shares(*ends, share)
+        z[beyond], found[beyond] = polish(curve, hermite(bracket, share)[0], t[beyond])
+        found[beyond] &= _inside(curve, bracket, z[beyond], t[beyond])
+        step[beyond] *= share
+    return Located(z, t, step, found)
 
 
 def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:

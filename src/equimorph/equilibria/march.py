@@ -11,6 +11,7 @@ from equimorph.equilibria.fronts import Bracket, Front, new_scalars
 from equimorph.equilibria.kernels import BRANCH, CONSTRAINT, CONVERGED, ENDED, REFUSED
 from equimorph.equilibria.location import locate_branch_point
 from equimorph.equilibria.records import EventFile, PointFile
+from equimorph.equilibria.stepping import kernels as stepping
 from equimorph.equilibria.tracing import TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Advance
@@ -88,7 +89,7 @@ class Block:
         move = here.advance(z, none, np.zeros_like(z), np.ones(count), none)
         start = (move.dz, move.tangent_z, move.tangent_t, move.index, move.determinant)
         state = (self.curve.structure.mass, here.weight, self._places, *self._scalars, self.active)
-        stuck = kernels.seat(lanes, levels, self._knobs, z, start, *state)
+        stuck = stepping.seat(lanes, levels, self._knobs, z, start, *state)
         self.active += count
         lost = self._given_up() if stuck else []
         self._close()
@@ -105,6 +106,8 @@ class Block:
         state = (numbers, counts, active)
         steps = (move.dz, move.dt, move.tangent_z, move.tangent_t)
         kernels.correct(*steps, mass, trial, *state, kernels.ACCEPTED, kernels.NEARLY)
+        ends = (move.dz, move.tangent_z, move.tangent_t, mass, self._places)
+        kernels.correct_arrivals(*ends, *state)
         locates = self.options.locates_branch_points
         good, doubtful = kernels.judge(move.index, move.determinant, *state, smallest, locates)
         if good:
@@ -115,7 +118,7 @@ class Block:
             self.events.add(move.tangent_z, self.options.stops, *record)
             if self.options.record:
                 self.points.add(trial, *record[1:])
-        finished, given_up = kernels.proceed(move.tangent_z, mass, self._places, *state, smallest)
+        finished, given_up = stepping.proceed(move.tangent_z, mass, self._places, *state, smallest)
         lost = self._given_up() if given_up else []
         if finished:
             self._close()

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria import kernels
 from equimorph.equilibria.fronts import Bracket, Front
+from equimorph.equilibria.records import kernels
 from equimorph.equilibria.tracing import Points
 
 Lanes = Float[np.ndarray, "lanes size"]

@@ -1,0 +1,1 @@
+"""From step to step: start, length and prediction."""
