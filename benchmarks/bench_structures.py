@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from equimorph.model import Parameter
-from equimorph.structures import EnergyStructure, Unknown
+from equimorph.structures import EnergyStructure, Truss, Unknown
 
 
 def chain(links):
@@ -44,13 +44,34 @@ def dense_energy(unknowns):
     )
 
 
+def bridge(bars):
+    """Girder of square bays with one diagonal each, four bars a bay; the first chord actuated."""
+    bays = bars // 4
+    joints = {f"{row}{i}": (i, height) for i in range(bays + 1) for row, height in ("b0", "t1")}
+    joints = {name: (float(x), float(y)) for name, (x, y) in joints.items()}
+    pairs = [("b0", "t0")]
+    for i in range(bays):
+        pairs += [(f"b{i}", f"b{i + 1}"), (f"t{i}", f"t{i + 1}"), (f"t{i}", f"b{i + 1}")]
+        pairs += [(f"b{i + 1}", f"t{i + 1}")]
+    middle = f"b{bays // 2}"
+    return Truss(
+        joints,
+        pairs[1:],
+        {"b0": "xy", "t0": "x", f"b{bays}": "y"},
+        {"F": {middle: (0.0, -1.0)}},
+        {"a": {"b0-b1": 1.0}},
+    )
+
+
 @pytest.mark.parametrize("lanes", [100, 4096])
-@pytest.mark.parametrize("make", [chain, dense_energy], ids=["chain", "dense"])
-def bench_newton_step_of_an_energy(benchmark, make, lanes):
+@pytest.mark.parametrize(
+    "make", [chain, dense_energy, bridge], ids=["chain of 40", "dense 40", "truss of 40 bars"]
+)
+def bench_newton_step(benchmark, make, lanes):
     structure = make(40)
     generator = np.random.default_rng(0)
     p = np.tile([parameter.default for parameter in structure.parameters], (lanes, 1))
-    z = 0.3 * structure.sample(p, generator)
+    z = 0.1 * structure.sample(p, generator)
     dp, row, one = np.ones_like(p), generator.normal(size=z.shape), np.ones(lanes)
     step = benchmark.pedantic(
         structure.advance, (z, p, dp, row, one, one), rounds=40, warmup_rounds=2

@@ -12,12 +12,14 @@ _HOMES = {
     "equimorph.errors": ("EquimorphError", "InputError"),
     "equimorph.model": ("Box", "Constraint", "Descriptor", "Grid", "Parameter", "Schedule"),
     "equimorph.structures": (
+        "Bar",
         "EnergyStructure",
         "Rod",
         "Spring",
         "State",
         "States",
         "Structure",
+        "Truss",
         "Unknown",
     ),
     "equimorph.equilibria": (

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.model import Parameter
-from equimorph.structures import EnergyStructure, Rod, Spring, Structure, Unknown
+from equimorph.structures import Bar, EnergyStructure, Rod, Spring, Structure, Truss, Unknown
 
 
 @dataclass(frozen=True)
@@ -109,10 +109,74 @@ def _chain_lagrangian(z, p):
     return bending - w * load + z[:, -2] * along + z[:, -1] * np.sin(phi).mean(axis=1)
 
 
+def arch_truss(strain):
+    """Five joints in the plane, seven bars, two of them actuated together, two loads."""
+    return Truss(
+        {"A": (-1.0, 0.0), "B": (-0.5, 0.4), "C": (0.0, 0.1), "D": (0.5, 0.4), "E": (1.0, 0.0)},
+        [
+            *(("A", "B"), ("B", "D"), ("C", "E"), ("D", "E")),
+            *(Bar(("A", "C"), 2.0), Bar(("B", "C"), 0.5, 1e-3), Bar(("C", "D"), 1.0, 2e-3, 0.6)),
+        ],
+        {"A": "xy", "E": "y"},
+        {"F": {"C": (0.0, -1.0)}, "H": {"B": (1.0, 0.0), "D": (0.5, -0.2)}},
+        {"a": {"B-D": 1.0, "A-B": -0.5}, "b": {"C-E": 1.0}},
+        strain,
+    )
+
+
+def tripod():
+    """Three bars in space to one joint, another joint held by three more; one bar actuated."""
+    return Truss(
+        {"A": (1, 0, 0), "B": (-1, 1, 0), "C": (-1, -1, 0), "D": (0, 0, 1), "E": (0, 0, 2)},
+        [("A", "D"), ("B", "D"), ("C", "D"), ("D", "E"), ("A", "E"), Bar(("B", "E"), 3.0)],
+        {"A": "xyz", "B": "xyz", "C": "xyz"},
+        {"F": {"E": (0.1, 0.0, -1.0)}},
+        {"a": {"B-D": 1.0}},
+    )
+
+
+def _truss_lagrangian(truss):
+    bars, places = truss.network.bars, truss.network.places
+    joints = list(truss.network.joints)
+    names = [parameter.name for parameter in truss.parameters]
+    data = truss.identity()
+
+    def lagrangian(z, p):
+        x = np.repeat(places[None], len(z), axis=0).astype(np.result_type(z, p))
+        for k, move in enumerate(truss.network.moves):
+            joint, axis = move.split(".")
+            x[:, joints.index(joint), "xyz".index(axis)] += z[:, k]
+        total = np.zeros(len(z), x.dtype)
+        for name, forces in data["loads"].items():
+            for joint, force in forces.items():
+                moved = x[:, joints.index(joint)] - places[joints.index(joint)]
+                total = total - p[:, names.index(name)] * (moved @ np.array(force))
+        for bar in bars:
+            i, j = (joints.index(end) for end in bar.ends)
+            rest = np.linalg.norm(places[j] - places[i]) if bar.rest is None else bar.rest
+            for name, rates in data["actuators"].items():
+                rest = rest + rates.get(bar.name, 0.0) * p[:, names.index(name)]
+            square = ((x[:, j] - x[:, i]) ** 2).sum(axis=1)
+            green = data["strain"] == "green"
+            strain = (square / rest**2 - 1) / 2 if green else np.sqrt(square) / rest - 1
+            total = total + bar.EA * rest * strain**2 / 2
+        return total
+
+    return lagrangian
+
+
+def _truss(name, truss):
+    centre = tuple(0.1 * np.arange(1.0, len(truss.parameters) + 1.0))
+    return Specimen(name, truss, centre, 0.1, 0.08, _truss_lagrangian(truss))
+
+
 SPECIMENS = (
     _rod("uniform"),
     _rod("left-half"),
     Specimen("spring", Spring(1.3), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     Specimen("spring by its energy", written_spring(), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
+    _truss("truss", arch_truss("engineering")),
+    _truss("truss, Green strain", arch_truss("green")),
+    _truss("truss in space", tripod()),
     Specimen("chain by its energy", closed_chain(), (0.8, 0.3, 0.5), 0.15, 1.0, _chain_lagrangian),
 )

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from equimorph.errors import InputError
 from equimorph.structures import Rod, Spring, Structure, from_identity
-from oracles.specimens import SPECIMENS, closed_chain, written_spring
+from oracles.specimens import SPECIMENS, arch_truss, closed_chain, tripod, written_spring
 
 STEP = 1e-30
 DRAWN = settings(max_examples=5, deadline=None, derandomize=True, database=None)
@@ -215,8 +215,10 @@ def test_only_a_symmetric_load_has_the_mirror():
         Spring(2.0),
         written_spring(),
         closed_chain(),
+        arch_truss("green"),
+        tripod(),
     ],
-    ids=["default", "resolution", "table", "spring", "energy", "constraints"],
+    ids=["default", "resolution", "table", "spring", "energy", "constraints", "truss", "space"],
 )
 def test_a_structure_is_rebuilt_from_its_identity(made):
     """Bit for bit: the identity is data."""
@@ -231,8 +233,8 @@ def test_a_structure_is_rebuilt_from_its_identity(made):
 @pytest.mark.parametrize(
     ("identity", "text"),
     [
-        ({"kind": "plate"}, "`kind` must be one of rod, spring, energy; got 'plate'"),
-        ({}, "`kind` must be one of rod, spring, energy; got None"),
+        ({"kind": "plate"}, "`kind` must be one of rod, spring, energy, truss; got 'plate'"),
+        ({}, "`kind` must be one of rod, spring, energy, truss; got None"),
         ({"kind": "rod", "colour": "red"}, "`structure` must have the data of a rod"),
     ],
 )

@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.equilibria.lift import Path, lift
 from equimorph.equilibria.tracing import TraceOptions
 from equimorph.errors import InputError
-from equimorph.model import Constraint
+from equimorph.model import Constraint, position
 from equimorph.structures import State
 
 
@@ -33,7 +33,7 @@ def limit_load(
     load: str,
     *,
     within: Sequence[Constraint] = (),
-    bound: float = 100.0,
+    bound: float | None = None,
     options: TraceOptions | None = None,
 ) -> LimitLoad:
     """Follow the path in `load` from `state` to the first loss of stability or constraint.
@@ -47,7 +47,8 @@ def limit_load(
     within
         Constraints that end the path, like ``[arch.max_curvature <= 10]``.
     bound
-        Largest load tried, in the parameter's unit; greater than its value in `state`.
+        Largest load tried, in the parameter's unit; greater than its value in `state`. None: a
+        hundred of the parameter's scales.
 
     Raises
     ------
@@ -58,6 +59,9 @@ def limit_load(
     ----------
     [Feher2025]_, section 3.2.1, conditions C1 and C2.
     """
+    parameters = state.structure.parameters
+    if bound is None:
+        bound = 100.0 * parameters[position(parameters, load)].scale
     if not bound > state[load]:
         raise InputError(f"`bound` must exceed {load} = {state[load]:g}; got {bound!r}.")
     if not state.stable:

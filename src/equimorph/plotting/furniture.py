@@ -24,8 +24,7 @@ _GROUND = "#d9d9d9"
 def frame_shapes(ax: Axes, outlines: Float[np.ndarray, "lanes points 2"], room: float) -> None:
     """Equal aspect, and limits around all outlines with `room`, a share of their width."""
     points = outlines.reshape(-1, 2)
-    # a row of NaN breaks the line
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    low, high = points.min(axis=0), points.max(axis=0)
     margin = room * max(high - low)
     ax.set_xlim(low[0] - margin, high[0] + margin)
     ax.set_ylim(low[1] - margin, high[1] + margin)

@@ -9,16 +9,19 @@ from equimorph.structures.energy import EnergyStructure, Unknown
 from equimorph.structures.rod import Rod
 from equimorph.structures.spring import Spring
 from equimorph.structures.states import State, States
+from equimorph.structures.truss import Bar, Truss
 
 KINDS: dict[str, Callable[..., Structure]] = {
     "rod": Rod,
     "spring": Spring,
     "energy": EnergyStructure,
+    "truss": Truss,
 }
 
 __all__ = [
     "KINDS",
     "Advance",
+    "Bar",
     "EnergyStructure",
     "Rod",
     "Spring",
@@ -26,6 +29,7 @@ __all__ = [
     "States",
     "Structure",
     "Symmetry",
+    "Truss",
     "Unknown",
     "bordered_advance",
     "from_identity",

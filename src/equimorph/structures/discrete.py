@@ -153,3 +153,14 @@ class DiscreteStructure(Structure):
                 f"{settings or 'the defaults'}, coming from the defaults."
             )
         return State(self, z[0], p)
+
+
+def along_corners(
+    corners: Float[np.ndarray, "lanes corners 2"], s: Float[np.ndarray, " points"]
+) -> Float[np.ndarray, "lanes points 2"]:
+    """Points of polylines; `s` runs from 0 to 1 from the first to the last corner."""
+    last = corners.shape[1] - 1
+    place = np.clip(np.asarray(s, dtype=float), 0.0, 1.0) * last
+    at = np.minimum(place.astype(int), last - 1)
+    share = (place - at)[:, None]
+    return np.asarray((1.0 - share) * corners[:, at] + share * corners[:, at + 1])

@@ -147,6 +147,30 @@ class EnergySection(_Section):
     )
 
 
+class BarSection(_Section):
+    """A bar of a truss; see `equimorph.Bar`."""
+
+    ends: list[str] = Field(min_length=2, max_length=2)
+    EA: float = Field(default=1.0, gt=0, le=LARGEST)
+    EI: float | None = Field(default=None, gt=0, le=LARGEST)
+    rest: float | None = Field(default=None, gt=0, le=LARGEST)
+
+
+Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
+
+
+class TrussSection(_Section):
+    """Bars between joints; see `equimorph.Truss`."""
+
+    kind: Literal["truss"]
+    joints: dict[str, Vector] = Field(min_length=2)
+    bars: list[BarSection] = Field(min_length=1)
+    supports: dict[str, str]
+    loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
+    actuators: dict[str, dict[str, Number]] = Field(default_factory=dict)
+    strain: Literal["engineering", "green"] = "engineering"
+
+
 class SetSection(_Section):
     """The part of the equilibrium set that is wanted."""
 
@@ -193,7 +217,7 @@ class RouteSection(_Section):
 
 
 StructureSection = Annotated[
-    RodSection | SpringSection | EnergySection, Field(discriminator="kind")
+    RodSection | SpringSection | EnergySection | TrussSection, Field(discriminator="kind")
 ]
 
 

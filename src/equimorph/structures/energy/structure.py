@@ -12,7 +12,7 @@ from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Descriptor, position
 from equimorph.structures.contract import Direction
-from equimorph.structures.discrete import DiscreteStructure
+from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.energy.declared import (
     Formulas,
     Symbols,
@@ -222,13 +222,7 @@ class EnergyStructure(DiscreteStructure):
     ) -> Float[np.ndarray, "lanes points 2"]:
         """Points of the line to draw; `s` runs from 0 to 1 from the first to the last."""
         corners = self._corners(z, p).reshape(len(z), -1, 2)
-        if s is None:
-            return corners
-        last = corners.shape[1] - 1
-        place = np.clip(np.asarray(s, dtype=float), 0.0, 1.0) * last
-        at = np.minimum(place.astype(int), last - 1)
-        share = (place - at)[:, None]
-        return np.asarray((1.0 - share) * corners[:, at] + share * corners[:, at + 1])
+        return corners if s is None else along_corners(corners, s)
 
     # --- descriptors ----------------------------------------------------------------------------
 

@@ -1,0 +1,184 @@
+"""Mechanics of a truss: energy, forces, stiffness and their derivatives, for batches of lanes."""
+
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.linalg.dense import multiply
+from equimorph.linalg.lanes import over_lanes
+from equimorph.linalg.sparse import SparseLayout
+from equimorph.structures.contract import Direction
+from equimorph.structures.discrete import DiscreteStructure, along_corners
+from equimorph.structures.truss.kernels import linearise_lanes
+from equimorph.structures.truss.network import Network
+from equimorph.structures.truss.strain import Energies
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+BarValues = Float[np.ndarray, "lanes bars"]
+Entries = Float[np.ndarray, "lanes entries"]
+
+SHORTEST = 1e-6
+"""Length of a bar, relative to its rest length, at which its joints count as one."""
+
+
+class TrussMechanics(DiscreteStructure):
+    """Everything of a truss but its names.
+
+    Parameters
+    ----------
+    network
+        Joints, bars, supports.
+    energies
+        Energies of the bars.
+    rates
+        Changes of the rest lengths by the parameters.
+    pulls
+        Forces on the unknowns by the parameters.
+    """
+
+    kind: ClassVar[str] = "truss"
+    constraints = 0
+
+    def __init__(
+        self,
+        network: Network,
+        energies: Energies,
+        rates: Float[np.ndarray, "bars parameters"],
+        pulls: Float[np.ndarray, "parameters unknowns"],
+    ) -> None:
+        self.network, self.energies, self.rates, self.pulls = network, energies, rates, pulls
+        self.unknowns = len(network.moves)
+        self.mass = np.ones(self.unknowns)
+
+    def spans(self, z: Lanes) -> Float[np.ndarray, "lanes bars space"]:
+        """Vectors from the first to the second joint of every bar."""
+        return np.asarray(self._drawn + self._differences(z))
+
+    def rest_lengths(self, p: Parameters) -> BarValues:
+        """Lengths without stress."""
+        return np.asarray(self.network.rests + multiply(p, self.rates.T))
+
+    def lengths(self, z: Lanes, p: Parameters) -> tuple[BarValues, BarValues]:
+        """Squares of the lengths, and the rest lengths."""
+        return np.asarray((self.spans(z) ** 2).sum(axis=2)), self.rest_lengths(p)
+
+    @cached_property
+    def _drawn(self) -> Float[np.ndarray, "bars space"]:
+        return np.asarray(np.diff(self.network.places[self.network.ends], axis=1)[:, 0])
+
+    def _differences(self, u: Lanes) -> Float[np.ndarray, "lanes bars space"]:
+        full = np.zeros((len(u), *self.network.held.shape))
+        full[:, ~self.network.held] = u
+        return np.asarray(np.diff(full[:, self.network.ends], axis=2)[:, :, 0])
+
+    def _gathered(self, forces: Float[np.ndarray, "lanes bars space"]) -> Lanes:
+        """Sum at the joints what bars exert on their second joint, and take from their first."""
+        full = np.zeros((len(forces), *self.network.held.shape))
+        for bar, (first, second) in enumerate(self.network.ends.tolist()):
+            full[:, second] += forces[:, bar]
+            full[:, first] -= forces[:, bar]
+        return np.asarray(full[:, ~self.network.held])
+
+    @cached_property
+    def _unknowns_of_bars(self) -> Int[np.ndarray, "bars both"]:
+        pairs = self.network.unknowns[self.network.ends]
+        return np.asarray(pairs.reshape(len(self.network.bars), -1))
+
+    @cached_property
+    def layout(self) -> SparseLayout:
+        """One entry for each pair of unknowns that a bar joins."""
+        found = {(i, i) for i in range(self.unknowns)}
+        for row in self._unknowns_of_bars.tolist():
+            found |= {(i, j) for i in row for j in row if i >= j >= 0}
+        rows, columns = np.array(sorted(found)).T
+        return SparseLayout(rows, columns, self.unknowns)
+
+    @cached_property
+    def _slots(self) -> Int[np.ndarray, "bars both both"]:
+        where = {
+            pair: slot
+            for slot, pair in enumerate(zip(self.layout.rows, self.layout.columns, strict=True))
+        }
+        pairs = self._unknowns_of_bars
+        return np.array([[[where.get((i, j), -1) for j in row] for i in row] for row in pairs])
+
+    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
+        """F, F_p·dp and the entries of F_z."""
+        residual, column = np.empty_like(z), np.empty_like(z)
+        entries = np.empty((len(z), len(self.layout.rows)))
+        bars = (self._unknowns_of_bars, self._slots, self._drawn, self.energies.stiffness)
+        shared = (*bars, self.network.rests, self.rates, self.pulls, self.energies.green)
+        given = [np.ascontiguousarray(array) for array in (z, p, dp)]
+        if len(z):
+            over_lanes(linearise_lanes, shared, given, [residual, column, entries])
+        return residual, column, entries
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """Forces that are missing at the joints."""
+        return self.linearised(z, p, np.zeros_like(p))[0]
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return self.linearised(z, p, dp)[1]
+
+    def entries(self, z: Lanes, p: Parameters) -> Entries:
+        """Entries of the stiffness matrix, geometric part included."""
+        return self.linearised(z, p, np.zeros_like(p))[2]
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """Strain energy of the bars, less the work of the loads."""
+        work = (multiply(p, self.pulls) * z).sum(axis=1)
+        return np.asarray(self.energies.value(*self.lengths(z, p)).sum(axis=1) - work)
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂E/∂p: for an actuator the force that it must bear, for a load minus its travel."""
+        by_rest = self.energies.by_rest(*self.lengths(z, p))
+        return np.asarray(multiply(by_rest, self.rates) - multiply(z, self.pulls.T))
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]: bar forces are 2 ∂W/∂g · d, with d the vector between the joints."""
+        d, (g, l0) = self.spans(z), self.lengths(z, p)
+        (dv, lv), (dw, lw) = ((self._differences(x), multiply(y, self.rates.T)) for x, y in (v, w))
+        gv, gw = (2.0 * (d * x).sum(axis=2) for x in (dv, dw))
+        gg, gl = self.energies.second(g, l0)
+        ggg, ggl, gll = self.energies.third(g, l0)
+        twice = ggg * gv * gw + ggl * (gv * lw + lv * gw) + gll * lv * lw
+        twice = twice + 2.0 * gg * (dv * dw).sum(axis=2)
+        by_v, by_w = gg * gv + gl * lv, gg * gw + gl * lw
+        return self._gathered(
+            2.0 * (twice[..., None] * d + by_v[..., None] * dw + by_w[..., None] * dv)
+        )
+
+    # --- states ---------------------------------------------------------------------------------
+
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Displacements within the size of the truss along each axis."""
+        extent = np.ptp(self.network.places, axis=0)
+        reach = np.broadcast_to(np.maximum(extent, 0.2 * extent.max()), self.network.held.shape)
+        shape = (len(p), self.unknowns)
+        return np.asarray(generator.uniform(-1.0, 1.0, shape) * reach[~self.network.held])
+
+    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """No bar has shrunk to a point, and all rest lengths are positive."""
+        g, l0 = self.lengths(z, p)
+        return np.asarray(((l0 > 0.0) & (g > (SHORTEST * l0) ** 2)).all(axis=1))
+
+    def shape(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "lanes points 2"]:
+        """Joints along a walk over all bars, some of them there and back.
+
+        `s` runs from 0 to 1 along it, each bar as long as the others. A truss in space is seen
+        obliquely: half of y recedes.
+        """
+        full = np.repeat(self.network.places[None], len(z), axis=0)
+        full[:, ~self.network.held] += z
+        if self.network.space == 3:
+            recede = 0.5 * np.sqrt(0.5) * full[..., 1]
+            full = np.stack([full[..., 0] + recede, full[..., 2] + recede], axis=-1)
+        corners = full[:, self.network.walk]
+        return corners if s is None else along_corners(corners, s)

@@ -1,0 +1,259 @@
+"""The truss: bars between pinned joints, loads on joints, bars that change their length."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, get_args
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+from equimorph.model import Descriptor, Parameter
+from equimorph.structures.natural import corrected
+from equimorph.structures.truss import descriptors
+from equimorph.structures.truss.mechanics import TrussMechanics
+from equimorph.structures.truss.network import AXES, Network, network
+from equimorph.structures.truss.strain import Energies, Strain
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Patterns = Mapping[str, Mapping[str, Any]]
+
+TINY = 1e-300
+SINGULAR = 1e-10
+"""Stiffness of a move, relative to the largest one, that counts as none."""
+
+
+class Truss(TrussMechanics):
+    """Pin-jointed elastic bars in the plane or in space, with displacements of any size.
+
+    Each bar has the energy ½ EA l₀ ε² with its rest length l₀ and engineering strain ε = l/l₀ − 1
+    or Green strain ε = (l²/l₀² − 1)/2; nodal forces are dead loads. Unknowns are the displacements
+    of the joints, in units of length, from the places where they are drawn. The metric measures
+    them by a typical move: a tenth of a bar, or less if the stiffness changes sooner.
+    The natural state is the equilibrium without load nearest to the drawing: the drawing itself,
+    unless bars have other rest lengths. Engineering strain has a kink where a bar shrinks to a
+    point, and sheets of the set end there: keep a set away from it by a constraint such as
+    ``max_utilisation <= 1``.
+
+    Parameters
+    ----------
+    joints
+        Places by name, of two or three coordinates.
+    bars
+        `Bar`s, or pairs of joints.
+    supports
+        Held axes by joint, like ``{"A": "xy", "C": "y"}``.
+    loads
+        Patterns of nodal forces by the name of the load parameter, which multiplies them:
+        ``{"F": {"B": (0, -1)}}``.
+    actuators
+        Changes of rest lengths by the name of the actuator, in units of length per unit of the
+        parameter: ``{"a": {"A-B": 1.0}}``.
+    strain
+        "engineering" or "green".
+
+    Raises
+    ------
+    InputError
+        For a joint without bars, a stiffness or length that is not positive, supports that leave
+        nothing free, a load or actuator without effect, a mechanism (with the joint that moves), or
+        rest lengths without an equilibrium nearby.
+
+    Examples
+    --------
+    >>> from equimorph import Truss
+    >>> arch = Truss({"A": (-1, 0), "B": (0, 0.1), "C": (1, 0)}, ["AB", "BC"],
+    ...     {"A": "xy", "C": "xy"}, {"F": {"B": (0, -1)}})
+    Traceback (most recent call last):
+    equimorph.errors.InputError: `ends` of a bar must be the names of two joints; got 'AB'.
+    >>> arch = Truss({"A": (-1, 0), "B": (0, 0.1), "C": (1, 0)}, [("A", "B"), ("B", "C")],
+    ...     {"A": "xy", "C": "xy"}, {"F": {"B": (0, -1)}})
+    >>> arch.natural_state()
+    State(truss: F=0; index 0)
+    """
+
+    length_unit = "length"
+
+    def __init__(  # three have defaults
+        self,
+        joints: Mapping[str, Sequence[float]],
+        bars: Iterable[Any],
+        supports: Mapping[str, str],
+        loads: Patterns | None = None,
+        actuators: Patterns | None = None,
+        strain: Strain = "engineering",
+    ) -> None:
+        if strain not in get_args(Strain):
+            raise InputError(f"`strain` must be engineering or green; got {strain!r}.")
+        made = network(joints, bars, supports)
+        self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
+        self._check_names()
+        stiffness = np.array([float(bar.EA) for bar in made.bars])
+        energies = Energies(strain == "green", stiffness)
+        rates = _rates(made, self._actuators)
+        forces = [made.vector(each, f"loads.{name}") for name, each in self._loads.items()]
+        super().__init__(
+            made,
+            energies,
+            np.pad(rates, ((0, 0), (0, len(forces)))),
+            np.array([*np.zeros((len(self._actuators), len(made.moves))), *forces]),
+        )
+        self.parameters = (
+            *(
+                _actuator(name, made, rate)
+                for name, rate in zip(self._actuators, rates.T, strict=True)
+            ),
+            *(Parameter(name, "force", 1.0, "load", 0.0) for name in self._loads),
+        )
+        self._start = self._equilibrium()
+        self._set_scales()
+
+    def _check_names(self) -> None:
+        names = [*self._actuators, *self._loads]
+        if not names:
+            raise InputError("`loads` or `actuators` must name a parameter; got none.")
+        for i, name in enumerate(names):
+            if not (isinstance(name, str) and name.isidentifier()) or name in names[:i]:
+                raise InputError(
+                    "`loads` and `actuators` must have names of their own, of letters, digits and "
+                    f"underscores; got {name!r}."
+                )
+
+    @property
+    def _rest_load(self) -> Float[np.ndarray, "1 parameters"]:
+        return np.zeros((1, len(self.parameters)))
+
+    def _equilibrium(self) -> Float[np.ndarray, " unknowns"]:
+        """Displacements at rest; refuse mechanisms."""
+        p, drawn = self._rest_load, np.zeros((1, self.unknowns))
+        z, found = corrected(self, drawn, p)
+        found &= np.abs(z).max() <= np.ptp(self.network.places, axis=0).max()
+        stiffness = self.layout.dense(self.entries(z if found[0] else drawn, p))[0]
+        values, vectors = np.linalg.eigh(stiffness)
+        if np.abs(values).min() <= SINGULAR * np.abs(values).max():
+            self._refuse_mechanism(vectors[:, int(np.argmin(np.abs(values)))])
+        if not found[0] or values.min() < 0.0:
+            raise InputError(
+                "`rest` lengths must allow a stable equilibrium without load near the joints as "
+                "drawn; Newton's method found none. Draw the joints closer to it."
+            )
+        return np.asarray(z[0])
+
+    def _set_scales(self) -> None:
+        """Measure moves by a typical one, and parameters by what makes it, if linearly.
+
+        Typical is a tenth of a bar, or the move v along a parameter at which the change of
+        stiffness, ½ vᵀ D²F[v, v], reaches the stiffness vᵀ F_z v, if that is smaller: the rise of
+        a shallow arch, say.
+        """
+        count = len(self.parameters)
+        z, p = (np.repeat(array, count, axis=0) for array in (self._start[None], self._rest_load))
+        columns = self.parameter_derivative(z, p, np.eye(count))
+        moves = self.solve(z, p, -columns[:, None]).x[:, 0]
+        rates = np.maximum(np.abs(moves).max(axis=1), TINY)
+        v = moves / rates[:, None]
+        stiff = -(columns * v).sum(axis=1) / rates
+        along = (v, np.zeros_like(p))
+        bend = np.abs((self.second_derivative(z, p, along, along) * v).sum(axis=1))
+        tenth = 0.1 * float(self.network.rests.mean())
+        typical = min(tenth, float((2.0 * stiff / np.maximum(bend, TINY)).min()))
+        self.mass = np.full(self.unknowns, typical**-2)
+        self.parameters = tuple(
+            replace(each, scale=typical / rate)
+            for each, rate in zip(self.parameters, rates.tolist(), strict=True)
+        )
+
+    def _refuse_mechanism(self, mode: Float[np.ndarray, " unknowns"]) -> None:
+        moves = np.zeros(self.network.held.shape)
+        moves[~self.network.held] = mode
+        at = int(np.argmax(np.abs(moves).max(axis=1)))
+        along = moves[at] / np.linalg.norm(moves[at])
+        along = along * np.sign(along[np.argmax(np.abs(along))])
+        direction = ", ".join(f"{x:.3g}" for x in np.round(along, 6) + 0.0)
+        raise InputError(
+            f"`truss` must be no mechanism; joint {self.network.joints[at]} can move along "
+            f"({direction}) without force. Add a bar or a support."
+        )
+
+    def identity(self) -> dict[str, Any]:
+        """Kind, and what the truss is made from."""
+        made = self.network
+        places = dict(zip(made.joints, made.places.tolist(), strict=True))
+        held = {
+            joint: "".join(axis for axis, fast in zip(AXES, row, strict=False) if fast)
+            for joint, row in zip(made.joints, made.held, strict=True)
+        }
+        return {
+            "kind": self.kind,
+            "joints": places,
+            "bars": [bar.data() for bar in made.bars],
+            "supports": {joint: axes for joint, axes in held.items() if axes},
+            "loads": {
+                name: {joint: [float(x) for x in force] for joint, force in forces.items()}
+                for name, forces in self._loads.items()
+            },
+            "actuators": {
+                name: {bar: float(rate) for bar, rate in rates.items()}
+                for name, rates in self._actuators.items()
+            },
+            "strain": "green" if self.energies.green else "engineering",
+        }
+
+    def natural_guess(self, p: Parameters) -> Lanes:
+        """The state at rest."""
+        return np.repeat(self._start[None], len(p), axis=0)
+
+    def force(self, bar: str) -> Descriptor:
+        """Force in a bar, positive in tension."""
+        return descriptors.force(self, bar)
+
+    def utilisation(self, bar: str) -> Descriptor:
+        """Compression of a bar over its Euler load π² EI/l₀²."""
+        return descriptors.utilisation(self, bar)
+
+    @property
+    def max_utilisation(self) -> Descriptor:
+        """Largest utilisation of the bars that have a bending stiffness."""
+        return descriptors.max_utilisation(self)
+
+    def displacement(self, joint: str, axis: str) -> Descriptor:
+        """Displacement of a joint along an axis, from where it is drawn."""
+        return descriptors.displacement(self, joint, axis)
+
+    def travel(self, load: str) -> Descriptor:
+        """Displacement along a load, work per unit of its parameter."""
+        return descriptors.travel(self, load)
+
+    @property
+    def elevation(self) -> Descriptor:
+        """The travel of the first load, or the first displacement."""
+        return descriptors.elevation(self)
+
+    def descriptor(self, text: str) -> Descriptor:
+        """Return the descriptor written like ``force(A-B)`` or ``displacement(B, y)``."""
+        return descriptors.named(self, text)
+
+
+def _rates(made: Network, actuators: Patterns) -> Float[np.ndarray, "bars actuators"]:
+    rates = np.zeros((len(made.bars), len(actuators)))
+    for k, (name, given) in enumerate(actuators.items()):
+        fine = isinstance(given, Mapping) and all(
+            isinstance(rate, int | float) and np.isfinite(rate) and rate for rate in given.values()
+        )
+        if not (fine and given):
+            raise InputError(
+                f"`actuators.{name}` must give rates by bar, finite and not 0; got {given!r}."
+            )
+        for bar, rate in given.items():
+            rates[made.bar(bar), k] = rate
+    return rates
+
+
+def _actuator(name: str, made: Network, rates: Float[np.ndarray, " bars"]) -> Parameter:
+    """Actuator that may not take a rest length to zero."""
+    moved = np.flatnonzero(rates)
+    limits = -made.rests[moved] / rates[moved]
+    lower = float(limits[rates[moved] > 0.0].max(initial=-np.inf))
+    upper = float(limits[rates[moved] < 0.0].min(initial=np.inf))
+    return Parameter(name, "length", 1.0, "actuator", 0.0, lower, upper)
