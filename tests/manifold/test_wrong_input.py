@@ -16,7 +16,7 @@ from equimorph.structures import Rod, Spring
         (
             Box(F=(-1, 1), x_l=(0.5, 1), k=(1, 2), m=(0, 1)),
             {},
-            "`box` must have one or two parameters; got 4 (F, x_l, k, m).",
+            "`box` must have one, two or three parameters; got 4 (F, x_l, k, m).",
         ),
         (
             Box(F=(-1, 1), Theta=(0, 1)),

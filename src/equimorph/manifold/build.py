@@ -34,7 +34,7 @@ SEARCHES = 4
 HOPELESS = 50
 """Doubtful grid cells, and four times what there were at first, beyond which bisection ends."""
 
-INTERVALS = {1: (200,), 2: (47, 81)}
+INTERVALS = {1: (200,), 2: (47, 81), 3: (24, 24, 24)}
 """Of the grid, by the number of free parameters, if not given."""
 
 
@@ -49,16 +49,17 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     checks: int = 2,
     progress: Progress | None = None,
 ) -> EquilibriumSet:
-    """All equilibria over a box in one or two parameters that are connected to the seeds.
+    """All equilibria over a box in one to three parameters that are connected to the seeds.
 
     Sheet lifting: equilibria at both ends of every grid edge are paired by lifting the edge;
-    around each triangle the curves close into loops that bound discs of the set. Folds and
-    constraints carry exact vertices. Seeds: natural states over a coarse grid, and random search.
+    around each triangle the curves close into loops that bound discs of the set; around each
+    tetrahedron the discs close into spheres that bound balls. Folds and constraints carry exact
+    vertices. Seeds: natural states over a coarse grid, and random search.
 
     Parameters
     ----------
     box
-        Ranges of the one or two free parameters.
+        Ranges of the one, two or three free parameters.
     fixed
         Values of other parameters; those not named keep their defaults.
     within
@@ -81,7 +82,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     Raises
     ------
     InputError
-        For a box in more than two parameters, unknown names, parameters both free and fixed, or
+        For a box in more than three parameters, unknown names, parameters both free and fixed, or
         values without meaning.
     """
     progress = progress or Silent()
@@ -110,12 +111,12 @@ def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:
     d = len(box.names)
     if d not in INTERVALS:
         raise InputError(
-            f"`box` must have one or two parameters; got {d} ({', '.join(box.names)})."
+            f"`box` must have one, two or three parameters; got {d} ({', '.join(box.names)})."
         )
     if intervals is None:
         return INTERVALS[d]
     if len(intervals) != d or any(int(n) != n or n < 2 for n in intervals):
-        number = ("one whole number", "two whole numbers")[d - 1]
+        number = ("one whole number", "two whole numbers", "three whole numbers")[d - 1]
         raise InputError(f"`intervals` must be {number} >= 2; got {intervals!r}.")
     return tuple(map(int, intervals))
 

@@ -1,4 +1,4 @@
-"""Sheet lifting, part five: the cells of the set, of any dimension."""
+"""Sheet lifting, part six: the cells of the set, of any dimension."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph.manifold.assembly import assemble
+from equimorph.manifold.balls import fill
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.points import CAP, FOLD
 from equimorph.manifold.polygons import find_loops
@@ -42,7 +43,12 @@ def find_cells(pairing: Pairing) -> Cells:
     if pairing.mesh.dimension == 1:
         return _segments(pairing)
     discs = assemble(pairing, find_loops(pairing))
-    return Cells(discs.corners, discs.index, discs.folds, discs.caps, discs.doubtful)
+    if pairing.mesh.dimension == 2:
+        return Cells(discs.corners, discs.index, discs.folds, discs.caps, discs.doubtful)
+    balls = fill(pairing, discs)
+    return Cells(
+        balls.corners, balls.index, balls.folds, balls.caps, discs.doubtful, balls.doubtful
+    )
 
 
 def _segments(pairing: Pairing) -> Cells:

@@ -108,7 +108,10 @@ def pin(
             break
     around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
     gap = np.linalg.norm(embed(setting, z, p) - aim.middle, axis=1)
-    return Pinned(z, p, np.asarray((size < 1e-8) & (gap <= REACH * around + 1e-3)))
+    found = (size < 1e-8) & (gap <= REACH * around + 1e-3)
+    for constraint in setting.constraints:
+        found[found] &= constraint.excess(z[found], p[found]) < 1e-9
+    return Pinned(z, p, found)
 
 
 def _middles(

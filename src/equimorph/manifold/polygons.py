@@ -11,7 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
+from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Pairing
+
+NEARER = 0.5
+"""Most that the gap in a chain may be, relative to the distance from another chain."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +52,25 @@ def find_loops(pairing: Pairing) -> Loops:
     ends = np.searchsorted(owner, np.stack([special, special + 1]))
     for triangle, start, stop in zip(special.tolist(), *ends.tolist(), strict=True):
         found = list(_around(pairing, triangle, set(plain[start:stop].ravel().tolist())))
-        chains = sum(polygon.open for polygon in found if polygon is not None)
+        chains = [polygon for polygon in found if polygon is not None and polygon.open]
         if any(polygon is None for polygon in found):
             broken.append(triangle)
-        elif chains > 1:
+        elif len(chains) > 1 and not _close_themselves(pairing, chains):
             ambiguous.append(triangle)
         else:
             polygons.extend(polygon for polygon in found if polygon is not None)
     return Loops(plain, owner, polygons, ambiguous, broken)
+
+
+def _close_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:
+    """Whether both ends of every open chain are much nearer to each other than to other chains."""
+    ends = np.array([(chain.points[0], chain.points[-1]) for chain in chains]).ravel()
+    place = embed(pairing.setting, pairing.points.z[ends], pairing.points.p[ends])
+    gap = np.linalg.norm(place[:, None] - place[None], axis=2)
+    chain = np.arange(len(ends)) // 2
+    own = chain[:, None] == chain[None]
+    to_itself = np.where(own, gap, 0.0).max(axis=1)
+    return bool((to_itself < NEARER * np.where(own, np.inf, gap).min(axis=1)).all())
 
 
 def _plain(

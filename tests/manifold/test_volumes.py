@@ -1,0 +1,135 @@
+"""Sets over three parameters: balls and spheres known by name, the spring, and a coarse arch."""
+
+import numpy as np
+import pytest
+
+from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.manifold.simplices import volumes
+from equimorph.manifold.topology import euler_characteristic
+from equimorph.model import Box, Descriptor
+from equimorph.structures import Rod, Spring
+from oracles.complexes import assert_faithful, assert_folds_are_singular
+from oracles.polynomial import Polynomial
+from oracles.surfaces import integral
+from typecheck import unchecked
+
+BOX = Box(a=(-1.3, 1.2), b=(-1.5, 1.4), c=(-1.4, 1.3))
+
+
+def ball() -> Polynomial:
+    """x² + a² + b² + c² = 1: a three-sphere, folded along the sphere x = 0."""
+    return Polynomial(lambda x, a, b, c: integral(x**2 + a**2 + b**2 + c**2 - 1.0), 1, "abc")
+
+
+def ridge() -> Polynomial:
+    """x³ + (a + c²/2) x + b: the graph b(x, a, c), folded along a surface with a curve of cusps."""
+    return Polynomial(
+        lambda x, a, b, c: integral(x**3 + a * x + 0.5 * c**2 * x + b), 1, ("a", "b", "c")
+    )
+
+
+def lifted(structure, box, intervals, **options) -> EquilibriumSet:
+    with unchecked():
+        return equilibrium_set(structure, box, intervals=intervals, checks=0, **options)
+
+
+def topology(eset: EquilibriumSet) -> tuple[int, int, int]:
+    return eset.audit.components, eset.audit.euler_characteristic, len(eset.boundaries)
+
+
+def projected_volume(eset: EquilibriumSet, index: int) -> float:
+    """Volume over the box of the cells of an index."""
+    corners = eset.coordinates[eset.cells[eset.cell_index == index]]
+    return float(np.abs(volumes(corners)).sum())
+
+
+def test_sheets_that_never_meet_are_balls():
+    """x³ − 9x + …: three sheets over the whole box."""
+    sheets = Polynomial(
+        lambda x, a, b, c: integral(x**3 - 9.0 * x + 0.5 * a + 0.5 * b + 0.2 * c), 1, "abc"
+    )
+    eset = equilibrium_set(sheets, BOX, intervals=(2, 3, 2), checks=1)
+    assert_faithful(eset)
+    assert topology(eset) == (3, 3, 3)
+    assert {piece.cells for piece in eset.components} == {6 * 2 * 3 * 2}
+    assert projected_volume(eset, 0) == pytest.approx(2 * 2.5 * 2.9 * 2.7, rel=1e-12)
+
+
+def test_three_sphere_is_closed_and_folded_along_a_sphere():
+    eset = lifted(ball(), BOX, (5, 6, 5))
+    assert_faithful(eset)
+    assert topology(eset) == (1, 0, 0)
+    assert len(eset.folds) == 1
+    assert euler_characteristic(eset.folds[0]) == 2
+    equator = eset.coordinates[np.unique(eset.folds[0])]
+    np.testing.assert_allclose((equator**2).sum(axis=1), 1.0, rtol=1e-12)
+    # chords across a fold surface of spacing 1/2 lose some of the ball's volume 4π/3
+    for index in (0, 1):
+        assert projected_volume(eset, index) == pytest.approx(4 * np.pi / 3, rel=0.1)
+
+
+@pytest.mark.slow
+def test_volume_below_a_sheet_converges_to_that_of_the_ball():
+    """Second order in the spacing: halving it leaves about a quarter of the error."""
+    errors = [4 * np.pi / 3 - projected_volume(lifted(ball(), BOX, (n, n, n)), 0) for n in (5, 10)]
+    assert 0 < errors[1] < errors[0] / 3
+
+
+@pytest.mark.parametrize("slope", [0.0, 1.0])
+def test_constraint_cuts_the_three_sphere_to_a_ball(slope):
+    """x ≤ 0.4 closes along a sphere; x + a ≤ 0.4 crosses the fold, which becomes a disc."""
+    slant = Descriptor("x + a", "1", lambda z, p: z[:, 0] + slope * p[:, 0])
+    eset = lifted(ball(), BOX, (5, 6, 5), within=[slant <= 0.4])
+    assert_faithful(eset)
+    assert topology(eset) == (1, 1, 1)
+    assert eset.boundaries[0].kind == "cap"
+    assert euler_characteristic(eset.boundaries[0].vertices) == 2
+    assert [euler_characteristic(fold) for fold in eset.folds] == [1 if slope else 2]
+    own = np.unique(eset.boundaries[0].vertices)
+    np.testing.assert_allclose(slant(eset.points)[own], 0.4, rtol=0, atol=1e-8)
+
+
+def test_curve_of_cusps_is_no_edge_of_the_fold_surface():
+    """Folds a + c²/2 = −3x², b = 2x³: a disc, smooth in (x, a, b, c)."""
+    eset = lifted(ridge(), Box(a=(-1.1, 0.6), b=(-0.7, 0.8), c=(-0.9, 1.0)), (4, 5, 4))
+    assert_faithful(eset)
+    assert topology(eset) == (1, 1, 1)
+    assert [euler_characteristic(fold) for fold in eset.folds] == [1]
+    x, folded = eset.points.z[:, 0], eset.kinds == 1
+    a, b, c = eset.coordinates[folded].T
+    np.testing.assert_allclose(a + 0.5 * c**2, -3 * x[folded] ** 2, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(b, 2 * x[folded] ** 3, rtol=0, atol=1e-9)
+
+
+def test_spring_over_actuator_load_and_stiffness():
+    """Three equilibria where |F|/k < (1 − x_l^(2/3))^(3/2): the volume of the unstable sheet.
+
+    Over x_l > 0.5 and k from 1 to 1.2: ∫∫ 2 k (1 − x^(2/3))^(3/2) dx dk, by quadrature.
+    """
+    eset = lifted(Spring(), Box(x_l=(0.5, 1.2), F=(-0.3, 0.3), k=(1.0, 1.2)), (10, 9, 2))
+    assert_faithful(eset)
+    assert_folds_are_singular(eset, 1e-8)
+    assert topology(eset) == (1, 1, 1)
+    folded = np.unique(np.concatenate(eset.folds))
+    delta, x = eset.points.z[folded, 0], eset.points["x_l"][folded]
+    np.testing.assert_allclose(x, np.cos(delta) ** 3, rtol=0, atol=1e-9)
+    x = np.linspace(0.5, 1.0, 20001)
+    area = np.trapezoid(2 * (1 - np.cbrt(x) ** 2) ** 1.5, x)
+    assert projected_volume(eset, 1) == pytest.approx(area * (1.2**2 - 1) / 2, rel=0.1)
+
+
+@pytest.mark.slow
+def test_arch_over_both_actuators_and_the_load():
+    """(Θ, Δ, q) across the pitchforks on Δ = 0, along which the set is smooth.
+
+    The boundary of a compact manifold of three dimensions has twice its Euler characteristic.
+    """
+    arch = Rod()
+    box = Box(Theta=(0.6, 1.4), Delta=(-0.6, 0.6), q=(0, 6))
+    eset = lifted(arch, box, (8, 8, 8), within=[arch.max_curvature <= 25])
+    assert_faithful(eset)
+    assert_folds_are_singular(eset, 1e-8)
+    assert eset.components[0].indices == (0, 1, 2, 3, 4)
+    assert len(eset.components) == 1
+    around = np.concatenate([piece.vertices for piece in eset.boundaries])
+    assert euler_characteristic(around) == 2 * eset.audit.euler_characteristic
