@@ -1,10 +1,12 @@
 """A study of a truss."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.storage import read_results
 from equimorph.study import run_study
@@ -21,7 +23,9 @@ def test_the_example_runs_from_file_to_page(drawn, tmp_path, monkeypatch):
     """Stable ways over lead where both bars are shorter than half the span."""
     text = EXAMPLE.read_text(encoding="utf-8").replace("[25, 25]", "[9, 9]")
     (tmp_path / "truss.toml").write_text(text, encoding="utf-8")
-    if not drawn:
+    if drawn:
+        monkeypatch.setattr(plotting, "film", partial(plotting.film, frames=6))
+    else:
         draw_dots(monkeypatch)
     with unchecked():
         outcome = run_study(tmp_path / "truss.toml", tmp_path / "out")
