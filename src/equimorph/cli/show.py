@@ -82,6 +82,9 @@ def _show(outcome: Outcome, screen: Console) -> None:
         screen.print(_table(heights, states))
     for each in outcome.routes:
         screen.print(_verdict(each), soft_wrap=True)
+    for amap in outcome.maps:
+        counts = ", ".join(f"{count} {kind}" for kind, count in amap.map.counts.items() if count)
+        screen.print(f"Map {amap.name}: {counts}.", soft_wrap=True)
 
 
 def _table(heights: Descriptor, states: States) -> Table:

@@ -141,6 +141,16 @@ def add_dimension(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
     return dimension
 
 
+def put_coordinate(
+    group: h5py.Group, name: str, values: Shaped[np.ndarray, " n"], meaning: str = ""
+) -> None:
+    """Store the places along a dimension of the same name, before the arrays that use it."""
+    dataset = group.create_dataset(name, data=values, fletcher32=True)
+    dataset.make_scale(name)
+    if meaning:
+        dataset.attrs["long_name"] = meaning
+
+
 def _dimension(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
     """Nearest dimension of this name and size, in the group or above it, else a new one."""
     place = group

@@ -9,10 +9,10 @@ import h5py
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
-from equimorph.storage import route_group, set_group, states_group
+from equimorph.storage import map_group, route_group, set_group, states_group
 from equimorph.storage.hdf import content, opened
 from equimorph.structures import State, States, Structure
-from equimorph.tasks import Route
+from equimorph.tasks import ActuatorMap, Route
 
 FORMAT = "an equimorph checkpoint"
 VERSION = 1
@@ -65,6 +65,7 @@ def set_part(height: Descriptor) -> Part[EquilibriumSet]:
 
 
 STATES_PART: Part[States] = Part("states", states_group.write, states_group.read)
+MAP_PART: Part[ActuatorMap] = Part("map", map_group.write, map_group.read)
 
 
 def _write_journey(group: h5py.Group, journey: Journey) -> None:

@@ -1,38 +1,40 @@
 """Results as one HDF5 file for everybody: xarray opens its groups, ParaView its ``/VTKHDF``.
 
 Groups: ``set`` (vertices and triangles of the equilibrium set), ``equilibria/<number>`` (states
-over one point each), ``routes/<name>`` (one each), and ``VTKHDF``, an unstructured grid whose
-arrays are hard links to those of ``set``. The points of the grid are the free parameters and a
-descriptor: that embedding is for looking at, the states are in ``set``.
+over one point each), ``routes/<name>`` and ``maps/<name>`` (one each), and ``VTKHDF``, an
+unstructured grid whose arrays are hard links to those of ``set``. The points of the grid are the
+free parameters and a descriptor: that embedding is for looking at, the states are in ``set``.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import h5py
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
-from equimorph.storage import route_group, set_group, states_group
+from equimorph.storage import map_group, route_group, set_group, states_group
 from equimorph.storage.files import write_bytes
 from equimorph.storage.hdf import content, get_json, opened, put_json
 from equimorph.storage.vtkhdf import link_grid
 from equimorph.structures import States, from_identity
-from equimorph.tasks import Route
+from equimorph.tasks import ActuatorMap, Route
 
 FORMAT = "equimorph results"
 VERSION = 1
-SET, ROUTES, EQUILIBRIA, STRUCTURE = "set", "routes", "equilibria", "structure"
+SET, ROUTES, MAPS, EQUILIBRIA = "set", "routes", "maps", "equilibria"
+STRUCTURE = "structure"
 
 
 @dataclass(frozen=True)
 class Results:
-    """What a results file holds: a set, routes on it by name, and equilibria over points."""
+    """What a results file holds: a set, routes and maps by name, and equilibria over points."""
 
     equilibrium_set: EquilibriumSet
     routes: dict[str, Route]
     equilibria: tuple[States, ...]
+    maps: dict[str, ActuatorMap] = field(default_factory=dict)
 
 
 def write_results(
@@ -41,6 +43,7 @@ def write_results(
     height: Descriptor,
     routes: Mapping[str, Route] | None = None,
     equilibria: Sequence[States] = (),
+    maps: Mapping[str, ActuatorMap] | None = None,
 ) -> Path:
     """Write an equilibrium set and what was found on it, in one step.
 
@@ -56,6 +59,8 @@ def write_results(
         Routes by name.
     equilibria
         States over one point each.
+    maps
+        Maps by name.
 
     Raises
     ------
@@ -72,6 +77,8 @@ def write_results(
             states_group.write(file.create_group(f"{EQUILIBRIA}/{number}"), states)
         for name, route in (routes or {}).items():
             route_group.write(file.create_group(f"{ROUTES}/{name}"), route)
+        for name, amap in (maps or {}).items():
+            map_group.write(file.create_group(f"{MAPS}/{name}"), amap)
 
     return write_bytes(Path(path), content(FORMAT, VERSION, fill))
 
@@ -98,4 +105,6 @@ def read_results(path: str | Path) -> Results:
         equilibria = tuple(
             states_group.read(file[f"{EQUILIBRIA}/{number}"], structure) for number in range(count)
         )
-    return Results(eset, routes, equilibria)
+        names = list(file[MAPS]) if MAPS in file else []
+        maps = {name: map_group.read(file[MAPS][name], structure) for name in names}
+    return Results(eset, routes, equilibria, maps)

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from equimorph import plotting
 from equimorph.model import Progress
 from equimorph.study.folder import ResultsFolder
-from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE, route_figures
-from equimorph.study.outcome import Outcome, RouteOutcome
+from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE, map_files, route_figures
+from equimorph.study.outcome import MapOutcome, Outcome, RouteOutcome
+from equimorph.tasks import CurvatureMap, LimitLoadMap
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,17 @@ def _figures(outcome: Outcome) -> list[Figure]:
         figures.append(_still(PLANE, partial(plotting.parameter_plane, eset)))
     for each in outcome.routes:
         figures += _figures_of_route(outcome, each)
-    return figures
+    return [*figures, *(_figure_of_map(each) for each in outcome.maps)]
+
+
+def _figure_of_map(each: MapOutcome) -> Figure:
+    def draw() -> Axes:
+        if isinstance(each.map, CurvatureMap):
+            return plotting.curvature_map(each.map)
+        assert isinstance(each.map, LimitLoadMap)
+        return plotting.load_map(each.map)
+
+    return _still(map_files(each.name), draw)
 
 
 def _figures_of_route(outcome: Outcome, each: RouteOutcome) -> list[Figure]:

@@ -57,6 +57,15 @@ def check_memory(problem: Problem) -> float:
     """
     needed = estimated_memory(problem.structure.size, problem.intervals)
     available = available_memory()
+    for task in problem.maps:
+        count = (task.grid.intervals[0], task.grid.intervals[1])
+        wanted = estimated_memory(problem.structure.size, count)
+        if wanted > available:
+            raise InputError(
+                f"`{task.key}.intervals` must fit into memory; got {list(count)}, for which about "
+                f"{amount(wanted)} are needed and {amount(available)} are available. "
+                f"Reduce `{task.key}.intervals`."
+            )
     if needed > available:
         raise InputError(
             f"`set.intervals` must fit into memory; got {list(problem.intervals)}, for which about "

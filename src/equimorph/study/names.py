@@ -26,6 +26,11 @@ def route_figures(name: str) -> RouteFigures:
     return RouteFigures(f"{name}-plane", f"{name}-shapes", f"{name}-margins", f"{name}-film.gif")
 
 
+def map_files(name: str) -> str:
+    """Beginning of the names of all files of the map called `name`: a figure and two tables."""
+    return f"{name}-map"
+
+
 def schedule_table(name: str) -> str:
     """File name of the schedule of the route called `name`; its sidecar ends in ``.json``."""
     return f"{name}-schedule.csv"

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import State, States
-from equimorph.study.prepare import Problem, Task
+from equimorph.study.prepare import MapTask, Problem, Task
 from equimorph.study.problem import Study
-from equimorph.tasks import Route
+from equimorph.tasks import ActuatorMap, Route
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,19 @@ class RouteOutcome:
 
 
 @dataclass(frozen=True)
+class MapOutcome:
+    """A map that was asked for."""
+
+    task: MapTask
+    map: ActuatorMap
+
+    @property
+    def name(self) -> str:
+        """Name in the study file; files of the map begin with it."""
+        return self.task.section.name
+
+
+@dataclass(frozen=True)
 class Outcome:
     """All answers of a study.
 
@@ -43,6 +56,8 @@ class Outcome:
         Equilibria at each wanted point, in the order of the file.
     routes
         Each wanted route, in the order of the file.
+    maps
+        Each wanted map, in the order of the file.
     reused
         Whether the set was read from the folder instead of computed.
     seconds
@@ -54,5 +69,6 @@ class Outcome:
     equilibrium_set: EquilibriumSet
     points: tuple[States, ...]
     routes: tuple[RouteOutcome, ...]
+    maps: tuple[MapOutcome, ...]
     reused: bool
     seconds: dict[str, float]

@@ -9,16 +9,18 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set
-from equimorph.model import Box, Constraint, Descriptor, parameter_vector, position
+from equimorph.model import Box, Constraint, Descriptor, Grid, parameter_vector, position
 from equimorph.structures import Structure, from_identity
 from equimorph.study.expressions import parse_comparison
 from equimorph.study.problem import (
+    MapSection,
     RouteSection,
     SetSection,
     StateSection,
     StructureSection,
     Study,
 )
+from equimorph.tasks import unloaded_base
 
 LARGEST_ANGLE = 20.0
 """Radians; ends turned further against each other need curvatures above 40 everywhere."""
@@ -34,6 +36,17 @@ class Task:
 
 
 @dataclass(frozen=True)
+class MapTask:
+    """A map that is wanted, with its grid, constraints and descriptor as objects."""
+
+    key: str
+    section: MapSection
+    grid: Grid
+    constraints: tuple[Constraint, ...]
+    descriptor: Descriptor | None
+
+
+@dataclass(frozen=True)
 class Problem:
     """A study whose names all mean something."""
 
@@ -44,6 +57,7 @@ class Problem:
     intervals: tuple[int, int]
     points: tuple[dict[str, float], ...]
     tasks: tuple[Task, ...]
+    maps: tuple[MapTask, ...]
     height: Descriptor
     """Descriptor that figures use as the height of the surface."""
 
@@ -80,6 +94,7 @@ def prepare(study: Study) -> Problem:
         intervals=_intervals(wanted),
         points=tuple(point.at for point in study.equilibria),
         tasks=tuple(_task(structure, box, route, i) for i, route in enumerate(study.routes)),
+        maps=tuple(_map_task(structure, each, i) for i, each in enumerate(study.maps)),
         height=structure.elevation,
     )
 
@@ -170,6 +185,29 @@ def _task(structure: Structure, box: Box, route: RouteSection, number: int) -> T
     for i, corner in enumerate(route.via or ()):
         check_point(box, corner, f"{key}.via[{i}]", whole=False)
     return Task(key, route, _constraints(structure, route.within, f"{key}.within"))
+
+
+def _map_task(structure: Structure, section: MapSection, number: int) -> MapTask:
+    key = f"map[{number}]"
+    with at_key(key):
+        for name, bounds in section.box.items():
+            for corner in bounds:
+                _check_value(structure, name, corner)
+        sides = zip(section.box.items(), section.intervals, strict=True)
+        grid = Grid(**{name: (*bounds, count) for (name, bounds), count in sides})
+        base = unloaded_base(structure, grid, section.load, section.fixed)
+        low = base[position(structure.parameters, section.load)]
+        if not low < section.bound:
+            raise InputError(f"`bound` must exceed {section.load} = {low:g}; got {section.bound}.")
+        if section.at is not None and not low < section.at < section.bound:
+            raise InputError(
+                f"`at` must lie between {section.load} = {low:g} and `bound` = "
+                f"{section.bound:g}; got {section.at:g}."
+            )
+        shown = "max_curvature" if section.descriptor is None else section.descriptor
+        descriptor = structure.descriptor(shown) if section.at is not None else None
+    constraints = _constraints(structure, section.within, f"{key}.within")
+    return MapTask(key, section, grid, constraints, descriptor)
 
 
 def _check_choice(structure: Structure, section: StateSection, key: str) -> None:

@@ -216,6 +216,31 @@ class RouteSection(_Section):
     margin: float = Field(default=0.0, ge=0, le=LARGEST)
 
 
+class MapSection(_Section):
+    """A map over two actuators, from the natural states of their settings on."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=80)
+    kind: Literal["limit_load_map", "curvature_map"]
+    box: Annotated[dict[str, Interval], AfterValidator(_two)]
+    intervals: list[Annotated[int, Field(ge=2, le=int(LARGEST))]] = Field(
+        min_length=2, max_length=2
+    )
+    load: str
+    at: Number | None = None
+    descriptor: str | None = None
+    bound: float = Field(default=100.0, gt=0, le=LARGEST)
+    fixed: Point = Field(default_factory=dict)
+    within: list[ComparisonText] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _level(self) -> "MapSection":
+        if (self.kind == "curvature_map") != (self.at is not None):
+            raise _requirement("give the load `at` in a curvature_map, and only there")
+        if self.kind == "limit_load_map" and self.descriptor is not None:
+            raise _requirement("give a descriptor in a curvature_map only")
+        return self
+
+
 StructureSection = Annotated[
     RodSection | SpringSection | EnergySection | TrussSection, Field(discriminator="kind")
 ]
@@ -229,12 +254,15 @@ class Study(_Section):
     equilibrium_set: SetSection = Field(alias="set")
     equilibria: list[PointSection] = Field(default_factory=list)
     routes: list[RouteSection] = Field(default_factory=list, alias="route")
+    maps: list[MapSection] = Field(default_factory=list, alias="map")
 
     @model_validator(mode="after")
     def _names_differ(self) -> "Study":
         names = [route.name for route in self.routes]
         if len(set(names)) < len(names):
             raise _requirement("give every route a name of its own")
+        if len({each.name for each in self.maps}) < len(self.maps):
+            raise _requirement("give every map a name of its own")
         return self
 
 

@@ -10,8 +10,15 @@ from jaxtyping import Float, Int
 from equimorph.model import Descriptor
 from equimorph.structures import States
 from equimorph.study import html
-from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE, route_figures, schedule_table
-from equimorph.study.outcome import Outcome, RouteOutcome
+from equimorph.study.names import (
+    PLANE,
+    STABLE_PLANE,
+    SURFACE,
+    map_files,
+    route_figures,
+    schedule_table,
+)
+from equimorph.study.outcome import MapOutcome, Outcome, RouteOutcome
 from equimorph.study.prepare import Problem
 
 ROOM = 0.03
@@ -35,6 +42,8 @@ def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
     body = [f"<h1>{escape(title)}</h1>", _question(outcome.problem)]
     for each in outcome.routes:
         body += _route(each, folder)
+    for amap in outcome.maps:
+        body += _map(amap, folder)
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):
         body += _equilibria(point, states, _shown_descriptors(outcome.problem))
     body += _set(outcome, folder)
@@ -78,6 +87,22 @@ def _route(each: RouteOutcome, folder: Path) -> list[str]:
         f"margin {html.number(each.route.margin)}, length {html.number(each.route.length)}.</p>",
         _schedule_links(each.name),
         f'<div class="figures">{"".join(pictures)}</div>',
+    ]
+
+
+def _map(each: MapOutcome, folder: Path) -> list[str]:
+    section, files = each.task.section, map_files(each.name)
+    counts = [f"{count} {kind}" for kind, count in each.map.counts.items() if count]
+    what, caption = "Limit loads", "Limit loads, with the curves on which they jump or bend."
+    if section.at is not None:
+        what = f"States at {section.load} = {html.number(section.at)}"
+        caption = "The first stable state on each path; dots: a real loading snaps on the way."
+    return [
+        f"<h2>Map {escape(each.name)}</h2>",
+        f"<p>{escape(what)} at {each.map.value.size} settings: {escape(', '.join(counts))}.</p>",
+        f'<div class="figures">{_still(folder, files, caption)}</div>',
+        f'<p>Tables: <a href="{files}.csv">{files}.csv</a> (settings) and '
+        f'<a href="{files}-curves.csv">{files}-curves.csv</a>.</p>',
     ]
 
 

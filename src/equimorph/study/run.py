@@ -10,7 +10,7 @@ from typing import Any
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent
-from equimorph.storage import write_results, write_schedule
+from equimorph.storage import write_map, write_results, write_schedule
 from equimorph.storage.files import read_text
 from equimorph.storage.parts import JOURNEY_PART, STATES_PART, Journey, set_part
 from equimorph.structures import States
@@ -18,8 +18,9 @@ from equimorph.study.checkpoints import Checkpoints
 from equimorph.study.choose import choose_state
 from equimorph.study.figures import draw_figures
 from equimorph.study.folder import ResultsFolder, open_results_folder
+from equimorph.study.maps import answered_map
 from equimorph.study.memory import MemoryWatch, check_memory
-from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, schedule_table
+from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, map_files, schedule_table
 from equimorph.study.outcome import Outcome, RouteOutcome
 from equimorph.study.prepare import Problem, Task, at_key, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
@@ -119,8 +120,12 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
         with _timed(seconds, f"route {task.section.name}"):
             routes.append(_route(study, problem, eset, task, answers))
     progress.report("routes", len(routes), len(routes))
+    maps = []
+    for map_task in problem.maps:
+        with _timed(seconds, f"map {map_task.section.name}"):
+            maps.append(answered_map(problem.structure, map_task, answers, progress))
     answers.forget_others()
-    return Outcome(study, problem, eset, points, tuple(routes), reused, seconds)
+    return Outcome(study, problem, eset, points, tuple(routes), tuple(maps), reused, seconds)
 
 
 def _set_question(study: Study) -> dict[str, Any]:
@@ -185,10 +190,13 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
         for each in outcome.routes:
             if each.route.schedule is not None:
                 write_schedule(each.route.schedule, staging / schedule_table(each.name))
+        for amap in outcome.maps:
+            write_map(amap.map, staging / f"{map_files(amap.name)}.csv")
         if not folder.holds([RESULTS]):
+            maps = {amap.name: amap.map for amap in outcome.maps}
             routes = {each.name: each.route for each in outcome.routes}
             eset, height = outcome.equilibrium_set, outcome.problem.height
-            write_results(staging / RESULTS, eset, height, routes, outcome.points)
+            write_results(staging / RESULTS, eset, height, routes, outcome.points, maps)
 
 
 @contextmanager

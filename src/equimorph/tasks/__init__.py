@@ -1,21 +1,27 @@
 """Shape-control tasks."""
 
 from equimorph.tasks.maps import (
+    ActuatorMap,
     CurvatureMap,
     LimitLoadMap,
     MapCurve,
     curvature_map,
     limit_load_map,
+    natural_states_over,
+    unloaded_base,
 )
 from equimorph.tasks.plan import plan
 from equimorph.tasks.route import Route
 
 __all__ = [
+    "ActuatorMap",
     "CurvatureMap",
     "LimitLoadMap",
     "MapCurve",
     "Route",
     "curvature_map",
     "limit_load_map",
+    "natural_states_over",
     "plan",
+    "unloaded_base",
 ]

@@ -12,7 +12,7 @@ from equimorph.errors import InputError
 from equimorph.model import Constraint, Grid, parameter_vector, position
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.maps.curves import MapCurve
-from equimorph.tasks.maps.natural import NaturalSheet
+from equimorph.tasks.maps.natural import NaturalSheet, natural_sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +33,8 @@ class ActuatorMap(ABC):
         Where the map is not smooth.
     sheet
         Unloaded states.
+    bound
+        Largest load, up to which paths are followed.
     """
 
     kinds: ClassVar[tuple[str, ...]]
@@ -47,6 +49,7 @@ class ActuatorMap(ABC):
     states: States
     curves: tuple[MapCurve, ...]
     sheet: NaturalSheet
+    bound: float
 
     def __repr__(self) -> str:
         """Size, how many of each status, and the curves."""
@@ -98,6 +101,13 @@ def unloaded_base(
     position(structure.parameters, load)
     corner = dict(zip(grid.names, map(float, grid.box.lower), strict=True))
     return parameter_vector(structure.parameters, {**structure.unloaded(), **fixed, **corner})
+
+
+def natural_states_over(
+    structure: Structure, grid: Grid, load: str, fixed: Mapping[str, float] | None = None
+) -> NaturalSheet:
+    """Unloaded states over a grid; see `unloaded_base` for what is refused."""
+    return natural_sheet(structure, grid, unloaded_base(structure, grid, load, fixed or {}))
 
 
 def settings_of(grid: Grid) -> tuple[Float[np.ndarray, "settings 2"], tuple[int, int]]:

@@ -38,15 +38,12 @@ class CurvatureMap(ActuatorMap):
         The given load.
     descriptor
         What the map shows.
-    bound
-        Largest load, of either sign, up to which paths were followed.
     """
 
     kinds: ClassVar[tuple[str, ...]] = KINDS
 
     at: float
     descriptor: Descriptor
-    bound: float
 
     @property
     def snaps(self) -> Bool[np.ndarray, "rows columns"]:
@@ -134,5 +131,5 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
         structure, grid, load, constraints, dict(fixed or {}),
         vertices.value.reshape(shape), vertices.kind.reshape(shape),
         States(structure, vertices.z, vertices.p), curves, sheet,
-        float(at), shown, float(bound),
+        float(bound), float(at), shown,
     )  # fmt: skip

@@ -25,16 +25,9 @@ class LimitLoadMap(ActuatorMap):
     "place": the extremum that meets a constraint is elsewhere on the structure; "edge": beyond it
     no unloaded state obeys the constraints; "jump" and "kink": none of these was found to be the
     reason. Places of the first four kinds are exact.
-
-    Attributes
-    ----------
-    bound
-        Largest load tried.
     """
 
     kinds: ClassVar[tuple[str, ...]] = KINDS
-
-    bound: float
 
     def at(self, **setting: float) -> LimitLoad:
         """Limit load at one setting of the box, with its path.

@@ -1,0 +1,103 @@
+"""A map over actuator settings as an HDF5 group."""
+
+from typing import Any
+
+import h5py
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.model import Constraint, Grid
+from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json
+from equimorph.structures import States, Structure
+from equimorph.tasks import ActuatorMap, CurvatureMap, LimitLoadMap, MapCurve, natural_states_over
+
+ABOUT = "about"
+
+
+def write(group: h5py.Group, amap: ActuatorMap) -> None:
+    """Write a map with its grid lines as coordinates; the curves one after the other."""
+    first, second = amap.grid.names
+    for name, axis in zip((first, second), amap.grid.axes(), strict=True):
+        unit = next(each.unit for each in amap.structure.parameters if each.name == name)
+        put_coordinate(group, name, axis, unit)
+    kinds = "; ".join(f"{k}: {kind}" for k, kind in enumerate(amap.kinds))
+    shown = amap.descriptor.name if isinstance(amap, CurvatureMap) else f"limit of {amap.load}"
+    put(group, "value", amap.value, [first, second], shown)
+    put(group, "status", amap.status, [first, second], kinds)
+    put(group, "z", amap.states.z, ["setting", "unknown"], "unknowns and multipliers, row by row")
+    put(group, "p", amap.states.p, ["setting", "parameter"], "parameters")
+    curves = amap.curves
+    put(group, "curve_kind", np.array([c.kind for c in curves], dtype=object), ["curve"])
+    ends = np.cumsum([len(c.points) for c in curves], dtype=np.int64)
+    put(group, "curve_end", ends, ["curve"], "points before the end of each curve")
+    put(group, "curve_point", _joined(curves, "points", 2), ["point", "coordinate"], "settings")
+    put(group, "curve_value", _joined(curves, "values", 2), ["point", "side"], "lower and higher")
+    sizes = amap.states.z.shape[1], amap.states.p.shape[1]
+    for name, size in zip("zp", sizes, strict=True):
+        states = [getattr(c.states, name) for c in curves]
+        array = np.concatenate([np.zeros((0, size)), *states])
+        put(group, f"curve_{name}", array, ["point", {"z": "unknown", "p": "parameter"}[name]])
+    put_json(group, ABOUT, _about(amap))
+
+
+def read(group: h5py.Group, structure: Structure) -> ActuatorMap:
+    """Read what `write` wrote; natural states are computed again."""
+    about = get_json(group, ABOUT)
+    grid = Grid(**about["grid"])
+    shared: dict[str, Any] = {
+        "structure": structure,
+        "grid": grid,
+        "load": about["load"],
+        "within": tuple(
+            Constraint(structure.descriptor(text), sense, bound)
+            for text, sense, bound in about["within"]
+        ),
+        "fixed": about["fixed"],
+        "value": get(group, "value"),
+        "status": get(group, "status"),
+        "states": States(structure, get(group, "z"), get(group, "p")),
+        "curves": _curves(group, structure),
+        "sheet": natural_states_over(structure, grid, about["load"], about["fixed"]),
+        "bound": about["bound"],
+    }
+    if "at" not in about:
+        return LimitLoadMap(**shared)
+    return CurvatureMap(
+        **shared, at=about["at"], descriptor=structure.descriptor(about["descriptor"])
+    )
+
+
+def _about(amap: ActuatorMap) -> dict[str, Any]:
+    box, names = amap.grid.box, amap.grid.names
+    sides = zip(names, box.lower.tolist(), box.upper.tolist(), amap.grid.intervals, strict=True)
+    about = {
+        "grid": {name: [low, high, count] for name, low, high, count in sides},
+        "load": amap.load,
+        "within": [[c.descriptor.name, c.sense, c.bound] for c in amap.within],
+        "fixed": dict(amap.fixed),
+        "bound": amap.bound,
+    }
+    if isinstance(amap, CurvatureMap):
+        about |= {"at": amap.at, "descriptor": amap.descriptor.name}
+    return about
+
+
+def _joined(
+    curves: tuple[MapCurve, ...], name: str, columns: int
+) -> Float[np.ndarray, "points columns"]:
+    return np.concatenate([np.zeros((0, columns)), *(getattr(c, name) for c in curves)])
+
+
+def _curves(group: h5py.Group, structure: Structure) -> tuple[MapCurve, ...]:
+    kinds, ends = get(group, "curve_kind"), get(group, "curve_end")
+    if not len(kinds):
+        return ()
+    parts = [_split(group, name, ends) for name in ("z", "p", "point", "value")]
+    return tuple(
+        MapCurve(str(kind), States(structure, z, p), points, values)
+        for kind, z, p, points, values in zip(kinds, *parts, strict=True)
+    )
+
+
+def _split(group: h5py.Group, name: str, ends: Int[np.ndarray, " curves"]) -> list[np.ndarray]:
+    return np.split(get(group, f"curve_{name}"), ends[:-1])
