@@ -234,7 +234,8 @@ def _pinned(pairing: Pairing, wanted: list[tuple[_Plan, Chord, int]]) -> list[in
         pairs = [wanted[k][1] for k in own]
         planes = _planes(pairing, [wanted[k][0].polygon.triangle for k in own])
         pinned = pin(pairing.setting, pairing.points, pairs, kind, planes)
-        for lane in np.flatnonzero(pinned.found):
+        inside = pairing.mesh.covers(pinned.p[:, pairing.setting.free])
+        for lane in np.flatnonzero(pinned.found & inside):
             low = int(pairing.points.index[list(pairs[lane])].min())
             out[own[lane]] = pairing.points.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out

@@ -12,14 +12,12 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph.manifold.assembly import Discs
+from equimorph.manifold.mesh import SLACK
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.pins import Pinned, pin
 from equimorph.manifold.points import AMID, CAP, CORNER, FOLD
 from equimorph.manifold.spheres import Sphere, Spheres, find_spheres
 from equimorph.manifold.topology import chains
-
-SLACK = 1e-12
-"""How far outside the box a point counts as inside, relative to ranges and to units."""
 
 Facet = tuple[int, int, int]
 Tetrahedron = tuple[int, int, int, int]
@@ -264,8 +262,7 @@ def _pin_inside(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int) ->
         span = np.tile(np.delete(axes, held, axis=0), (len(lanes), 1, 1))
         again = pin(setting, store, [groups[lane] for lane in lanes.tolist()], kind, span)
         pinned.z[lanes], pinned.p[lanes], pinned.found[lanes] = again.z, again.p, again.found
-    free = pinned.p[:, setting.free]
-    inside = ((free >= low - SLACK) & (free <= high + SLACK)).all(axis=1)
+    inside = pairing.mesh.covers(pinned.p[:, setting.free])
     return Pinned(pinned.z, pinned.p, pinned.found & inside)
 
 

@@ -16,6 +16,9 @@ SHIFT = 0.02
 MARGIN = 0.2
 """How far the coarse grid reaches beyond the box, in ranges of the parameters."""
 
+SLACK = 1e-12
+"""How far outside the box a point counts as inside, in ranges of the parameters."""
+
 Lines = tuple[Float[np.ndarray, " _"], ...]
 """Places of grid lines along each free parameter."""
 
@@ -57,6 +60,12 @@ class BaseMesh:
         used = np.full(len(self.edges), self.dimension == 1)
         used[self.sides] = True
         return used
+
+    def covers(self, points: Float[np.ndarray, "n d"]) -> Bool[np.ndarray, " n"]:
+        """Which points lie in the box, up to round-off."""
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        slack = SLACK * (high - low)
+        return np.asarray(((points >= low - slack) & (points <= high + slack)).all(axis=1))
 
     def locate(self, point: Float[np.ndarray, " d"]) -> int:
         """Cell that contains a point; the nearest one by barycentric coordinates."""
