@@ -9,8 +9,16 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOMES = {
-    "equimorph.errors": ("EquimorphError", "InputError"),
-    "equimorph.model": ("Box", "Constraint", "Descriptor", "Grid", "Parameter", "Schedule"),
+    "equimorph.errors": ("CancelledError", "EquimorphError", "InputError"),
+    "equimorph.model": (
+        "Box",
+        "Constraint",
+        "Descriptor",
+        "Grid",
+        "Parameter",
+        "Schedule",
+        "Spline",
+    ),
     "equimorph.structures": (
         "Bar",
         "EnergyStructure",
@@ -27,7 +35,9 @@ _HOMES = {
         "CriticalCurve",
         "Event",
         "Landing",
+        "Lifts",
         "LimitLoad",
+        "LimitLoads",
         "Path",
         "TraceOptions",
         "branch_curve",

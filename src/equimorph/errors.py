@@ -12,6 +12,10 @@ class InputError(EquimorphError, ValueError):
     """The caller's mistake: what is wrong, which value was given, what is allowed."""
 
 
+class CancelledError(EquimorphError):
+    """Raised by a progress sink to cancel a computation; lifts of many states keep what is done."""
+
+
 def suggestion(written: str, allowed: Sequence[str]) -> str:
     """Sentence to end a message with when an allowed name is close to what was written, or nothing.
 

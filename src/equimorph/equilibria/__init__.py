@@ -11,8 +11,8 @@ from equimorph.equilibria.critical_curves import (
 )
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
 from equimorph.equilibria.deflation import deflated_newton
-from equimorph.equilibria.lift import Event, Path, check_start, lift, way_points
-from equimorph.equilibria.limit import LimitLoad, limit_load
+from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
+from equimorph.equilibria.limit import LimitLoad, LimitLoads, limit_load
 from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.pools import distinct
@@ -28,7 +28,9 @@ __all__ = [
     "Event",
     "FoundStates",
     "Landing",
+    "Lifts",
     "LimitLoad",
+    "LimitLoads",
     "NewtonHomotopy",
     "Outcome",
     "ParameterLine",

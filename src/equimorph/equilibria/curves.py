@@ -14,12 +14,37 @@ Values = Float[np.ndarray, " lanes"]
 
 
 @runtime_checkable
+class Metric(Protocol):
+    """Length of steps: a diagonal mass matrix for the first `unknowns` of `size` entries."""
+
+    @property
+    def size(self) -> int:
+        """Entries of z."""
+
+    @property
+    def unknowns(self) -> int:
+        """Entries that the metric measures."""
+
+    @property
+    def mass(self) -> Float[np.ndarray, " unknowns"]:
+        """Diagonal of the mass matrix."""
+
+
+@runtime_checkable
 class Curve(Protocol):
     """One curve F(z, t) = 0 per lane, t the share of the way from start (0) to goal (1)."""
 
     @property
     def structure(self) -> Structure:
         """The structure whose equilibria are followed."""
+
+    @property
+    def metric(self) -> Metric:
+        """Length of steps in z: the structure's own, unless the curve has more unknowns."""
+
+    @property
+    def folds_change_index(self) -> bool:
+        """Whether the index changes where dt/ds vanishes, and only there."""
 
     @property
     def weight(self) -> Values:
@@ -30,6 +55,15 @@ class Curve(Protocol):
 
     def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
         """p(t)."""
+
+    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"]]:
+        """Unknowns and multipliers of the structure, and all parameters."""
+
+    def rate(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """dp/dt."""
+
+    def bend(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """d²p/dt²."""
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent; see `Advance`."""
@@ -55,6 +89,28 @@ class ParameterLine:
     def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
         """p(t)."""
         return np.asarray(self.start + t[:, None] * self.velocity)
+
+    @property
+    def metric(self) -> Metric:
+        """The structure's own."""
+        return self.structure
+
+    @property
+    def folds_change_index(self) -> bool:
+        """Whether the index changes where dt/ds vanishes, and only there."""
+        return True
+
+    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"]]:
+        """Return z and p(t)."""
+        return z, self.parameters(t)
+
+    def rate(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """Velocity, the same for all t."""
+        return self.velocity
+
+    def bend(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """Zero."""
+        return np.zeros_like(self.velocity)
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent; see `Advance`."""
@@ -83,6 +139,28 @@ class NewtonHomotopy:
         """Parameters, the same for all t."""
         return self.p + 0.0 * t[:, None]
 
+    @property
+    def metric(self) -> Metric:
+        """The structure's own."""
+        return self.structure
+
+    @property
+    def folds_change_index(self) -> bool:
+        """Whether the index changes where dt/ds vanishes, and only there."""
+        return True
+
+    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"]]:
+        """Return z and p."""
+        return z, self.parameters(t)
+
+    def rate(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """Zero."""
+        return np.zeros_like(self.p)
+
+    def bend(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+        """Zero."""
+        return np.zeros_like(self.p)
+
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent by the general bordered solve."""
         residual = self.structure.residual(z, self.p) - (1.0 - t)[:, None] * self.defect
@@ -90,24 +168,24 @@ class NewtonHomotopy:
         return bordered_advance(self.structure, z, self.p, residual, self.defect, closing)
 
 
-def squared_length(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> Values:
-    """Squared length of a step (dz, dt) in the structure's metric and the curve's own."""
-    return _squared(structure, weight, dz, dt, 0.0)
+def squared_length(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> Values:
+    """Squared length of a step (dz, dt) in the metric and the curve's own."""
+    return _squared(metric, weight, dz, dt, 0.0)
 
 
-def correction_size(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> Values:
+def correction_size(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> Values:
     """Size of a Newton correction: its length, with the multipliers included lightly."""
-    return np.asarray(np.sqrt(_squared(structure, weight, dz, dt, MULTIPLIER_WEIGHT)))
+    return np.asarray(np.sqrt(_squared(metric, weight, dz, dt, MULTIPLIER_WEIGHT)))
 
 
-def _squared(structure: Structure, weight: Values, dz: Lanes, dt: Values, light: float) -> Values:
+def _squared(metric: Metric, weight: Values, dz: Lanes, dt: Values, light: float) -> Values:
     out = np.empty(len(dz))
-    squared_lengths(np.ascontiguousarray(dz), dt, weight, structure.mass, light, out)
+    squared_lengths(np.ascontiguousarray(dz), dt, weight, metric.mass, light, out)
     return out
 
 
-def dual(structure: Structure, weight: Values, dz: Lanes, dt: Values) -> tuple[Lanes, Values]:
+def dual(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> tuple[Lanes, Values]:
     """Row whose product with a step is the metric's inner product with (dz, dt)."""
     row = np.zeros_like(dz)
-    row[:, : structure.unknowns] = dz[:, : structure.unknowns] * structure.mass
+    row[:, : metric.unknowns] = dz[:, : metric.unknowns] * metric.mass
     return row, weight**2 * dt

@@ -95,7 +95,7 @@ def initial_front(curve: Curve, z: Lanes, t: Values) -> Front:
 
 
 def _unit(curve: Curve, front: Front) -> Front:
-    length = squared_length(curve.structure, curve.weight, front.tangent_z, front.tangent_t)
+    length = squared_length(curve.metric, curve.weight, front.tangent_z, front.tangent_t)
     norm = np.sqrt(length)
     return replace(
         front, tangent_z=front.tangent_z / norm[:, None], tangent_t=front.tangent_t / norm
@@ -117,10 +117,10 @@ def onto_curve(
     the first correction is below a quarter of the length and its tangent within acos 0.9 of that of
     `front`.
     """
-    structure, lanes = curve.structure, len(length)
+    metric, lanes = curve.metric, len(length)
     numbers, counts = new_scalars(lanes)
     trial = np.ascontiguousarray(guess[0]).copy()
-    row, corner = dual(structure, curve.weight, front.tangent_z, front.tangent_t)
+    row, corner = dual(metric, curve.weight, front.tangent_z, front.tangent_t)
     numbers[kernels.TRIAL], numbers[kernels.CORNER] = guess[1], corner
     numbers[kernels.DEFECT] = kernels.row_sums(row, trial - front.z) - length
     numbers[kernels.DEFECT] += corner * (guess[1] - front.t)
@@ -131,7 +131,7 @@ def onto_curve(
         open_lanes = counts[kernels.STAGE] == kernels.CORRECTING
         move = curve.advance(trial, numbers[kernels.TRIAL], row, *closing)
         state = (trial, numbers, counts, lanes, kernels.EXACT, 0.0)
-        kernels.correct(move.dz, move.dt, move.tangent_z, move.tangent_t, structure.mass, *state)
+        kernels.correct(move.dz, move.dt, move.tangent_z, move.tangent_t, metric.mass, *state)
         new = open_lanes & (counts[kernels.STAGE] == kernels.CONVERGED)
         out.tangent_z[new] = move.tangent_z[new] / numbers[kernels.NORM, new, None]
         out.index[new] = move.index[new]

@@ -10,11 +10,20 @@ from equimorph.equilibria.fronts import Bracket, Front
 from equimorph.equilibria.location import (
     Located,
     locate_branch_point,
+    locate_critical,
     locate_fold,
     locate_goal,
     locate_root,
 )
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN, TraceOptions
+from equimorph.equilibria.tracing import (
+    ARRIVAL,
+    BRANCH,
+    CONSTRAINT,
+    CRITICAL,
+    FOLD,
+    RETURN,
+    TraceOptions,
+)
 from equimorph.model import Constraint
 
 Lanes = Float[np.ndarray, "lanes size"]
@@ -66,7 +75,7 @@ def locate_all(
     options: TraceOptions,
 ) -> Happenings:
     """Locate the events in all brackets that have to be located, all of a kind at once."""
-    bits = [FOLD, BRANCH, ARRIVAL, RETURN, CONSTRAINT]
+    bits = [FOLD, BRANCH, CRITICAL, ARRIVAL, RETURN, CONSTRAINT]
     if not options.locate_passed:
         bits = [bit for bit in bits if bit & options.stops]
     parts = []
@@ -86,7 +95,7 @@ def locate_all(
                 place.found,
             )
         )
-    return Happenings.joined(parts, curve.structure.size)
+    return Happenings.joined(parts, curve.metric.size)
 
 
 def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
@@ -118,11 +127,13 @@ def _locate(
         return locate_fold(here, bracket)
     if bit == BRANCH:
         return locate_branch_point(here, bracket)
+    if bit == CRITICAL:
+        return locate_critical(here, bracket)
     if bit in {ARRIVAL, RETURN}:
         return locate_goal(here, bracket, 1.0 if bit == ARRIVAL else 0.0)
 
     def worst(some: Int[np.ndarray, " lanes"], z: Lanes, t: Values) -> Values:
-        p = here.take(some).parameters(t)
+        z, p = here.take(some).states(z, t)
         return np.asarray(np.max([c.excess(z, p) for c in constraints], axis=0))
 
     return locate_root(here, bracket, worst)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria.cubics import least_inside
-from equimorph.equilibria.curves import ParameterLine, dual
+from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.fronts import Front
 from equimorph.equilibria.happenings import Happenings, locate_all
 from equimorph.equilibria.outcome import LOST, Outcome
@@ -42,7 +42,7 @@ REGULAR_ENDS = (ARRIVAL, RETURN, CONSTRAINT)
 
 
 def with_hidden_events(
-    curve: ParameterLine,
+    curve: Curve,
     z: Float[np.ndarray, "lanes size"],
     outcome: Outcome,
     options: TraceOptions,
@@ -91,7 +91,7 @@ def _why(end: Happenings, i: int) -> str:
     return "the path touches a fold and goes on" if touching else ""
 
 
-def _before_ends(curve: ParameterLine, points: Points, outcome: Outcome) -> Happenings:
+def _before_ends(curve: Curve, points: Points, outcome: Outcome) -> Happenings:
     """Events between the last point of a lane and its end, inside a longer step with two of them.
 
     They show where the index at the end is another than the steps tell.
@@ -116,7 +116,7 @@ def _before_ends(curve: ParameterLine, points: Points, outcome: Outcome) -> Happ
     return Happenings.joined(found, size)
 
 
-def _points(curve: ParameterLine, z: Float[np.ndarray, "lanes size"], outcome: Outcome) -> Points:
+def _points(curve: Curve, z: Float[np.ndarray, "lanes size"], outcome: Outcome) -> Points:
     """Starts, recorded points, and the ends that are regular ones."""
     lanes, none = np.arange(len(z)), np.zeros(len(z))
     index = curve.structure.index(z, curve.parameters(none))
@@ -127,7 +127,7 @@ def _points(curve: ParameterLine, z: Float[np.ndarray, "lanes size"], outcome: O
 
 
 def hidden_events(
-    curve: ParameterLine, points: Points, options: TraceOptions, *, thorough: bool = True
+    curve: Curve, points: Points, options: TraceOptions, *, thorough: bool = True
 ) -> Happenings:
     """Folds and branch points between the points of traced paths that their steps do not show.
 
@@ -172,7 +172,7 @@ def hidden_events(
     return Happenings.joined(found, curve.structure.size)
 
 
-def gaps(curve: ParameterLine, points: Points) -> Values:
+def gaps(curve: Curve, points: Points) -> Values:
     """Test function ``1 / det(BᵀF_z⁻¹B)``: zero where F_z is singular.
 
     By the formula of Cauchy and Binet it is close to a multiple of the product of the smallest
@@ -188,7 +188,7 @@ def gaps(curve: ParameterLine, points: Points) -> Values:
     for start in range(0, len(out), AT_ONCE):
         some = slice(start, start + AT_ONCE)
         lanes = points.lanes[some]
-        p = curve.start[lanes] + points.t[some, None] * curve.velocity[lanes]
+        p = curve.take(lanes).parameters(points.t[some])
         y = structure.solve(np.ascontiguousarray(points.z[some]), p, rhs[: len(lanes)]).x
         with np.errstate(all="ignore"):
             small = y.reshape(-1, structure.size) @ b.T
@@ -253,7 +253,7 @@ def _lowest(
     return out
 
 
-def _fronts(curve: ParameterLine, points: Points, near: Some) -> Front:
+def _fronts(curve: Curve, points: Points, near: Some) -> Front:
     """Unit tangents at points of paths, along them."""
     lanes = points.lanes
     # the chord to the next point, or from the one before, tells the direction and closes the system

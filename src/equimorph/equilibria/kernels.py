@@ -33,7 +33,7 @@ CORRECTING, AIMING, CONVERGED, REFUSED, ENDED, SHORT, LONG, STUCK = range(8)
 """Stages: in Newton's iteration; in that of a step to the end of t; step converged; step refused;
 lane finished; given up: step too short, too many steps, or a singular start."""
 
-ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT = 1, 2, 4, 8, 16
+ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT, CRITICAL = 1, 2, 4, 8, 16, 32
 """Bits of what can happen in a step."""
 
 LEVEL_SLOPE = 1e-6
@@ -186,11 +186,12 @@ def correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active):
 
 
 @njit(**{**SUMS, "_nrt": True})
-def judge(index, determinant, numbers, counts, active, smallest, locates):
+def judge(index, determinant, numbers, counts, active, smallest, locates, plain):
     """Tell what happened in steps that converged, and refuse those that hide something.
 
-    Returns how many steps are good, and in how many of them something happened that only a branch
-    point explains.
+    `plain`: whether dt/ds vanishes where the index changes, and only there; on other curves each
+    has a meaning of its own. Returns how many steps are good, and in how many of them something
+    happened that only a branch point explains.
     """
     good, doubtful = 0, 0
     for i in range(active):
@@ -202,8 +203,10 @@ def judge(index, determinant, numbers, counts, active, smallest, locates):
         flipped = np.sign(new) != np.sign(old)
         changed = abs(index[i] - counts[INDEX, i])
         # at a fold the path turns and the index changes; at a branch point one without the other
-        fold = flipped and changed == 1
+        fold = flipped and (changed == 1 or not plain)
         what = FOLD if fold else (BRANCH if flipped or changed == 1 else 0)
+        if not plain:
+            what = (FOLD if flipped else 0) | (CRITICAL if changed == 1 else 0)
         what |= ARRIVAL if end >= 1.0 else 0
         what |= RETURN if end <= 0.0 else 0
         counts[WHAT, i] = what
@@ -258,6 +261,31 @@ def _dips(i, numbers):
     if not (slope < 0.0 and slope + 2.0 * bow * length > 0.0):
         return False
     return here - slope * slope / (4.0 * bow) < DIP * min(here, there)
+
+
+@njit(**{**SUMS, "_nrt": True})
+def may_graze(last, here, new, good, numbers, out):
+    """Whether constraints may be violated inside steps that obey them at both ends.
+
+    By values at the step before, here and at the end: how far they may rise in between, and whether
+    they may fall at the end. Returns how many such steps there are.
+    """
+    found = 0
+    for k in range(new.shape[0]):
+        for i in range(new.shape[1]):
+            before, length = numbers[ARC, good[i]], numbers[LENGTH, good[i]]
+            room, rise = -max(here[k, i], new[k, i]), new[k, i] - here[k, i]
+            reach, peak = abs(rise), True
+            if before > 0.0:
+                slope, earlier = rise / length, (here[k, i] - last[k, i]) / before
+                change = slope - earlier
+                reach = max(reach, abs(change) * length)
+                start = earlier + change * before / (before + length)
+                end = slope + change * length / (before + length)
+                peak = start + abs(change) > 0.0 and end - abs(change) < 0.0
+            out[k, i] = peak and 0.0 < room < reach
+            found += out[k, i]
+    return found
 
 
 @njit(**SUMS)

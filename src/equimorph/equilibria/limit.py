@@ -2,14 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
+from jaxtyping import Float, Shaped
 
 from equimorph.equilibria.lift import Path, lift
+from equimorph.equilibria.starts import check_starts, violated
 from equimorph.equilibria.tracing import TraceOptions
 from equimorph.errors import InputError
-from equimorph.model import Constraint, position
-from equimorph.structures import State
+from equimorph.model import Constraint, Progress, position
+from equimorph.structures import State, States
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,48 @@ class LimitLoad:
     detail: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class LimitLoads:
+    """Limit loads of many states, in their order: arrays (lanes).
+
+    Parameters
+    ----------
+    value
+        Largest load met; not a number where it is undefined, lost or cancelled.
+    kind
+        As of `LimitLoad`, or "cancelled".
+    states
+        Where each path ended.
+    criticality
+        Of branch points, else "".
+    detail
+        One line for lanes that need it: the constraint that was met, why a lane was lost.
+    """
+
+    value: Float[np.ndarray, " lanes"]
+    kind: Shaped[np.ndarray, " lanes"]
+    states: States
+    criticality: Shaped[np.ndarray, " lanes"]
+    detail: dict[int, str]
+
+    def __len__(self) -> int:
+        """Number of states."""
+        return len(self.value)
+
+    def __repr__(self) -> str:
+        """How many of each kind."""
+        kinds, counts = np.unique(self.kind, return_counts=True)
+        ends = ", ".join(f"{n} {kind}" for kind, n in zip(kinds, counts, strict=True))
+        return f"LimitLoads({len(self)}: {ends})"
+
+    def __getitem__(self, lane: int) -> LimitLoad:
+        """One of them, without its path."""
+        words = str(self.criticality[lane]) or None, self.detail.get(lane, "")
+        state = self.states[lane]
+        return LimitLoad(float(self.value[lane]), str(self.kind[lane]), state, None, *words)
+
+
+@overload
 def limit_load(
     state: State,
     load: str,
@@ -35,25 +80,51 @@ def limit_load(
     within: Sequence[Constraint] = (),
     bound: float | None = None,
     options: TraceOptions | None = None,
-) -> LimitLoad:
-    """Follow the path in `load` from `state` to the first loss of stability or constraint.
+    progress: Progress | None = None,
+) -> LimitLoad: ...
+@overload
+def limit_load(
+    state: States,
+    load: str,
+    *,
+    within: Sequence[Constraint] = (),
+    bound: float | None = None,
+    options: TraceOptions | None = None,
+    progress: Progress | None = None,
+) -> LimitLoads: ...
+def limit_load(
+    state: State | States,
+    load: str,
+    *,
+    within: Sequence[Constraint] = (),
+    bound: float | None = None,
+    options: TraceOptions | None = None,
+    progress: Progress | None = None,
+) -> LimitLoad | LimitLoads:
+    """Follow the path in `load` from each state to the first loss of stability or constraint.
 
     Parameters
     ----------
     state
-        Stable equilibrium, usually the natural state.
+        Stable equilibrium, usually the natural state; or `States` (lanes).
     load
         Name of the parameter that grows.
     within
         Constraints that end the path, like ``[arch.max_curvature <= 10]``.
     bound
-        Largest load tried, in the parameter's unit; greater than its value in `state`. None: a
-        hundred of the parameter's scales.
+        Largest load tried, in the parameter's unit; greater than its value in every state. None:
+        a hundred of the parameter's scales.
+    options, progress
+        As of `lift`.
+
+    Returns
+    -------
+    `LimitLoad` of one state, with its path; `LimitLoads` of many.
 
     Raises
     ------
     InputError
-        If `state` is no stable equilibrium, or `bound` does not exceed its load.
+        If a state is no stable equilibrium, or `bound` does not exceed its load.
 
     References
     ----------
@@ -62,6 +133,9 @@ def limit_load(
     parameters = state.structure.parameters
     if bound is None:
         bound = 100.0 * parameters[position(parameters, load)].scale
+    rise = {load: bound}
+    if isinstance(state, States):
+        return _many(state, rise, tuple(within), options, progress)
     if not bound > state[load]:
         raise InputError(f"`bound` must exceed {load} = {state[load]:g}; got {bound!r}.")
     if not state.stable:
@@ -69,8 +143,33 @@ def limit_load(
     for constraint in within:
         if not constraint.holds(state.batch)[0]:
             return LimitLoad(np.nan, "undefined unloaded", state, None, None, str(constraint))
-    path = lift(state, {load: bound}, within=within, options=options)
+    path = lift(state, rise, within=within, options=options, progress=progress)
     end = path.end
     kind = "none below the bound" if end.kind == "arrived" else end.kind
     value = float(path.states[load].max()) if kind != "lost" else np.nan
     return LimitLoad(value, kind, end.state, path, end.criticality, end.detail)
+
+
+def _many(
+    states: States,
+    rise: dict[str, float],
+    within: tuple[Constraint, ...],
+    options: TraceOptions | None,
+    progress: Progress | None,
+) -> LimitLoads:
+    [(load, bound)] = rise.items()
+    check_starts(states)
+    highest = float(states[load].max())
+    if not bound > highest:
+        raise InputError(f"`bound` must exceed {load} = {highest:g}; got {bound!r}.")
+    unstable = np.flatnonzero(states.index != 0)
+    if len(unstable):
+        index = int(states.index[unstable[0]])
+        raise InputError(f"`state` must be stable; got index {index} in number {unstable[0]}.")
+    undefined = violated(states, within)
+    ended = lift(states, rise, within=within, options=options, progress=progress)
+    kind = np.where(ended.arrived, "none below the bound", ended.kind)
+    kind = np.where(undefined, "undefined unloaded", kind)
+    unknown = np.isin(kind, ("undefined unloaded", "lost", "cancelled"))
+    value = np.where(unknown, np.nan, ended.states[load])
+    return LimitLoads(value, kind, ended.states, ended.criticality, ended.detail)

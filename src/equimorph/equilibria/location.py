@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.curves import (
     Curve,
-    ParameterLine,
     correction_size,
     dual,
     squared_length,
@@ -83,7 +83,7 @@ def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:
         here, lanes = curve.take(todo), len(todo)
         still, one, none = np.zeros((lanes, z.shape[1])), np.ones(lanes), np.zeros(lanes)
         step = here.advance(z[todo], t[todo], still, one, none)
-        new = correction_size(curve.structure, here.weight, step.dz, none)
+        new = correction_size(curve.metric, here.weight, step.dz, none)
         better = new < size[todo]
         todo = todo[better]
         z[todo] += step.dz[better]
@@ -98,7 +98,7 @@ def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:
 def _inside(curve: Curve, bracket: Bracket, z: Lanes, t: Values) -> Flags:
     """Whether points lie between the ends of their step: a guard against jumps and neighbours."""
     old, new = bracket.before, bracket.after
-    gap = squared_length(curve.structure, curve.weight, z - old.z, t - old.t)
+    gap = squared_length(curve.metric, curve.weight, z - old.z, t - old.t)
     slack = 1e-3 * bracket.step + 1e-9
     along, whole = _along(curve, old, z, t), _along(curve, old, new.z, new.t)
     between = (along >= -slack) & (along <= whole + slack)
@@ -107,14 +107,8 @@ def _inside(curve: Curve, bracket: Bracket, z: Lanes, t: Values) -> Flags:
 
 def _along(curve: Curve, front: Front, z: Lanes, t: Values) -> Values:
     """Distance of points along the tangents of `front`."""
-    row, corner = dual(curve.structure, curve.weight, front.tangent_z, front.tangent_t)
+    row, corner = dual(curve.metric, curve.weight, front.tangent_z, front.tangent_t)
     return np.asarray(np.einsum("li,li->l", row, z - front.z) + corner * (t - front.t))
-
-
-def _velocity(curve: Curve, lanes: int) -> Float[np.ndarray, "lanes parameters"]:
-    if isinstance(curve, ParameterLine):
-        return curve.velocity
-    return np.zeros((lanes, len(curve.structure.parameters)))
 
 
 @dataclass(frozen=True)
@@ -129,7 +123,7 @@ class _Singular:
 
 def _test_function(curve: Curve, z: Lanes, t: Values, b: Lanes) -> _Singular:
     structure, p = curve.structure, curve.parameters(t)
-    dp = _velocity(curve, len(z))
+    dp = curve.rate(t)
     rhs = np.zeros((len(z), 1, structure.size + 1))
     rhs[:, 0, -1] = 1.0
     border = (b[:, None], b[:, None], np.zeros((len(z), 1, 1)))
@@ -139,13 +133,6 @@ def _test_function(curve: Curve, z: Lanes, t: Values, b: Lanes) -> _Singular:
     g_z = -structure.second_derivative(z, p, (v, none_p), (v, none_p))
     mixed = structure.second_derivative(z, p, (v, none_p), (none_z, dp))
     return _Singular(v, g, g_z, -np.einsum("li,li->l", v, mixed))
-
-
-def _column(curve: Curve, z: Lanes, t: Values) -> Lanes:
-    """F_t."""
-    if isinstance(curve, ParameterLine):
-        return curve.structure.parameter_derivative(z, curve.parameters(t), curve.velocity)
-    raise TypeError("events are located on lines in parameter space only")
 
 
 def _null_guess(curve: Curve, z: Lanes, t: Values) -> Lanes:
@@ -184,7 +171,7 @@ def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
         z[todo] += step[:, :-2]
         t[todo] += step[:, -2]
         beta[todo] += step[:, -1]
-        size[todo] = correction_size(curve.structure, here.weight, step[:, :-2], step[:, -2])
+        size[todo] = correction_size(curve.metric, here.weight, step[:, :-2], step[:, -2])
         todo = todo[size[todo] >= 1e-13]
         if len(todo) == 0:
             break
@@ -197,9 +184,10 @@ def _branch_step(
 ) -> Float[np.ndarray, "lanes unknowns"]:
     """Newton step (dz, dt, dβ) of the extended system of branch points."""
     structure, lanes = curve.structure, len(z)
-    p, dp = curve.parameters(t), _velocity(curve, lanes)
+    p, dp = curve.parameters(t), curve.rate(t)
     none_z, none_p = np.zeros_like(z), np.zeros_like(p)
-    test, column = _test_function(curve, z, t, b), _column(curve, z, t)
+    test = _test_function(curve, z, t, b)
+    column = structure.parameter_derivative(z, p, dp)
     rhs = np.zeros((lanes, 1, structure.size + 1))
     rhs[:, 0, :-1] = column
     border = (b[:, None], b[:, None], np.zeros((lanes, 1, 1)))
@@ -208,6 +196,7 @@ def _branch_step(
     mixed = structure.second_derivative(z, p, (v, none_p), (none_z, dp))
     h_z = mixed - structure.second_derivative(z, p, (v, none_p), (y, none_p))
     twice = structure.second_derivative(z, p, (none_z, dp), (none_z, dp))
+    twice += structure.parameter_derivative(z, p, curve.bend(t))
     h_t = np.einsum("li,li->l", v, twice) - np.einsum("li,li->l", y, mixed)
     residual = structure.residual(z, p) + beta[:, None] * b
     h = np.einsum("li,li->l", v, column)
@@ -249,3 +238,25 @@ def locate_root(
 
     root = root_inside(curve, bracket, scalar, (low, high), share)
     return Located(root.z, root.t, root.at, root.found)
+
+
+def locate_critical(curve: Curve, bracket: Bracket) -> Located:
+    """Where an eigenvalue of F_z vanishes on a curve that is regular there."""
+    structure = curve.structure
+    z, p = curve.states(bracket.after.z, bracket.after.t)
+    b = null_border(structure, z, p)
+
+    def gap(some: Some, z: Lanes, t: Values) -> Values:
+        z, p = curve.take(some).states(z, t)
+        return Critical(structure, z, p, b[some]).g
+
+    everyone = np.arange(len(bracket.lanes))
+    ends = tuple(gap(everyone, front.z, front.t) for front in (bracket.before, bracket.after))
+    share = np.clip(ends[0] / (ends[0] - ends[1]), 1e-3, 1.0 - 1e-3)
+    change = np.sign(ends[0]) != np.sign(ends[1])
+
+    def scalar(some: Some, front: Front) -> Values:
+        return gap(some, front.z, front.t)
+
+    root = root_inside(curve, bracket, scalar, (ends[0], ends[1]), share)
+    return Located(root.z, root.t, root.at, root.found & change)

@@ -6,11 +6,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import kernels
+from equimorph.equilibria.cubics import least_inside
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.fronts import Bracket, Front, new_scalars
 from equimorph.equilibria.kernels import BRANCH, CONSTRAINT, CONVERGED, ENDED, REFUSED
 from equimorph.equilibria.location import locate_branch_point
 from equimorph.equilibria.records import EventFile, PointFile
+from equimorph.equilibria.starts import ON_BOUND
 from equimorph.equilibria.stepping import kernels as stepping
 from equimorph.equilibria.tracing import TraceOptions
 from equimorph.model import Constraint
@@ -20,6 +22,10 @@ Lanes = Float[np.ndarray, "lanes size"]
 Names = Int[np.ndarray, " lanes"]
 Some = Int[np.ndarray, " some"]
 
+DIFFERENCE = 1e-5
+"""Step of differences along a curve, in the metric."""
+MISS = 0.1
+"""Error of the largest value of a cubic inside a step, as a share of its rise above the ends."""
 WHY = {
     kernels.SHORT: "the step became too small",
     kernels.LONG: "no end in {most} steps",
@@ -63,7 +69,7 @@ class Block:
     ) -> None:
         self.curve, self.constraints, self.options = curve, constraints, options
         self.capacity, self.active = capacity, 0
-        size = curve.structure.size
+        size = curve.metric.size
         self.events = EventFile(size, events + capacity)
         self.points = PointFile(size, capacity if options.record else 0)
         self._places = tuple(np.empty((capacity, size)) for _ in range(6))
@@ -88,7 +94,11 @@ class Block:
         none = np.zeros(count)
         move = here.advance(z, none, np.zeros_like(z), np.ones(count), none)
         start = (move.dz, move.tangent_z, move.tangent_t, move.index, move.determinant)
-        state = (self.curve.structure.mass, here.weight, self._places, *self._scalars, self.active)
+        state = (self.curve.metric.mass, here.weight, self._places, *self._scalars, self.active)
+        new = slice(self.active, self.active + count)
+        for k, constraint in enumerate(self.constraints):
+            self._excess[2 * k, new] = np.nan
+            self._excess[2 * k + 1, new] = constraint.excess(*here.states(z, none))
         stuck = stepping.seat(lanes, levels, self._knobs, z, start, *state)
         self.active += count
         lost = self._given_up() if stuck else []
@@ -102,18 +112,21 @@ class Block:
         closing = numbers[kernels.CORNER, :active], numbers[kernels.DEFECT, :active]
         t = numbers[kernels.TRIAL, :active]
         move = self._here.advance(trial[:active], t, row[:active], *closing)
-        mass, smallest = self.curve.structure.mass, self.options.smallest_step
+        mass, smallest = self.curve.metric.mass, self.options.smallest_step
         state = (numbers, counts, active)
         steps = (move.dz, move.dt, move.tangent_z, move.tangent_t)
         kernels.correct(*steps, mass, trial, *state, kernels.ACCEPTED, kernels.NEARLY)
         ends = (move.dz, move.tangent_z, move.tangent_t, mass, self._places)
         kernels.correct_arrivals(*ends, *state)
-        locates = self.options.locates_branch_points
-        good, doubtful = kernels.judge(move.index, move.determinant, *state, smallest, locates)
+        locates, plain = self.options.locates_branch_points, self.curve.folds_change_index
+        good, doubtful = kernels.judge(
+            move.index, move.determinant, *state, smallest, locates, plain
+        )
         if good:
-            self._constrain()
             if doubtful and locates:
                 self._refuse_jumps(move)
+            if self.constraints:
+                self._constrain(move)
             record = (self._places, self._scalars, active)
             self.events.add(move.tangent_z, self.options.stops, *record)
             if self.options.record:
@@ -124,16 +137,52 @@ class Block:
             self._close()
         return lost
 
-    def _constrain(self) -> None:
-        if not self.constraints:
-            return
+    def _constrain(self, move: Advance) -> None:
+        """Note violated constraints; refuse steps inside which one may be violated for a while."""
         numbers, counts = self._scalars
         good = np.flatnonzero(counts[kernels.STAGE, : self.active] == CONVERGED)
-        z = self._places[4][good]
-        p = self._here.take(good).parameters(numbers[kernels.TRIAL, good])
-        for constraint in self.constraints:
-            violated = good[constraint.excess(z, p) > 0.0]
-            counts[kernels.WHAT, violated] |= CONSTRAINT
+        z, t = self._places[4][good], numbers[kernels.TRIAL, good]
+        states = self._here.take(good).states(z, t)
+        last, here = self._excess[::2, good], self._excess[1::2, good]
+        new = np.array([constraint.excess(*states) for constraint in self.constraints])
+        counts[kernels.WHAT, good[(new > 0.0).any(axis=0)]] |= CONSTRAINT
+        close = np.empty(new.shape, bool)
+        if kernels.may_graze(last, here, new, good, numbers, close):
+            for k, constraint in enumerate(self.constraints):
+                near, values = good[close[k]], (here[k, close[k]], new[k, close[k]])
+                self._refuse_grazing(constraint, near, values, move)
+        kept = counts[kernels.STAGE, good] == CONVERGED
+        self._excess[::2, good[kept]] = here[:, kept]
+        self._excess[1::2, good[kept]] = new[:, kept]
+
+    def _refuse_grazing(
+        self,
+        constraint: Constraint,
+        at: Some,
+        values: tuple[Float[np.ndarray, " some"], Float[np.ndarray, " some"]],
+        move: Advance,
+    ) -> None:
+        """Refuse steps inside which the cubic through values and slopes may exceed the bound.
+
+        The next try ends where the cubic is largest, where it is exact after a few tries.
+        """
+        if len(at) == 0:
+            return
+        (numbers, counts), (_, _, z, tangent, trial, _) = self._scalars, self._places
+        here, length = self._here.take(at), numbers[kernels.LENGTH, at]
+        norm = numbers[kernels.NORM, at]
+        ends = (
+            (z[at], numbers[kernels.T, at], tangent[at], numbers[kernels.SLOPE, at]),
+            (trial[at], numbers[kernels.TRIAL, at], move.tangent_z[at] / norm[:, None],
+             numbers[kernels.NEW_SLOPE, at]),
+        )  # fmt: skip
+        slopes = [_slope(here, constraint, *end) for end in ends]
+        share, least = least_inside((-values[0], -values[1]), (-slopes[0], -slopes[1]), length)
+        rise = -least - np.maximum(*values)
+        grazing = (rise > ON_BOUND * max(1.0, abs(constraint.bound))) & (least < MISS * rise)
+        counts[kernels.STAGE, at[grazing]] = REFUSED
+        wanted = np.clip(share, 0.1, 0.9) * length / kernels.BACK
+        numbers[kernels.LENGTH, at[grazing]] = wanted[grazing]
 
     def _refuse_jumps(self, move: Advance) -> None:
         """Refuse changes of index or direction without a fold or branch point.
@@ -193,3 +242,20 @@ class Block:
         state = (*self._scalars, self._excess)
         self.active = kernels.close_gaps(self._places, *state, self.active)
         self._here = self.curve.take(self.lanes)
+
+
+def _slope(
+    curve: Curve,
+    constraint: Constraint,
+    z: Lanes,
+    t: Float[np.ndarray, " lanes"],
+    tangent_z: Lanes,
+    tangent_t: Float[np.ndarray, " lanes"],
+) -> Float[np.ndarray, " lanes"]:
+    """Change of a constraint's excess per length along curves."""
+    h = DIFFERENCE
+    ahead, behind = (
+        constraint.excess(*curve.states(z + s * h * tangent_z, t + s * h * tangent_t))
+        for s in (1.0, -1.0)
+    )
+    return np.asarray((ahead - behind) / (2.0 * h))

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.curves import ParameterLine
+from equimorph.equilibria.curves import Curve
 from equimorph.structures import Structure
 
 Lanes = Float[np.ndarray, "lanes size"]
@@ -64,8 +64,13 @@ class NormalForm:
         return [str(kind) for kind in np.where(skew, crossing, kinds)]
 
 
-def normal_form(structure: Structure, z: Lanes, p: Parameters, dp: Parameters) -> NormalForm:
-    """Coefficients at simple branch points of paths along `dp`; F_zzz by differences, to 1e-10."""
+def normal_form(
+    structure: Structure, z: Lanes, p: Parameters, dp: Parameters, bend: Parameters | None = None
+) -> NormalForm:
+    """Coefficients at simple branch points of paths along `dp`; F_zzz by differences, to 1e-10.
+
+    `bend`: second derivative of the parameters along curved paths.
+    """
     n, still = structure.unknowns, np.zeros_like(p)
     b = null_border(structure, z, p)
     norm = np.sqrt(b[:, :n] ** 2 @ structure.mass)
@@ -76,6 +81,8 @@ def normal_form(structure: Structure, z: Lanes, p: Parameters, dp: Parameters) -
     rhs[:, 0, :-1] = -structure.parameter_derivative(z, p, dp)
     psi = np.ascontiguousarray(at.solve(rhs)[:, 0, :-1])
     twice = structure.second_derivative(z, p, (psi, dp), (psi, dp))
+    if bend is not None:
+        twice = twice + structure.parameter_derivative(z, p, bend)
     return NormalForm(
         phi,
         psi,
@@ -87,6 +94,6 @@ def normal_form(structure: Structure, z: Lanes, p: Parameters, dp: Parameters) -
     )
 
 
-def criticality(curve: ParameterLine, z: Lanes, t: Values) -> list[str]:
-    """Classify simple branch points of lines in parameter space; see `NormalForm.kinds`."""
-    return normal_form(curve.structure, z, curve.parameters(t), curve.velocity).kinds
+def criticality(curve: Curve, z: Lanes, t: Values) -> list[str]:
+    """Classify simple branch points of curves in parameter space; see `NormalForm.kinds`."""
+    return normal_form(curve.structure, z, curve.parameters(t), curve.rate(t), curve.bend(t)).kinds

@@ -7,7 +7,7 @@ from concurrent.futures import wait
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.happenings import Happenings, locate_all
@@ -16,11 +16,13 @@ from equimorph.equilibria.tracing import (
     ARRIVAL,
     BRANCH,
     CONSTRAINT,
+    CRITICAL,
     FOLD,
     RETURN,
     Points,
     TraceOptions,
 )
+from equimorph.errors import CancelledError
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.model import Constraint, Progress, Silent
 
@@ -29,14 +31,16 @@ Values = Float[np.ndarray, " lanes"]
 Names = Int[np.ndarray, " lanes"]
 Some = Int[np.ndarray, " some"]
 
-LOST = 0
+LOST, CANCELLED = 0, -1
 KINDS = {
     ARRIVAL: "arrived",
     RETURN: "returned",
     FOLD: "fold",
     BRANCH: "branch point",
     CONSTRAINT: "constraint",
+    CRITICAL: "critical",
     LOST: "lost",
+    CANCELLED: "cancelled",
 }
 LANES_PER_THREAD = 128
 """A second thread is not worth its start for fewer lanes than this on each."""
@@ -88,8 +92,9 @@ def follow(
     treated by itself: its result is the same, bit for bit, whatever the other lanes, their order
     and the threads.
 
-    Whatever `progress` raises stops all threads and reaches the caller: so a computation is
-    cancelled.
+    Whatever `progress` raises stops all threads and reaches the caller; only after
+    `CancelledError` lanes that were not finished have the code `CANCELLED`, and the others are
+    returned.
     """
     options, batching = options or TraceOptions(), batching or Batching()
     count = max(1, min(batching.threads or threads(), len(z) // LANES_PER_THREAD))
@@ -100,7 +105,11 @@ def follow(
         _Job(Block(curve, constraints, options, capacity, EVENTS_AT_ONCE), queue, ledger, z)
         for _ in range(count)
     ]
-    _run(jobs, queue, progress or Silent())
+    try:
+        _run(jobs, queue, progress or Silent())
+    except CancelledError:
+        ledger.code[ledger.code == LOST] = CANCELLED
+        ledger.code[list(ledger.why)] = LOST
     return _outcome(ledger, jobs)
 
 
@@ -269,10 +278,10 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Outcome:
     for lane, reason in (pair for job in jobs for pair in job.missed.items()):
         ledger.code[lane], ledger.why[lane] = LOST, reason
     size = ledger.z.shape[1]
-    passed = [part.take(ledger.retries[part.lanes] == t) for job in jobs for part, t in job.passed]
+    passed = [part.take(_last(ledger, part, t)) for job in jobs for part, t in job.passed]
     parts = [part for job in jobs for part in job.block.points.parts()]
     points = [
-        part if (last := ledger.retries[part.lanes] == tries).all() else part.take(last)
+        part if (last := _last(ledger, part, tries)).all() else part.take(last)
         for part, tries in parts
     ]
     return Outcome(
@@ -285,3 +294,9 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Outcome:
         Happenings.joined(passed, size),
         Points.joined(points, size),
     )
+
+
+def _last(ledger: _Ledger, part: Points | Happenings, tries: Some) -> Bool[np.ndarray, " some"]:
+    """Which entries belong to the last try of a lane that was finished."""
+    of_last = ledger.retries[part.lanes] == tries
+    return np.asarray(of_last & (ledger.code[part.lanes] != CANCELLED))

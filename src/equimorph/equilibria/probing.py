@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.cubics import least_inside
-from equimorph.equilibria.curves import ParameterLine, squared_length
+from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.fronts import Bracket, Front, step_along
 from equimorph.equilibria.happenings import Happenings, locate_all
 from equimorph.equilibria.location import hermite
@@ -43,17 +43,17 @@ class Probe:
         return Probe(self.front.take(some), *columns)
 
 
-def probed(curve: ParameterLine, front: Front, length: Values) -> Probe:
+def probed(curve: Curve, front: Front, length: Values) -> Probe:
     """Eigenvalue nearest to zero, and its slope along the curve, at one point of each lane."""
     p = curve.parameters(front.t)
     b = null_border(curve.structure, front.z, p)
     at = Critical(curve.structure, front.z, p, b)
-    slope = at.second(front.tangent_z, front.tangent_t[:, None] * curve.velocity)
+    slope = at.second(front.tangent_z, front.tangent_t[:, None] * curve.rate(front.t))
     return Probe(front, -at.g, slope, length)
 
 
 def look_inside(
-    curve: ParameterLine,
+    curve: Curve,
     ends: tuple[Probe, Probe],
     first: float | None,
     options: TraceOptions,
@@ -95,7 +95,7 @@ def _upright(probe: Probe, sign: float, zero: float) -> Probe:
     return replace(probe, value=turned * probe.value, slope=turned * probe.slope)
 
 
-def _surprise(curve: ParameterLine, ends: tuple[Probe, Probe], middle: Probe) -> float:
+def _surprise(curve: Curve, ends: tuple[Probe, Probe], middle: Probe) -> float:
     """By how much the cubic through two points misses the value between them."""
     low, high = ends
     s, width = (middle.length - low.length) / (high.length - low.length), _chord(curve, low, high)
@@ -104,9 +104,7 @@ def _surprise(curve: ParameterLine, ends: tuple[Probe, Probe], middle: Probe) ->
     return float(np.abs(middle.value - cubic)[0])
 
 
-def _between(
-    curve: ParameterLine, start: Probe, span: tuple[Values, Values], share: float
-) -> Probe | None:
+def _between(curve: Curve, start: Probe, span: tuple[Values, Values], share: float) -> Probe | None:
     """Point of a step at a share of a span, or elsewhere in it if the curve is singular there."""
     for place in (min(max(share, 0.1), 0.9), 0.37, 0.71):
         length = span[0] + place * span[1]
@@ -125,14 +123,14 @@ def _event(
     return Happenings(np.zeros(1, int), kind, z, t, low.length, index, sure)
 
 
-def _chord(curve: ParameterLine, low: Probe, high: Probe) -> Values:
+def _chord(curve: Curve, low: Probe, high: Probe) -> Values:
     """Distance between two points: for narrow pieces their arclength."""
     a, b = low.front, high.front
     lengths = squared_length(curve.structure, curve.weight, b.z - a.z, b.t - a.t)
     return np.asarray(np.sqrt(lengths))
 
 
-def _least(curve: ParameterLine, low: Probe, high: Probe) -> tuple[float, float, float]:
+def _least(curve: Curve, low: Probe, high: Probe) -> tuple[float, float, float]:
     """Share and least value of the cubic between two points, and the smaller of their values."""
     values, slopes = (low.value, high.value), (low.slope, high.slope)
     share, least = least_inside(values, slopes, _chord(curve, low, high))
@@ -140,7 +138,7 @@ def _least(curve: ParameterLine, low: Probe, high: Probe) -> tuple[float, float,
 
 
 def _at_the_least(
-    curve: ParameterLine,
+    curve: Curve,
     near: tuple[Probe, Probe],
     ends: tuple[Probe, Probe],
     options: TraceOptions,
@@ -167,16 +165,16 @@ def _at_the_least(
     return [_event(code, z, t, replace(low, length=length), found=True)]
 
 
-def _turns(curve: ParameterLine, z: Float[np.ndarray, "1 size"], t: Values) -> bool:
+def _turns(curve: Curve, z: Float[np.ndarray, "1 size"], t: Values) -> bool:
     """Whether vᵀF_t is not zero at a singular point: a fold in which the path does not turn."""
     p = curve.parameters(t)
     at = Critical(curve.structure, z, p, null_border(curve.structure, z, p))
-    column = curve.structure.parameter_derivative(z, p, curve.velocity)
-    return bool(np.abs(at.along(curve.velocity))[0] > 1e-6 * np.linalg.norm(column) > 1e-12)
+    column = curve.structure.parameter_derivative(z, p, curve.rate(t))
+    return bool(np.abs(at.along(curve.rate(t)))[0] > 1e-6 * np.linalg.norm(column) > 1e-12)
 
 
 def _both(
-    curve: ParameterLine,
+    curve: Curve,
     points: tuple[Probe, Probe, Probe],
     index: Int[np.ndarray, " 1"],
     options: TraceOptions,

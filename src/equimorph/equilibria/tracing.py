@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.kernels import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
+from equimorph.equilibria.kernels import ARRIVAL, BRANCH, CONSTRAINT, CRITICAL, FOLD, RETURN
 
 __all__ = [
     "ARRIVAL",
     "BRANCH",
     "CONSTRAINT",
+    "CRITICAL",
     "FOLD",
     "RETURN",
     "Points",
@@ -44,7 +45,7 @@ class TraceOptions:
         """Bits of the events that end a lane."""
         stop = ARRIVAL | RETURN | CONSTRAINT
         stop |= 0 if self.through_folds else FOLD
-        return stop | (0 if self.through_branch_points else BRANCH)
+        return stop | (0 if self.through_branch_points else BRANCH | CRITICAL)
 
     @property
     def locates_branch_points(self) -> bool:

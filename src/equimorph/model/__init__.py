@@ -11,6 +11,7 @@ from equimorph.model.parameter import (
 )
 from equimorph.model.progress import Progress, Silent
 from equimorph.model.schedule import Schedule
+from equimorph.model.spline import Spline
 
 __all__ = [
     "Box",
@@ -22,6 +23,7 @@ __all__ = [
     "Role",
     "Schedule",
     "Silent",
+    "Spline",
     "names_of",
     "parameter_vector",
     "position",

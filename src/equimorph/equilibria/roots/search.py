@@ -76,7 +76,7 @@ class _Search:
         ):  # fmt: skip
             self._ends[row_number] = column
         self.root = Root(old.z.copy(), np.empty(lanes), np.empty(lanes), np.zeros(lanes, bool))
-        mass = curve.structure.mass
+        mass = curve.metric.mass
         kernels.begin(curve.weight, mass, self._places, *self._scalars, self._ends, lanes)
         self._here = curve
         self._close()
@@ -87,7 +87,7 @@ class _Search:
         trial, row = (place[:active] for place in self._places[5:])
         closing = numbers[march.CORNER, :active], numbers[march.DEFECT, :active]
         move = self._here.advance(trial, numbers[march.TRIAL, :active], row, *closing)
-        mass, steps = self.curve.structure.mass, (move.dz, move.dt, move.tangent_z, move.tangent_t)
+        mass, steps = self.curve.metric.mass, (move.dz, move.dt, move.tangent_z, move.tangent_t)
         march.correct(*steps, mass, trial, numbers, counts, active, march.EXACT, 0.0)
         values = np.zeros(active)
         there = np.flatnonzero(counts[march.STAGE, :active] == march.CONVERGED)

@@ -1,0 +1,179 @@
+"""What a lift of one state finds: a path with its events."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria.curves import Curve
+from equimorph.equilibria.hidden import with_hidden_events
+from equimorph.equilibria.lifting.legs import Leg, listed, prepared
+from equimorph.equilibria.normal_form import criticality
+from equimorph.equilibria.outcome import KINDS, LOST, Outcome, follow
+from equimorph.equilibria.tracing import BRANCH, CONSTRAINT, FOLD, TraceOptions
+from equimorph.errors import InputError
+from equimorph.model import Constraint, Progress
+from equimorph.structures import State, States
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened on a lift, at an exact state.
+
+    kind: "arrived", "fold", "branch point", "constraint", "returned" (a path that turned at a fold
+    came back to the parameters of its start), "critical" (stability changes where a path with
+    unknown parameters goes on) or "lost"; `at`: number of the leg + share of it;
+    `criticality` of branch points; `detail`: one line.
+    """
+
+    kind: str
+    state: State
+    at: float
+    criticality: str | None = None
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A lifted curve: exact states in order, what happened on the way, and how it ended.
+
+    Parameters
+    ----------
+    states
+        Equilibria along the curve, start and end included.
+    at
+        Segment number + share of the segment, per state.
+    length
+        Length from the start in the structure's metric and scaled parameters, per state.
+    index
+        Negative eigenvalues of the constrained Hessian per state; at an end that is critical, the
+        index on the near side.
+    events
+        Events passed, in order, and the end.
+    """
+
+    states: States
+    at: Float[np.ndarray, " points"]
+    length: Float[np.ndarray, " points"]
+    index: Int[np.ndarray, " points"]
+    events: tuple[Event, ...]
+
+    def __repr__(self) -> str:
+        """Number of states and how the lift ended."""
+        end = self.end.state
+        return f"Path({len(self.states)} states; {self.end.kind} at {end})"
+
+    @property
+    def end(self) -> Event:
+        """How the lift ended."""
+        return self.events[-1]
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the curve was lifted to its end."""
+        return self.end.kind == "arrived"
+
+
+def lift_one(
+    state: State,
+    to: Leg | Sequence[Leg],
+    within: tuple[Constraint, ...],
+    options: TraceOptions,
+    progress: Progress | None,
+) -> Path:
+    """Follow all legs from one state; see `lift`."""
+    pieces: list[_Segment] = []
+    here = state
+    for number, leg in enumerate(listed(to)):
+        begun = prepared(here.batch, leg)
+        if not begun.curve.weight[0] > 0.0:
+            continue
+        outcome = follow(begun.curve, begun.z, within, options, progress=progress)
+        if begun.curve.folds_change_index:
+            outcome = with_hidden_events(begun.curve, begun.z, outcome, options)
+        pieces.append(_segment(begun.curve, outcome, number, within))
+        if pieces[-1].events[-1].kind != "arrived":
+            break
+        here = pieces[-1].events[-1].state
+    if not pieces:
+        raise InputError("`to` must change at least one parameter; got the start itself.")
+    return _joined(state, pieces)
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """One leg of a path, without its first point."""
+
+    z: Float[np.ndarray, "points size"]
+    p: Float[np.ndarray, "points parameters"]
+    at: Float[np.ndarray, " points"]
+    length: Float[np.ndarray, " points"]
+    index: Int[np.ndarray, " points"]
+    events: tuple[Event, ...]
+
+
+def _segment(
+    curve: Curve, outcome: Outcome, number: int, within: tuple[Constraint, ...]
+) -> _Segment:
+    events = (*_passed(curve, outcome, number), _end(curve, outcome, number, within))
+    last = outcome.travelled[0] if outcome.code[0] != LOST else np.inf
+    points = outcome.points.take(outcome.points.travelled < last)
+    ended = slice(0, int(outcome.code[0] != LOST))
+    t = np.concatenate([points.t, outcome.t[ended]])
+    z, p = _states(curve, np.concatenate([points.z, outcome.z[ended]]), t)
+    length = np.concatenate([points.travelled, outcome.travelled[ended]])
+    index = np.concatenate([points.index, outcome.index[ended]])
+    return _Segment(z, p, number + t, length, index, events)
+
+
+def _states(
+    curve: Curve, z: Float[np.ndarray, "points extended"], t: Float[np.ndarray, " points"]
+) -> tuple[Float[np.ndarray, "points size"], Float[np.ndarray, "points parameters"]]:
+    """Unknowns and parameters at points of the only lane."""
+    return curve.take(np.zeros(len(t), int)).states(z, t)
+
+
+def _passed(curve: Curve, outcome: Outcome, number: int) -> list[Event]:
+    passed = outcome.passed
+    z, p = _states(curve, passed.z, passed.t)
+    return [
+        Event(
+            KINDS[int(code)],
+            State(curve.structure, z[i], p[i]),
+            number + float(passed.t[i]),
+            criticality(curve, z[i : i + 1], passed.t[i : i + 1])[0] if code == BRANCH else None,
+        )
+        for i, code in enumerate(passed.code)
+    ]
+
+
+def _end(curve: Curve, outcome: Outcome, number: int, within: tuple[Constraint, ...]) -> Event:
+    code, t = int(outcome.code[0]), outcome.t
+    z, p = _states(curve, outcome.z, t)
+    state = State(curve.structure, z[0], p[0])
+    kind, detail, critical = KINDS[code], outcome.why.get(0, ""), None
+    if code == CONSTRAINT:
+        worst = max(within, key=lambda c: c.excess(state.z[None], state.p[None])[0])
+        detail = str(worst)
+    if code == FOLD and not curve.folds_change_index:
+        detail = "the Jacobian of the descriptors by the unknown parameters is singular"
+    if code == BRANCH:
+        critical = criticality(curve, z, t)[0]
+        detail = critical
+    return Event(kind, state, number + float(t[0]), critical, detail)
+
+
+def _joined(start: State, pieces: list[_Segment]) -> Path:
+    z = np.concatenate([start.z[None], *(piece.z for piece in pieces)])
+    p = np.concatenate([start.p[None], *(piece.p for piece in pieces)])
+    at = np.concatenate([[0.0], *(piece.at for piece in pieces)])
+    lengths, travelled = [np.zeros(1)], 0.0
+    for piece in pieces:
+        lengths.append(travelled + piece.length)
+        travelled = lengths[-1][-1] if len(piece.length) else travelled
+    index = np.concatenate([[start.index], *(piece.index for piece in pieces)]).astype(int)
+    passed = [event for piece in pieces for event in piece.events[:-1]]
+    middle = [piece.events[-1] for piece in pieces[-1:]]
+    states = States(start.structure, z, p)
+    return Path(states, at, np.concatenate(lengths), index, (*passed, *middle))

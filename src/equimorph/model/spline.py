@@ -1,0 +1,83 @@
+"""Smooth curves in parameter space through samples."""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+
+from equimorph.errors import InputError
+
+Samples = Float[np.ndarray, "knots *lanes"]
+
+
+class Spline:
+    """Cubic spline through samples: ``Spline(Theta=[0.9, 1.1, 1.0], q=[0, 1, 3])``.
+
+    Twice continuously differentiable, third derivative continuous at the second and the last but
+    one knot ("not a knot"); a parabola through three samples, a line through two.
+
+    Parameters
+    ----------
+    t
+        Knots, growing from 0 to 1; equidistant if None.
+    samples
+        Values of each parameter at the knots: (knots,), or (knots, lanes) for many lanes.
+
+    Raises
+    ------
+    InputError
+        For fewer than two samples, numbers of samples that differ, or knots that do not grow from
+        0 to 1.
+
+    Examples
+    --------
+    >>> Spline(q=[0.0, 1.0, 4.0])(0.25)
+    {'q': array(0.25)}
+    """
+
+    def __init__(
+        self,
+        t: Sequence[float] | Float[np.ndarray, " knots"] | None = None,
+        /,
+        **samples: Sequence[float] | Samples,
+    ) -> None:
+        if not samples:
+            raise InputError("`Spline` must name at least one parameter; got none.")
+        self.samples = {name: _numbers(name, values) for name, values in samples.items()}
+        counts = {name: len(values) for name, values in self.samples.items()}
+        knots = next(iter(counts.values()))
+        if knots < 2 or len(set(counts.values())) > 1:
+            raise InputError(
+                f"`Spline` must have two or more samples, as many of each parameter; got {counts}."
+            )
+        self.t = np.linspace(0.0, 1.0, knots) if t is None else _numbers("t", t)
+        good = self.t.shape == (knots,) and self.t[0] == 0.0 and self.t[-1] == 1.0
+        if not (good and (np.diff(self.t) > 0.0).all()):
+            raise InputError(
+                f"`t` must be {knots} numbers that grow from 0 to 1, one per sample; got {t!r}."
+            )
+
+    def __repr__(self) -> str:
+        """Parameters and number of knots."""
+        return f"Spline({', '.join(self.samples)}: {len(self.t)} knots)"
+
+    @cached_property
+    def pieces(self) -> dict[str, CubicSpline]:
+        """The cubics of each parameter."""
+        return {name: CubicSpline(self.t, values) for name, values in self.samples.items()}
+
+    def __call__(self, t: float) -> dict[str, Float[np.ndarray, " *lanes"]]:
+        """Values of the parameters at t between 0 and 1."""
+        return {name: np.asarray(cubics(t)) for name, cubics in self.pieces.items()}
+
+
+def _numbers(name: str, values: object) -> Samples:
+    try:
+        numbers = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        numbers = np.full(1, np.nan)
+    if numbers.ndim == 0 or not np.isfinite(numbers).all():
+        raise InputError(f"`{name}` must be a list of finite numbers; got {values!r}.")
+    return numbers
