@@ -59,6 +59,10 @@ DIP, WIDE = 0.1, 1e-3
 """Least determinant inside a step, as a share of those at its ends, below which the step may hide
 two events; length from which on it is refused then."""
 
+BROAD = 0.05
+"""Length of a step above which one that seems to pass a branch point is refused: most jump to
+another branch, which a shorter one does not, and looking for the branch point costs more."""
+
 
 @njit(**SUMS)
 def squared_lengths(dz, dt, weight, mass, light, out):
@@ -217,6 +221,7 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
         hidden = (hidden or (what & (ARRIVAL | RETURN)) != 0) and length > 10 * smallest
         bad = changed > 1 or (flipped and hidden) or _turns_twice(old, new, end - start, length)
         bad = bad or (length > WIDE and changed == 0 and _dips(i, numbers))
+        bad = bad or (locates and length > BROAD and (what & BRANCH) != 0)
         if bad or (flipped and not fold and not locates):
             counts[STAGE, i] = REFUSED
             continue

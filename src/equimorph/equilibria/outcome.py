@@ -44,7 +44,7 @@ KINDS = {
 }
 LANES_PER_THREAD = 128
 """A second thread is not worth its start for fewer lanes than this on each."""
-EVENTS_AT_ONCE = 256
+EVENTS_AT_ONCE = 512
 REPORT_EVERY = 0.2
 """Seconds."""
 
@@ -53,11 +53,11 @@ REPORT_EVERY = 0.2
 class Batching:
     """How many lanes march side by side on how many threads; no result depends on it.
 
-    capacity: lanes of a thread that fit into its cache together; threads: as many as there are
-    processors if None.
+    capacity: lanes of a thread, so many that calls cost little beside them; threads: as many as
+    there are processors if None.
     """
 
-    capacity: int = 256
+    capacity: int = 512
     threads: int | None = None
 
 
