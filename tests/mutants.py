@@ -9,7 +9,9 @@ from typing import Any
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from studies import ARCH, SPRING
+from studies import ARCH, SPRING, coarse_examples
+
+STUDIES = [SPRING, ARCH, *coarse_examples()]
 
 HUGE = "<a number of 4401 digits>"
 """Stands for a number that Python refuses to print."""
@@ -26,8 +28,35 @@ TEXTS = [
     *("height(1/3) >= 0.1", "<=", "angle <= <= 1", "angle <= 1e", "angle <= --1", "a >= ..", "{x}"),
     *("\x1b[2J", "\n", "\u2028", "\u202e", "é", "🙂", "'", '"', "\\", "\x7f", "\x9b31m"),
 ]
+FORMULAS = [
+    *("phi1", "phi2**2", "P*top", "alpha", "top", "1", "x", "phi1/phi2", "sqrt(phi1)", "abs(phi1)"),
+    *(
+        "9**9**9**9",
+        "phi1**1e9",
+        "1/0",
+        "(-1)**0.5",
+        "log(-1)",
+        "exp(1e308)",
+        "phi1 +",
+        "(" * 300,
+        "-" * 5000,
+    ),
+    *("+".join(["phi1"] * 3000), "phi1 if P else 0", "__import__('os')", "phi1.real", "phi1(2)"),
+    *("lambda: 0", "[phi1]", "phi1 == 1", "phi1, 2", "cos", "cos()", "cos(1, 2)", "'a'", "1j"),
+]
 KEYS = [
     *("structure", "set", "equilibria", "route", "title", "kind", "load", "span", "elements"),
+    *(
+        "energy",
+        "unknowns",
+        "parameters",
+        "definitions",
+        "draw",
+        "joints",
+        "bars",
+        "supports",
+        "EA",
+    ),
     *("degree", "stiffness", "box", "fixed", "within", "intervals", "at", "name", "start", "goal"),
     *("via", "margin", "highest", "lowest", "near", "Theta", "Delta", "q", "nu", "x_l", "F", "k"),
 ]
@@ -36,6 +65,7 @@ DATES = [datetime.date(2020, 1, 1), datetime.time(1, 2, 3), datetime.datetime(20
 SCALARS: SearchStrategy[Any] = st.one_of(
     st.sampled_from(NUMBERS),
     st.sampled_from(TEXTS),
+    st.sampled_from(FORMULAS),
     st.booleans(),
     st.sampled_from(DATES),
     st.integers(),
@@ -84,7 +114,7 @@ def _places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 @st.composite
 def mutated_structures(draw: DrawFn) -> bytes:
     """A study in which a few entries are removed, renamed, repeated, added or replaced."""
-    study = tomllib.loads(draw(st.sampled_from([SPRING, ARCH])))
+    study = tomllib.loads(draw(st.sampled_from(STUDIES)))
     for _ in range(draw(st.integers(1, 3))):
         places = _places(study)
         if not places:
@@ -115,14 +145,15 @@ def _change(draw: DrawFn, home: Any, last: Any, way: str) -> None:
 PLAUSIBLE = [
     *("angle", "height", "energy", "height(0.5)", "max_curvature", "curvature(0)", "x(1/3)"),
     *("angle <= 1.2", "height >= -2", "energy <= 3", "max_curvature <= 8", "height(0.5) >= -0.1"),
-    *("uniform", "left-half", "rod", "spring", "other-name"),
+    *("uniform", "left-half", "rod", "spring", "other-name", "phi1", "phi2**2", "P*top", "cos(P)"),
+    *("lean", "a.y", "a", "b", "xy", "x"),
 ]
 
 
 @st.composite
 def plausible_mutants(draw: DrawFn) -> bytes:
     """A study that may well be meant: other numbers, other names, fewer or more entries."""
-    study = tomllib.loads(draw(st.sampled_from([SPRING, ARCH])))
+    study = tomllib.loads(draw(st.sampled_from(STUDIES)))
     for _ in range(draw(st.integers(1, 3))):
         places = [path for path in _places(study) if "intervals" not in path]
         *path, last = draw(st.sampled_from(places))
@@ -145,7 +176,7 @@ def plausible_mutants(draw: DrawFn) -> bytes:
 @st.composite
 def mutated_bytes(draw: DrawFn) -> bytes:
     """A study file that was cut, or in which a few stretches of bytes are lost or replaced."""
-    content = draw(st.sampled_from([SPRING, ARCH])).encode()
+    content = draw(st.sampled_from(STUDIES)).encode()
     for _ in range(draw(st.integers(1, 3))):
         start = draw(st.integers(0, len(content)))
         stop = draw(st.one_of(st.just(len(content)), st.integers(start, start + 8)))

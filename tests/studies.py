@@ -1,5 +1,6 @@
 """Small studies, one finished run, and dots for figures, for the tests of the outer layers."""
 
+import re
 import shutil
 from functools import partial
 from pathlib import Path
@@ -52,6 +53,13 @@ via = [{ Theta = 1.3 }, { Delta = 1.3 }]
 within = ["max_curvature <= 20"]
 margin = 0.1
 """
+
+
+def coarse_examples() -> list[str]:
+    """Examples of structures that are described in the file itself, on coarse grids."""
+    folder = Path(__file__).parents[1] / "examples"
+    texts = [(folder / f"{name}.toml").read_text() for name in ("column", "truss")]
+    return [re.sub(r"intervals = .*", "intervals = [5, 5]", text) for text in texts]
 
 
 def finished_run(base: Path) -> tuple[Outcome, Path]:

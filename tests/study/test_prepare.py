@@ -41,6 +41,11 @@ WRONG = {
         "Theta = [10, 140]",
         r"in `set\.box`: `Theta` must be an angle in radians, within ±20; got 140\. .*write 2\.443",
     ),
+    "rod without a bound": (
+        'within = ["max_curvature <= 20"]\nintervals',
+        'within = ["height(0.5) >= -0.1"]\nintervals',
+        r"`set\.within` must bound the curvature of a rod, .*; got height\(0\.5\) >= -0\.1\. Add",
+    ),
     "degrees fixed": (
         "{ Theta = [0.2, 2.5], Delta = [-2.0, 2.0] }\nfixed = { q = 2.5 }",
         "{ Theta = [0.2, 2.5], q = [-2.0, 2.0] }\nfixed = { Delta = 30 }",

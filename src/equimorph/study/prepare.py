@@ -90,7 +90,7 @@ def prepare(study: Study) -> Problem:
         structure=structure,
         box=box,
         fixed=wanted.fixed,
-        constraints=_constraints(structure, wanted.within, "set.within"),
+        constraints=_bounds(structure, wanted.within),
         intervals=_intervals(wanted),
         points=tuple(point.at for point in study.equilibria),
         tasks=tuple(_task(structure, box, route, i) for i, route in enumerate(study.routes)),
@@ -167,6 +167,18 @@ def _intervals(wanted: SetSection) -> tuple[int, int]:
     """Intervals of the grid; what a study leaves out takes the library's default."""
     default: tuple[int, int] = signature(equilibrium_set).parameters["intervals"].default
     return default if wanted.intervals is None else (wanted.intervals[0], wanted.intervals[1])
+
+
+def _bounds(structure: Structure, texts: Sequence[str]) -> tuple[Constraint, ...]:
+    """Constraints of the set; a rod has equilibria of any curvature, so that it needs a bound."""
+    constraints = _constraints(structure, texts, "set.within")
+    bounded = {each.descriptor.name for each in constraints if each.sense == "<="}
+    if structure.kind == "rod" and "max_curvature" not in bounded:
+        raise InputError(
+            "`set.within` must bound the curvature of a rod, which has equilibria without end; "
+            f'got {", ".join(texts) or "nothing"}. Add "max_curvature <= 20".'
+        )
+    return constraints
 
 
 def _constraints(structure: Structure, texts: Sequence[str], key: str) -> tuple[Constraint, ...]:

@@ -143,12 +143,16 @@ def _equilibria(
         stability, *columns, _numbers(states.margin), _numbers(states.energy), strict=True
     )
     rows = [[html.sketch(shape, box), *cells] for shape, cells in zip(shapes, numbers, strict=True)]
-    head = ["shape", "", *(escape(each.name) for each in descriptors), "margin", "energy"]
+    shown = [*descriptors, states.structure.descriptor("energy")]
+    units = [f"{escape(each.name)} ({escape(each.unit)})" for each in shown]
+    head = ["shape", "", *units[:-1], "margin", units[-1]]
     kinds = ["" if index == 0 else "unstable" for index in states.index]
     return [
         heading,
         f"<p>{len(states)} found, {len(states.stable)} of them stable.</p>",
         html.table(head, rows, kinds),
+        "<p>Index: number of directions in which the energy falls. Margin: smallest stiffness in "
+        "any direction, negative where unstable.</p>",
     ]
 
 

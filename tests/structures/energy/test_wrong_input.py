@@ -20,6 +20,9 @@ def made(energy="k*phi**2/2 - M*phi", unknowns="phi", parameters=(LOAD, STIFFNES
     ("arguments", "text"),
     [
         ({"energy": "k*phi**2/2 - M*phi)"}, "`energy` must be a formula; got 'k*phi**2"),
+        ({"energy": "k*phi**2/2 + 1/(2 - 2)"}, "`energy` must be a formula of finite numbers; got"),
+        ({"energy": "k*phi*9**9**9"}, "`energy` must be a formula of finite numbers; got"),
+        ({"energy": "k*phi*(-1)**0.5"}, "must be a formula in real numbers, not in '(-1) ** 0.5'"),
         ({"energy": "k*psi"}, "`energy` must be a formula in phi, M, k, not in the unknown symbol"),
         ({"energy": "__import__('os').getcwd()"}, "not in \"__import__('os').getcwd()\"; got"),
         ({"energy": "k*phi.real"}, "not in 'phi.real'; got"),

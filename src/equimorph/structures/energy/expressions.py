@@ -65,6 +65,10 @@ def _read(text: str, names: Mapping[str, Any], what: str) -> Any:
         return casadi().SX(_value(tree, names))
     except _UnreadableError as error:
         raise InputError(f"`{what}` must be a formula in {error}; got {_short(text)}.") from None
+    except ArithmeticError:
+        raise InputError(
+            f"`{what}` must be a formula of finite numbers; got {_short(text)}."
+        ) from None
     except RecursionError:
         raise InputError(
             f"`{what}` must be a shorter formula; got {_short(text)}. Give parts of it names in "
@@ -110,7 +114,10 @@ def _combined(node: Any, names: Mapping[str, Any]) -> Any:
     operation = _BINARY.get(type(node.op))
     if operation is None:
         return None
-    return operation(_value(node.left, names), _value(node.right, names))
+    value = operation(_value(node.left, names), _value(node.right, names))
+    if isinstance(value, complex):
+        raise _UnreadableError(f"real numbers, not in {_short(ast.unparse(node))}")
+    return value
 
 
 def _compared(node: Any, names: Mapping[str, Any]) -> Any:
