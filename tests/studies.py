@@ -56,9 +56,9 @@ margin = 0.1
 
 
 def coarse_examples() -> list[str]:
-    """Examples of structures that are described in the file itself, on coarse grids."""
+    """Examples whose structures or maps are described in the file itself, on coarse grids."""
     folder = Path(__file__).parents[1] / "examples"
-    texts = [(folder / f"{name}.toml").read_text() for name in ("column", "truss")]
+    texts = [(folder / f"{name}.toml").read_text() for name in ("column", "truss", "maps")]
     return [re.sub(r"intervals = .*", "intervals = [5, 5]", text) for text in texts]
 
 

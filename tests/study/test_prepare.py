@@ -1,6 +1,7 @@
 import pytest
 
 from equimorph.errors import InputError
+from equimorph.manifold import INTERVALS
 from equimorph.study.prepare import Problem, prepare
 from equimorph.study.problem import parse_study
 
@@ -27,6 +28,10 @@ def test_what_is_left_out_takes_the_structures_default(arch_text: str):
 def test_a_load_table_reaches_the_rod(arch_text: str):
     problem = _prepare(arch_text.replace('"uniform"', "[[0, 2], [0.5, 2], [0.5, 0], [1, 0]]"))
     assert problem.structure.identity()["load"] == [[0, 2], [0.5, 2], [0.5, 0], [1, 0]]
+
+
+def test_a_study_without_intervals_takes_those_of_the_library(arch_text: str):
+    assert _prepare(arch_text.replace("intervals = [5, 9]", "")).intervals == INTERVALS[2]
 
 
 # What is changed in the study, and what the line must say.

@@ -1,7 +1,7 @@
 """The equilibrium set as a simplicial complex: lifting, folds, strata, audit."""
 
 from equimorph.manifold.audit import Audit
-from equimorph.manifold.build import equilibrium_set
+from equimorph.manifold.build import INTERVALS, equilibrium_set
 from equimorph.manifold.equilibrium_set import (
     Boundary,
     Component,
@@ -11,6 +11,7 @@ from equimorph.manifold.equilibrium_set import (
 )
 
 __all__ = [
+    "INTERVALS",
     "Audit",
     "Boundary",
     "Component",

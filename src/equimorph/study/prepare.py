@@ -3,12 +3,11 @@
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from inspect import signature
 
 import numpy as np
 
 from equimorph.errors import InputError
-from equimorph.manifold import equilibrium_set
+from equimorph.manifold import INTERVALS
 from equimorph.model import Box, Constraint, Descriptor, Grid, parameter_vector, position
 from equimorph.structures import Structure, from_identity
 from equimorph.study.expressions import parse_comparison
@@ -165,8 +164,8 @@ def _check_fixed(structure: Structure, box: Box, fixed: Mapping[str, float]) -> 
 
 def _intervals(wanted: SetSection) -> tuple[int, int]:
     """Intervals of the grid; what a study leaves out takes the library's default."""
-    default: tuple[int, int] = signature(equilibrium_set).parameters["intervals"].default
-    return default if wanted.intervals is None else (wanted.intervals[0], wanted.intervals[1])
+    first, second = wanted.intervals or INTERVALS[len(wanted.box)]
+    return first, second
 
 
 def _bounds(structure: Structure, texts: Sequence[str]) -> tuple[Constraint, ...]:
