@@ -20,7 +20,7 @@ LARGEST = 10.0
 """Bound of the curvature."""
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def natural_states(lanes: int, elements: int = 6, degree: int = 9) -> States:
     """So many natural states with max |κ| ≤ 10, from random settings in the box."""
     rod, generator = Rod(elements=elements, degree=degree), np.random.default_rng(5)
