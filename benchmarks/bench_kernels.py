@@ -5,11 +5,11 @@
 
 import numpy as np
 import pytest
+from equimorph.structures.rod.mechanics.recovery.kernels import largest_lanes
 
 from equimorph.linalg import solve_bordered
 from equimorph.structures import Rod
 from equimorph.structures.rod.kernels import advance_lanes
-from equimorph.structures.rod.recovery.kernels import largest_lanes
 
 RESOLUTIONS = [(6, 9), (12, 6), (12, 8), (24, 8)]
 
@@ -45,7 +45,12 @@ def bench_newton_step_on_one_thread(benchmark, elements, degree, lanes):
     numbers = [np.empty(lanes) for _ in range(4)]
     index = np.empty(lanes, np.int64)
     outputs = (np.empty_like(z), numbers[0], np.empty_like(z), numbers[1], numbers[2], index)
-    shared = (rod.layout.stiffness, rod.layout.ends, rod.mesh.weights, rod.loads)
+    shared = (
+        rod.mechanics.layout.stiffness,
+        rod.mechanics.layout.ends,
+        rod.mesh.weights,
+        rod.mechanics.loads,
+    )
     inputs = (z, p, dp, row, np.ones(lanes), np.zeros(lanes))
     benchmark.pedantic(
         advance_lanes,
@@ -71,7 +76,7 @@ def bench_newton_step_through_the_contract(benchmark, lanes):
 def bench_largest_curvature_on_one_thread(benchmark, lanes):
     rod = Rod()
     z, p, _, _ = lanes_near_the_arch(rod, lanes)
-    shared = rod.recovery.extremum_data
+    shared = rod.mechanics.recovery.extremum_data
     largest, place = np.empty(lanes), np.empty(lanes)
     benchmark.pedantic(largest_lanes, (*shared, z, p, largest, place), rounds=60, warmup_rounds=2)
     record(benchmark, rod, lanes)
@@ -92,7 +97,7 @@ def bench_dense_bordered_solve(benchmark):
     """The fall-back of lanes with an unsafe pivot."""
     rod, lanes = Rod(), 100
     z, p, _, row = lanes_near_the_arch(rod, lanes)
-    full = rod.layout.dense(*rod.kkt(z, p))
+    full = rod.mechanics.layout.dense(*rod.mechanics.kkt(z, p))
     rhs = np.ones((lanes, 2, rod.size + 1))
     arguments = (full, row[:, None], row[:, None], np.zeros((lanes, 1, 1)), rhs)
     benchmark.pedantic(solve_bordered, arguments, rounds=5, warmup_rounds=1)

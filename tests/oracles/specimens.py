@@ -7,6 +7,7 @@ import numpy as np
 
 from equimorph.model import Parameter
 from equimorph.structures import Bar, EnergyStructure, Rod, Spring, Structure, Truss, Unknown
+from oracles import rods
 
 
 @dataclass(frozen=True)
@@ -31,15 +32,21 @@ class Specimen:
 
 def _rod(load):
     rod = Rod(load, elements=4, degree=5)
+    assembled, loads = rod.mechanics.layout.assembled, rod.mechanics.loads
 
     def lagrangian(z, p):
         theta = np.concatenate([p[:, 1:2] + p[:, :1], z[:, :-2], p[:, 1:2] - p[:, :1]], axis=1)
-        energy = 0.5 * np.einsum("li,ij,lj->l", theta, rod.layout.assembled, theta)
-        energy = energy - p[:, 2] * (np.sin(theta) @ rod.loads)
+        energy = 0.5 * np.einsum("li,ij,lj->l", theta, assembled, theta)
+        energy = energy - p[:, 2] * (np.sin(theta) @ loads)
         along = np.cos(theta) @ rod.mesh.weights - p[:, 3]
         return energy + z[:, -2] * along + z[:, -1] * (np.sin(theta) @ rod.mesh.weights)
 
     return Specimen(f"rod, {load}", rod, (1.0, 0.2, 1.5, 0.8), 0.19, 1.0, lagrangian)
+
+
+def _general(name, make):
+    rod, centre, lagrangian = make()
+    return Specimen(name, rod, centre, 0.15, 1.0, lagrangian)
 
 
 def _spring_energy(z, p):
@@ -173,6 +180,10 @@ def _truss(name, truss):
 SPECIMENS = (
     _rod("uniform"),
     _rod("left-half"),
+    _general("sprung rod", rods.sprung_rod),
+    _general("stretchable cantilever", rods.stretchable_cantilever),
+    _general("sliding rod", rods.sliding_rod),
+    _general("stretchable arch", rods.stretchable_arch),
     Specimen("spring", Spring(1.3), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     Specimen("spring by its energy", written_spring(), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     _truss("truss", arch_truss("engineering")),

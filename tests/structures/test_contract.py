@@ -65,11 +65,12 @@ def test_effort_is_the_derivative_by_the_parameters(specimen, seed):
 @given(seed=any_seed)
 @DRAWN
 def test_energy_is_the_lagrangian_without_its_constraints(specimen, seed):
-    """1e-13: round-off."""
+    """1e-13 of terms of order one: round-off."""
     structure = specimen.structure
     z, p, _, _ = specimen.states(seed=seed)
     z[:, structure.unknowns :] = 0.0
-    np.testing.assert_allclose(structure.energy(z, p), specimen.lagrangian(z, p), rtol=1e-13)
+    exact = specimen.lagrangian(z, p)
+    np.testing.assert_allclose(structure.energy(z, p), exact, rtol=1e-13, atol=1e-13)
 
 
 @every_structure
@@ -192,8 +193,8 @@ def test_symmetries_map_residuals_to_residuals(specimen):
         np.testing.assert_allclose(image_p, p * symmetry.signs, rtol=1e-15)
         here = np.abs(structure.residual(z, p))
         there = np.abs(structure.residual(image_z, image_p))
-        if isinstance(structure, Rod):
-            here[:, :-2] = here[:, :-2][:, ::-1]
+        if isinstance(structure, Rod):  # most of them turn the rod round
+            here, there = np.sort(here, axis=1), np.sort(there, axis=1)
         np.testing.assert_allclose(there, here, atol=1e-12)
         back_z, back_p = symmetry.apply(image_z, image_p)
         np.testing.assert_allclose(back_z, z, atol=1e-14)

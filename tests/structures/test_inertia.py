@@ -28,9 +28,9 @@ def with_vanishing_pivot(rod, z, p, generator):
     element = generator.integers(0, rod.mesh.elements, len(z))
     node = rod.mesh.element_nodes[element, 1]
     theta, m = rod.nodal_angles(z, p)[lanes, node], rod.mesh.weights[node]
-    transverse = z[:, -1] * m - p[:, 2] * rod.loads[node]
+    transverse = z[:, -1] * m - p[:, 2] * rod.mechanics.loads[node]
     pivot = generator.choice([0.0, 1e-15, -1e-12, 1e-9, -1e-7], len(z))
-    rest = rod.layout.stiffness[element, 1, 1] - transverse * np.sin(theta) - pivot
+    rest = rod.mechanics.layout.stiffness[element, 1, 1] - transverse * np.sin(theta) - pivot
     out = z.copy()
     out[:, -2] = rest / (m * np.cos(theta))
     return out
@@ -50,7 +50,7 @@ def guarded(rod, z, p):
 
 def assert_inertia(rod, z, p):
     """Index = negative eigenvalues − 2, wherever the signs of all of them are sure."""
-    eigenvalues = np.linalg.eigvalsh(rod.layout.dense(*rod.kkt(z, p)))
+    eigenvalues = np.linalg.eigvalsh(rod.mechanics.layout.dense(*rod.mechanics.kkt(z, p)))
     size = np.abs(eigenvalues)
     sure = size.min(axis=1) > SURE * size.max(axis=1)
     assert sure.mean() > 0.99

@@ -212,7 +212,7 @@ def test_margin_is_the_smallest_constrained_eigenvalue(q):
     """Oracle: scipy's eigh on a basis of the constraints' null space, mass matrix. 1e-8."""
     rod = Rod(elements=6, degree=5)
     z, p = loaded(rod, q=q)
-    full = rod.layout.dense(*rod.kkt(z, p))[0]
+    full = rod.mechanics.layout.dense(*rod.mechanics.kkt(z, p))[0]
     null = scipy.linalg.null_space(full[-2:, :-2])
     hessian, mass = null.T @ full[:-2, :-2] @ null, null.T @ np.diag(rod.mass) @ null
     values = scipy.linalg.eigh(hessian, mass, eigvals_only=True)

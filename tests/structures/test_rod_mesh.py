@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from equimorph.structures.rod.mechanics.loads import load_shape
 
 from equimorph.errors import InputError
 from equimorph.structures import Rod
 from equimorph.structures.rod.discretisation import mesh_with_kinks, reference_element
-from equimorph.structures.rod.loads import load_shape
 
 DEGREES = [3, 4, 6, 8, 12, 16]
 
@@ -85,7 +85,9 @@ def test_element_ends_meet_every_kink(kinks):
 def test_cumulated_load_is_exact(load, rho):
     """Closed forms of ∫₀ˢ Q. 1e-14: round-off of sums."""
     rod = Rod(load)
-    np.testing.assert_allclose(rod.rho, rho(rod.mesh.nodes[rod.mesh.element_nodes]), atol=2e-14)
+    np.testing.assert_allclose(
+        rod.mechanics.rho, rho(rod.mesh.nodes[rod.mesh.element_nodes]), atol=2e-14
+    )
 
 
 def test_a_callable_with_declared_kinks_is_integrated_exactly():
@@ -93,7 +95,7 @@ def test_a_callable_with_declared_kinks_is_integrated_exactly():
     rod = Rod(lambda s: np.abs(s - 0.3), kinks=[0.3])
     s = rod.mesh.nodes[rod.mesh.element_nodes]
     exact = np.where(s < 0.3, 0.3 * s - s**2 / 2, 0.045 + (s - 0.3) ** 2 / 2)
-    np.testing.assert_allclose(rod.rho, exact, atol=2e-14)
+    np.testing.assert_allclose(rod.mechanics.rho, exact, atol=2e-14)
 
 
 def test_built_in_shapes_integrate_to_one():

@@ -14,7 +14,7 @@ def test_euler_loads_are_eigenvalues_of_the_discretised_operator():
     Tolerance: elements of degree 8 represent the first modes to round-off.
     """
     rod = em.Rod()
-    K = rod.layout.assembled[1:-1, 1:-1]
+    K = rod.mechanics.layout.assembled[1:-1, 1:-1]
     free = null_space(rod.mass[None])
     loads = eigh(free.T @ K @ free, free.T @ (rod.mass[:, None] * free), eigvals_only=True)[:4]
     x = brentq(lambda x: np.sin(x) - x * np.cos(x), 4.0, 4.7, xtol=1e-15)

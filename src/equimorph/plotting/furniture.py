@@ -78,7 +78,7 @@ def moving_parts(ax: Axes, states: States) -> MovingParts:
     lines = np.empty((0, len(states), 2, 2))
     tails = heads = np.empty((len(states), 0, 2))
     if isinstance(structure, Rod):
-        lines = _pointer_lines(states)
+        lines = _pointer_lines(structure, states)
         tails, heads = _rod_arrows(structure, states)
     elif isinstance(structure, Spring):
         look |= {"linestyle": "none", "marker": "o", "markersize": 5, "markerfacecolor": "white"}
@@ -99,10 +99,11 @@ def moving_parts(ax: Axes, states: States) -> MovingParts:
     return MovingParts(pointers, lines, arrows, tails, heads)
 
 
-def _pointer_lines(states: States) -> Float[np.ndarray, "ends states 2 2"]:
-    """Lines along the end tangents of a rod, through the hubs."""
-    hubs = states.shape()[:, [0, -1]].swapaxes(0, 1)
-    angles = np.stack([states["Delta"] + states["Theta"], states["Delta"] - states["Theta"]])
+def _pointer_lines(rod: Rod, states: States) -> Float[np.ndarray, "ends states 2 2"]:
+    """Lines along the held end tangents of a rod, through the hubs."""
+    held = np.flatnonzero(rod.mechanics.held)
+    hubs = states.shape()[:, [0, -1]].swapaxes(0, 1)[held]
+    angles = rod.nodal_angles(states.z, states.p)[:, [0, -1]].T[held]
     along = 1.7 * _HUB * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return np.stack([hubs - along, hubs + along], axis=2)
 
@@ -110,10 +111,8 @@ def _pointer_lines(states: States) -> Float[np.ndarray, "ends states 2 2"]:
 def _rod_arrows(
     rod: Rod, states: States
 ) -> tuple[Float[np.ndarray, "states arrows 2"], Float[np.ndarray, "states arrows 2"]]:
-    """Line load qQ(s), downward if positive, at stations along the rod."""
-    tips = states.shape(_STATIONS)
-    down = states["q"][:, None] * rod.load.density(_STATIONS)
-    return tips, np.stack([np.zeros_like(down), -down], axis=-1)
+    """Line load at stations along the rod."""
+    return states.shape(_STATIONS), rod.line_load(states.p, _STATIONS)
 
 
 def _tip_arrow(

@@ -6,7 +6,7 @@ from typing import Any
 from equimorph.errors import InputError
 from equimorph.structures.contract import Advance, Structure, Symmetry, bordered_advance
 from equimorph.structures.energy import EnergyStructure, Unknown
-from equimorph.structures.rod import Rod
+from equimorph.structures.rod import Couple, Curvature, End, LineLoad, PointForce, Rod, Tendon
 from equimorph.structures.spring import Spring
 from equimorph.structures.states import State, States
 from equimorph.structures.truss import Bar, Truss
@@ -22,13 +22,19 @@ __all__ = [
     "KINDS",
     "Advance",
     "Bar",
+    "Couple",
+    "Curvature",
+    "End",
     "EnergyStructure",
+    "LineLoad",
+    "PointForce",
     "Rod",
     "Spring",
     "State",
     "States",
     "Structure",
     "Symmetry",
+    "Tendon",
     "Truss",
     "Unknown",
     "bordered_advance",

@@ -69,6 +69,8 @@ class Structure(ABC):
     """Diagonal of the mass matrix: the metric of margins, distances and lengths."""
     length_unit: str = "1"
     """Unit of the coordinates to draw."""
+    energy_scale: float = 1.0
+    """What one unit of `energy` is in the units of the parameters: E in joules, say."""
 
     @property
     def size(self) -> int:

@@ -66,7 +66,7 @@ class States:
     @cached_property
     def energy(self) -> Float[np.ndarray, " lanes"]:
         """Potential energy E."""
-        return self.structure.energy(self.z, self.p)
+        return self.structure.energy(self.z, self.p) * self.structure.energy_scale
 
     @property
     def multipliers(self) -> Float[np.ndarray, "lanes constraints"]:

@@ -24,10 +24,11 @@ REFINED = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class CondensedLayout:
-    """Saddle-point matrices ``[H B; Bᵀ 0]`` of chained elements, many lanes at a time.
+    """Saddle-point matrices ``[H B; Bᵀ T]`` of chained elements, many lanes at a time.
 
     H is the assembly of one element matrix per element, the same for every lane, plus a diagonal
-    for each lane. B holds m columns (constraint gradients).
+    for each lane. B holds m columns (constraint gradients). The trailing block T (m × m) is zero
+    where it is left out; minus the compliances of elastic supports otherwise.
 
     Parameters
     ----------
@@ -66,6 +67,7 @@ class CondensedLayout:
         self,
         diagonal: Float[np.ndarray, "lanes nodes"],
         border: Float[np.ndarray, "lanes m nodes"],
+        trailing: Float[np.ndarray, "lanes m m"] | None = None,
     ) -> Float[np.ndarray, "lanes size size"]:
         """Return the saddle-point matrices in full."""
         lanes, m = border.shape[:2]
@@ -77,9 +79,11 @@ class CondensedLayout:
         full[:, at, at] += diagonal[:, inner]
         full[:, n:, :n] = border[:, :, inner]
         full[:, :n, n:] = border[:, :, inner].transpose(0, 2, 1)
+        if trailing is not None:
+            full[:, n:, n:] = trailing
         return full
 
-    def solve(
+    def solve(  # noqa: PLR0913  # the bordered system has this many parts
         self,
         diagonal: Float[np.ndarray, "lanes nodes"],
         border: Float[np.ndarray, "lanes m nodes"],
@@ -87,15 +91,21 @@ class CondensedLayout:
         rows: Float[np.ndarray, "lanes k size"],
         corner: Float[np.ndarray, "lanes k k"],
         rhs: Float[np.ndarray, "lanes sides bordered"],
+        *,
+        trailing: Float[np.ndarray, "lanes m m"] | None = None,
     ) -> BorderedSolution:
-        """Solve ``[A Cᵀ; R D] x = rhs`` with ``A = [H B; Bᵀ 0]``, and count A's inertia.
+        """Solve ``[A Cᵀ; R D] x = rhs`` with ``A = [H B; Bᵀ T]``, and count A's inertia.
 
-        ``In(A) = In(H) + In(−BᵀH⁻¹B)`` with the pivots' signs as In(H). A small pivot loses digits
-        of the solution: a step of iterative refinement brings them back. Lanes with a pivot ratio
-        below `REFINABLE` (or not a number) are solved again by the pivoted dense factorisation.
+        ``In(A) = In(H) + In(T − BᵀH⁻¹B)`` with the pivots' signs as In(H). A small pivot loses
+        digits of the solution: a step of iterative refinement brings them back. Lanes with a pivot
+        ratio below `REFINABLE` (or not a number) are solved again by the pivoted dense
+        factorisation.
         """
-        self._check(diagonal, border, columns, rows, corner, rhs)
-        arrays = [np.ascontiguousarray(a) for a in (diagonal, border, columns, rows, corner, rhs)]
+        if trailing is None:
+            trailing = np.zeros((len(diagonal), border.shape[1], border.shape[1]))
+        given = (diagonal, border, columns, rows, corner, rhs, trailing)
+        self._check(*given)
+        arrays = [np.ascontiguousarray(a) for a in given]
         x, negative, ratio = self._solve(*arrays)
         pivoted = np.zeros(len(x), bool)
         doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
@@ -105,8 +115,8 @@ class CondensedLayout:
             pivoted[doubtful] = True
             pivoted[refined[good]] = False
         if pivoted.any():
-            matrix = self.dense(diagonal[pivoted], border[pivoted])
-            again = solve_bordered(matrix, *(a[pivoted] for a in arrays[2:]))
+            matrix = self.dense(diagonal[pivoted], border[pivoted], trailing[pivoted])
+            again = solve_bordered(matrix, *(a[pivoted] for a in arrays[2:6]))
             x[pivoted], negative[pivoted] = again.x, again.negative
         return BorderedSolution(x, negative, ratio, pivoted)
 
@@ -122,6 +132,7 @@ class CondensedLayout:
             "rows": (lanes, k, size),
             "corner": (lanes, k, k),
             "rhs": (lanes, sides, size + k),
+            "trailing": (lanes, m, m),
         }
         for (name, shape), array in zip(shapes.items(), arrays, strict=True):
             if array.shape != shape:
@@ -136,7 +147,7 @@ class CondensedLayout:
     ]:
         """Solutions, negative eigenvalues and pivot ratios by the condensed elimination."""
         lanes = len(arrays[0])
-        x, ratio = np.empty(arrays[-1].shape), np.empty(lanes)
+        x, ratio = np.empty(arrays[5].shape), np.empty(lanes)
         negative = np.empty(lanes, dtype=np.int64)
         over_lanes(solve_condensed, (self.stiffness, self.ends), arrays, [x, negative, ratio])
         return x, negative, ratio
@@ -145,13 +156,13 @@ class CondensedLayout:
         self, arrays: list[np.ndarray], x: Float[np.ndarray, "lanes sides bordered"]
     ) -> tuple[Float[np.ndarray, "lanes sides bordered"], Bool[np.ndarray, " lanes"]]:
         """Solutions after a step of iterative refinement, and which of them can be trusted."""
-        diagonal, border, columns, rows, corner, rhs = arrays
+        diagonal, border, columns, rows, corner, rhs, trailing = arrays
         n = columns.shape[2]
         full = np.zeros((len(x), rhs.shape[2], rhs.shape[2]))
-        full[:, :n, :n] = self.dense(diagonal, border)
+        full[:, :n, :n] = self.dense(diagonal, border, trailing)
         full[:, :n, n:], full[:, n:, :n] = columns.transpose(0, 2, 1), rows
         full[:, n:, n:] = corner
         defect = np.ascontiguousarray(rhs - np.einsum("lij,lsj->lsi", full, x))
-        change = self._solve(*arrays[:-1], defect)[0]
+        change = self._solve(*arrays[:5], defect, trailing)[0]
         size, largest = (np.abs(a).max(axis=(1, 2), initial=0.0) for a in (change, x))
         return x + change, np.asarray(size <= REFINED * largest)

@@ -8,7 +8,8 @@ from jaxtyping import Float
 
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
-from equimorph.structures.rod.mechanics import RodMechanics
+from equimorph.structures.rod.interface import Mechanics
+from equimorph.structures.rod.measured import Measured
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -49,77 +50,82 @@ def _symbol(letter: str, s: float) -> str:
     return f"{letter}({_SYMBOLS.get(s, f'{s:g}')})"
 
 
-def _field(rod: RodMechanics, s: float, which: int) -> Callable[[Lanes, Parameters], Values]:
+def _field(rod: Measured, s: float, which: int) -> Callable[[Lanes, Parameters], Values]:
     """θ, κ, x or y (0 … 3) at one arclength."""
-    at = np.array([s])
+    at, unit = np.array([s]), rod.units.value(("angle", "curvature", "length", "length")[which])
 
     def value(z: Lanes, p: Parameters) -> Values:
-        return rod.fields(z, p, at)[:, 0, which]
+        return unit * rod.mechanics.fields(z, p, at)[:, 0, which]
 
     return value
 
 
-def coordinate(rod: RodMechanics, s: float, axis: int) -> Descriptor:
+def coordinate(rod: Measured, s: float, axis: int) -> Descriptor:
     """x(s) (axis 0) or y(s) (axis 1)."""
     at = _arclength(s)
     name, symbol = _written("height" if axis else "x", at), _symbol("y" if axis else "x", at)
-    return Descriptor(name, "L", _field(rod, at, 2 + axis), symbol, rod.signature)
+    unit = rod.units.label("length")
+    return Descriptor(name, unit, _field(rod, at, 2 + axis), symbol, rod.signature)
 
 
-def angle(rod: RodMechanics, s: float) -> Descriptor:
+def angle(rod: Measured, s: float) -> Descriptor:
     """θ(s)."""
     at = _arclength(s)
     name, value = _written("angle", at), _field(rod, at, 0)
     return Descriptor(name, "rad", value, _symbol("θ", at), rod.signature)
 
 
-def curvature(rod: RodMechanics, s: float) -> Descriptor:
+def curvature(rod: Measured, s: float) -> Descriptor:
     """κ(s)."""
     at = _arclength(s)
     name, value = _written("curvature", at), _field(rod, at, 1)
-    return Descriptor(name, "1/L", value, _symbol("κ", at), rod.signature)
+    unit = rod.units.label("curvature")
+    return Descriptor(name, unit, value, _symbol("κ", at), rod.signature)
 
 
-def max_curvature(rod: RodMechanics) -> Descriptor:
+def max_curvature(rod: Measured) -> Descriptor:
     """max_s |κ(s)|."""
+    unit = rod.units.value("curvature")
 
     def value(z: Lanes, p: Parameters) -> Values:
-        return rod.largest_curvature(z, p)[0]
+        return unit * rod.mechanics.largest_curvature(z, p)[0]
 
     def place(z: Lanes, p: Parameters) -> Values:
-        return rod.largest_curvature(z, p)[1]
+        return rod.mechanics.largest_curvature(z, p)[1]
 
-    return Descriptor("max_curvature", "1/L", value, "max |κ|", rod.signature, place)
+    label = rod.units.label("curvature")
+    return Descriptor("max_curvature", label, value, "max |κ|", rod.signature, place)
 
 
-def support_force(rod: RodMechanics, component: str) -> Descriptor:
-    """λ or μ, in units of 4π²B/L²."""
+def support_force(rod: Measured, component: str) -> Descriptor:
+    """λ or μ."""
     if component not in {"lambda", "mu"}:
         raise InputError(f"`component` must be 'lambda' or 'mu'; got {component!r}.")
-    place = rod.unknowns + (component == "mu")
+    axis, unit = int(component == "mu"), rod.units.value("force")
 
     def value(z: Lanes, p: Parameters) -> Values:
-        return z[:, place].copy()
+        return unit * rod.mechanics.support_forces(z, p)[:, axis]
 
     symbol = "λ" if component == "lambda" else "μ"
     name = f"support_force({component})"
-    return Descriptor(name, "4π²B/L²", value, symbol, rod.signature)
+    return Descriptor(name, rod.units.label("force"), value, symbol, rod.signature)
 
 
-def end_moment(rod: RodMechanics, end: int) -> Descriptor:
-    """∂L/∂θ(0) or ∂L/∂θ(1)."""
+def end_moment(rod: Measured, end: int) -> Descriptor:
+    """Couple of the support at an end on the rod."""
     if end not in {0, 1}:
         raise InputError(f"`end` must be 0 or 1; got {end!r}.")
 
+    unit = rod.units.value("couple")
+
     def value(z: Lanes, p: Parameters) -> Values:
-        effort = rod.effort(z, p)
-        # efforts of Θ and Δ are the difference and the sum of those of θ(0) and θ(1)
-        return 0.5 * (effort[:, 1] + (1.0 if end == 0 else -1.0) * effort[:, 0])
+        return unit * rod.mechanics.end_moments(z, p)[:, end]
 
-    return Descriptor(f"end_moment({end})", "4π²B/L", value, f"M({end})", rod.signature)
+    label = rod.units.label("couple")
+    return Descriptor(f"end_moment({end})", label, value, f"M({end})", rod.signature)
 
 
-def named(rod: RodMechanics, text: str) -> Descriptor:
+def named(rod: Measured, text: str) -> Descriptor:
     """Descriptor written as text."""
     match = re.fullmatch(r"\s*(\w+)\s*(?:\(\s*([^()]*?)\s*\))?\s*", text)
     name, argument = (match.group(1), match.group(2)) if match else ("", None)
@@ -140,9 +146,14 @@ def named(rod: RodMechanics, text: str) -> Descriptor:
     )
 
 
-def total_energy(rod: RodMechanics) -> Descriptor:
+def total_energy(rod: Measured) -> Descriptor:
     """Potential energy E."""
-    return Descriptor("energy", "4π²B/L", rod.energy, "E", rod.signature)
+    unit = rod.units.value("couple")
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return unit * rod.mechanics.energy(z, p)
+
+    return Descriptor("energy", rod.units.energy_label, value, "E", rod.signature)
 
 
 def _fraction(text: str) -> float:
@@ -154,11 +165,11 @@ def _fraction(text: str) -> float:
 
 
 def discretisation_error(
-    rod: RodMechanics, finer: RodMechanics, z: Lanes, p: Parameters
+    rod: Mechanics, finer: Mechanics, z: Lanes, p: Parameters
 ) -> Float[np.ndarray, " lanes"]:
     """Twice the largest change of max |κ|, of κ(s) and of y(s) after Newton on a finer rod."""
-    matrix = rod.mesh.interpolation(finer.mesh.nodes[1:-1])
-    fine = np.concatenate([rod.nodal_angles(z, p) @ matrix.T, z[:, -2:]], axis=1)
+    matrix = rod.mesh.interpolation(finer.mesh.nodes[finer.unknown_nodes])
+    fine = np.concatenate([rod.nodal_angles(z, p) @ matrix.T, z[:, rod.unknowns :]], axis=1)
     still = np.zeros((len(z), finer.size))
     one, none = np.ones(len(z)), np.zeros(len(z))
     for _ in range(REFINING):

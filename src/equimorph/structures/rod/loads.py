@@ -45,8 +45,12 @@ class LoadShape:
         return rho
 
 
-def load_shape(spec: LoadSpec, kinks: Sequence[float] = ()) -> LoadShape:
+def load_shape(
+    spec: LoadSpec, kinks: Sequence[float] = (), name: str = "load", symbol: str = "Q"
+) -> LoadShape:
     """Make a load shape of a name, a table [[s, Q], ...] or a callable Q(s) with its `kinks`.
+
+    `name` and `symbol` are what the messages call it.
 
     Raises
     ------
@@ -56,32 +60,36 @@ def load_shape(spec: LoadSpec, kinks: Sequence[float] = ()) -> LoadShape:
     if isinstance(spec, str):
         if spec not in NAMED:
             raise InputError(
-                f"`load` must be one of {', '.join(map(repr, NAMED))}, a table [[s, Q], ...] "
-                f"or a callable Q(s); got {spec!r}."
+                f"`{name}` must be one of {', '.join(map(repr, NAMED))}, a table "
+                f"[[s, {symbol}], ...] or a callable {symbol}(s); got {spec!r}."
             )
-        return _from_table(spec, np.array(NAMED[spec]))
+        return _from_table(spec, np.array(NAMED[spec]), name, symbol)
     if callable(spec):
-        return _from_callable(spec, kinks)
+        return _from_callable(spec, kinks, name, symbol)
     try:
         table = np.array(spec, dtype=float)
     except (TypeError, ValueError):
         raise InputError(
-            f"`load` must be a table of numbers [[s, Q], ...]; got {spec!r}."
+            f"`{name}` must be a table of numbers [[s, {symbol}], ...]; got {spec!r}."
         ) from None
-    return _from_table(table.tolist(), table)
+    return _from_table(table.tolist(), table, name, symbol)
 
 
-def _from_table(identity: Any, table: Float[np.ndarray, "..."]) -> LoadShape:
+def _from_table(
+    identity: Any, table: Float[np.ndarray, "..."], name: str, symbol: str
+) -> LoadShape:
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2:
-        raise InputError(f"`load` must be a table of rows [s, Q]; got shape {table.shape}.")
+        raise InputError(
+            f"`{name}` must be a table of rows [s, {symbol}]; got shape {table.shape}."
+        )
     if not np.isfinite(table).all():
-        raise InputError("`load` must be finite; got a table with NaN or infinite entries.")
+        raise InputError(f"`{name}` must be finite; got a table with NaN or infinite entries.")
     s, q = table[:, 0], table[:, 1]
     falls = np.flatnonzero(np.diff(s) < 0)
     if s[0] != 0.0 or s[-1] != 1.0 or len(falls):
         wrong = s[falls[0] : falls[0] + 2] if len(falls) else s[[0, -1]]
         raise InputError(
-            "`load` must be a table with s rising from 0 to 1; got s "
+            f"`{name}` must be a table with s rising from 0 to 1; got s "
             f"{'falling' if len(falls) else 'rising'} from {wrong[0]:g} to {wrong[1]:g}."
         )
     inside = np.unique(s[(s > 0) & (s < 1)])
@@ -95,7 +103,7 @@ def _from_table(identity: Any, table: Float[np.ndarray, "..."]) -> LoadShape:
     return LoadShape(identity, density, inside)
 
 
-def _from_callable(function: Shape, kinks: Sequence[float]) -> LoadShape:
+def _from_callable(function: Shape, kinks: Sequence[float], name: str, symbol: str) -> LoadShape:
     at = np.unique(np.asarray(kinks, dtype=float))
     if not ((at > 0) & (at < 1)).all():
         raise InputError(f"`kinks` must lie between 0 and 1; got {list(kinks)!r}.")
@@ -104,7 +112,7 @@ def _from_callable(function: Shape, kinks: Sequence[float]) -> LoadShape:
         values = np.broadcast_to(np.asarray(function(points), dtype=float), points.shape)
         if not np.isfinite(values).all():
             bad = points[~np.isfinite(values)][0]
-            raise InputError(f"`load` must be finite; got Q({bad:g}) = {values.min()}.")
+            raise InputError(f"`{name}` must be finite; got {symbol}({bad:g}) = {values.min()}.")
         return values
 
     return LoadShape(None, density, at)

@@ -1,16 +1,16 @@
 """Mechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
 
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.contract import Advance, Direction, Structure, Symmetry
+from equimorph.structures.contract import Advance, Direction, Symmetry
 from equimorph.structures.rod.derivatives.kernels import (
     matrix_lanes,
     parameter_lanes,
@@ -18,6 +18,7 @@ from equimorph.structures.rod.derivatives.kernels import (
     second_lanes,
 )
 from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.rod.kernels import advance_lanes
 from equimorph.structures.rod.loads import LoadShape
 from equimorph.structures.rod.recovery import Recovery
@@ -26,17 +27,18 @@ Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Nodal = Float[np.ndarray, "lanes nodes"]
 
+PARAMETERS = 4
 
-class RodMechanics(Structure):
-    """Everything about the rod that needs no continuation and no names: see `Rod`.
+
+class ClampedMechanics(Mechanics):
+    """Mechanics of the uniform rod between two clamps under one vertical line load.
 
     L = Σ ½ θᵀKθ + Σᵢ (μ mᵢ − q Rᵢ) sin θᵢ + λ mᵢ cos θᵢ − λν with quadrature weights m, load
     weights R = m ρ and K the stiffness over 4π². Parameters (Θ, Δ, q, ν), multipliers (λ, μ).
     """
 
-    kind: ClassVar[str] = "rod"
-    length_unit = "L"
     constraints = 2
+    held = (True, True)
 
     def __init__(self, mesh: Mesh, load: LoadShape) -> None:
         self.mesh, self.load = mesh, load
@@ -63,7 +65,7 @@ class RodMechanics(Structure):
         Kernels do not check what they read.
         """
         lanes = len(pairs[0][0])
-        shapes = (lanes, self.size), (lanes, len(self.parameters))
+        shapes = (lanes, self.size), (lanes, PARAMETERS)
         for pair in pairs:
             if (pair[0].shape, pair[1].shape) != shapes:
                 wrong = int(pair[0].shape == shapes[0])
@@ -72,6 +74,11 @@ class RodMechanics(Structure):
                     "States belong to the rod, and the resolution, that made them."
                 )
         return [np.ascontiguousarray(array) for pair in pairs for array in pair]
+
+    @property
+    def unknown_nodes(self) -> slice:
+        """All but the ends."""
+        return slice(1, -1)
 
     # --- fields -----------------------------------------------------------------------------
 
@@ -189,7 +196,7 @@ class RodMechanics(Structure):
         out = Advance(*outputs[:-1])
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             unsafe = ~(ratio >= PIVOT_GUARD)
-            again = super().advance(*(x[unsafe] for x in inputs))
+            again = self.plain_advance(*(x[unsafe] for x in inputs))
             for name, column in vars(again).items():
                 getattr(out, name)[unsafe] = column
         return out
@@ -208,18 +215,13 @@ class RodMechanics(Structure):
         forces = generator.normal(size=(lanes, 2)) * 8.0
         return np.concatenate([base + amplitude @ waves, forces], axis=1)
 
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
-        """Whether the highest Legendre coefficient of θ is small in every element."""
-        theta = self.nodal_angles(z, p)[:, self.mesh.element_nodes]
-        tail = np.abs(theta @ self.mesh.reference.to_legendre[-2:].T)
-        return np.asarray(tail.max(axis=(1, 2)) < 1e-3)
+    def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
+        """λ and μ."""
+        return z[:, -2:].copy()
 
-    def shape(
-        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
-    ) -> Float[np.ndarray, "lanes points 2"]:
-        """Positions (x, y) at arclengths `s` (default: 101 equidistant ones), in units of L."""
-        at = np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
-        return self.fields(z, p, at)[:, :, 2:]
+    def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
+        """∂L/∂θ(0) and ∂L/∂θ(1)."""
+        return self._residual(z, p)[1][:, :2].copy()
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror x → ν − x for symmetric loads: θ(s) → −θ(1 − s), Δ → −Δ."""

@@ -1,25 +1,39 @@
-"""The clamped planar elastic rod with two rotary actuators at its ends."""
+"""Planar elastic rods."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.errors import InputError
-from equimorph.model import Descriptor, Parameter, parameter_vector
+from equimorph.model import Descriptor, Parameter, names_of, parameter_vector
 from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.discretisation import mesh_with_kinks
-from equimorph.structures.rod.loads import LoadSpec, load_shape
-from equimorph.structures.rod.mechanics import RodMechanics
+from equimorph.structures.rod.general.assembly import Description
+from equimorph.structures.rod.general.mechanics import GeneralMechanics
+from equimorph.structures.rod.general.natural import natural_rod
+from equimorph.structures.rod.general.terms import LineLoad
+from equimorph.structures.rod.interface import Mechanics
+from equimorph.structures.rod.loads import LoadShape, LoadSpec, load_shape
+from equimorph.structures.rod.measured import Measured
+from equimorph.structures.rod.mechanics import ClampedMechanics
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch
+from equimorph.structures.rod.units import Units
 from equimorph.structures.states import State, States
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 
 DEFAULT_SPAN = float(np.sin(1.0))
+CLAMPED = ("clamped", "clamped")
+
+
+def _all_default(stiffness: Any, curvature: Any, *others: Any) -> bool:
+    """Whether options are those of the clamped, uniform, straight, inextensible rod."""
+    numbers = all(isinstance(value, int | float) for value in (stiffness, curvature))
+    return numbers and (stiffness, curvature) == (1.0, 0.0) and not any(others)
 
 
 def _why_not(natural: Natural) -> str:
@@ -43,62 +57,143 @@ def _why_not(natural: Natural) -> str:
     )
 
 
-class Rod(RodMechanics):
-    """Planar, inextensible, unshearable elastic rod of length 1 with clamped ends.
+class Rod(Measured):
+    """Planar, unshearable elastic rod.
 
-    Energy ``E = ∫ θ'²/(8π²) ds − q ∫ ρ sin θ ds`` with ``ρ = ∫₀ˢ Q``; constraints ``∫ cos θ = ν``
-    and ``∫ sin θ = 0``; end angles θ(0) = Δ + Θ, θ(1) = Δ − Θ. Gauss–Lobatto elements with
-    quadrature at the nodes, so that energy, residual and Hessian agree exactly; element ends meet
-    the kinks of the load. Fields are recovered from the elements' ends, where they converge with
-    twice the degree. Scales: lengths by L, forces by 4π²B/L², energies by 4π²B/L, curvature
-    by 1/L.
+    Without options below `elements` it is the clamped, uniform, inextensible arch of length 1 under
+    one vertical line load: energy ``E = ∫ θ'²/(8π²) ds − q ∫ ρ sin θ ds`` with ``ρ = ∫₀ˢ Q``;
+    constraints ``∫ cos θ = ν`` and ``∫ sin θ = 0``; end angles θ(0) = Δ + Θ, θ(1) = Δ − Θ. In
+    general ``E = ∫ ½ B (θ' − κ₀)² ds`` plus the potentials of loads and springs, and each end is
+    held, free or sprung in x, y and θ. Gauss–Lobatto elements with quadrature at the nodes, so
+    that energy, residual and Hessian agree exactly; element ends meet all kinks. Fields are
+    recovered from the elements' ends, where they converge with twice the degree.
+
+    Scales: lengths by L, forces by 4π²B/L², energies and couples by 4π²B/L, curvature by 1/L; with
+    `EI` and `length` everything is in the user's units. Arclengths s are shares of the length, from
+    0 at end A to 1 at end B. x points from A to B, y up; angles and couples count counterclockwise.
 
     Parameters
     ----------
     load
-        "uniform", "left-half", a table [[s, Q], ...] or a callable Q(s). q > 0 acts downward.
+        "uniform", "left-half", a table [[s, Q], ...] or a callable Q(s). q > 0 acts downward. The
+        default is uniform, unless there are `loads`.
     span
-        Default of the parameter ν, distance of the ends, between 0 and 1. Near 1 the rod bends
-        within about 1 − ν of its ends: the default elements resolve it up to ν = 0.99 at Θ = 0.9.
+        Default of the parameter ν, distance of the ends in x where both are supported. Near 1 the
+        clamped arch bends within about 1 − ν of its ends: the default elements resolve it up to
+        ν = 0.99 at Θ = 0.9.
     kinks
-        Arclengths at which a callable Q is not smooth.
+        Arclengths at which a callable Q, stiffness or curvature is not smooth.
     elements, degree
         Resolution: the default, six elements of degree 9, keeps limit loads, heights and
         curvature within 1e-8 for max |κ| ≤ 10; `error_estimate` bounds what it loses beyond.
+    ends
+        Ends A and B: "clamped", "pinned", "free", "sliding" (angle and y are held), or an `End`.
+    stiffness
+        B(s) relative to B (to `EI`): a number, a table or a callable; positive.
+    curvature
+        Intrinsic curvature κ₀(s).
+    axial
+        Axial stiffness EA(s), in units of 4π²B/L² (of force). None: inextensible.
+    loads
+        More parameters of the role "load" by name, 0 by default: a `LineLoad`, `PointForce` or
+        `Couple`, or several of a kind that share the amplitude.
+    actuators
+        The same for the role "actuator"; `Curvature` patterns and `Tendon`s, above all.
+    coordinates
+        Named linear coordinates in place of parameters: ``{"turn": {"theta_A": 1, "theta_B": -1}}``
+        means θ_A = turn and θ_B = −turn. By default Theta and Delta where both end angles are held,
+        ``{}`` leaves theta_A and theta_B.
+    rise
+        Default of the parameter rise, of end B above A where both are supported.
+    EI, length
+        Bending stiffness and length in a consistent system of units; labels are those of SI.
 
     Raises
     ------
     InputError
-        For an unknown load, values that are not finite, a span outside (0, 1), or a resolution
-        below 2 elements or outside degrees 3 … 16.
+        For an unknown load, values that are not finite, a span outside (0, 1), a resolution below 2
+        elements or outside degrees 3 … 16, a support that lets the rod drift, stiffness that is not
+        positive, a kink outside the rod, a follower load, or inconsistent names.
 
     References
     ----------
     [Feher2025]_, equations (11)–(22).
+
+    Examples
+    --------
+    A cantilever under a dead tip load of P L²/B = 2, in units of B and L:
+
+    >>> from equimorph import PointForce, Rod, lift
+    >>> rod = Rod(ends=("clamped", "free"), loads={"P": PointForce(1.0)}, EI=1.0, length=1.0)
+    >>> bent = lift(rod.natural_state(), to={"P": 2.0}).end.state
+    >>> round(-rod.height(1.0)(bent), 5)
+    0.49346
     """
 
-    def __init__(
+    kind: ClassVar[str] = "rod"
+
+    def __init__(  # noqa: PLR0913  # a default for everything
         self,
-        load: LoadSpec = "uniform",
-        span: float = DEFAULT_SPAN,
+        load: LoadSpec | None = None,
+        span: float | None = None,
         *,
         kinks: Sequence[float] = (),
         elements: int = 6,
         degree: int = 9,
+        ends: Sequence[Any] = CLAMPED,
+        stiffness: Any = 1.0,
+        curvature: Any = 0.0,
+        axial: Any = None,
+        loads: Mapping[str, Any] | None = None,
+        actuators: Mapping[str, Any] | None = None,
+        coordinates: Mapping[str, Mapping[str, float]] | None = None,
+        rise: float = 0.0,
+        EI: float | None = None,
+        length: float | None = None,
     ) -> None:
         if not (isinstance(elements, int) and elements >= 2):
             raise InputError(f"`elements` must be a whole number >= 2; got {elements!r}.")
         if not (isinstance(degree, int) and 3 <= degree <= 16):
             raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
-        shape = load_shape(load, kinks)
-        super().__init__(mesh_with_kinks(shape.kinks, elements, degree), shape)
+        self.units = Units(EI, length)
         self._resolution = (elements, degree)
+        shape = "uniform" if load is None and loads is None else load
+        self._load = None if shape is None else load_shape(shape, kinks)
+        self._general: Description | None = None
+        options = (axial is not None, loads is not None, actuators, coordinates is not None, rise)
+        arch = self._load is not None and tuple(ends) == CLAMPED and self.units.plain
+        if self._load is not None and arch and _all_default(stiffness, curvature, *options):
+            self._become_arch(self._load, DEFAULT_SPAN if span is None else span)
+        else:
+            own = {} if shape is None else {"q": LineLoad(shape, kinks=kinks)}
+            span = DEFAULT_SPAN * self.units.value("length") if span is None else span
+            self._general = Description(
+                ends, stiffness, curvature, axial, {**own, **(loads or {})}, actuators or {},
+                coordinates, span, rise, kinks, self.units,
+            )  # fmt: skip
+            self._become_general(self._general)
+        self.unknowns, self.constraints = self.mechanics.unknowns, self.mechanics.constraints
+        self.mass, self.length_unit = self.mechanics.mass, self.units.label("length")
+        self.energy_scale = self.units.value("couple")
+
+    def _become_arch(self, load: LoadShape, span: float) -> None:
+        elements, degree = self._resolution
+        self.mechanics: Mechanics = ClampedMechanics(
+            mesh_with_kinks(load.kinks, elements, degree), load
+        )
         self.parameters = (
             Parameter("Theta", "rad", 1.0, "actuator"),
             Parameter("Delta", "rad", 1.0, "actuator", 0.0),
             Parameter("q", "4π²B/L²", 1.0, "load", 0.0),
             Parameter("nu", "L", 1.0, "fixed", self._checked_span(span), 0.0, 1.0),
         )
+
+    def _become_general(self, description: Description) -> None:
+        raw, self._raw_matrix = description.mechanics(*self._resolution)
+        self._raw = raw
+        self.parameters = description.parameters
+        names = names_of(self.parameters)
+        self.mechanics = GeneralMechanics(raw.model.mapped(names, self._raw_matrix))
 
     @staticmethod
     def _checked_span(span: float) -> float:
@@ -114,69 +209,98 @@ class Rod(RodMechanics):
         return value
 
     def identity(self) -> dict[str, Any]:
-        """Kind, load, span and resolution."""
-        if self.load.identity is None:
-            raise InputError(
-                "`load` must be a name or a table to be written to a file; got a callable. "
-                "Sample it into a table [[s, Q], ...]."
-            )
-        return {
-            "kind": self.kind,
-            "load": self.load.identity,
-            "span": self.parameters[3].default,
-            "elements": self._resolution[0],
-            "degree": self._resolution[1],
-        }
-
-    def refined(self) -> "Rod":
-        """Return the same rod with elements of a degree higher by four."""
+        """Kind, resolution, and everything that differs from the default arch."""
         elements, degree = self._resolution
-        named = self.load.identity is not None
-        return Rod(
-            self.load.identity if named else self.load.density,
-            float(self.parameters[3].default or DEFAULT_SPAN),
-            kinks=() if named else tuple(self.load.kinks),
-            elements=elements,
-            degree=min(degree + 4, 16),
-        )
+        data: dict[str, Any] = {"kind": self.kind}
+        if self._general is not None:
+            data |= self._general.identity()
+        elif self._load is not None:
+            if self._load.identity is None:
+                raise InputError(
+                    "`load` must be a name or a table to be written to a file; got a callable. "
+                    "Sample it into a table [[s, Q], ...]."
+                )
+            data |= {"load": self._load.identity, "span": self.parameters[3].default}
+        return {**data, "elements": elements, "degree": degree}
+
+    @cached_property
+    def refined(self) -> Mechanics:
+        """The same rod with elements of a degree higher by four."""
+        elements, degree = self._resolution
+        degree = min(degree + 4, 16)
+        if self._general is not None:
+            raw, matrix = self._general.mechanics(elements, degree)
+            return GeneralMechanics(raw.model.mapped(names_of(self.parameters), matrix))
+        assert self._load is not None
+        return ClampedMechanics(mesh_with_kinks(self._load.kinks, elements, degree), self._load)
+
+    def _natural(self, p: Parameters) -> Natural:
+        """Natural states and how each was met."""
+        if self._general is None:
+            return natural_arch(self.mechanics, p)
+        m = self.constraints
+        y = np.concatenate([p, np.ones((len(p), 1))], axis=1)
+        raw = np.einsum("ij,lj->li", self._raw_matrix[m:-1, m:], y)
+        return natural_rod(self._raw, raw)
 
     def natural(self, p: Parameters) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
-        """Unloaded arch, continued from the straight rod."""
-        natural = natural_arch(self, p)
+        """Unloaded rod, continued from its stress-free shape."""
+        natural = self._natural(p)
         return natural.z, natural.outcome == Outcome.FOUND
 
     def may_be_natural(self, p: Parameters) -> Bool[np.ndarray, " lanes"]:
-        """Θ > 0: the straight rod has no upright side."""
-        return np.asarray(p[:, 0] > 0.0)
+        """Θ > 0 for the arch: the straight rod has no upright side."""
+        return p[:, 0] > 0.0 if self._general is None else np.ones(len(p), bool)
 
     def unloaded(self) -> Mapping[str, float]:
-        """q = 0."""
-        return {"q": 0.0}
+        """All loads zero."""
+        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
 
     def natural_state(self, **values: float) -> State:
-        """Natural state at given end angles: q = 0, continued from the straight rod.
+        """Natural state at given actuators: unloaded, continued from the stress-free rod.
 
         Raises
         ------
         InputError
-            For unknown or meaningless parameters, q ≠ 0, Θ ≤ 0 (the straight rod has no upright
-            side), where the continuation meets a fold, or where the elements do not resolve it.
+            For unknown or meaningless parameters, a load that is not 0, Θ ≤ 0 for the arch (the
+            straight rod has no upright side), where the continuation meets a fold, or where the
+            elements do not resolve it.
         """
-        if values.get("q", 0.0) != 0.0:
-            raise InputError(f"`q` must be 0 in the natural state; got {values['q']!r}.")
+        for name in self.unloaded():
+            if values.get(name, 0.0) != 0.0:
+                raise InputError(f"`{name}` must be 0 in the natural state; got {values[name]!r}.")
         p = parameter_vector(self.parameters, values)
-        natural = natural_arch(self, p[None])
-        if natural.outcome[0] != Outcome.FOUND:
+        natural = self._natural(p[None])
+        if natural.outcome[0] == Outcome.FOUND:
+            return State(self, natural.z[0], p)
+        if self._general is None:
             raise InputError(
                 f"`Theta`, `Delta` must have a natural state; got Theta={p[0]:g}, Delta={p[1]:g} "
                 f"at nu={float(p[3])!r}. {_why_not(natural)}"
             )
-        return State(self, natural.z[0], p)
+        given = ", ".join(
+            f"{each.name}={value:g}" for each, value in zip(self.parameters, p, strict=True)
+        )
+        raise InputError(
+            f"`natural_state` must be reached from the stress-free rod; got {given}, and the "
+            "continuation ends before. A straight rod buckles either way: turn an end, give it "
+            "curvature, or choose ends nearer to the stress-free ones."
+        )
 
     def natural_states(self, p: Parameters) -> tuple[States, Bool[np.ndarray, " lanes"]]:
         """Natural states of many settings, and which of them were found."""
         z, found = self.natural(p)
         return States(self, z, p), found
+
+    def line_load(
+        self, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes points 2"]:
+        """Dead load per arclength at shares s of the length, in the user's units."""
+        if self._general is not None:
+            return self._general.line_load(p, self._raw_matrix[self.constraints :], s)
+        assert self._load is not None
+        down = -p[:, 2:3] * self._load.density(s)
+        return np.stack([np.zeros_like(down), down], axis=2)
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
         """Bound of the errors of curvature and height, by solving again with a higher degree.
@@ -185,7 +309,7 @@ class Rod(RodMechanics):
         part is the smallest by far. Infinite where the finer rod has no equilibrium beside the
         state, as may happen at a fold.
         """
-        return descriptors.discretisation_error(self, self.refined(), z, p)
+        return descriptors.discretisation_error(self.mechanics, self.refined, z, p)
 
     # --- descriptors ------------------------------------------------------------------------
 

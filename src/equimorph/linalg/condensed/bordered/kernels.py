@@ -40,14 +40,15 @@ START, SIDES = np.int64(0), np.int64(2)
 
 @njit(**FLAGS)
 def solve_condensed(
-    stiffness, ends, diagonal, border, columns, rows, corner, rhs, x, negative, ratio
+    stiffness, ends, diagonal, border, columns, rows, corner, rhs, trailing, x, negative, ratio
 ):
-    """Bordered solves ``[H B C; Bᵀ 0 …; R … D] x = rhs`` for lanes-first arrays; see `condensed`.
+    """Bordered solves ``[H B C; Bᵀ T …; R … D] x = rhs`` for lanes-first arrays; see `condensed`.
 
     diagonal (lanes, nodes); border (lanes, m, nodes); columns (lanes, k, n + m) and rows alike;
-    corner (lanes, k, k); rhs (lanes, r, n + m + k); x like rhs. At least eight lanes; the last
-    block overlaps the one before. Products aᵀH⁻¹b need forward-reduced columns only, in the order
-    B, C, right-hand sides, R; just the combined right-hand sides are substituted back.
+    corner (lanes, k, k); rhs (lanes, r, n + m + k); trailing T (lanes, m, m); x like rhs. At least
+    eight lanes; the last block overlaps the one before. Products aᵀH⁻¹b need forward-reduced
+    columns only, in the order B, C, right-hand sides, R; just the combined right-hand sides are
+    substituted back.
     """
     elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
     lanes, nodes = diagonal.shape
@@ -83,7 +84,7 @@ def solve_condensed(
             _products(left, a * nodes, work, nodes, tiles, first, last, products, a)
         for lane in range(LANES):
             at = start + lane
-            _set_small(columns[at], rows[at], corner[at], rhs[at], m, lane, small)
+            _set_small(columns[at], rows[at], corner[at], rhs[at], trailing[at], lane, small)
         _subtract_products(products, tiles, size, width, small)
         _count_border(small, m, width, square, extremes)
         for lane in range(LANES):
@@ -147,18 +148,19 @@ def _products(left, start, work, nodes, tiles, first, last, products, a):
 
 
 @njit(**INNER)
-def _set_small(columns, rows, corner, rhs, m, lane, small):
+def _set_small(columns, rows, corner, rhs, trailing, lane, small):
     """What the border itself puts into the small system of one lane, right-hand sides last."""
-    k, r = columns.shape[0], rhs.shape[0]
+    m, k, r = trailing.shape[0], columns.shape[0], rhs.shape[0]
     n, size, width = rhs.shape[1] - m - k, m + k, m + k + r
     for a in range(size):
         for b in range(size):
-            fixed = 0.0
-            if a < m <= b:
+            if a < m and b < m:
+                fixed = trailing[a, b]
+            elif a < m:
                 fixed = columns[b - m, n + a]
-            elif b < m <= a:
+            elif b < m:
                 fixed = rows[a - m, n + b]
-            elif a >= m:
+            else:
                 fixed = corner[a - m, b - m]
             small[a * width + b, lane] = fixed
         for c in range(r):

@@ -1,0 +1,15 @@
+"""General planar rods: any ends, loads, stiffness and intrinsic curvature."""
+
+from equimorph.structures.rod.general.ends import End
+from equimorph.structures.rod.general.mechanics import GeneralMechanics
+from equimorph.structures.rod.general.terms import Couple, Curvature, LineLoad, PointForce, Tendon
+
+__all__ = [
+    "Couple",
+    "Curvature",
+    "End",
+    "GeneralMechanics",
+    "LineLoad",
+    "PointForce",
+    "Tendon",
+]

@@ -1,0 +1,276 @@
+"""From what a user says of a rod to its model and its parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError, suggestion
+from equimorph.model import Parameter
+from equimorph.model.parameter import Role
+from equimorph.structures.rod.discretisation import mesh_with_kinks
+from equimorph.structures.rod.general.ends import End, check_supports, end
+from equimorph.structures.rod.general.mechanics import GeneralMechanics
+from equimorph.structures.rod.general.model import Build, RodModel, raw_model
+from equimorph.structures.rod.general.terms import LineLoad, Term, term
+from equimorph.structures.rod.loads import LoadShape
+from equimorph.structures.rod.profiles import profile
+from equimorph.structures.rod.units import Units
+
+Terms = Mapping[str, Any]
+Matrix = Float[np.ndarray, "scalars others"]
+TURNING = {
+    "Theta": {"theta_A": 1.0, "theta_B": -1.0},
+    "Delta": {"theta_A": 1.0, "theta_B": 1.0},
+}
+"""Coordinates of the end angles of a rod that is held, or sprung, at both."""
+RESERVED = ("theta_A", "theta_B", "nu", "rise")
+CLOSEST = 1e-6
+"""Shortest piece of a rod between kinks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """A general rod as its user describes it; see `Rod`."""
+
+    ends: Sequence[Any]
+    stiffness: Any
+    curvature: Any
+    axial: Any
+    loads: Terms
+    actuators: Terms
+    coordinates: Mapping[str, Mapping[str, float]] | None
+    span: float
+    rise: float
+    kinks: Sequence[float]
+    units: Units
+
+    @cached_property
+    def supports(self) -> tuple[End, End]:
+        """Both ends, checked."""
+        if isinstance(self.ends, str) or len(self.ends) != 2:
+            raise InputError(f"`ends` must be two ends, A and B; got {self.ends!r}.")
+        first, last = (end(spec, f"ends[{i}]") for i, spec in enumerate(self.ends))
+        check_supports((first, last))
+        return first, last
+
+    @cached_property
+    def terms(self) -> dict[str, tuple[Term, ...]]:
+        """Terms by the name of their amplitude, actuators first."""
+        out: dict[str, tuple[Term, ...]] = {}
+        for group, given in (("actuators", self.actuators), ("loads", self.loads)):
+            if not isinstance(given, Mapping):
+                raise InputError(f"`{group}` must map names to terms; got {given!r}.")
+            for name, spec in given.items():
+                key = f"{group}.{name}"
+                if name in RESERVED or name in out or not name.isidentifier():
+                    raise InputError(
+                        f"`{key}` must have a name of its own, of letters, digits and _; "
+                        f"got {name!r}."
+                    )
+                several = spec if isinstance(spec, list | tuple) else [spec]
+                out[name] = tuple(term(one, key) for one in several)
+                measures = {one.measure for one in out[name]}
+                if len(measures) != 1:
+                    raise InputError(
+                        f"`{key}` must hold terms of one kind, as they share one amplitude; got "
+                        f"{', '.join(sorted(measures)) or 'none'}."
+                    )
+        return out
+
+    def _profile(self, name: str, unit: float = 1.0) -> LoadShape:
+        return _scaled(profile(getattr(self, name), name, self.kinks), unit)
+
+    def build(self, elements: int, degree: int) -> Build:
+        """The rod in non-dimensional form."""
+        rigid = self._profile("stiffness")
+        curved = self._profile("curvature", self.units.value("curvature"))
+        axial = None
+        if self.axial is not None:
+            axial = self._profile("axial", self.units.value("force"))
+        shapes = [rigid, curved, *([] if axial is None else [axial])]
+        breaks = [s for terms in self.terms.values() for one in terms for s in one.breaks]
+        kinks = np.unique([*breaks, *(s for shape in shapes for s in shape.kinks)])
+        if len(kinks) and np.diff(np.concatenate([[0.0], kinks, [1.0]])).min() < CLOSEST:
+            raise InputError(
+                f"`kinks`, of loads and profiles together, must lie {CLOSEST:g} apart at least; "
+                f"got {kinks.tolist()}."
+            )
+        if axial is not None and any(self.quantity(name) == "tension" for name in self.terms):
+            raise InputError(
+                "`axial` must be left out for rods with tendons: their axial pull is not modelled; "
+                f"got axial = {self.axial!r}."
+            )
+        mesh = mesh_with_kinks(kinks, elements, degree)
+        _check_positive(rigid, "stiffness", mesh.nodes)
+        _check_positive(axial, "axial", mesh.nodes)
+        couple, spring = self.units.value("couple"), self.units.value("spring")
+        first, last = (support.scaled(couple, spring) for support in self.supports)
+        return Build(mesh, (first, last), rigid, curved, axial, self.terms)
+
+    def mechanics(self, elements: int, degree: int) -> tuple[GeneralMechanics, Matrix]:
+        """Mechanics in raw parameters, and raw scalars as combinations of the user's."""
+        model = raw_model(self.build(elements, degree))
+        return GeneralMechanics(model), self._matrix(model)
+
+    # --- parameters -----------------------------------------------------------------------------
+
+    @cached_property
+    def _raw(self) -> tuple[str, ...]:
+        names = [
+            name
+            for name, support in zip(RESERVED, self.supports, strict=False)
+            if support.angle != "free"
+        ]
+        names += self.terms
+        for name, axis in (("nu", "x"), ("rise", "y")):
+            if all(getattr(support, axis) != "free" for support in self.supports):
+                names.append(name)
+        return tuple(names)
+
+    @cached_property
+    def _coordinates(self) -> dict[str, dict[str, float]]:
+        both = {"theta_A", "theta_B"} <= set(self._raw)
+        given = self.coordinates
+        if given is None:
+            return TURNING if both else {}
+        for name, weights in given.items():
+            if not isinstance(weights, Mapping) or not weights:
+                raise InputError(
+                    f"`coordinates.{name}` must map parameters to weights; got {weights!r}."
+                )
+            for raw, weight in weights.items():
+                if raw not in self._raw:
+                    raise InputError(
+                        f"`coordinates.{name}` must combine {', '.join(self._raw)}; got {raw!r}."
+                        f"{suggestion(raw, self._raw)}"
+                    )
+                if not (isinstance(weight, int | float) and np.isfinite(weight)):
+                    raise InputError(
+                        f"`coordinates.{name}.{raw}` must be a finite number; got {weight!r}."
+                    )
+        return {name: dict(weights) for name, weights in given.items()}
+
+    def quantity(self, raw: str) -> str:
+        """What a raw parameter measures."""
+        if raw in self.terms:
+            return self.terms[raw][0].measure
+        return "angle" if raw.startswith("theta") else "length"
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The user's parameters: coordinates, angles, actuators, loads, span and rise."""
+        combined = {raw for weights in self._coordinates.values() for raw in weights}
+        clash = set(self._coordinates) & (set(self._raw) - combined)
+        if clash:
+            raise InputError(f"`coordinates` must not name a parameter; got {sorted(clash)[0]!r}.")
+        out = [self._coordinate(name, weights) for name, weights in self._coordinates.items()]
+        return (*out, *(self._parameter(raw) for raw in self._raw if raw not in combined))
+
+    def _coordinate(self, name: str, weights: Mapping[str, float]) -> Parameter:
+        quantities = {self.quantity(raw) for raw in weights}
+        if len(quantities) > 1:
+            raise InputError(
+                f"`coordinates.{name}` must combine parameters of one unit; got "
+                f"{', '.join(sorted(quantities))}."
+            )
+        first = next(iter(weights))
+        role: Role = "load" if first in self.loads else "actuator"
+        quantity = quantities.pop()
+        default = None if self.coordinates is None and name == "Theta" else 0.0
+        units = self.units
+        return Parameter(name, units.label(quantity), units.value(quantity), role, default)
+
+    def _parameter(self, raw: str) -> Parameter:
+        quantity, units = self.quantity(raw), self.units
+        label, scale = units.label(quantity), units.value(quantity)
+        if raw == "nu":
+            far = scale if self.axial is None else np.inf
+            blank = Parameter(raw, label, scale, "fixed", None, -far, far)
+            span = self.span * scale if units.plain else self.span
+            return Parameter(raw, label, scale, "fixed", blank.check(span), -far, far)
+        if raw == "rise":
+            return Parameter(raw, label, scale, "fixed", float(self.rise))
+        role: Role = "load" if raw in self.loads else "actuator"
+        return Parameter(raw, label, scale, role, 0.0)
+
+    def _matrix(self, model: RodModel) -> Matrix:
+        names = [parameter.name for parameter in self.parameters]
+        m = model.multipliers
+        matrix = np.zeros((model.scalars, m + len(names) + 1))
+        matrix[:m, :m] = np.eye(m)
+        matrix[-1, -1] = 1.0
+        for i, raw in enumerate(model.names):
+            unit = self.units.value(self.quantity(raw))
+            if self.quantity(raw) == "tension":  # the offset is in the user's unit, too
+                unit *= self.units.value("length")
+            if raw in names:
+                matrix[m + i, m + names.index(raw)] = 1.0 / unit
+            for name, weights in self._coordinates.items():
+                matrix[m + i, m + names.index(name)] = weights.get(raw, 0.0) / unit
+        return matrix
+
+    def line_load(
+        self, p: Float[np.ndarray, "lanes parameters"], matrix: Matrix, s: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "lanes n 2"]:
+        """Dead load per arclength, in the user's units; matrix: what `mechanics` returns."""
+        out = np.zeros((len(p), len(s), 2))
+        columns = matrix[:, -len(self.parameters) - 1 : -1]
+        for name, terms in self.terms.items():
+            row = columns[self._raw.index(name)] * self.units.value(self.quantity(name))
+            amplitude = np.einsum("j,lj->l", row, p)
+            for one in terms:
+                if isinstance(one, LineLoad):
+                    force = one.density().density(s)[:, None] * np.array(one.direction)
+                    out += amplitude[:, None, None] * force
+        return out
+
+    def identity(self) -> dict[str, Any]:
+        """Everything that differs from the default, as plain data."""
+        terms = {
+            group: {name: [one.data() for one in self.terms[name]] for name in given}
+            for group, given in (("actuators", self.actuators), ("loads", self.loads))
+        }
+        data: dict[str, Any] = {"ends": [support.data() for support in self.supports], **terms}
+        for name, default in (("stiffness", 1.0), ("curvature", 0.0), ("axial", None)):
+            value = getattr(self, name)
+            if callable(value):
+                raise InputError(
+                    f"`{name}` must be a number or a table to be written to a file; got a "
+                    "callable. Sample it into a table [[s, f], ...]."
+                )
+            if not (isinstance(value, int | float | None) and value == default):
+                data[name] = value.tolist() if isinstance(value, np.ndarray) else value
+        if self.coordinates is not None:
+            data["coordinates"] = self._coordinates
+        if self.rise != 0.0:
+            data["rise"] = float(self.rise)
+        if not self.units.plain:
+            data |= {"EI": self.units.bending_stiffness, "length": self.units.length}
+        return data
+
+
+def _scaled(shape: LoadShape, unit: float) -> LoadShape:
+    """The profile divided by a unit."""
+    if unit == 1.0:
+        return shape
+
+    def density(points: Float[np.ndarray, " points"]) -> Float[np.ndarray, " points"]:
+        return shape.density(points) / unit
+
+    return LoadShape(None, density, shape.kinks)
+
+
+def _check_positive(shape: LoadShape | None, name: str, s: Float[np.ndarray, " nodes"]) -> None:
+    if shape is None:
+        return
+    points = np.unique(np.concatenate([s, np.linspace(0.0, 1.0, 201)]))
+    values = shape.density(points)
+    worst = int(np.argmin(values))
+    if not values[worst] > 0.0:
+        raise InputError(
+            f"`{name}` must be positive everywhere; got {values[worst]:g} at s = {points[worst]:g}."
+        )

@@ -1,0 +1,261 @@
+"""Mechanics of general rods: energy, residual, derivatives and solves in batches."""
+
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+from equimorph.linalg import BorderedSolution, CondensedLayout
+from equimorph.linalg.lanes import over_lanes
+from equimorph.structures.contract import Advance, Border, Direction, Symmetry, solved_advance
+from equimorph.structures.rod.general.fields import Fields
+from equimorph.structures.rod.general.kernels import linearise_lanes, second_lanes
+from equimorph.structures.rod.general.model import RodModel
+from equimorph.structures.rod.general.symmetry import mirrors
+from equimorph.structures.rod.interface import Mechanics
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Nodal = Float[np.ndarray, "lanes nodes"]
+Values = Float[np.ndarray, " lanes"]
+Scalars = Float[np.ndarray, "lanes scalars"]
+
+BLOCK = 512
+"""Lanes that take a Newton step together: their matrices stay in the cache."""
+FORCES = 8.0
+"""Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
+
+
+class GeneralMechanics(Mechanics):
+    """A rod whose Lagrangian is a `RodModel`."""
+
+    def __init__(self, model: RodModel) -> None:
+        self.model, self.mesh = model, model.mesh
+        self.constraints, self.held = model.multipliers, model.held
+        start, stop = model.held
+        ends = np.array([int(start), model.mesh.elements - int(stop)])
+        self.layout = CondensedLayout(np.ascontiguousarray(model.stiffness), ends)
+        self.mass = model.mesh.weights[self.unknown_nodes].copy()
+        self.unknowns = len(self.mass)
+
+    @property
+    def unknown_nodes(self) -> slice:
+        """Nodes whose angles are unknown."""
+        return self.layout.unknown
+
+    @cached_property
+    def _tables(self) -> tuple[np.ndarray, ...]:
+        model = self.model
+        slope = np.ascontiguousarray(model.slope)
+        return model.sine, model.cosine, model.softness, slope, *model.rows
+
+    @cached_property
+    def _step_data(self) -> tuple[object, ...]:
+        model = self.model
+        squared, turned = (np.ascontiguousarray(a) for a in (model.quadratic, model.turned))
+        first = np.int64(self.unknown_nodes.start)
+        return self.layout.stiffness, *self._tables, squared, turned, first
+
+    def _checked(self, *pairs: Direction) -> list[np.ndarray]:
+        """States and directions as contiguous arrays of the right widths, for the kernels."""
+        lanes = len(pairs[0][0])
+        shapes = (lanes, self.size), (lanes, len(self.model.names))
+        for pair in pairs:
+            if (pair[0].shape, pair[1].shape) != shapes:
+                wrong = int(pair[0].shape == shapes[0])
+                raise InputError(
+                    f"`{'zp'[wrong]}` must have shape {shapes[wrong]}; got {pair[wrong].shape}. "
+                    "States belong to the rod, and the resolution, that made them."
+                )
+        return [np.ascontiguousarray(array) for pair in pairs for array in pair]
+
+    def scalars(self, z: Lanes, p: Parameters) -> Scalars:
+        """Multipliers, parameters and 1."""
+        return np.concatenate([z[:, self.unknowns :], p, np.ones((len(z), 1))], axis=1)
+
+    # --- fields -----------------------------------------------------------------------------
+
+    def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
+        """Angles θ at all nodes, the prescribed ends included."""
+        z, p = self._checked((z, p))
+        theta = np.einsum("kj,lj->lk", self.model.turned, self.scalars(z, p))
+        out = np.empty((len(z), len(self.mesh.nodes)))
+        out[:, 0], out[:, -1] = theta[:, 0], theta[:, 1]
+        out[:, self.unknown_nodes] = z[:, : self.unknowns]
+        return out
+
+    @cached_property
+    def _fields(self) -> Fields:
+        return Fields(self.model)
+
+    def fields(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes points 4"]:
+        """(θ, κ, x, y) at arclengths."""
+        return self._fields.at(self.nodal_angles(z, p), self.scalars(z, p), s)
+
+    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
+        """max_s |κ(s)| and where it occurs."""
+        return self._fields.largest_curvature(self.nodal_angles(z, p), self.scalars(z, p))
+
+    # --- contract ---------------------------------------------------------------------------
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """L without the multipliers' part."""
+        theta, y, m = self.nodal_angles(z, p), self.scalars(z, p), self.constraints
+        total = 0.5 * np.einsum("li,ij,lj->l", theta, self.layout.assembled, theta)
+        total -= np.einsum("li,ji,lj->l", theta, self.model.slope, y)
+        total += 0.5 * np.einsum("li,ij,lj->l", y, self.model.quadratic, y)
+        normal, _ = self._normal(theta, y)
+        total += (normal - 0.5 * self.model.softness * normal**2).sum(axis=1)
+        return np.asarray(total - (y[:, :m] * self._gradient(theta, y)[:, :m]).sum(axis=1))
+
+    def _normal(
+        self, theta: Nodal, y: Scalars
+    ) -> tuple[Float[np.ndarray, "lanes points"], Float[np.ndarray, "lanes points"]]:
+        """N at the nodes of every element, and θ there."""
+        angles = theta[:, self.mesh.element_nodes.ravel()]
+        a = np.einsum("lj,ji->li", y, self.model.sine)
+        b = np.einsum("lj,ji->li", y, self.model.cosine)
+        return a * np.sin(angles) + b * np.cos(angles), angles
+
+    def _gradient(self, theta: Nodal, y: Scalars) -> Scalars:
+        """∂L/∂y at fixed θ."""
+        normal, angles = self._normal(theta, y)
+        stretch = 1.0 - self.model.softness * normal
+        out = np.einsum("li,ji->lj", stretch * np.sin(angles), self.model.sine)
+        out += np.einsum("li,ji->lj", stretch * np.cos(angles), self.model.cosine)
+        out -= np.einsum("li,ji->lj", theta, self.model.slope)
+        return np.asarray(out + np.einsum("li,ij->lj", y, self.model.quadratic))
+
+    def _end_moments(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes 2"]:
+        """∂L/∂θ at both ends of the rod."""
+        d, model = self.mesh.degree, self.model
+        normal, angles = self._normal(theta, y)
+        a = np.einsum("lj,ji->li", y, model.sine[:, [0, -1]])
+        b = np.einsum("lj,ji->li", y, model.cosine[:, [0, -1]])
+        angles, normal = angles[:, [0, -1]], normal[:, [0, -1]]
+        out = (1.0 - model.softness[[0, -1]] * normal) * (a * np.cos(angles) - b * np.sin(angles))
+        out -= np.einsum("lj,jk->lk", y, model.slope[:, [0, -1]])
+        out[:, 0] += np.einsum("li,i->l", theta[:, : d + 1], model.stiffness[0, 0])
+        out[:, 1] += np.einsum("li,i->l", theta[:, -d - 1 :], model.stiffness[-1, -1])
+        return out
+
+    def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
+        """Force of the support at A: multipliers, or what balances the loads."""
+        return np.asarray(np.einsum("kj,lj->lk", self.model.reaction, self.scalars(z, p)))
+
+    def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
+        """Couples that hold the angles, of springs too; 0 at free angles."""
+        theta, y, model = self.nodal_angles(z, p), self.scalars(z, p), self.model
+        rest = np.einsum("kj,lj->lk", model.rest, y)
+        held = self._end_moments(theta, y)
+        sprung = model.springs * (rest - theta[:, [0, -1]])
+        return np.asarray(np.where(model.held, held, sprung))
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p."""
+        theta, y = self.nodal_angles(z, p), self.scalars(z, p)
+        out = self._gradient(theta, y) + self._end_moments(theta, y) @ self.model.turned
+        return np.ascontiguousarray(out[:, self.constraints : -1])
+
+    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
+        """F, F_p·dp, and the parts of F_z: diagonal, border, trailing block."""
+        z, p, _, dp = self._checked((z, p), (z, dp))
+        lanes, nodes, m = len(z), self.layout.nodes, self.constraints
+        out = (
+            np.empty_like(z),
+            np.empty_like(z),
+            np.empty((lanes, nodes)),
+            np.empty((lanes, m, nodes)),
+            np.empty((lanes, m, m)),
+        )
+        over_lanes(linearise_lanes, self._step_data, [z, p, dp], out)
+        return out
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+        return self.linearised(z, p, np.zeros_like(p))[0]
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return self.linearised(z, p, dp)[1]
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        arrays = self._checked((z, p), v, w)
+        out = np.empty_like(arrays[0])
+        sine, cosine, softness, _, sine_rows, cosine_rows, _ = self._tables
+        _, _, turned, first = self._step_data[-4:]
+        sizes = np.int64(self.mesh.elements), np.int64(self.constraints), first
+        shared = (sine, cosine, softness, sine_rows, cosine_rows, turned, *sizes)
+        over_lanes(second_lanes, shared, arrays, [out])
+        return out
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with F_z − shift·mass, bordered."""
+        diagonal, gradients, trailing = self.linearised(z, p, np.zeros_like(p))[2:]
+        if shift is not None:
+            diagonal -= shift[:, None] * self.mesh.weights
+        if border is None:
+            nothing = np.zeros((len(z), 0, self.size))
+            border = (nothing, nothing, np.zeros((len(z), 0, 0)))
+        columns, rows, corner = border
+        parts = (diagonal, gradients, columns, rows, corner, rhs)
+        return self.layout.solve(*parts, trailing=trailing)
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step; residual, column and matrix are computed together."""
+        given = (z, p, dp, row, corner, defect)
+        starts = range(0, max(len(z), 1), BLOCK)
+        parts = [self._advance(*(array[i : i + BLOCK] for array in given)) for i in starts]
+        if len(parts) == 1:
+            return parts[0]
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return Advance(*(np.concatenate(column) for column in columns))
+
+    def _advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        residual, column, diagonal, gradients, trailing = self.linearised(z, p, dp)
+
+        def solve(rhs: Float[np.ndarray, "lanes 2 bordered"], border: Border) -> BorderedSolution:
+            columns, rows, inner = border
+            parts = (diagonal, gradients, columns, rows, inner, rhs)
+            return self.layout.solve(*parts, trailing=trailing)
+
+        return solved_advance(solve, residual, column, (row, corner, defect), self.constraints)
+
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Random curvatures between the end angles, with random multipliers."""
+        lanes, s = len(p), self.mesh.nodes
+        modes = np.arange(1, 9)
+        amplitude = generator.normal(size=(lanes, len(modes))) * (3.0 / modes)
+        amplitude *= generator.uniform(size=(lanes, 1))
+        y = np.concatenate([np.zeros((lanes, self.constraints)), p, np.ones((lanes, 1))], axis=1)
+        ends = np.einsum("kj,lj->lk", self.model.turned, y)
+        start, stop = self.model.held
+        if start == stop:
+            waves = np.sin(np.pi * np.outer(modes, s))
+            tilt = 0.0 if start else generator.normal(size=(lanes, 1))
+            base = ends[:, :1] * (1 - s) + ends[:, 1:] * s + tilt
+        else:
+            waves = np.sin(np.pi * np.outer(modes - 0.5, s if start else 1 - s))
+            base = ends.sum(axis=1)[:, None] * np.ones_like(s)
+        theta = (base + amplitude @ waves)[:, self.unknown_nodes]
+        forces = generator.normal(size=(lanes, self.constraints)) * FORCES
+        return np.concatenate([theta, forces], axis=1)
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Mirror images and half turns that leave the Lagrangian as it is."""
+        return mirrors(self.model, self.unknowns)

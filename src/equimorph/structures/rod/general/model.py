@@ -1,0 +1,310 @@
+"""The numbers of a general rod: its Lagrangian as constant arrays."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.structures.rod.discretisation import Mesh, reference_element
+from equimorph.structures.rod.general.ends import FREE, HELD, End, compliance
+from equimorph.structures.rod.general.terms import Effects, Term
+from equimorph.structures.rod.loads import LoadShape
+from equimorph.structures.rod.profiles import at_nodes
+
+FOUR_PI_SQUARED = 4.0 * np.pi**2
+Rows = Float[np.ndarray, "scalars elements order"]
+
+
+@dataclass(frozen=True, eq=False)
+class Build:
+    """What a general rod is made of, in non-dimensional form.
+
+    terms: what each amplitude scales, by name, in the order of the parameters.
+    """
+
+    mesh: Mesh
+    ends: tuple[End, End]
+    stiffness: LoadShape
+    curvature: LoadShape
+    axial: LoadShape | None
+    terms: Mapping[str, Sequence[Term]]
+
+
+@dataclass(frozen=True, eq=False)
+class Densities:
+    """Fields that a state is a combination of, at nodes of one rule in every element.
+
+    Rows belong to the scalars. The force on the cross-section is (−b, −a): ``b = Σ y along``,
+    ``a = Σ y across``; the moment is ``rigidity · κ − Σ y bending``.
+    """
+
+    along: Rows
+    across: Rows
+    bending: Rows
+    rigidity: Float[np.ndarray, "elements order"]
+    softness: Float[np.ndarray, "elements order"]
+
+    def mapped(self, matrix: Float[np.ndarray, "scalars others"]) -> "Densities":
+        """For other scalars that determine these as ``matrix @ others``."""
+        along, across, bending = (
+            np.einsum("jk,jei->kei", matrix, a) for a in (self.along, self.across, self.bending)
+        )
+        return Densities(along, across, bending, self.rigidity, self.softness)
+
+
+@dataclass(frozen=True, eq=False)
+class RodModel:
+    """The Lagrangian of a rod in its nodal angles θ and *scalars* y = (multipliers, parameters, 1).
+
+    ``L = ½ θᵀKθ − θ·(slope y) + Σ (N − ½ γ N²) + ½ yᵀ Q y`` with the sum over the nodes of every
+    element and ``N = A sin θ + B cos θ``, ``A = m · across y``, ``B = m · along y``, quadrature
+    weights m. N/m is the compressive force and γ the axial compliance over m: a stretchable rod's
+    strain is eliminated node by node. Prescribed end angles are ``turned y``.
+
+    Parameters
+    ----------
+    names
+        Parameters.
+    multipliers
+        Number of multipliers: supports that act against each other in x, in y.
+    held
+        Whether the angles of the ends are prescribed.
+    stiffness
+        Element matrices, with springs at the ends; `bending_stiffness` without.
+    slope
+        Coefficients of the angles, couples included; `element_slope` without, by element.
+    springs, rest
+        Stiffness of springs at the ends' angles, and where they are at rest.
+    reaction
+        Force of the support at A.
+    origin
+        Coordinates of end A (`from_start`) or B. Like all rows, they combine the scalars.
+    """
+
+    mesh: Mesh
+    names: tuple[str, ...]
+    multipliers: int
+    held: tuple[bool, bool]
+    stiffness: Float[np.ndarray, "elements order order"]
+    bending_stiffness: Float[np.ndarray, "elements order order"]
+    nodal: Densities
+    fine: Densities
+    slope: Float[np.ndarray, "scalars nodes"]
+    element_slope: Rows
+    quadratic: Float[np.ndarray, "scalars scalars"]
+    turned: Float[np.ndarray, "2 scalars"]
+    springs: Float[np.ndarray, "2"]
+    rest: Float[np.ndarray, "2 scalars"]
+    reaction: Float[np.ndarray, "2 scalars"]
+    origin: Float[np.ndarray, "2 scalars"]
+    from_start: tuple[bool, bool]
+
+    @property
+    def scalars(self) -> int:
+        """Number of multipliers and parameters, and 1 for the constant."""
+        return self.multipliers + len(self.names) + 1
+
+    @cached_property
+    def sine(self) -> Float[np.ndarray, "scalars points"]:
+        """Coefficients of sin θ at the nodes of every element."""
+        rows = self.mesh.element_weights * self.nodal.across
+        return np.ascontiguousarray(rows.reshape(self.scalars, -1))
+
+    @cached_property
+    def cosine(self) -> Float[np.ndarray, "scalars points"]:
+        """Coefficients of cos θ."""
+        rows = self.mesh.element_weights * self.nodal.along
+        return np.ascontiguousarray(rows.reshape(self.scalars, -1))
+
+    @cached_property
+    def softness(self) -> Float[np.ndarray, " points"]:
+        """γ: axial compliance over the quadrature weight."""
+        return np.ascontiguousarray((self.nodal.softness / self.mesh.element_weights).ravel())
+
+    @cached_property
+    def rows(self) -> tuple[Int[np.ndarray, " some"], ...]:
+        """Scalars with coefficients of sin θ, of cos θ and of θ that are not all zero."""
+        return tuple(np.flatnonzero(a.any(axis=1)) for a in (self.sine, self.cosine, self.slope))
+
+    def mapped(
+        self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
+    ) -> "RodModel":
+        """The same rod in other parameters: its scalars are ``matrix @ others``."""
+        return replace(
+            self,
+            names=tuple(names),
+            nodal=self.nodal.mapped(matrix),
+            fine=self.fine.mapped(matrix),
+            slope=matrix.T @ self.slope,
+            element_slope=np.einsum("jk,jei->kei", matrix, self.element_slope),
+            quadratic=matrix.T @ self.quadratic @ matrix,
+            turned=self.turned @ matrix,
+            rest=self.rest @ matrix,
+            reaction=self.reaction @ matrix,
+            origin=self.origin @ matrix,
+        )
+
+
+def raw_names(build: Build) -> tuple[str, ...]:
+    """Parameters of a rod before coordinates are chosen: angles, amplitudes, span, rise."""
+    angles = [
+        name
+        for name, end in zip(("theta_A", "theta_B"), build.ends, strict=True)
+        if end.angle != FREE
+    ]
+    places = [name for name, axis in (("nu", "x"), ("rise", "y")) if _opposed(build.ends, axis)]
+    return (*angles, *build.terms, *places)
+
+
+def _opposed(ends: tuple[End, End], axis: str) -> bool:
+    """Whether both ends are supported in a direction: then there is a multiplier."""
+    return all(getattr(end, axis) != FREE for end in ends)
+
+
+def raw_model(build: Build) -> RodModel:
+    """Arrays of a rod in the parameters of `raw_names`."""
+    names, mesh, ends = raw_names(build), build.mesh, build.ends
+    opposed = [axis for axis in ("x", "y") if _opposed(ends, axis)]
+    m = len(opposed)
+    place = {name: m + i for i, name in enumerate(names)}
+    count = m + len(names) + 1
+    fine = Mesh(mesh.breaks, reference_element(max(20, 2 * mesh.degree)))
+    nodal, finer = (_densities(build, grid, opposed, place, count) for grid in (mesh, fine))
+    unit = mesh.reference.derivative / mesh.lengths[:, None, None]
+    weighted = mesh.element_weights * nodal.rigidity
+    bending = np.einsum("eki,ek,ekj->eij", unit, weighted, unit)
+    bending = 0.5 * (bending + bending.transpose(0, 2, 1))
+    element_slope = np.einsum("eki,ek,jek->jei", unit, mesh.element_weights, nodal.bending)
+    slope = np.zeros((count, len(mesh.nodes)))
+    for e, nodes in enumerate(mesh.element_nodes):
+        slope[:, nodes] += element_slope[:, e]
+    _add_couples(build, place, slope)
+    quadratic = _curvature_energy(build, place, count)
+    reaction, origin, from_start = _supports(build, opposed, place, quadratic)
+    stiffness, springs = bending.copy(), np.zeros(2)
+    turned, rest = np.zeros((2, 2, count))
+    for side, (name, node) in enumerate((("theta_A", 0), ("theta_B", -1))):
+        angle = ends[side].angle
+        if angle == HELD:
+            turned[side, place[name]] = 1.0
+        elif angle != FREE:
+            springs[side], rest[side, place[name]] = float(angle), 1.0
+            stiffness[node, node, node] += float(angle)
+            slope[place[name], node] += float(angle)
+            quadratic[place[name], place[name]] += float(angle)
+    return RodModel(
+        mesh,
+        names,
+        m,
+        (ends[0].angle == HELD, ends[1].angle == HELD),
+        stiffness,
+        bending,
+        nodal,
+        finer,
+        slope,
+        element_slope,
+        quadratic,
+        turned,
+        springs,
+        rest,
+        reaction,
+        origin,
+        from_start,
+    )
+
+
+def _summed(terms: Sequence[Term], mesh: Mesh) -> Effects:
+    """Effects of several terms with one amplitude."""
+    parts = [term.effects(mesh) for term in terms]
+    zero = np.zeros((mesh.elements, mesh.degree + 1))
+    return Effects(
+        along=sum((part.along for part in parts), zero),
+        across=sum((part.across for part in parts), zero),
+        bending=sum((part.bending for part in parts), zero),
+        natural=sum((part.natural for part in parts), zero),
+        couples=tuple(couple for part in parts for couple in part.couples),
+        force=(sum(part.force[0] for part in parts), sum(part.force[1] for part in parts)),
+    )
+
+
+def _densities(
+    build: Build, mesh: Mesh, opposed: Sequence[str], place: Mapping[str, int], count: int
+) -> Densities:
+    """Rows of all scalars on a mesh with the elements of the rod."""
+    rigidity = at_nodes(build.stiffness, mesh) / FOUR_PI_SQUARED
+    along, across, bending = np.zeros((3, count, mesh.elements, mesh.degree + 1))
+    for c, axis in enumerate(opposed):
+        (along if axis == "x" else across)[c] = 1.0
+    bending[-1] = rigidity * at_nodes(build.curvature, mesh)
+    for name, terms in build.terms.items():
+        effects, row = _summed(terms, mesh), place[name]
+        # a free end B takes no load: what lies beyond a cross-section hangs on end A
+        along[row] = effects.along - (effects.force[0] if build.ends[1].x == FREE else 0.0)
+        across[row] = effects.across - (effects.force[1] if build.ends[1].y == FREE else 0.0)
+        bending[row] = effects.bending + rigidity * effects.natural
+    softness = np.zeros_like(rigidity)
+    if build.axial is not None:
+        softness = 1.0 / at_nodes(build.axial, mesh)
+    return Densities(along, across, bending, rigidity, softness)
+
+
+def _add_couples(
+    build: Build, place: Mapping[str, int], slope: Float[np.ndarray, "scalars nodes"]
+) -> None:
+    for name, terms in build.terms.items():
+        for s, moment in _summed(terms, build.mesh).couples:
+            node = int(np.argmin(np.abs(build.mesh.nodes - s)))
+            slope[place[name], node] += moment
+
+
+def _curvature_energy(
+    build: Build, place: Mapping[str, int], count: int
+) -> Float[np.ndarray, "scalars scalars"]:
+    """∫ B κ_j κ_k of the intrinsic curvatures: the energy of a straight rod."""
+    mesh = build.mesh
+    natural = np.zeros((count, mesh.elements, mesh.degree + 1))
+    natural[-1] = at_nodes(build.curvature, mesh)
+    for name, terms in build.terms.items():
+        natural[place[name]] = _summed(terms, mesh).natural
+    weights = mesh.element_weights * at_nodes(build.stiffness, mesh) / FOUR_PI_SQUARED
+    return np.asarray(np.einsum("jei,ei,kei->jk", natural, weights, natural))
+
+
+def _supports(
+    build: Build,
+    opposed: Sequence[str],
+    place: Mapping[str, int],
+    quadratic: Float[np.ndarray, "scalars scalars"],
+) -> tuple[Float[np.ndarray, "2 scalars"], Float[np.ndarray, "2 scalars"], tuple[bool, bool]]:
+    """Add the energy of the supports; A's reaction; where the rod begins, or ends if A is free.
+
+    With λ the force of the support at A, F that of all loads, x the place of B's support, and
+    compliances c: ``−(λ + F) x − ½ c_A λ² − ½ c_B (λ + F)²``, end A at ``−c_A λ``, end B at
+    ``x + c_B (λ + F)``. Without opposed supports λ is −F or 0.
+    """
+    count = len(quadratic)
+    reactions, origin = np.zeros((2, 2, count))
+    from_start = [True, True]
+    for axis, (name, coordinate) in enumerate((("nu", "x"), ("rise", "y"))):
+        first, last = (getattr(end, coordinate) for end in build.ends)
+        total = np.zeros(count)
+        for term_name, terms in build.terms.items():
+            total[place[term_name]] = _summed(terms, build.mesh).force[axis]
+        reaction, site = np.zeros(count), np.zeros(count)
+        if coordinate in opposed:
+            reaction[opposed.index(coordinate)] = 1.0
+            site[place[name]] = 1.0
+        elif last == FREE:
+            reaction = -total
+        rest, reactions[axis] = reaction + total, reaction
+        quadratic -= np.outer(rest, site) + np.outer(site, rest)
+        if first != FREE:
+            quadratic -= compliance(first) * np.outer(reaction, reaction)
+            origin[axis] = -compliance(first) * reaction
+        if last != FREE:
+            quadratic -= compliance(last) * np.outer(rest, rest)
+        if first == FREE:
+            origin[axis], from_start[axis] = compliance(last) * rest, False
+    return reactions, origin, (from_start[0], from_start[1])

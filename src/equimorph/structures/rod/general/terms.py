@@ -1,0 +1,324 @@
+"""What acts on a rod: loads, couples, intrinsic curvature and tendons, each with an amplitude."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.loads import LoadShape, load_shape
+from equimorph.structures.rod.profiles import at_nodes, inside, profile
+
+ElementNodes = Float[np.ndarray, "elements order"]
+DOWN = (0.0, -1.0)
+
+
+def _arclength(value: Any, name: str) -> float:
+    try:
+        s = float(value)
+    except (TypeError, ValueError):
+        s = np.nan
+    if not 0.0 <= s <= 1.0:
+        raise InputError(
+            f"`{name}` must be a share of the rod's length, from 0 to 1; got {value!r}."
+        )
+    return s
+
+
+def _stretch(start: Any, stop: Any) -> tuple[float, float]:
+    first, last = _arclength(start, "start"), _arclength(stop, "stop")
+    if not first < last:
+        raise InputError(f"`start` must be less than `stop`; got {start!r} and {stop!r}.")
+    return first, last
+
+
+def _direction(value: Any) -> tuple[float, float]:
+    try:
+        x, y = (float(component) for component in value)
+    except (TypeError, ValueError):
+        x, y = np.nan, np.nan
+    if not (np.isfinite(x) and np.isfinite(y) and (x, y) != (0.0, 0.0)):
+        raise InputError(f"`direction` must be two numbers (x, y), not both 0; got {value!r}.")
+    return x, y
+
+
+@dataclass(frozen=True, eq=False)
+class Effects:
+    """What a term of amplitude 1 does: see `structures.rod.general.model`.
+
+    along, across: load cumulated from end A in x and y, `force` all of it; bending: the part of the
+    moment that does not come from curvature; natural: intrinsic curvature; couples: (arclength,
+    moment).
+    """
+
+    along: ElementNodes | float = 0.0
+    across: ElementNodes | float = 0.0
+    bending: ElementNodes | float = 0.0
+    natural: ElementNodes | float = 0.0
+    couples: tuple[tuple[float, float], ...] = ()
+    force: tuple[float, float] = (0.0, 0.0)
+
+
+class Term:
+    """Something that acts on a rod in proportion to a parameter."""
+
+    word: ClassVar[str]
+    measure: ClassVar[str]
+    """What the amplitude is: "line", "force", "couple", "curvature" or "tension"."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Arclengths inside the rod where it is not smooth."""
+        raise NotImplementedError
+
+    def effects(self, mesh: Mesh) -> Effects:
+        """Effects on the nodes of a mesh whose element ends meet the breaks."""
+        raise NotImplementedError
+
+    def data(self) -> dict[str, Any]:
+        """The term as plain data; `InputError` for a callable."""
+        out: dict[str, Any] = {"term": self.word}
+        for field in fields(self):  # type: ignore[arg-type]  # every term is a dataclass
+            value = getattr(self, field.name)
+            if callable(value):
+                raise InputError(
+                    f"`{field.name}` of a {self.word} must be a number or a table to be written "
+                    "to a file; got a callable."
+                )
+            if field.name != "kinks":  # of a callable only, and that is refused
+                out[field.name] = _plain(value)
+        return out
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, str | int | float):
+        return value
+    return [_plain(item) for item in value]
+
+
+def _interior(points: Sequence[float]) -> tuple[float, ...]:
+    return tuple(float(s) for s in points if 0.0 < s < 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class LineLoad(Term):
+    """Dead load along the rod: the amplitude times ``shape(s) · direction`` per arclength.
+
+    The default is a uniform load downward; self-weight of a rod on a plane inclined by α is
+    ``LineLoad(direction=(sin α, −cos α))``.
+
+    Parameters
+    ----------
+    shape
+        "uniform", "left-half", a table [[s, Q], ...] or a callable Q(s); s runs from 0 to 1.
+    direction
+        Its horizontal and vertical part.
+    kinks
+        Arclengths where a callable is not smooth.
+    """
+
+    shape: Any = "uniform"
+    direction: Sequence[float] = DOWN
+    kinks: Sequence[float] = ()
+    word: ClassVar[str] = "line load"
+    measure: ClassVar[str] = "line"
+
+    def __post_init__(self) -> None:
+        """Check shape and direction."""
+        _direction(self.direction)
+        self.density()
+
+    def density(self) -> LoadShape:
+        """Q(s)."""
+        return load_shape(self.shape, self.kinks, "shape")
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Kinks of the shape."""
+        return _interior(self.density().kinks.tolist())
+
+    def effects(self, mesh: Mesh) -> Effects:
+        """Load cumulated from end A."""
+        x, y = _direction(self.direction)
+        rho = self.density().cumulated(mesh)
+        total = float(rho[-1, -1])
+        return Effects(along=x * rho, across=y * rho, force=(x * total, y * total))
+
+
+@dataclass(frozen=True, eq=False)
+class PointForce(Term):
+    """Dead force at arclength s: the amplitude times `direction`.
+
+    Parameters
+    ----------
+    s
+        Where it acts, from 0 to 1.
+    direction
+        Its horizontal and vertical part; downward by default.
+    """
+
+    s: float
+    direction: Sequence[float] = DOWN
+    word: ClassVar[str] = "point force"
+    measure: ClassVar[str] = "force"
+
+    def __post_init__(self) -> None:
+        """Check place and direction."""
+        _arclength(self.s, "s")
+        _direction(self.direction)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Its place."""
+        return _interior([self.s])
+
+    def effects(self, mesh: Mesh) -> Effects:
+        """Load cumulated from end A: a step."""
+        x, y = _direction(self.direction)
+        step = np.ones((1, mesh.degree + 1)) * inside(self.s, 2.0, mesh)[:, None]
+        return Effects(along=x * step, across=y * step, force=(x, y))
+
+
+@dataclass(frozen=True, eq=False)
+class Couple(Term):
+    """Couple at arclength s, positive counterclockwise: its work is the amplitude times θ(s)."""
+
+    s: float
+    word: ClassVar[str] = "couple"
+    measure: ClassVar[str] = "couple"
+
+    def __post_init__(self) -> None:
+        """Check the place."""
+        _arclength(self.s, "s")
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Its place."""
+        return _interior([self.s])
+
+    def effects(self, mesh: Mesh) -> Effects:
+        """A jump of the moment."""
+        return Effects(couples=((float(self.s), 1.0),))
+
+
+@dataclass(frozen=True, eq=False)
+class Curvature(Term):
+    """Intrinsic curvature: the amplitude times ``pattern(s)`` from `start` to `stop`.
+
+    A segment of a soft arm, or a bilayer that swells.
+
+    Parameters
+    ----------
+    pattern
+        A number, a table [[s, f], ...] or a callable.
+    start, stop
+        Where it begins and ends.
+    """
+
+    pattern: Any = 1.0
+    start: float = 0.0
+    stop: float = 1.0
+    kinks: Sequence[float] = ()
+    word: ClassVar[str] = "curvature"
+    measure: ClassVar[str] = "curvature"
+
+    def __post_init__(self) -> None:
+        """Check pattern and stretch."""
+        _stretch(self.start, self.stop)
+        self._profile()
+
+    def _profile(self) -> LoadShape:
+        return profile(self.pattern, "pattern", self.kinks)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Its ends, and the pattern's kinks."""
+        return _interior([self.start, self.stop, *self._profile().kinks.tolist()])
+
+    def effects(self, mesh: Mesh) -> Effects:
+        """Intrinsic curvature."""
+        there = inside(self.start, self.stop, mesh)[:, None]
+        return Effects(natural=there * at_nodes(self._profile(), mesh))
+
+
+@dataclass(frozen=True, eq=False)
+class Tendon(Term):
+    """Cable guided along the rod at an offset from its axis, pulled with a given tension.
+
+    Between `start` and `stop` the cable at offset d(s), positive to the left of the axis, has the
+    length ``∫ (1 − dκ) ds``: tension T bends the rod as the moment T d does, and works on the
+    shortening. Friction is left out; the compression of the axis matters for extensible rods only.
+
+    Parameters
+    ----------
+    offset
+        d(s), in the user's unit of length: a number, a table [[s, d], ...] or a callable.
+    start, stop
+        Where the cable is anchored.
+    """
+
+    offset: Any
+    start: float = 0.0
+    stop: float = 1.0
+    kinks: Sequence[float] = ()
+    word: ClassVar[str] = "tendon"
+    measure: ClassVar[str] = "tension"
+
+    def __post_init__(self) -> None:
+        """Check offset and stretch."""
+        _stretch(self.start, self.stop)
+        self._profile()
+
+    def _profile(self) -> LoadShape:
+        return profile(self.offset, "offset", self.kinks)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Its ends, and the offset's kinks."""
+        return _interior([self.start, self.stop, *self._profile().kinks.tolist()])
+
+    def effects(self, mesh: Mesh) -> Effects:
+        """A moment T d."""
+        there = inside(self.start, self.stop, mesh)[:, None]
+        return Effects(bending=there * at_nodes(self._profile(), mesh))
+
+
+TERMS: dict[str, type[Term]] = {
+    kind.word: kind for kind in (LineLoad, PointForce, Couple, Curvature, Tendon)
+}
+REFUSED = {
+    "follower": "a follower load has no potential, so that equilibria are no critical points",
+}
+
+
+def term(data: Any, name: str) -> Term:
+    """Term of plain data, or the term itself.
+
+    Raises
+    ------
+    InputError
+        For anything else; follower loads are refused with the reason.
+    """
+    if isinstance(data, Term):
+        return data
+    content = dict(data) if isinstance(data, Mapping) else {}
+    word = str(content.pop("term", None))
+    for key, why in REFUSED.items():
+        if key in word:
+            raise InputError(
+                f"`{name}` must be conservative; got {word!r}: {why}. Use a dead load, whose "
+                "direction stays."
+            )
+    if word not in TERMS:
+        raise InputError(
+            f"`{name}` must be a term ({', '.join(TERMS)}), one or a list; got {data!r}."
+        )
+    try:
+        return TERMS[word](**content)
+    except TypeError as error:
+        raise InputError(f"`{name}` must have the data of a {word}; got {error}.") from None

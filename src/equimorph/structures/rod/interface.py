@@ -1,0 +1,127 @@
+"""What a rod's mechanics must offer; `Rod` adds names, natural states and descriptors."""
+
+from abc import ABC, abstractmethod
+from functools import partial
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from equimorph.linalg import BorderedSolution
+from equimorph.structures.contract import (
+    Advance,
+    Border,
+    Direction,
+    Symmetry,
+    solved_advance,
+)
+from equimorph.structures.rod.discretisation import Mesh
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Nodal = Float[np.ndarray, "lanes nodes"]
+Values = Float[np.ndarray, " lanes"]
+
+
+class Mechanics(ABC):
+    """Energy, residual, derivatives and solves of a discretised rod in batches of lanes.
+
+    z = (angles at the unknown nodes, multipliers); methods as in `structures.contract.Structure`.
+    """
+
+    mesh: Mesh
+    unknowns: int
+    constraints: int
+    mass: Float[np.ndarray, " unknowns"]
+    held: tuple[bool, bool]
+    """Whether the angles of the ends are prescribed."""
+
+    @property
+    def size(self) -> int:
+        """Length of z."""
+        return self.unknowns + self.constraints
+
+    @property
+    @abstractmethod
+    def unknown_nodes(self) -> slice:
+        """Nodes whose angles are unknown."""
+
+    @abstractmethod
+    def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
+        """Angles θ at all nodes, the prescribed ends included."""
+
+    @abstractmethod
+    def fields(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes points 4"]:
+        """(θ, κ, x, y) at arclengths."""
+
+    @abstractmethod
+    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
+        """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
+
+    @abstractmethod
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """Potential energy E."""
+
+    @abstractmethod
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+
+    @abstractmethod
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+
+    @abstractmethod
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+
+    @abstractmethod
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p."""
+
+    @abstractmethod
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with F_z − shift·mass, bordered."""
+
+    @abstractmethod
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step along the curve with parameter velocity `dp`."""
+
+    @abstractmethod
+    def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
+        """Force of the support at A on the rod."""
+
+    @abstractmethod
+    def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
+        """Couples of the supports, or actuators, on both ends of the rod."""
+
+    def plain_advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """`advance` by the general bordered solve."""
+        residual, column = self.residual(z, p), self.parameter_derivative(z, p, dp)
+        solve = partial(self.solve, z, p)
+        return solved_advance(solve, residual, column, (row, corner, defect), self.constraints)
+
+    @abstractmethod
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Random guesses."""
+
+    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """Whether the highest Legendre coefficients of θ are small in every element."""
+        theta = self.nodal_angles(z, p)[:, self.mesh.element_nodes]
+        tail = np.abs(theta @ self.mesh.reference.to_legendre[-2:].T)
+        return np.asarray(tail.max(axis=(1, 2)) < 1e-3)
+
+    @abstractmethod
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Symmetries of the equilibrium set."""

@@ -1,0 +1,143 @@
+"""Lagrangians of general rods, written out: nothing is taken from the package but the mesh.
+
+With quadrature weights m at the nodes of every element, one-sided values at jumps, and N the
+compressive force, L = Σ m (½ B (θ' − κ₀)² − T d θ' + N − N²/(2 EA)) − M θ(s) + springs.
+"""
+
+import numpy as np
+
+from equimorph.structures import Couple, Curvature, End, LineLoad, PointForce, Rod, Tendon
+
+
+class Quadrature:
+    """Points, weights and slopes of nodal fields in every element."""
+
+    def __init__(self, rod):
+        mesh = rod.mesh
+        t = 1e-13 + (1 - 2e-13) * mesh.reference.nodes
+        self.s = mesh.breaks[:-1, None] + mesh.lengths[:, None] * t
+        self.m = mesh.lengths[:, None] * mesh.reference.weights
+        self.slope = mesh.reference.derivative / mesh.lengths[:, None, None]
+        self.nodes, self.at = mesh.nodes, mesh.element_nodes
+
+    def total(self, values):
+        return (self.m * values).sum(axis=(1, 2))
+
+    def kappa(self, theta):
+        return np.einsum("eij,lej->lei", self.slope, theta[:, self.at])
+
+    def node(self, s):
+        return int(np.argmin(np.abs(self.nodes - s)))
+
+
+def column(values):
+    return values[:, None, None]
+
+
+def bending(quadrature, theta, rigidity, natural):
+    return quadrature.total(0.5 * rigidity * (quadrature.kappa(theta) - natural) ** 2)
+
+
+def sprung_rod():
+    """Everything at once: springs, jumps of stiffness, five loads and actuators, coordinates."""
+    rod = Rod(
+        ends=(End(angle=0.02, x="held", y=2.0), End(x=1.5)),
+        stiffness=[[0, 1], [0.3, 2], [0.3, 1.5], [1, 1]],
+        curvature=[[0, 0], [1, 1.2]],
+        actuators={"bend": Curvature(0.8, 0.2, 0.6), "pull": Tendon(0.05, 0.0, 0.5)},
+        loads={
+            "q": LineLoad(direction=(0.3, -1.0)),
+            "P": [PointForce(0.4, (1.0, 0.5)), PointForce(1.0, (0.0, 0.2))],
+            "M": Couple(0.6),
+        },
+        coordinates={"turn": {"theta_A": 1.0, "theta_B": -1.0}, "reach": {"nu": 2.0}},
+        elements=4,
+        degree=5,
+    )
+    g = Quadrature(rod)
+    before, after = 1 + g.s / 0.3, 1.5 - 0.5 * (g.s - 0.3) / 0.7
+    rigidity = np.where(g.s < 0.3, before, after) / (4 * np.pi**2)
+
+    def lagrangian(z, p):
+        turn, reach, bend, pull, q, P, M, rise = p.T
+        theta = np.concatenate([z[:, :-2], -turn[:, None]], axis=1)
+        lam, mu, s = z[:, -2], z[:, -1], g.s
+        natural = 1.2 * s + column(bend) * 0.8 * ((s > 0.2) & (s < 0.6))
+        out = bending(g, theta, rigidity, natural)
+        out = out - pull * g.total(0.05 * (s < 0.5) * g.kappa(theta))
+        across_x = column(lam) + column(q) * 0.3 * s + column(P) * (s > 0.4)
+        across_y = column(mu) - column(q) * s + column(P) * 0.5 * (s > 0.4)
+        angles = theta[:, g.at]
+        out = out + g.total(across_x * np.cos(angles) + across_y * np.sin(angles))
+        out = out - M * theta[:, g.node(0.6)] + 0.01 * (theta[:, 0] - turn) ** 2
+        fx, fy = 0.3 * q + P, -q + 0.7 * P
+        out = out - (lam + fx) * 2 * reach - 0.5 * (lam + fx) ** 2 / 1.5
+        return out - (mu + fy) * rise - 0.5 * mu**2 / 2.0
+
+    return rod, (0.4, 0.4, 0.5, 0.7, 0.5, 0.3, 0.05, 0.1), lagrangian
+
+
+def stretchable_cantilever():
+    """Free end B, axial stiffness that varies, load inside and at the end."""
+    rod = Rod(
+        ends=("clamped", "free"),
+        axial=[[0, 3.0], [1, 5.0]],
+        loads={"q": LineLoad("left-half", (0.5, -1.0)), "P": PointForce(1.0, (-1.0, 0.3))},
+        elements=4,
+        degree=5,
+    )
+    g = Quadrature(rod)
+
+    def lagrangian(z, p):
+        start, q, P = p.T
+        theta, s = np.concatenate([start[:, None], z], axis=1), g.s
+        beyond = np.where(s < 0.5, 1.0 - 2.0 * s, 0.0)  # load between s and the free end
+        x = -column(q) * 0.5 * beyond + column(P)
+        y = column(q) * beyond - 0.3 * column(P)
+        angles = theta[:, g.at]
+        normal = x * np.cos(angles) + y * np.sin(angles)
+        axial = 3.0 + 2.0 * s
+        out = bending(g, theta, 1 / (4 * np.pi**2), 0.0)
+        return out + g.total(normal - normal**2 / (2 * axial))
+
+    return rod, (0.2, 0.4, 0.3), lagrangian
+
+
+def sliding_rod():
+    """End A free in x, pinned to a line; end B clamped: one multiplier, positions from B."""
+    rod = Rod(
+        ends=(End(angle="free", x="free", y="held"), "clamped"),
+        loads={"P": PointForce(0.5, (1.0, -1.0)), "M": Couple(0.0)},
+        elements=4,
+        degree=5,
+    )
+    g = Quadrature(rod)
+
+    def lagrangian(z, p):
+        stop, P, M, rise = p.T
+        theta, mu = np.concatenate([z[:, :-1], stop[:, None]], axis=1), z[:, -1]
+        angles, right = theta[:, g.at], g.s > 0.5
+        x, y = column(P) * right, column(mu) - column(P) * right
+        out = bending(g, theta, 1 / (4 * np.pi**2), 0.0)
+        out = out + g.total(x * np.cos(angles) + y * np.sin(angles))
+        return out - M * theta[:, 0] - (mu - P) * rise
+
+    return rod, (0.3, 0.4, 0.1, 0.1), lagrangian
+
+
+def stretchable_arch():
+    """Clamped, extensible: the multipliers have a trailing block."""
+    rod = Rod(axial=4.0, load="left-half", elements=4, degree=5)
+    g = Quadrature(rod)
+
+    def lagrangian(z, p):
+        Theta, Delta, q, nu, rise = p.T
+        ends = (Delta + Theta)[:, None], (Delta - Theta)[:, None]
+        theta = np.concatenate([ends[0], z[:, :-2], ends[1]], axis=1)
+        lam, mu, s = z[:, -2], z[:, -1], g.s
+        angles, rho = theta[:, g.at], np.minimum(2 * s, 1.0)
+        normal = column(lam) * np.cos(angles) + (column(mu) - column(q) * rho) * np.sin(angles)
+        out = bending(g, theta, 1 / (4 * np.pi**2), 0.0) + g.total(normal - normal**2 / 8.0)
+        return out - lam * nu - (mu - q) * rise
+
+    return rod, (1.0, 0.2, 1.5, 0.8, 0.05), lagrangian
