@@ -5,11 +5,11 @@
 
 import numpy as np
 import pytest
-from equimorph.structures.rod.mechanics.recovery.kernels import largest_lanes
 
 from equimorph.linalg import solve_bordered
 from equimorph.structures import Rod
 from equimorph.structures.rod.kernels import advance_lanes
+from equimorph.structures.rod.recovery.kernels import largest_lanes
 
 RESOLUTIONS = [(6, 9), (12, 6), (12, 8), (24, 8)]
 

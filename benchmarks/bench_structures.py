@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 
 from equimorph.model import Parameter
-from equimorph.structures import EnergyStructure, Truss, Unknown
+from equimorph.structures import (
+    Couple,
+    Curvature,
+    End,
+    EnergyStructure,
+    LineLoad,
+    PointForce,
+    Rod,
+    Tendon,
+    Truss,
+    Unknown,
+)
 
 
 def chain(links):
@@ -72,6 +83,54 @@ def bench_newton_step(benchmark, make, lanes):
     generator = np.random.default_rng(0)
     p = np.tile([parameter.default for parameter in structure.parameters], (lanes, 1))
     z = 0.1 * structure.sample(p, generator)
+    dp, row, one = np.ones_like(p), generator.normal(size=z.shape), np.ones(lanes)
+    step = benchmark.pedantic(
+        structure.advance, (z, p, dp, row, one, one), rounds=40, warmup_rounds=2
+    )
+    assert np.isfinite(step.dz).all()
+    time = benchmark.stats.stats.median if benchmark.stats else np.nan
+    benchmark.extra_info |= {
+        "lanes": lanes,
+        "size": structure.size,
+        "us per lane": 1e6 * time / lanes,
+        "largest residual": float(step.residual.max()),
+    }
+
+
+def rod_with_every_option():
+    """Springs, varying stiffness and curvature, extensible, seven amplitudes."""
+    return Rod(
+        ends=(End(angle=0.3, y=5.0), End(x=5.0)),
+        stiffness=[[0, 1], [1, 2]],
+        curvature=[[0, 0], [1, 1]],
+        axial=50.0,
+        actuators={"k": Curvature(1.0, 0.0, 0.5)},
+        loads={
+            "q": LineLoad(direction=(0.3, -1.0)),
+            "w": LineLoad("left-half"),
+            "P": PointForce(0.5),
+            "M": Couple(0.5),
+        },
+    )
+
+
+def rod_with_a_tendon():
+    """A soft arm: three curvatures, a tendon, its weight and a tip load."""
+    thirds = {f"k{i}": Curvature(1.0, i / 3, (i + 1) / 3) for i in range(3)}
+    return Rod(
+        ends=("clamped", "free"),
+        actuators={**thirds, "T": Tendon(0.05)},
+        loads={"q": LineLoad(), "P": PointForce(1.0)},
+    )
+
+
+@pytest.mark.parametrize("lanes", [100, 4096])
+@pytest.mark.parametrize("make", [rod_with_every_option, rod_with_a_tendon], ids=["all", "arm"])
+def bench_newton_step_of_a_general_rod(benchmark, make, lanes):
+    structure = make()
+    generator = np.random.default_rng(0)
+    p = np.tile([parameter.default or 0.3 for parameter in structure.parameters], (lanes, 1))
+    z = 0.3 * structure.sample(p, generator)
     dp, row, one = np.ones_like(p), generator.normal(size=z.shape), np.ones(lanes)
     step = benchmark.pedantic(
         structure.advance, (z, p, dp, row, one, one), rounds=40, warmup_rounds=2

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from equimorph.structures.rod.mechanics.loads import load_shape
 
 from equimorph.errors import InputError
 from equimorph.structures import Rod
 from equimorph.structures.rod.discretisation import mesh_with_kinks, reference_element
+from equimorph.structures.rod.loads import load_shape
 
 DEGREES = [3, 4, 6, 8, 12, 16]
 

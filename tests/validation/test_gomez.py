@@ -29,3 +29,13 @@ def test_shallow_limit_of_the_snapping_angle():
     assert values[-1] == pytest.approx(1.7818, abs=5e-5)
     gaps = np.diff(values)
     assert gaps[0] / gaps[1] == pytest.approx(10.0, rel=0.05)
+
+
+def test_the_snapping_angle_as_an_actuator_of_its_own():
+    """One end turned as the only coordinate of a general rod: the same fold."""
+    strip = em.Rod(coordinates={"alpha": {"theta_A": 1.0}, "beta": {"theta_B": 1.0}})
+    rest = strip.natural_state(alpha=0.1, beta=-0.1, nu=0.9)
+    level = em.lift(rest, {"alpha": 0.0, "beta": 0.0}).end.state
+    end = em.lift(level, {"alpha": -0.7}).end
+    assert end.kind == "fold"
+    assert -end.state["alpha"] == pytest.approx(0.56485, abs=5e-6)

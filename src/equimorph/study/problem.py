@@ -7,7 +7,15 @@ are wanted, and routes between states. Types are strict and unknown keys are ref
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from equimorph.errors import InputError
@@ -55,21 +63,59 @@ def _comparison(text: str) -> str:
     return text
 
 
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) <= LARGEST
+
+
+def _is_table(value: Any) -> bool:
+    """Whether it is a table of at least two rows of two numbers."""
+    rows = value if isinstance(value, list) else []
+    return len(rows) >= 2 and all(
+        isinstance(row, list) and len(row) == 2 and all(map(_is_number, row)) for row in rows
+    )
+
+
 def _load(shape: Any) -> Any:
     """Check a load shape; one requirement for all forms makes one readable line."""
-    rows = shape if isinstance(shape, list) else []
-    table = len(rows) >= 2 and all(
-        isinstance(row, list)
-        and len(row) == 2
-        and all(type(x) in (int, float) and abs(x) <= LARGEST for x in row)
-        for row in rows
-    )
-    if shape not in ("uniform", "left-half") and not table:
+    if shape not in ("uniform", "left-half") and not _is_table(shape):
         raise _requirement(
             'be "uniform", "left-half" or a table [[s, Q], ...] of finite numbers '
             f"up to {LARGEST:g}"
         )
     return shape
+
+
+def _profile(shape: Any) -> Any:
+    if not (_is_number(shape) or _is_table(shape)):
+        raise _requirement(f"be a number or a table [[s, f], ...] of numbers up to {LARGEST:g}")
+    return shape
+
+
+def _end(given: Any) -> Any:
+    table = isinstance(given, dict) and set(given) <= {"angle", "x", "y"}
+    parts = given.values() if table else [given]
+    if not all(isinstance(part, str) or (table and _is_number(part)) for part in parts):
+        raise _requirement(
+            'be a word like "clamped", or a table like { angle = "free", x = "held", y = 2.0 }'
+        )
+    return given
+
+
+def _terms(given: Any) -> Any:
+    """Check that terms are data of numbers, texts and lists; the rod itself knows their keys."""
+
+    def plain(value: Any) -> bool:
+        if isinstance(value, list):
+            return all(map(plain, value))
+        return isinstance(value, str) or _is_number(value)
+
+    for term in given if isinstance(given, list) else [given]:
+        if not (isinstance(term, dict) and all(map(plain, term.values()))):
+            raise _requirement(
+                'be a table like { term = "point force", s = 0.5 }, or a list of such tables, of '
+                f"texts and numbers up to {LARGEST:g}"
+            )
+    return given
 
 
 def _formula(given: Any) -> Any:
@@ -91,14 +137,37 @@ class _Section(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+Profile = Annotated[Any, AfterValidator(_profile)]
+Term = Annotated[Any, AfterValidator(_terms)]
+EndOfRod = Annotated[Any, AfterValidator(_end)]
+
+
 class RodSection(_Section):
-    """A curved rod between two rotary actuators."""
+    """A planar rod: by default a curved one between two rotary actuators; see `equimorph.Rod`."""
 
     kind: Literal["rod"]
-    load: Annotated[Any, AfterValidator(_load)] = "uniform"
-    span: float | None = Field(default=None, gt=0, lt=1)
+    load: Annotated[Any, AfterValidator(_load)] | None = None
+    ends: Annotated[list[EndOfRod], Field(min_length=2, max_length=2)] | None = None
+    stiffness: Profile | None = None
+    curvature: Profile | None = None
+    axial: Profile | None = None
+    loads: dict[str, Term] | None = None
+    actuators: dict[str, Term] | None = None
+    coordinates: dict[str, dict[str, Number]] | None = None
+    rise: Number | None = None
+    EI: Number | None = None
+    length: Number | None = None
+    span: float | None = Field(default=None, gt=0, le=LARGEST)
     elements: int | None = Field(default=None, ge=2, le=1000)
     degree: int | None = Field(default=None, ge=3, le=16)
+
+    @field_validator("span")
+    @classmethod
+    def _within_reach(cls, span: float | None, info: Any) -> float | None:
+        longest = info.data.get("length") or 1.0
+        if span is not None and info.data.get("axial") is None and not span < longest:
+            raise _requirement(f"be less than {longest:g}")
+        return span
 
 
 class SpringSection(_Section):

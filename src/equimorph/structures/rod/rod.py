@@ -101,7 +101,7 @@ class Rod(Measured):
         The same for the role "actuator"; `Curvature` patterns and `Tendon`s, above all.
     coordinates
         Named linear coordinates in place of parameters: ``{"turn": {"theta_A": 1, "theta_B": -1}}``
-        means θ_A = turn and θ_B = −turn. By default Theta and Delta where both end angles are held,
+        means θ_A = turn and θ_B = −turn. By default Theta and Delta where both end angles are held;
         ``{}`` leaves theta_A and theta_B.
     rise
         Default of the parameter rise, of end B above A where both are supported.

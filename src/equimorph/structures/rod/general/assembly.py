@@ -26,7 +26,7 @@ TURNING = {
     "Theta": {"theta_A": 1.0, "theta_B": -1.0},
     "Delta": {"theta_A": 1.0, "theta_B": 1.0},
 }
-"""Coordinates of the end angles of a rod that is held, or sprung, at both."""
+"""Coordinates of the end angles of a rod that is held at both."""
 RESERVED = ("theta_A", "theta_B", "nu", "rise")
 CLOSEST = 1e-6
 """Shortest piece of a rod between kinks."""
@@ -133,7 +133,7 @@ class Description:
 
     @cached_property
     def _coordinates(self) -> dict[str, dict[str, float]]:
-        both = {"theta_A", "theta_B"} <= set(self._raw)
+        both = all(support.angle == "held" for support in self.supports)
         given = self.coordinates
         if given is None:
             return TURNING if both else {}
@@ -180,7 +180,9 @@ class Description:
         first = next(iter(weights))
         role: Role = "load" if first in self.loads else "actuator"
         quantity = quantities.pop()
-        default = None if self.coordinates is None and name == "Theta" else 0.0
+        # between held ends a straight rod needs a turn to know its upright side
+        needed = self.coordinates is None and name == "Theta" and "nu" in self._raw
+        default = None if needed else 0.0
         units = self.units
         return Parameter(name, units.label(quantity), units.value(quantity), role, default)
 
@@ -246,6 +248,8 @@ class Description:
                 data[name] = value.tolist() if isinstance(value, np.ndarray) else value
         if self.coordinates is not None:
             data["coordinates"] = self._coordinates
+        if "nu" in self._raw:
+            data["span"] = float(self.span)
         if self.rise != 0.0:
             data["rise"] = float(self.rise)
         if not self.units.plain:

@@ -140,7 +140,7 @@ class GeneralMechanics(Mechanics):
         out -= np.einsum("lj,jk->lk", y, model.slope[:, [0, -1]])
         out[:, 0] += np.einsum("li,i->l", theta[:, : d + 1], model.stiffness[0, 0])
         out[:, 1] += np.einsum("li,i->l", theta[:, -d - 1 :], model.stiffness[-1, -1])
-        return out
+        return np.asarray(out)
 
     def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
         """Force of the support at A: multipliers, or what balances the loads."""

@@ -102,11 +102,13 @@ def _orientation(
         return np.asarray(value["theta_A"])
     if "theta_B" in value and "theta_A" not in value:
         return np.asarray(value["theta_B"] - turning)
+    length = np.maximum(np.hypot(*chord.T), 1e-12)
     if "nu" in value and "rise" in value:
         wanted = np.arctan2(value["rise"], value["nu"])
-        return np.asarray(wanted - np.arctan2(chord[:, 1], chord[:, 0]))
-    if "theta_A" in value:
+    elif "theta_A" in value:
         return np.asarray(0.5 * (value["theta_A"] + value["theta_B"] - turning))
-    if "nu" in value:  # ends slide in y: nothing but x says where they are
-        return np.asarray(-np.arctan2(chord[:, 1], chord[:, 0]))
-    return np.asarray(0.5 * np.pi - np.arctan2(chord[:, 1], chord[:, 0]))
+    elif "nu" in value:
+        wanted = np.arccos(np.clip(value["nu"] / length, -1.0, 1.0))
+    else:
+        wanted = np.arcsin(np.clip(value["rise"] / length, -1.0, 1.0))
+    return np.asarray(wanted - np.arctan2(chord[:, 1], chord[:, 0]))

@@ -318,7 +318,12 @@ def term(data: Any, name: str) -> Term:
         raise InputError(
             f"`{name}` must be a term ({', '.join(TERMS)}), one or a list; got {data!r}."
         )
+    kind = TERMS[word]
+    keys = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # as above
     try:
-        return TERMS[word](**content)
-    except TypeError as error:
-        raise InputError(f"`{name}` must have the data of a {word}; got {error}.") from None
+        return kind(**content)
+    except TypeError:
+        raise InputError(
+            f"`{name}` must have the data of a {word} ({', '.join(keys)}); got "
+            f"{', '.join(content) or 'none'}."
+        ) from None

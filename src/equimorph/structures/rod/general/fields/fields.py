@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
 from equimorph.linalg.lanes import over_lanes
@@ -22,6 +22,8 @@ Angles = Float[np.ndarray, "lanes nodes"]
 Scalars = Float[np.ndarray, "lanes scalars"]
 Values = Float[np.ndarray, " lanes"]
 
+NEAR = 0.97
+"""Share of the largest nodal curvature from which on an element may hold the largest one."""
 REFINING = 4
 """Newton steps from the largest nodal curvature to the extremum of its polynomial."""
 
@@ -56,8 +58,9 @@ class Fields:
             fine.along,
             fine.across,
             fine.bending,
-            fine.rigidity,
+            1.0 / fine.rigidity,
             fine.softness,
+            *(np.flatnonzero(a.any(axis=(1, 2))) for a in (fine.across, fine.along, fine.bending)),
             spread @ coarse.to_legendre,
             self.reference.integral,
             model.mesh.lengths,
@@ -68,9 +71,11 @@ class Fields:
     ) -> Float[np.ndarray, "lanes elements 5 fine"]:
         """θ, κ, x, y and the moment at the nodes of the finer rule in every element."""
         shape = (len(angles), self.model.mesh.elements, 5, len(self.reference.nodes))
-        out = np.empty(shape)
+        flat = np.empty((len(angles), int(np.prod(shape[1:]))))
         if len(angles):
-            over_lanes(fields_lanes, self._shared, [np.ascontiguousarray(angles), scalars], [out])
+            given = [np.ascontiguousarray(angles), np.ascontiguousarray(scalars)]
+            over_lanes(fields_lanes, self._shared, given, [flat])
+        out = flat.reshape(shape)
         for axis, row in enumerate((X, Y)):
             place = np.einsum("j,lj->l", self.model.origin[axis], scalars)
             if not self.model.from_start[axis]:
@@ -91,36 +96,35 @@ class Fields:
     def largest_curvature(self, angles: Angles, scalars: Scalars) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs.
 
-        In every element the largest nodal value, improved by Newton on its interpolant.
+        The largest nodal values, improved by Newton on the interpolants of their elements.
         """
         kappa = self.everywhere(angles, scalars)[:, :, KAPPA]
-        nodes = self.reference.nodes
-        top = np.abs(kappa).argmax(axis=2)
-        series = np.einsum("lei,ki->kle", kappa, self.reference.to_legendre)
+        sizes = np.abs(kappa)
+        nodal = sizes.max(axis=2)
+        lane, element = np.nonzero(~(nodal < NEAR * nodal.max(axis=1, keepdims=True)))
+        top = sizes[lane, element].argmax(axis=1)
+        x, value = self._extrema(kappa[lane, element], top)
+        order = np.lexsort((value, lane))
+        last = order[np.searchsorted(lane[order], np.arange(len(kappa)), side="right") - 1]
+        mesh = self.model.mesh
+        place = mesh.breaks[element] + mesh.lengths[element] * 0.5 * (x + 1.0)
+        return value[last], place[last]
+
+    def _extrema(
+        self, kappa: Float[np.ndarray, "some fine"], top: Int[np.ndarray, " some"]
+    ) -> tuple[Float[np.ndarray, " some"], Float[np.ndarray, " some"]]:
+        """Place in [−1, 1] and size of the extrema beside the nodes `top`."""
+        nodes = 2.0 * self.reference.nodes - 1.0
+        series = self.reference.to_legendre @ kappa.T
         slope, bend = legendre.legder(series, 1), legendre.legder(series, 2)
-        x = 2.0 * nodes[top] - 1.0
-        low, high = (2.0 * nodes[np.clip(top + k, 0, len(nodes) - 1)] - 1.0 for k in (-1, 1))
+        x = nodes[top]
+        low, high = (nodes[np.clip(top + k, 0, len(nodes) - 1)] for k in (-1, 1))
         for _ in range(REFINING):
-            turn, rate = (_evaluated(x, part) for part in (slope, bend))
+            turn, rate = (legendre.legval(x, part, tensor=False) for part in (slope, bend))
             with np.errstate(divide="ignore", invalid="ignore"):
                 moved = x - turn / rate
             x = np.where((moved >= low) & (moved <= high), moved, x)
-        best = np.abs(
-            np.stack([_evaluated(x, series), np.take_along_axis(kappa, top[..., None], 2)[..., 0]])
-        )
-        places = np.stack([x, 2.0 * nodes[top] - 1.0])
-        which = best.argmax(axis=0)[None]
-        value = np.take_along_axis(best, which, 0)[0]
-        place = np.take_along_axis(places, which, 0)[0]
-        element = value.argmax(axis=1)
-        lanes = np.arange(len(value))
-        share = 0.5 * (place[lanes, element] + 1.0)
-        mesh = self.model.mesh
-        return value[lanes, element], mesh.breaks[element] + mesh.lengths[element] * share
-
-
-def _evaluated(
-    x: Float[np.ndarray, "lanes elements"], series: Float[np.ndarray, "terms lanes elements"]
-) -> Float[np.ndarray, "lanes elements"]:
-    """Legendre series at a point of its own for each lane and element."""
-    return np.asarray(legendre.legval(x, series, tensor=False))
+        found = np.abs(legendre.legval(x, series, tensor=False))
+        at_node = np.abs(np.take_along_axis(kappa, top[:, None], 1)[:, 0])
+        better = found >= at_node
+        return np.where(better, x, nodes[top]), np.where(better, found, at_node)

@@ -1,4 +1,4 @@
-"""Compiled kernel of the fields of general rods, one lane at a time; at least eight lanes.
+"""Compiled kernel of the fields of general rods, eight lanes at a time; at least eight lanes.
 
 In an element, from its left end, where θ and the moment M are superconvergent,
 ``M' = (1 − N/EA) N'`` with N as in `model.RodModel`, ``κ = (M + bending)/rigidity``, ``θ' = κ``.
@@ -9,9 +9,20 @@ length.
 import numpy as np
 from numba import njit
 
-from equimorph.linalg.kernels import FLAGS, INNER
+from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes
+from equimorph.linalg.simd import (
+    LANES,
+    absolute,
+    lanes_less,
+    load,
+    sincos,
+    spread,
+    store,
+    where_less,
+    work_rows,
+)
 
-MOST = 60
+MOST = np.int64(60)
 """Iterations after which a field is taken as it is: a state that the elements do not resolve."""
 SETTLED = 1e-14
 """Change of θ, relative to 1 + |θ|, that is round-off."""
@@ -20,86 +31,121 @@ THETA, KAPPA, X, Y, MOMENT = range(5)
 
 
 @njit(**INNER)
-def _combine(rows, scalars, e, out):
-    """Combine the rows of an element with the scalars."""
-    out[:] = 0.0
-    for j in range(len(scalars)):
-        if scalars[j] != 0.0:
-            for i in range(len(out)):
-                out[i] += scalars[j] * rows[j, e, i]
+def _combined(table, rows, e, i, scalars):
+    """Row entries of an element's node times the scalars; other rows than `rows` are zero."""
+    total = spread(0.0)
+    for r in range(len(rows)):
+        total = total + spread(table[rows[r], e, i]) * load(scalars, rows[r])
+    return total
 
 
 @njit(**INNER)
-def _integrate(matrix, start, length, values, out):
-    """Integral from the left end, plus a start value."""
-    for i in range(len(out)):
-        total = 0.0
-        for j in range(len(values)):
-            total += matrix[i, j] * values[j]
-        out[i] = start + length * total
+def _integrate(matrix, start, length, values, out, row):
+    """Integral from the left end, plus a start value, into rows from `row` on."""
+    count = len(matrix)
+    for i in range(count):
+        total = spread(0.0)
+        for j in range(count):
+            total = total + spread(matrix[i, j]) * load(values, j)
+        store(out, row + i, start + spread(length) * total)
 
 
 @njit(**INNER)
-def _left_moment(stiffness, slope, weight, softness, along, across, e, angles, scalars):
-    """Moment at the left end of an element, by its balance."""
+def _left_moment(stiffness, slope, weight, softness, along, across, rows, e, angles, scalars):
+    """Moment at the left end of an element, by its balance; rows: of across, along, slope."""
     order = stiffness.shape[1]
-    moment, a, b = 0.0, 0.0, 0.0
-    for j in range(len(scalars)):
-        moment += scalars[j] * slope[j, e, 0]
-        a += scalars[j] * across[j, e, 0]
-        b += scalars[j] * along[j, e, 0]
+    base = e * (order - 1)
+    moment = _combined(slope, rows[2], e, 0, scalars)
     for i in range(order):
-        moment -= stiffness[e, 0, i] * angles[e * (order - 1) + i]
-    s, c = np.sin(angles[e * (order - 1)]), np.cos(angles[e * (order - 1)])
-    normal = a * s + b * c
-    return moment - weight[e, 0] * (1.0 - softness[e, 0] * normal) * (a * c - b * s)
+        moment = moment - spread(stiffness[e, 0, i]) * load(angles, base + i)
+    s, c = sincos(load(angles, base))
+    a, b = _combined(across, rows[0], e, 0, scalars), _combined(along, rows[1], e, 0, scalars)
+    stretch = spread(1.0) - spread(softness[e, 0]) * (a * s + b * c)
+    return moment - spread(weight[e, 0]) * stretch * (a * c - b * s)
+
+
+@njit(**INNER)
+def _iterate(integral, length, left, start, pull, give, softness, e, theta, new, out):
+    """One iteration; whether some lane moved.
+
+    pull: rows of a, b and bending; give: one over rigidity; new: rate, then stretched cosine and
+    sine; out: κ and the moment. Lanes that have settled keep their θ, so that what happens to a
+    lane never depends on those beside it.
+    """
+    fine = len(integral)
+    for i in range(fine):
+        s, c = sincos(load(theta, i))
+        a, b = load(pull, i), load(pull, fine + i)
+        stretch = spread(1.0) - spread(softness[e, i]) * (a * s + b * c)
+        store(new, i, stretch * (a * c - b * s))
+        store(new, fine + i, stretch * c)
+        store(new, 2 * fine + i, stretch * s)
+    _integrate(integral, start, length, new, out, MOMENT * fine)
+    for i in range(fine):
+        moment = load(out, MOMENT * fine + i) + load(pull, 2 * fine + i)
+        store(out, KAPPA * fine + i, moment * spread(give[e, i]))
+        store(new, i, load(out, KAPPA * fine + i))
+    _integrate(integral, left, length, new, out, THETA * fine)
+    worst = spread(0.0)
+    for i in range(fine):
+        turned = load(out, THETA * fine + i)
+        change = absolute(turned - load(theta, i)) / (spread(1.0) + absolute(turned))
+        worst = where_less(worst, change, change, worst)
+    settled = spread(SETTLED)
+    for i in range(fine):
+        turned = load(out, THETA * fine + i)
+        store(theta, i, where_less(settled, worst, turned, load(theta, i)))
+    return lanes_less(settled, worst) != 0
 
 
 @njit(**FLAGS)
 def fields_lanes(
     stiffness, slope, weight, softness, along, across, fine_along, fine_across, fine_bending,
-    rigidity, fine_softness, spread, integral, lengths, angles, scalars, out,
+    give, fine_softness, across_rows, along_rows, bending_rows, refine, integral, lengths,
+    angles, scalars, out,
 ):  # fmt: skip
-    """θ, κ, x, y and M of every lane at the finer nodes: out (lanes, elements, 5, fine).
+    """θ, κ, x, y and M of every lane at the finer nodes: out (lanes, elements · 5 · fine).
 
-    angles (lanes, nodes); scalars (lanes, scalars); spread (fine, order) interpolates from the
-    element's nodes; x and y begin at 0.
+    angles (lanes, nodes); scalars (lanes, scalars); refine (fine, order) interpolates from the
+    element's nodes; give: one over rigidity; x and y begin at 0.
     """
     elements, order, fine = stiffness.shape[0], stiffness.shape[1], len(integral)
-    a, b, g = np.empty(fine), np.empty(fine), np.empty(fine)
-    theta, rate, kappa, new = np.empty(fine), np.empty(fine), np.empty(fine), np.empty(fine)
-    moment, along_x, along_y = np.empty(fine), np.empty(fine), np.empty(fine)
-    for lane in range(len(angles)):
-        x, y = 0.0, 0.0
-        mine, values = angles[lane], scalars[lane]
+    nodes, count = angles.shape[1], scalars.shape[1]
+    size = elements * 5 * fine
+    nodal, y = work_rows(nodes), work_rows(count)
+    pull, theta, new = work_rows(3 * fine), work_rows(fine), work_rows(3 * fine)
+    local, whole = work_rows(5 * fine), work_rows(size)
+    rows = (across_rows, along_rows, bending_rows)
+    for block in range(0, angles.shape[0], LANES):
+        start = min(block, angles.shape[0] - LANES)
+        read_lanes(angles, start * nodes, nodes, nodes, nodal, 0, 1)
+        read_lanes(scalars, start * count, count, count, y, 0, 1)
+        x_left, y_left = spread(0.0), spread(0.0)
         for e in range(elements):
-            base, h = e * (order - 1), lengths[e]
-            start = _left_moment(stiffness, slope, weight, softness, along, across, e, mine, values)
-            _combine(fine_across, values, e, a)
-            _combine(fine_along, values, e, b)
-            _combine(fine_bending, values, e, g)
+            base, length = e * (order - 1), lengths[e]
+            moment = _left_moment(
+                stiffness, slope, weight, softness, along, across, rows, e, nodal, y
+            )
             for i in range(fine):
-                theta[i] = 0.0
+                store(pull, i, _combined(fine_across, across_rows, e, i, y))
+                store(pull, fine + i, _combined(fine_along, along_rows, e, i, y))
+                store(pull, 2 * fine + i, _combined(fine_bending, bending_rows, e, i, y))
+                angle = spread(0.0)
                 for j in range(order):
-                    theta[i] += spread[i, j] * mine[base + j]
-            for _ in range(MOST):
-                for i in range(fine):
-                    s, c = np.sin(theta[i]), np.cos(theta[i])
-                    stretch = 1.0 - fine_softness[e, i] * (a[i] * s + b[i] * c)
-                    rate[i] = stretch * (a[i] * c - b[i] * s)
-                    along_x[i], along_y[i] = stretch * c, stretch * s
-                _integrate(integral, start, h, rate, moment)
-                for i in range(fine):
-                    kappa[i] = (moment[i] + g[i]) / rigidity[e, i]
-                _integrate(integral, mine[base], h, kappa, new)
-                change = 0.0
-                for i in range(fine):
-                    change = max(change, abs(new[i] - theta[i]) / (1.0 + abs(new[i])))
-                    theta[i] = new[i]
-                if not change > SETTLED:
-                    break
-            out[lane, e, THETA], out[lane, e, KAPPA] = theta, kappa
-            out[lane, e, MOMENT] = moment
-            _integrate(integral, x, h, along_x, out[lane, e, X])
-            _integrate(integral, y, h, along_y, out[lane, e, Y])
-            x, y = out[lane, e, X, fine - 1], out[lane, e, Y, fine - 1]
+                    angle = angle + spread(refine[i, j]) * load(nodal, base + j)
+                store(theta, i, angle)
+            left, steps = load(nodal, base), 0
+            while steps < MOST and _iterate(
+                integral, length, left, moment, pull, give, fine_softness, e, theta, new, local
+            ):
+                steps += 1
+            for i in range(fine):  # the sums of the last iteration, as they belong to its κ
+                store(new, i, load(new, fine + i))
+            _integrate(integral, x_left, length, new, local, X * fine)
+            for i in range(fine):
+                store(new, i, load(new, 2 * fine + i))
+            _integrate(integral, y_left, length, new, local, Y * fine)
+            x_left, y_left = load(local, X * fine + fine - 1), load(local, Y * fine + fine - 1)
+            for i in range(5 * fine):
+                store(whole, e * 5 * fine + i, load(local, i))
+        write_lanes(whole, 0, 1, out, start * size, size, size)
