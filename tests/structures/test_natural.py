@@ -5,7 +5,7 @@ import pytest
 
 from equimorph.errors import InputError
 from equimorph.structures import Rod, States
-from equimorph.structures.rod import natural
+from equimorph.structures.rod import continuation, natural
 from equimorph.structures.rod.natural import Outcome, natural_arch
 
 SPAN = float(np.sin(1.0))
@@ -19,7 +19,7 @@ def settings(thetas, deltas, nu=SPAN):
 def test_natural_states_are_stable_unloaded_equilibria_over_the_box():
     """Θ from 0.2 to 2.5, Δ from −2 to 2: every state found; none only where the free rod folds."""
     rod, p = Rod(), settings(np.linspace(0.2, 2.5, 12), np.linspace(-2, 2, 9))
-    found = natural_arch(rod, p)
+    found = natural_arch(rod.mechanics, p)
     assert set(found.outcome) == {Outcome.FOUND, Outcome.FREE_FOLD}
     there = found.outcome == Outcome.FOUND
     states = States(rod, found.z[there], p[there])
@@ -33,9 +33,9 @@ def test_natural_states_are_stable_unloaded_equilibria_over_the_box():
 def test_which_states_exist_depends_neither_on_mesh_nor_on_steps(monkeypatch):
     """Finer elements and steps a third as long; fold scales within 1e-3, the smallest step's."""
     p = settings(np.linspace(1.6, 2.5, 7), np.linspace(1.2, 2.0, 5))
-    coarse = natural_arch(Rod(), p)
-    monkeypatch.setattr(natural, "BEND", 0.1)
-    fine = natural_arch(Rod(elements=12, degree=8), p)
+    coarse = natural_arch(Rod().mechanics, p)
+    monkeypatch.setattr(continuation, "BEND", 0.1)
+    fine = natural_arch(Rod(elements=12, degree=8).mechanics, p)
     np.testing.assert_array_equal(coarse.outcome, fine.outcome)
     np.testing.assert_allclose(coarse.scale, fine.scale, atol=1e-3)
     there = coarse.outcome == Outcome.FOUND
@@ -49,7 +49,7 @@ def test_the_free_rod_really_folds_where_it_is_said_to():
     0.92 by a parabola, within 0.003.
     """
     rod = Rod(elements=12, degree=8)
-    scale = natural_arch(rod, settings([2.0], [2.0])).scale[0]
+    scale = natural_arch(rod.mechanics, settings([2.0], [2.0])).scale[0]
     row = np.zeros((1, rod.size))
     row[0, -2] = 1.0
     at = np.array([0.90, 0.91, 0.92])
@@ -70,10 +70,10 @@ def test_the_free_rod_really_folds_where_it_is_said_to():
 
 def _free_state(rod, p):
     """Free-span state at the end angles of p, by the package's own continuation."""
-    part = natural._free_part(p)
+    part = natural.free_part(p)
     x = np.zeros((1, rod.size + 1))
     x[0, -1] = 1.0
-    return np.ascontiguousarray(natural._follow(rod, part, x)[1][:, :-1])
+    return np.ascontiguousarray(continuation.follow(rod.mechanics, part, x)[1][:, :-1])
 
 
 @pytest.mark.parametrize(
@@ -99,9 +99,9 @@ def test_a_nearly_straight_rod_has_its_natural_state():
 def test_states_of_a_batch_do_not_depend_on_the_batch(monkeypatch):
     """Settings continued alone and together agree to the accuracy of Newton's last step."""
     rod, p = Rod(), settings(np.linspace(0.3, 2.4, 9), np.linspace(-1.9, 1.9, 7))
-    together = natural_arch(rod, p)
+    together = natural_arch(rod.mechanics, p)
     monkeypatch.setattr(natural, "BLOCK", 3)
-    apart = natural_arch(rod, p)
+    apart = natural_arch(rod.mechanics, p)
     np.testing.assert_array_equal(together.outcome, apart.outcome)
     np.testing.assert_allclose(together.z, apart.z, atol=1e-9)
 

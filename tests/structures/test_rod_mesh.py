@@ -100,7 +100,7 @@ def test_a_callable_with_declared_kinks_is_integrated_exactly():
 
 def test_built_in_shapes_integrate_to_one():
     for name in ("uniform", "left-half"):
-        assert Rod(name).rho[-1, -1] == pytest.approx(1.0, rel=1e-14)
+        assert Rod(name).mechanics.rho[-1, -1] == pytest.approx(1.0, rel=1e-14)
 
 
 def test_a_table_written_as_the_uniform_load_is_the_uniform_load():

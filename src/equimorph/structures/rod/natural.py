@@ -63,9 +63,7 @@ def _continue(rod: Mechanics, p: Parameters, lanes: Int[np.ndarray, " some"], ou
     stop = p[lanes] * [1.0, 1.0, 0.0, 1.0]
     x = np.zeros((len(lanes), rod.size + 1))
     x[:, -1] = 1.0
-    still = np.zeros(len(lanes), bool)
-    turn = Part(stop * [0.0, 0.0, 0.0, 1.0], stop, free=True, sharpening=still)
-    out.scale[lanes], x = follow(rod, turn, x)
+    out.scale[lanes], x = follow(rod, free_part(stop), x)
     out.span[lanes], free = x[:, -1], out.scale[lanes] >= 1.0
     out.outcome[lanes[~free]] = Outcome.FREE_FOLD
     lanes, x, stop = lanes[free], x[free], stop[free]
@@ -81,3 +79,9 @@ def _continue(rod: Mechanics, p: Parameters, lanes: Int[np.ndarray, " some"], ou
     reached = np.flatnonzero(there)
     exact = newton(rod, last, reached, np.ones(len(reached)), x[reached])[0].x[:, :-1]
     out.z[lanes[reached]] = exact
+
+
+def free_part(stop: Parameters) -> Part:
+    """From the straight rod to the end angles, with the span free."""
+    still = np.zeros(len(stop), bool)
+    return Part(stop * [0.0, 0.0, 0.0, 1.0], stop, free=True, sharpening=still)

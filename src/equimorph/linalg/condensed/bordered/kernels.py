@@ -55,7 +55,7 @@ def solve_condensed(
     m, k, r = border.shape[1], columns.shape[1], rhs.shape[1]
     first, last = min(ends[0], 1), nodes - 1 - min(elements - ends[1], 1)
     n, size, width = last - first + 1, m + k, m + k + r
-    tiles = (TIES + width + k + TILE - 1) // TILE
+    tiles = tiles_of(m, k, r)
     lower, vertices, work, extremes = work_arrays(elements, inner, tiles)
     block, left = work_rows(nodes), work_rows(size * nodes)
     products, small = work_rows(size * tiles * TILE), work_rows(size * width)
@@ -65,28 +65,24 @@ def solve_condensed(
         read_lanes(diagonal, start * nodes, nodes, nodes, block, 0, 1)
         for c in range(m):
             position = (start * m + c) * nodes
-            read_lanes(border, position, m * nodes, nodes, work, _row(c, 0, nodes), TILE)
+            read_lanes(border, position, m * nodes, nodes, work, row_of_column(c, 0, nodes), TILE)
         for c in range(k):
             position = (start * k + c) * (n + m)
-            at = _row(m + c, first, nodes)
+            at = row_of_column(m + c, first, nodes)
             read_lanes(columns, position, k * (n + m), n, work, at, TILE)
-            at = _row(width + c, first, nodes)
+            at = row_of_column(width + c, first, nodes)
             read_lanes(rows, position, k * (n + m), n, work, at, TILE)
         for c in range(r):
-            position, at = (start * r + c) * (n + m + k), _row(m + k + c, first, nodes)
+            position, at = (start * r + c) * (n + m + k), row_of_column(m + k + c, first, nodes)
             read_lanes(rhs, position, r * (n + m + k), n, work, at, TILE)
-        start_block(block, vertices, extremes)
-        for group in range((elements + GROUP - 1) // GROUP):
-            reduce_group(stiffness, group, block, ends, tiles, lower, vertices, work, extremes)
-        for a in range(size):
-            column = _row(a if a < m else r + k + a, 0, nodes)
-            _weigh(lower, vertices, inner, work, column, left, a * nodes, last)
-            _products(left, a * nodes, work, nodes, tiles, first, last, products, a)
+        reduce_block(
+            stiffness, ends, block, m, k, r, lower, vertices, work, extremes, left, products
+        )
         for lane in range(LANES):
             at = start + lane
             _set_small(columns[at], rows[at], corner[at], rhs[at], trailing[at], lane, small)
-        _subtract_products(products, tiles, size, width, small)
-        _count_border(small, m, width, square, extremes)
+        subtract_products(products, tiles, size, width, small)
+        count_border(small, m, width, square, extremes)
         for lane in range(LANES):
             negative[start + lane] = np.int64(extremes[0, lane])
             ratio[start + lane] = pivot_ratio(extremes, lane)
@@ -94,13 +90,9 @@ def solve_condensed(
             solve_lanes(small, size, width)
         for c in range(0, r, 2):
             other = min(c + 1, r - 1)
-            for e in range(elements, -1, -1):
-                node = e * (inner + 1)
-                stop = min(node + inner, nodes - 1) + 1
-                _combine(work, nodes, node, stop, size, width, c, other, small, solution)
-                restore_element(
-                    e, elements, inner, ends, lower, vertices, work, solution, START, SIDES
-                )
+            restore_pair(
+                stiffness, ends, size, width, c, other, lower, vertices, work, small, solution
+            )
             for side, column in enumerate((c, other)):
                 position = (start * r + column) * (n + m + k)
                 lane_step = r * (n + m + k)
@@ -111,7 +103,40 @@ def solve_condensed(
 
 
 @njit(**INNER)
-def _row(c, node, nodes):
+def reduce_block(stiffness, ends, block, m, k, r, lower, vertices, work, extremes, left, products):
+    """Factor H of eight lanes, reduce its columns, and multiply those of the border with all."""
+    elements, inner, nodes = stiffness.shape[0], stiffness.shape[1] - 2, block.shape[0]
+    first, last = min(ends[0], 1), nodes - 1 - min(elements - ends[1], 1)
+    tiles = tiles_of(m, k, r)
+    start_block(block, vertices, extremes)
+    for group in range((elements + GROUP - 1) // GROUP):
+        reduce_group(stiffness, group, block, ends, tiles, lower, vertices, work, extremes)
+    for a in range(m + k):
+        column = row_of_column(a if a < m else r + k + a, 0, nodes)
+        _weigh(lower, vertices, inner, work, column, left, a * nodes, last)
+        _products(left, a * nodes, work, nodes, tiles, first, last, products, a)
+
+
+@njit(**INNER)
+def tiles_of(m, k, r):
+    """Tiles that hold ties, m constraints, k columns and rows, and r right-hand sides."""
+    return (TIES + m + 2 * k + r + TILE - 1) // TILE
+
+
+@njit(**INNER)
+def restore_pair(stiffness, ends, size, width, c, other, lower, vertices, work, small, solution):
+    """Substitute two right-hand sides back, side by side, with the border's part solved."""
+    elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
+    nodes = elements * (inner + 1) + 1
+    for e in range(elements, -1, -1):
+        node = e * (inner + 1)
+        stop = min(node + inner, nodes - 1) + 1
+        _combine(work, nodes, node, stop, size, width, c, other, small, solution)
+        restore_element(e, elements, inner, ends, lower, vertices, work, solution, START, SIDES)
+
+
+@njit(**INNER)
+def row_of_column(c, node, nodes):
     """Row of column c (ties not counted) at a node."""
     slot = TIES + c
     return ((slot // TILE) * nodes + node) * TILE + slot % TILE
@@ -168,7 +193,7 @@ def _set_small(columns, rows, corner, rhs, trailing, lane, small):
 
 
 @njit(**INNER)
-def _subtract_products(products, tiles, size, width, small):
+def subtract_products(products, tiles, size, width, small):
     """Complete the Schur complement of H and its right-hand sides."""
     for a in range(size):
         for b in range(width):
@@ -177,7 +202,7 @@ def _subtract_products(products, tiles, size, width, small):
 
 
 @njit(**INNER)
-def _count_border(small, m, width, square, extremes):
+def count_border(small, m, width, square, extremes):
     """Add the negative eigenvalues of the first m rows and columns to the count of pivots."""
     if m == 2:
         store(extremes, 0, load(extremes, 0) + negative_of_two(small, 0, width))
@@ -193,10 +218,10 @@ def _count_border(small, m, width, square, extremes):
 def _combine(work, nodes, start, stop, size, width, c, other, small, solution):
     """Two right-hand sides less the border's share, side by side: f − [B C] y, reduced."""
     for i in range(start, stop):
-        first = load(work, _row(size + c, i, nodes))
-        second = load(work, _row(size + other, i, nodes))
+        first = load(work, row_of_column(size + c, i, nodes))
+        second = load(work, row_of_column(size + other, i, nodes))
         for b in range(size):
-            column = load(work, _row(b, i, nodes))
+            column = load(work, row_of_column(b, i, nodes))
             first = first - column * load(small, b * width + size + c)
             second = second - column * load(small, b * width + size + other)
         store(solution, 2 * i, stack2(first, second))

@@ -92,6 +92,71 @@ def _write(rows, first, n, m, constraints, target, start):
     write_lanes(rows, first, 1, target, start * (n + m), n + m, n + m)
 
 
+@njit(**INNER)
+def assemble_block(
+    stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic, turned,
+    first, z, p, dp, start, theta, scalars, velocity, ends,
+    force, turn, curved, edges, closure, moved, corner,
+):  # fmt: skip
+    """F, F_p·dp and F_z of a block of lanes from `start` on.
+
+    force, turn (nodes + m): forces and their change by dp; curved (nodes): diagonal beside the
+    stiffness; edges (m · nodes): gradients of the constraints; closure, moved (m): constraints and
+    their change; corner (m · m): the trailing block.
+    """
+    elements, order = stiffness.shape[0], stiffness.shape[1]
+    nodes, m, count = theta.shape[0], closure.shape[0], len(quadratic)
+    n, zero = z.shape[1] - m, spread(0.0)
+    read_state(z, p, start, first, n, m, 1.0, turned, theta, scalars)
+    for k in range(LANES):
+        for j in range(count):
+            inside = m <= j < count - 1
+            velocity[j, k] = dp[start + k, j - m] if inside else 0.0
+    store(ends, 0, _mixed(turned, 0, velocity))
+    store(ends, 1, _mixed(turned, 1, velocity))
+    for i in range(nodes):
+        store(force, i, zero - _combined(slope, slope_rows, i, scalars))
+        store(turn, i, zero - _combined(slope, slope_rows, i, velocity))
+        store(curved, i, zero)
+    edges[:] = 0.0
+    for c in range(m):
+        store(closure, c, _mixed(quadratic, c, scalars))
+        store(moved, c, _mixed(quadratic, c, velocity))
+        for d in range(m):
+            store(corner, c * m + d, spread(quadratic[c, d]))
+    for e in range(elements):
+        for i in range(order):
+            node, at = e * (order - 1) + i, e * order + i
+            s, c = sincos(load(theta, node))
+            k = spread(softness[at])
+            a = _combined(sine, sine_rows, at, scalars)
+            b = _combined(cosine, cosine_rows, at, scalars)
+            normal, shear = a * s + b * c, a * c - b * s
+            stretch = spread(1.0) - k * normal
+            soft = k * shear
+            a = _combined(sine, sine_rows, at, velocity)
+            b = _combined(cosine, cosine_rows, at, velocity)
+            change = a * s + b * c
+            _add(force, node, stretch * shear)
+            _add(curved, node, zero - normal * stretch - soft * shear)
+            _add(turn, node, stretch * (a * c - b * s) - soft * change)
+            for j in range(m):
+                sj, cj = spread(sine[j, at]), spread(cosine[j, at])
+                own = sj * s + cj * c
+                _add(edges, j * nodes + node, stretch * (sj * c - cj * s) - soft * own)
+                _add(closure, j, stretch * own)
+                _add(moved, j, zero - k * change * own)
+                for d in range(m):
+                    other = spread(sine[d, at]) * s + spread(cosine[d, at]) * c
+                    _add(corner, j * m + d, zero - k * own * other)
+    for j in range(m):
+        change = load(edges, j * nodes) * load(ends, 0)
+        change = change + load(edges, j * nodes + nodes - 1) * load(ends, 1)
+        _add(moved, j, change)
+    _bend(stiffness, theta, force)
+    _turn_ends(stiffness, ends, turn)
+
+
 @njit(**FLAGS)
 def linearise_lanes(
     stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic, turned,
@@ -102,64 +167,19 @@ def linearise_lanes(
     diagonal (lanes, nodes) beside the stiffness; border (lanes, m, nodes), gradients of the
     constraints; trailing (lanes, m, m).
     """
-    elements, order = stiffness.shape[0], stiffness.shape[1]
     nodes, m = diagonal.shape[1], border.shape[1]
     n, count = z.shape[1] - m, len(quadratic)
     theta, scalars, velocity = work_rows(nodes), work_rows(count), work_rows(count)
-    ends = work_rows(2)
+    ends, corner = work_rows(2), work_rows(m * m)
     force, turn, curved = work_rows(nodes + m), work_rows(nodes + m), work_rows(nodes)
     edges, closure, moved = work_rows(m * nodes), work_rows(m), work_rows(m)
-    corner, zero = work_rows(m * m), spread(0.0)
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
-        read_state(z, p, start, first, n, m, 1.0, turned, theta, scalars)
-        for k in range(LANES):
-            for j in range(count):
-                inside = m <= j < count - 1
-                velocity[j, k] = dp[start + k, j - m] if inside else 0.0
-        store(ends, 0, _mixed(turned, 0, velocity))
-        store(ends, 1, _mixed(turned, 1, velocity))
-        for i in range(nodes):
-            store(force, i, zero - _combined(slope, slope_rows, i, scalars))
-            store(turn, i, zero - _combined(slope, slope_rows, i, velocity))
-            store(curved, i, zero)
-        edges[:] = 0.0
-        for c in range(m):
-            store(closure, c, _mixed(quadratic, c, scalars))
-            store(moved, c, _mixed(quadratic, c, velocity))
-            for d in range(m):
-                store(corner, c * m + d, spread(quadratic[c, d]))
-        for e in range(elements):
-            for i in range(order):
-                node, at = e * (order - 1) + i, e * order + i
-                s, c = sincos(load(theta, node))
-                k = spread(softness[at])
-                a = _combined(sine, sine_rows, at, scalars)
-                b = _combined(cosine, cosine_rows, at, scalars)
-                normal, shear = a * s + b * c, a * c - b * s
-                stretch = spread(1.0) - k * normal
-                soft = k * shear
-                a = _combined(sine, sine_rows, at, velocity)
-                b = _combined(cosine, cosine_rows, at, velocity)
-                change = a * s + b * c
-                _add(force, node, stretch * shear)
-                _add(curved, node, zero - normal * stretch - soft * shear)
-                _add(turn, node, stretch * (a * c - b * s) - soft * change)
-                for j in range(m):
-                    sj, cj = spread(sine[j, at]), spread(cosine[j, at])
-                    own = sj * s + cj * c
-                    _add(edges, j * nodes + node, stretch * (sj * c - cj * s) - soft * own)
-                    _add(closure, j, stretch * own)
-                    _add(moved, j, zero - k * change * own)
-                    for d in range(m):
-                        other = spread(sine[d, at]) * s + spread(cosine[d, at]) * c
-                        _add(corner, j * m + d, zero - k * own * other)
-        for j in range(m):
-            change = load(edges, j * nodes) * load(ends, 0)
-            change = change + load(edges, j * nodes + nodes - 1) * load(ends, 1)
-            _add(moved, j, change)
-        _bend(stiffness, theta, force)
-        _turn_ends(stiffness, ends, turn)
+        assemble_block(
+            stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic,
+            turned, first, z, p, dp, start, theta, scalars, velocity, ends,
+            force, turn, curved, edges, closure, moved, corner,
+        )  # fmt: skip
         write_lanes(curved, 0, 1, diagonal, start * nodes, nodes, nodes)
         write_lanes(edges, 0, 1, border, start * m * nodes, m * nodes, m * nodes)
         _write(force, first, n, m, closure, residual, start)

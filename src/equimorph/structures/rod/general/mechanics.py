@@ -7,11 +7,13 @@ from jaxtyping import Float
 
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout
+from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.contract import Advance, Border, Direction, Symmetry, solved_advance
+from equimorph.structures.contract import Advance, Border, Direction, Symmetry
 from equimorph.structures.rod.general.fields import Fields
 from equimorph.structures.rod.general.kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general.model import RodModel
+from equimorph.structures.rod.general.step.kernels import advance_lanes
 from equimorph.structures.rod.general.symmetry import mirrors
 from equimorph.structures.rod.interface import Mechanics
 
@@ -21,8 +23,6 @@ Nodal = Float[np.ndarray, "lanes nodes"]
 Values = Float[np.ndarray, " lanes"]
 Scalars = Float[np.ndarray, "lanes scalars"]
 
-BLOCK = 512
-"""Lanes that take a Newton step together: their matrices stay in the cache."""
 FORCES = 8.0
 """Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
 
@@ -215,26 +215,23 @@ class GeneralMechanics(Mechanics):
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
-        """One Newton step; residual, column and matrix are computed together."""
-        given = (z, p, dp, row, corner, defect)
-        starts = range(0, max(len(z), 1), BLOCK)
-        parts = [self._advance(*(array[i : i + BLOCK] for array in given)) for i in starts]
-        if len(parts) == 1:
-            return parts[0]
-        columns = zip(*(vars(part).values() for part in parts), strict=True)
-        return Advance(*(np.concatenate(column) for column in columns))
-
-    def _advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        residual, column, diagonal, gradients, trailing = self.linearised(z, p, dp)
-
-        def solve(rhs: Float[np.ndarray, "lanes 2 bordered"], border: Border) -> BorderedSolution:
-            columns, rows, inner = border
-            parts = (diagonal, gradients, columns, rows, inner, rhs)
-            return self.layout.solve(*parts, trailing=trailing)
-
-        return solved_advance(solve, residual, column, (row, corner, defect), self.constraints)
+        """Fused kernel; lanes with an unsafe pivot take the general solve."""
+        z, p, row, dp = self._checked((z, p), (row, dp))
+        inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
+        lanes = len(z)
+        dz, tangent_z = np.empty((2, *z.shape))
+        dt, tangent_t, residual, ratio = np.empty((4, lanes))
+        index = np.empty(lanes, dtype=np.int64)
+        outputs = [dz, dt, tangent_z, tangent_t, residual, index, ratio]
+        over_lanes(advance_lanes, (self.layout.ends, *self._step_data), inputs, outputs)
+        unknown = np.full(lanes, np.nan)
+        out = Advance(dz, dt, tangent_z, tangent_t, residual, index, unknown)
+        if not ratio.min(initial=1.0) >= PIVOT_GUARD:
+            unsafe = ~(ratio >= PIVOT_GUARD)
+            again = self.plain_advance(*(x[unsafe] for x in inputs))
+            for name, column in vars(again).items():
+                getattr(out, name)[unsafe] = column
+        return out
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random curvatures between the end angles, with random multipliers."""

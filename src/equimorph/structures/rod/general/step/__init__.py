@@ -1,0 +1,1 @@
+"""Fused Newton step of general rods."""
