@@ -6,6 +6,7 @@ a fast answer that is wrong is seen.
 
 import platform
 
+import numpy as np
 import pytest
 
 from equimorph.manifold import EquilibriumSet, equilibrium_set
@@ -80,4 +81,15 @@ def bench_plan(benchmark, arch_set, via, margin):
         steps=len(route.schedule.progress),
         length=route.length,
         margin=route.margin,
+    )
+
+
+def bench_states_over_many_points(benchmark, arch_set):
+    """10⁴ random points in one call."""
+    points = np.random.default_rng(0).uniform([0.2, -2], [2.5, 2], (10_000, 2))
+    found = benchmark(arch_set.over, Theta=points[:, 0], Delta=points[:, 1])
+    benchmark.extra_info.update(
+        states=len(found.states),
+        microseconds_each=benchmark.stats.stats.min * 100,
+        largest_residual=float(found.states.residual.max()),
     )

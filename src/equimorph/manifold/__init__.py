@@ -7,8 +7,8 @@ from equimorph.manifold.equilibrium_set import (
     Component,
     EquilibriumSet,
     Stratum,
-    lift_to,
 )
+from equimorph.manifold.over import StatesOver, lift_to
 
 __all__ = [
     "INTERVALS",
@@ -16,6 +16,7 @@ __all__ = [
     "Boundary",
     "Component",
     "EquilibriumSet",
+    "StatesOver",
     "Stratum",
     "equilibrium_set",
     "lift_to",

@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.equilibria import find_equilibria
-from equimorph.manifold.equilibrium_set import EquilibriumSet, lift_to
+from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.mesh import BaseMesh
+from equimorph.manifold.over import lift_to
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.seeds import Seeds, polished
 from equimorph.model import Progress, names_of

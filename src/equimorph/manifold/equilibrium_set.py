@@ -7,18 +7,12 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria import ParameterLine, TraceOptions, distinct, newton
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.errors import InputError
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.mesh import BaseMesh
-from equimorph.manifold.simplices import barycentric
-from equimorph.model import Box, Constraint, parameter_vector
+from equimorph.manifold.over import Sheets, StatesOver
+from equimorph.model import Box, Constraint, parameter_vector, position
 from equimorph.structures import States, Structure
-
-OVERHANG = 0.3
-"""How far beyond a cell, in barycentric coordinates, a point may lie to be tried from it."""
 
 
 @dataclass(frozen=True)
@@ -119,63 +113,87 @@ class EquilibriumSet:
         InputError
             For names that are not free, missing ones, or a point outside the box.
         """
-        unknown = [name for name in at if name not in self.names]
-        if unknown or len(at) != len(self.names):
-            raise InputError(
-                f"`at` must give {' and '.join(self.names)}; got {', '.join(at) or 'nothing'}."
-            )
+        _check_names(self.names, at)
         point = np.array([float(at[name]) for name in self.names])
         if not self.box.contains(point, slack=1e-12):
             raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
         return parameter_vector(self.structure.parameters, {**self.fixed, **at})
 
     def at(self, **at: float) -> States:
-        """Exact states over one point of the box, sorted by energy.
-
-        Lifted from all known equilibria over the corners of the grid cell around the point,
-        through folds, and corrected from the cells above it; distinct ends are the states.
-        """
-        p = self.parameters_at(at)
-        point = np.array([float(at[name]) for name in self.names])
-        around = self.mesh.cells[self.mesh.locate(point)]
-        starts = np.flatnonzero(np.isin(self.grid_vertex, around))
-        lifted = lift_to(self.points[starts], p, self.constraints)
-        # a sheet that a constraint or a curved fold hides from the corners is still under a cell
-        z = np.concatenate([lifted, self._corrected(point, p)])
-        z = z[distinct(self.structure, z)]
-        states = States(self.structure, z, np.tile(p, (len(z), 1)))
+        """Exact states over one point of the box, sorted by energy; see `over`."""
+        states = self._sheets.over(self.parameters_at(at)[None])[0]
         return states[np.argsort(states.energy, kind="stable")]
 
-    def _corrected(
-        self, point: Float[np.ndarray, " d"], p: Float[np.ndarray, " P"]
-    ) -> Float[np.ndarray, "n size"]:
-        """Unknowns of equilibria over a point, by Newton from the cells above it, nearby only."""
-        weights = barycentric(self.coordinates[self.cells], point)
-        above = np.flatnonzero(weights.min(axis=1) > -OVERHANG)
-        corners = self.points.z[self.cells[above]]
-        guess = np.einsum("ck,ckn->cn", weights[above], corners)
-        n, mass = self.structure.unknowns, self.structure.mass
-        reach = np.sqrt((corners - guess[:, None])[:, :, :n] ** 2 @ mass).max(axis=1)
-        everywhere = np.tile(p, (len(guess), 1))
-        z, good = newton(self.structure, guess, everywhere)
-        good &= np.sqrt((z - guess)[:, :n] ** 2 @ mass) <= 2.0 * reach
-        good &= self.structure.resolved(z, everywhere)
-        for constraint in self.constraints:
-            good &= constraint.excess(z, everywhere) <= 0.0
-        return np.asarray(z[good])
+    def over(self, **at: Float[np.ndarray, " points"]) -> StatesOver:
+        """Exact states over many points of the box, with the pieces of the set that they lie on.
+
+        The cells above a point give guesses, which Newton corrects. Where they leave a doubt, as
+        close to curved folds, all known equilibria nearby are lifted to the point.
+
+        Parameters
+        ----------
+        at
+            Values of each free parameter, one per point.
+
+        Raises
+        ------
+        InputError
+            For names that are not free, missing ones, different numbers of values, or points
+            outside the box.
+        """
+        p = self._parameters_over(at)
+        states, point, cell = self._sheets.over(p)
+        known = cell >= 0
+        stratum, component = (
+            np.where(known, label[cell], -1) if len(label) else cell
+            for label in (self.stratum, self.component)
+        )
+        index = np.where(known, self.cell_index[cell], -1) if len(self.cells) else cell
+        index[~known] = states[~known].index
+        return StatesOver(states, point, cell, index, stratum, component, len(p))
+
+    def _parameters_over(
+        self, at: Mapping[str, Float[np.ndarray, " points"]]
+    ) -> Float[np.ndarray, "points P"]:
+        """All parameters over points of the box."""
+        _check_names(self.names, at)
+        columns = [np.asarray(at[name], dtype=float) for name in self.names]
+        if any(column.ndim != 1 or len(column) != len(columns[0]) for column in columns):
+            shapes = ", ".join(f"{name} {np.shape(at[name])}" for name in self.names)
+            raise InputError(
+                "`at` must give one number for each point, equally many values of each parameter; "
+                f"got shapes {shapes}."
+            )
+        points = np.stack(columns, axis=1)
+        outside = np.flatnonzero(~self.box.contains(points, slack=1e-12))
+        if len(outside):
+            worst = dict(zip(self.names, points[outside[0]].tolist(), strict=True))
+            raise InputError(f"`at` must lie in {self.box}; got {worst} (point {outside[0]}).")
+        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
+        p = np.tile(self.parameters_at(low), (len(points), 1))
+        p[:, [position(self.structure.parameters, name) for name in self.names]] = points
+        return p
+
+    @cached_property
+    def _sheets(self) -> Sheets:
+        """The cells, made ready for queries."""
+        free = [position(self.structure.parameters, name) for name in self.names]
+        caps = [piece.vertices for piece in self.boundaries if piece.kind != "box"]
+        folded, capped = np.zeros((2, len(self.points)), bool)
+        for flags, pieces in ((folded, self.folds), (capped, caps)):
+            for piece in pieces:
+                flags[piece] = True
+        return Sheets(
+            self.points,
+            np.array(free),
+            self.cells,
+            self.cell_index,
+            folded,
+            capped,
+            self.constraints,
+        )
 
 
-def lift_to(
-    states: States, p: Float[np.ndarray, " P"], constraints: tuple[Constraint, ...]
-) -> Float[np.ndarray, "n size"]:
-    """Unknowns of all equilibria at p that straight lifts from `states` reach."""
-    velocity = p - states.p
-    still = np.abs(velocity).max(axis=1, initial=0.0) == 0.0
-    moving = np.flatnonzero(~still)
-    line = ParameterLine(states.structure, states.p[moving].copy(), velocity[moving])
-    options = TraceOptions(
-        through_folds=True, through_branch_points=True, record=False, locate_passed=False
-    )
-    outcome = follow(line, states.z[moving].copy(), constraints, options)
-    arrived = outcome.code == ARRIVAL
-    return np.concatenate([states.z[still], outcome.z[arrived]])
+def _check_names(names: tuple[str, ...], at: Mapping[str, object]) -> None:
+    if set(at) != set(names):
+        raise InputError(f"`at` must give {' and '.join(names)}; got {', '.join(at) or 'nothing'}.")

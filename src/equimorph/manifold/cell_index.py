@@ -1,0 +1,150 @@
+"""Which cells lie over points: uniform bins over the space of the free parameters."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.simplices import volumes
+
+MOST_BINS = 4
+"""Bins per cell, at most."""
+NUDGE = 1e-9
+"""Shift, in ranges of the parameters, that puts points between cells into one of them."""
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Pairs of a point and a cell near it, sorted by point.
+
+    weights: barycentric coordinates of the point in the cell; inside: whether the cell contains the
+    point, where points between cells belong to one of them on each sheet.
+    """
+
+    point: Int[np.ndarray, " hits"]
+    cell: Int[np.ndarray, " hits"]
+    weights: Float[np.ndarray, "hits corners"]
+    inside: Bool[np.ndarray, " hits"]
+
+    def take(self, some: Bool[np.ndarray, " hits"] | Int[np.ndarray, " some"]) -> "Hits":
+        """Some of the pairs."""
+        return Hits(*(column[some] for column in vars(self).values()))
+
+
+@dataclass(frozen=True)
+class CellIndex:
+    """Bins over a box that list the cells above them, and the barycentric maps of the cells.
+
+    Points are scaled to the unit cube. Cells of bin b are ``cells[starts[b] : starts[b + 1]]``;
+    barycentric coordinate k of x in cell c is ``maps[k, c] @ (x, 1)``, nan if it has no volume.
+    """
+
+    lower: Float[np.ndarray, " d"]
+    width: Float[np.ndarray, " d"]
+    counts: Int[np.ndarray, " d"]
+    starts: Int[np.ndarray, " bins_and_one"]
+    cells: Int[np.ndarray, " entries"]
+    maps: Float[np.ndarray, "corners C corners"]
+    overhang: Float[np.ndarray, " C"]
+
+    @classmethod
+    def of(
+        cls, corners: Float[np.ndarray, "C corners d"], overhang: Float[np.ndarray, " C"]
+    ) -> "CellIndex":
+        """Index of cells.
+
+        Parameters
+        ----------
+        corners
+            Corners of the cells.
+        overhang
+            How far beyond each cell a point may lie to be found near it, in barycentric
+            coordinates.
+        """
+        d = corners.shape[2]
+        flat = corners.reshape(-1, d)
+        lower = flat.min(axis=0) if len(flat) else np.zeros(d)
+        width = flat.max(axis=0) - lower if len(flat) else np.ones(d)
+        width = np.where(width > 0.0, width, 1.0)
+        unit = (corners - lower) / width
+        low, high = unit.min(axis=1), unit.max(axis=1)
+        extent = high - low
+        counts = _bins(extent)
+        room = overhang[:, None] * extent
+        first, last = (
+            np.clip((side * counts).astype(int), 0, counts - 1)
+            for side in (low - room, high + room)
+        )
+        starts, cells = _listed(first, last, counts)
+        return cls(lower, width, counts, starts, cells, _maps(unit), overhang)
+
+    def near(self, points: Float[np.ndarray, "n d"]) -> Hits:
+        """Cells that contain points or that these miss by at most their overhang."""
+        unit = (points - self.lower) / self.width
+        place = np.clip((unit * self.counts).astype(int), 0, self.counts - 1)
+        bins = np.ravel_multi_index(tuple(place.T), tuple(self.counts))
+        number = self.starts[bins + 1] - self.starts[bins]
+        point = np.repeat(np.arange(len(points)), number)
+        cell = self.cells[_ranges(self.starts[bins], number)]
+        shift = _inward(unit)
+        weights: list[Float[np.ndarray, " hits"]] = []
+        inside = np.ones(len(cell), bool)
+        for rows in self.maps:
+            row = rows[cell]
+            weight, push = row[:, -1].copy(), np.zeros(len(cell))
+            for k, (column, nudge) in enumerate(zip(unit.T, shift.T, strict=True)):
+                weight += row[:, k] * column[point]
+                push += row[:, k] * nudge[point]
+            inside &= weight + push >= 0.0
+            close = np.flatnonzero(weight > -self.overhang[cell] - NUDGE)
+            point, cell, inside = point[close], cell[close], inside[close]
+            weights = [each[close] for each in (*weights, weight)]
+        return Hits(point, cell, np.stack(weights, axis=1), inside)
+
+
+def _bins(extent: Float[np.ndarray, "C d"]) -> Int[np.ndarray, " d"]:
+    """Number of bins along each parameter: half the size of a typical cell, but not too many."""
+    typical = np.median(extent, axis=0) if len(extent) else np.ones(extent.shape[1])
+    counts = np.clip(np.round(2.0 / np.maximum(typical, 1e-6)), 1, None)
+    share = MOST_BINS * max(len(extent), 1) / counts.prod()
+    fitting = np.maximum(counts * min(1.0, share ** (1.0 / len(counts))), 1)
+    return np.asarray(fitting.astype(int))
+
+
+def _inward(unit: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
+    """Small shifts towards the middle of the box, in directions that no grid line has."""
+    generic = 0.1 * np.cos(1.0 + np.arange(unit.shape[1]))
+    return np.asarray(NUDGE * (0.5 + generic - unit))
+
+
+def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "corners C corners"]:
+    """Inverse of the matrix of each cell's corners over ones, row by row."""
+    ones = np.ones((*unit.shape[:2], 1))
+    matrix = np.swapaxes(np.concatenate([unit, ones], axis=2), 1, 2).copy()
+    flat = volumes(unit) == 0.0
+    matrix[flat] = np.eye(matrix.shape[1])
+    maps = np.linalg.inv(matrix)
+    maps[flat] = np.nan
+    return np.ascontiguousarray(np.swapaxes(maps, 0, 1))
+
+
+def _listed(
+    first: Int[np.ndarray, "C d"], last: Int[np.ndarray, "C d"], counts: Int[np.ndarray, " d"]
+) -> tuple[Int[np.ndarray, " bins_and_one"], Int[np.ndarray, " entries"]]:
+    """Cells by bin, from the ranges of bins that they reach."""
+    spread = last - first + 1
+    number = spread.prod(axis=1)
+    cells_of = np.repeat(np.arange(len(first)), number)
+    step, bins_of = _ranges(np.zeros_like(number), number), np.zeros(len(cells_of), int)
+    for k in reversed(range(len(counts))):
+        step, along = np.divmod(step, spread[cells_of, k])
+        bins_of += (first[cells_of, k] + along) * int(counts[k + 1 :].prod())
+    order = np.argsort(bins_of, kind="stable")
+    filled = np.bincount(bins_of, minlength=int(counts.prod()))
+    return np.concatenate([[0], np.cumsum(filled)]), cells_of[order]
+
+
+def _ranges(start: Int[np.ndarray, " n"], number: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+    """Numbers from each start on, one range after the other."""
+    before = np.cumsum(number) - number
+    return np.asarray(np.arange(int(number.sum())) + np.repeat(start - before, number))

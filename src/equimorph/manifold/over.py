@@ -1,0 +1,311 @@
+"""The states of an equilibrium set over points: the cells above them, polished by Newton."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria import ParameterLine, TraceOptions, distinct
+from equimorph.equilibria.outcome import follow
+from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.manifold.cell_index import CellIndex, Hits
+from equimorph.model import Constraint
+from equimorph.structures import States, Structure
+
+OVERHANG = 0.3
+"""How far beyond a cell, in barycentric coordinates, a point may lie to be tried from it."""
+ITERATIONS = 12
+ROUND_OFF = 1e-12
+"""Bound of the next Newton correction, in the metric, below which a state is exact."""
+SAME = 1e-6
+"""Distance in the metric below which two states over one point are the same."""
+CHUNK = 2048
+"""Points that are served together: their work arrays stay small."""
+
+Points = Float[np.ndarray, "points P"]
+Lanes = Float[np.ndarray, "lanes size"]
+Guesses = Float[np.ndarray, "hits size"]
+
+
+@dataclass(frozen=True, eq=False)
+class StatesOver:
+    """States of a set over points, sorted by point: the sheets over each.
+
+    Parameters
+    ----------
+    states
+        All states.
+    point
+        Number of the point that each lies over.
+    cell
+        Cell of the set that each lies on, −1 where only a lift found it.
+    index
+        Negative eigenvalues; 0 is stable.
+    stratum, component
+        Numbers of the pieces of the set that each lies on, −1 if not known.
+    count
+        Number of points.
+    """
+
+    states: States
+    point: Int[np.ndarray, " lanes"]
+    cell: Int[np.ndarray, " lanes"]
+    index: Int[np.ndarray, " lanes"]
+    stratum: Int[np.ndarray, " lanes"]
+    component: Int[np.ndarray, " lanes"]
+    count: int
+
+    def __len__(self) -> int:
+        """Number of points."""
+        return self.count
+
+    def __getitem__(self, number: int) -> "StatesOver":
+        """States over one of the points."""
+        if not 0 <= number < self.count:
+            raise IndexError(f"there are {self.count} points; got number {number}")
+        mine = slice(*np.searchsorted(self.point, (number, number + 1)))
+        cell, index, stratum, component = (
+            column[mine] for column in (self.cell, self.index, self.stratum, self.component)
+        )
+        alone = np.zeros_like(cell)
+        return StatesOver(self.states[mine], alone, cell, index, stratum, component, 1)
+
+    def __iter__(self) -> Iterator["StatesOver"]:
+        """Go through the points one by one."""
+        return (self[number] for number in range(self.count))
+
+    def __repr__(self) -> str:
+        """How many states over how many points."""
+        return f"StatesOver({len(self.states)} states over {self.count} points)"
+
+
+@dataclass(frozen=True, eq=False)
+class Sheets:
+    """Cells of a set with their states, as the queries for states over points need them.
+
+    Parameters
+    ----------
+    points
+        States of the vertices.
+    free
+        Places of the free parameters.
+    cells, cell_index
+        Vertices and index of the cells.
+    folded, capped
+        Whether vertices lie on folds, and on constraints.
+    constraints
+        Those that cut the set off.
+    """
+
+    points: States
+    free: Int[np.ndarray, " d"]
+    cells: Int[np.ndarray, "C corners"]
+    cell_index: Int[np.ndarray, " C"]
+    folded: Bool[np.ndarray, " V"]
+    capped: Bool[np.ndarray, " V"]
+    constraints: tuple[Constraint, ...]
+
+    @property
+    def structure(self) -> Structure:
+        """To which the states belong."""
+        return self.points.structure
+
+    @cached_property
+    def above(self) -> CellIndex:
+        """Index of the cells."""
+        overhang = np.where(self._at_an_edge, OVERHANG, 0.0)
+        return CellIndex.of(self.points.p[:, self.free][self.cells], overhang)
+
+    @cached_property
+    def _at_an_edge(self) -> Bool[np.ndarray, " C"]:
+        """Cells on folds or constraints, where straight cells miss the curved edge."""
+        return np.asarray((self.folded | self.capped)[self.cells].any(axis=1))
+
+    @cached_property
+    def _at_a_cap(self) -> Bool[np.ndarray, " C"]:
+        return np.asarray(self.capped[self.cells].any(axis=1))
+
+    def over(self, p: Points) -> tuple[States, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """States over points (all parameters given), sorted by point; the points; the cells.
+
+        Cells that contain a point, and those on folds and constraints that it just misses, are
+        interpolated and corrected by Newton. Across folds states appear in pairs of opposite
+        parity: where the sum of (−1)^index is not that of the cells above, or a cell gives no
+        state, all known equilibria nearby are lifted to the point instead.
+        """
+        parts = [self._some(p[at : at + CHUNK], at) for at in range(0, len(p), CHUNK)]
+        if not parts:
+            return (
+                States(self.structure, np.zeros((0, self.structure.size)), p),
+                np.zeros(0, int),
+                np.zeros(0, int),
+            )
+        z, point, cell = (np.concatenate(column) for column in zip(*parts, strict=True))
+        order = np.lexsort((cell, point))
+        point = point[order]
+        return States(self.structure, z[order], p[point]), point, cell[order]
+
+    def _some(
+        self, p: Points, first: int
+    ) -> tuple[Lanes, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        near = self.above.near(p[:, self.free])
+        hits = near.take(near.inside | self._at_an_edge[near.cell])
+        z, good = self._polished(self._guess(hits), p, hits)
+        kept = np.flatnonzero(good)
+        kept = kept[_one_of_each(self.structure, z[kept], hits.take(kept))]
+        kept = kept[self._allowed(z[kept], p[hits.point[kept]])]
+        sure = self._sure(hits, good, kept, len(p))
+        kept = kept[sure[hits.point[kept]]]
+        parts = [(z[kept], hits.point[kept], hits.cell[kept])]
+        parts.extend(self._searched(p, near, number) for number in np.flatnonzero(~sure))
+        z, point, cell = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return z, first + point, cell
+
+    def _guess(self, hits: Hits) -> Lanes:
+        """Interpolation between the corners, at the nearest point of the cell."""
+        weights = np.maximum(hits.weights, 0.0)
+        weights /= weights.sum(axis=1, keepdims=True)
+        corners = self.cells[hits.cell]
+        z = weights[:, :1] * self.points.z[corners[:, 0]]
+        for k in range(1, corners.shape[1]):
+            z += weights[:, k : k + 1] * self.points.z[corners[:, k]]
+        return np.asarray(z)
+
+    @cached_property
+    def _size(self) -> Float[np.ndarray, " C"]:
+        """Longest side of each cell from its first corner, in the metric."""
+        n, mass = self.structure.unknowns, self.structure.mass
+        u = self.points.z[:, :n]
+        sides = [u[corner] - u[self.cells[:, 0]] for corner in self.cells.T[1:]]
+        return np.asarray(np.sqrt(np.max([side**2 @ mass for side in sides], axis=0)))
+
+    def _polished(
+        self, guess: Lanes, p: Points, hits: Hits
+    ) -> tuple[Lanes, Bool[np.ndarray, " hits"]]:
+        """Exact states of the cells' own index near the guesses, where there are any."""
+        structure = self.structure
+        z, good, index = _newton(structure, guess, p[hits.point])
+        good &= index == self.cell_index[hits.cell]
+        moved = np.sqrt((z - guess)[:, : structure.unknowns] ** 2 @ structure.mass)
+        good &= moved <= 2.0 * self._size[hits.cell] + SAME
+        good[good] = structure.resolved(z[good], p[hits.point[good]])
+        return z, good
+
+    def _sure(
+        self,
+        hits: Hits,
+        good: Bool[np.ndarray, " hits"],
+        kept: Int[np.ndarray, " kept"],
+        count: int,
+    ) -> Bool[np.ndarray, " points"]:
+        """Points over which the states cannot be other than those kept."""
+        capped = self._at_a_cap[hits.cell]
+        failed = ~good & (hits.inside & ~self._at_an_edge[hits.cell] | capped)
+        sign = 1 - 2 * (self.cell_index[hits.cell] % 2)
+        found = np.bincount(hits.point[kept], sign[kept], count)
+        expected = np.bincount(hits.point, sign * hits.inside, count)
+        # a constraint takes single states away
+        exempt = np.bincount(hits.point, capped, count) > 0
+        whole = np.bincount(hits.point, failed, count) == 0
+        return np.asarray(whole & (exempt | (found == expected)))
+
+    def _allowed(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
+        good = np.ones(len(z), bool)
+        for constraint in self.constraints:
+            good &= constraint.excess(z, p) <= 0.0
+        return good
+
+    def _searched(
+        self, p: Points, near: Hits, number: np.int64
+    ) -> tuple[Lanes, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """States over one point by lifts from all regular vertices of the cells near it."""
+        mine = near.take(near.point == number)
+        corners = np.unique(self.cells[mine.cell])
+        corners = corners[~self.folded[corners]]
+        target = p[number]
+        z = lift_to(self.points[corners], target, self.constraints)
+        guess = self._guess(mine)
+        solved, good = self._polished(guess, p, mine)
+        good &= self._allowed(solved, p[mine.point])
+        z = np.concatenate([solved[good], z])
+        z = z[distinct(self.structure, z)]
+        index = self.structure.index(z, np.tile(target, (len(z), 1)))
+        return z, np.full(len(z), number), self._nearest(z, index, guess, mine)
+
+    def _nearest(
+        self, z: Lanes, index: Int[np.ndarray, " lanes"], guess: Guesses, mine: Hits
+    ) -> Int[np.ndarray, " n"]:
+        """Cell of the same index whose interpolation over the point is nearest to each state."""
+        n, mass = self.structure.unknowns, self.structure.mass
+        gap = ((z[:, None, :n] - guess[None, :, :n]) ** 2) @ mass
+        gap[index[:, None] != self.cell_index[mine.cell][None]] = np.inf
+        if len(guess) == 0:
+            return np.full(len(z), -1)
+        best = gap.argmin(axis=1)
+        near = np.isfinite(gap[np.arange(len(z)), best])
+        return np.where(near, mine.cell[best], -1)
+
+
+def lift_to(
+    states: States, p: Float[np.ndarray, " P"], constraints: tuple[Constraint, ...]
+) -> Lanes:
+    """Unknowns of all equilibria at p that straight lifts from `states` reach."""
+    velocity = p - states.p
+    still = np.abs(velocity).max(axis=1, initial=0.0) == 0.0
+    moving = np.flatnonzero(~still)
+    line = ParameterLine(states.structure, states.p[moving].copy(), velocity[moving])
+    options = TraceOptions(
+        through_folds=True, through_branch_points=True, record=False, locate_passed=False
+    )
+    outcome = follow(line, states.z[moving].copy(), constraints, options)
+    arrived = outcome.code == ARRIVAL
+    return np.concatenate([states.z[still], outcome.z[arrived]])
+
+
+def _newton(
+    structure: Structure, z: Lanes, p: Points
+) -> tuple[Lanes, Bool[np.ndarray, " lanes"], Int[np.ndarray, " lanes"]]:
+    """Newton at fixed parameters until the next correction would be round-off; and the index.
+
+    Corrections shrink quadratically: the one after sizes a and b is about b (b/a)².
+    """
+    z, n = z.copy(), structure.unknowns
+    good, index = np.zeros(len(z), bool), np.full(len(z), -1)
+    before, todo = np.zeros(len(z)), np.arange(len(z))
+    for _ in range(ITERATIONS):
+        count = len(todo)
+        if count == 0:
+            break
+        still, none = np.zeros((count, structure.size)), np.zeros(count)
+        fixed = np.zeros((count, p.shape[1]))
+        step = structure.advance(z[todo], p[todo], fixed, still, np.ones(count), none)
+        size = np.sqrt(step.dz[:, :n] ** 2 @ structure.mass)
+        alive = np.isfinite(size) & (size < 1.0)
+        z[todo[alive]] += step.dz[alive]
+        bound = size * (size / np.maximum(before[todo], np.maximum(size, 1e-300))) ** 2
+        done = alive & (bound < ROUND_OFF)
+        good[todo[done]], index[todo[done]] = True, step.index[done]
+        before[todo] = size
+        todo = todo[alive & ~done]
+    return z, good, index
+
+
+def _one_of_each(structure: Structure, z: Lanes, hits: Hits) -> Int[np.ndarray, " kept"]:
+    """One of the equal states over each point, rather one from a cell that contains the point.
+
+    Equal states have equal products with any vector, so that they are neighbours in its order.
+    """
+    n, mass = structure.unknowns, structure.mass
+    product = z[:, :n] @ (mass * np.cos(1.0 + np.arange(n)))
+    order = np.lexsort((product, hits.point))
+    gap = np.diff(z[order, :n], axis=0) ** 2 @ mass
+    new = np.ones(len(z), bool)
+    new[1:] = (gap > SAME**2) | (np.diff(hits.point[order]) > 0)
+    group = np.empty(len(z), int)
+    group[order] = np.cumsum(new)
+    order = np.lexsort((~hits.inside, group))
+    first = np.ones(len(z), bool)
+    first[1:] = np.diff(group[order]) > 0
+    return np.sort(order[first])
