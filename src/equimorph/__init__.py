@@ -27,6 +27,7 @@ _HOMES = {
         "EnergyStructure",
         "LineLoad",
         "PointForce",
+        "Pressure",
         "Rod",
         "Spring",
         "State",

@@ -6,7 +6,7 @@ compressive force, L = Σ m (½ B (θ' − κ₀)² − T d θ' + N − N²/(2 E
 
 import numpy as np
 
-from equimorph.structures import Couple, Curvature, End, LineLoad, PointForce, Rod, Tendon
+from equimorph.structures import Couple, Curvature, End, LineLoad, PointForce, Pressure, Rod, Tendon
 
 
 class Quadrature:
@@ -141,3 +141,36 @@ def stretchable_arch():
         return out - lam * nu - (mu - q) * rise
 
     return rod, (1.0, 0.2, 1.5, 0.8, 0.05), lagrangian
+
+
+def places(mesh, slopes):
+    """∫ of nodal fields from end A, at the nodes of every element."""
+    inside = np.einsum("ij,lej->lei", mesh.reference.integral, slopes) * column(mesh.lengths)[:, 0]
+    whole = (mesh.lengths[:, None] * mesh.reference.weights * slopes).sum(axis=2)
+    return inside + (np.cumsum(whole, axis=1) - whole)[:, :, None]
+
+
+def inflated_rod():
+    """Pressure on a curved rod whose ends are clamped and pinned at different heights."""
+    rod = Rod(
+        ends=("clamped", "pinned"),
+        curvature=-1.5,
+        actuators={"p": Pressure()},
+        loads={"q": LineLoad()},
+        elements=4,
+        degree=5,
+    )
+    g = Quadrature(rod)
+
+    def lagrangian(z, p):
+        start, pressure, q, nu, rise = p.T
+        theta = np.concatenate([start[:, None], z[:, :-2]], axis=1)
+        lam, mu, angles = z[:, -2], z[:, -1], theta[:, g.at]
+        out = bending(g, theta, 1 / (4 * np.pi**2), -1.5)
+        across = column(mu) - column(q) * g.s
+        out = out + g.total(column(lam) * np.cos(angles) + across * np.sin(angles))
+        x, y = places(rod.mesh, np.cos(angles)), places(rod.mesh, np.sin(angles))
+        area = 0.5 * g.total(y * np.cos(angles) - x * np.sin(angles))
+        return out - lam * nu - (mu - q) * rise - pressure * area
+
+    return rod, (0.8, 1.2, 0.5, 0.85, 0.05), lagrangian

@@ -42,6 +42,14 @@ WRONG = {
         {"loads": {"P": {"term": "follower force", "s": 1.0}}},
         "`loads.P` must be conservative; got 'follower force'.*Use a dead load",
     ),
+    "pressure on a moving end": (
+        {"ends": ("clamped", "free"), "loads": {"p": em.Pressure()}},
+        "`ends` must hold x and y of both ends.*pressure is a follower load without a potential",
+    ),
+    "pressure on a stretching rod": (
+        {"axial": 5.0, "loads": {"p": em.Pressure()}},
+        "`axial` must be left out for rods under the pressure `p`",
+    ),
     "no term": ({"loads": {"P": 3.0}}, r"`loads\.P` must be a term \(line load, point force"),
     "data of a term": (
         {"loads": {"P": {"term": "point force", "at": 1.0}}},

@@ -6,7 +6,16 @@ from typing import Any
 from equimorph.errors import InputError
 from equimorph.structures.contract import Advance, Structure, Symmetry, bordered_advance
 from equimorph.structures.energy import EnergyStructure, Unknown
-from equimorph.structures.rod import Couple, Curvature, End, LineLoad, PointForce, Rod, Tendon
+from equimorph.structures.rod import (
+    Couple,
+    Curvature,
+    End,
+    LineLoad,
+    PointForce,
+    Pressure,
+    Rod,
+    Tendon,
+)
 from equimorph.structures.spring import Spring
 from equimorph.structures.states import State, States
 from equimorph.structures.truss import Bar, Truss
@@ -28,6 +37,7 @@ __all__ = [
     "EnergyStructure",
     "LineLoad",
     "PointForce",
+    "Pressure",
     "Rod",
     "Spring",
     "State",

@@ -12,6 +12,7 @@ from equimorph.model import Descriptor, Parameter, names_of, parameter_vector
 from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.discretisation import mesh_with_kinks
 from equimorph.structures.rod.general.assembly import Description
+from equimorph.structures.rod.general.ends import End
 from equimorph.structures.rod.general.mechanics import GeneralMechanics
 from equimorph.structures.rod.general.natural import natural_rod
 from equimorph.structures.rod.general.terms import LineLoad
@@ -301,6 +302,19 @@ class Rod(Measured):
         assert self._load is not None
         down = -p[:, 2:3] * self._load.density(s)
         return np.stack([np.zeros_like(down), down], axis=2)
+
+    def point_forces(
+        self, p: Parameters
+    ) -> tuple[Float[np.ndarray, " points"], Float[np.ndarray, "lanes points 2"]]:
+        """Shares of the length at which point forces act, and the forces in the user's units."""
+        if self._general is None:
+            return np.zeros(0), np.zeros((len(p), 0, 2))
+        return self._general.point_forces(p, self._raw_matrix[self.constraints :])
+
+    @property
+    def ends(self) -> tuple[End, End]:
+        """How ends A and B are supported."""
+        return (End(), End()) if self._general is None else self._general.supports
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
         """Bound of the errors of curvature and height, by solving again with a higher degree.

@@ -2,7 +2,14 @@
 
 from equimorph.structures.rod.general.ends import End
 from equimorph.structures.rod.general.mechanics import GeneralMechanics
-from equimorph.structures.rod.general.terms import Couple, Curvature, LineLoad, PointForce, Tendon
+from equimorph.structures.rod.general.terms import (
+    Couple,
+    Curvature,
+    LineLoad,
+    PointForce,
+    Pressure,
+    Tendon,
+)
 
 __all__ = [
     "Couple",
@@ -11,5 +18,6 @@ __all__ = [
     "GeneralMechanics",
     "LineLoad",
     "PointForce",
+    "Pressure",
     "Tendon",
 ]

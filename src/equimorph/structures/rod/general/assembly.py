@@ -15,7 +15,7 @@ from equimorph.structures.rod.discretisation import mesh_with_kinks
 from equimorph.structures.rod.general.ends import End, check_supports, end
 from equimorph.structures.rod.general.mechanics import GeneralMechanics
 from equimorph.structures.rod.general.model import Build, RodModel, raw_model
-from equimorph.structures.rod.general.terms import LineLoad, Term, term
+from equimorph.structures.rod.general.terms import LineLoad, PointForce, Pressure, Term, term
 from equimorph.structures.rod.loads import LoadShape
 from equimorph.structures.rod.profiles import profile
 from equimorph.structures.rod.units import Units
@@ -104,12 +104,30 @@ class Description:
                 "`axial` must be left out for rods with tendons: their axial pull is not modelled; "
                 f"got axial = {self.axial!r}."
             )
+        self._check_pressure()
         mesh = mesh_with_kinks(kinks, elements, degree)
         _check_positive(rigid, "stiffness", mesh.nodes)
         _check_positive(axial, "axial", mesh.nodes)
         couple, spring = self.units.value("couple"), self.units.value("spring")
         first, last = (support.scaled(couple, spring) for support in self.supports)
         return Build(mesh, (first, last), rigid, curved, axial, self.terms)
+
+    def _check_pressure(self) -> None:
+        """Refuse pressure without a potential, or with a stretching axis."""
+        for name, terms in self.terms.items():
+            if not any(isinstance(one, Pressure) for one in terms):
+                continue
+            if not all(end.x == end.y == "held" for end in self.supports):
+                raise InputError(
+                    f"`ends` must hold x and y of both ends of a rod under the pressure `{name}`; "
+                    "got one that moves: where the chord moves, pressure is a follower load "
+                    "without a potential. Hold the ends, or use a dead line load."
+                )
+            if self.axial is not None:
+                raise InputError(
+                    f"`axial` must be left out for rods under the pressure `{name}`; got "
+                    f"axial = {self.axial!r}: pressure on a stretching axis is not modelled."
+                )
 
     def mechanics(self, elements: int, degree: int) -> tuple[GeneralMechanics, Matrix]:
         """Mechanics in raw parameters, and raw scalars as combinations of the user's."""
@@ -220,14 +238,31 @@ class Description:
     ) -> Float[np.ndarray, "lanes n 2"]:
         """Dead load per arclength, in the user's units; matrix: what `mechanics` returns."""
         out = np.zeros((len(p), len(s), 2))
-        columns = matrix[:, -len(self.parameters) - 1 : -1]
+        for one, amplitude in self._amplitudes(p, matrix):
+            if isinstance(one, LineLoad):
+                force = one.density().density(s)[:, None] * np.array(one.direction)
+                out += amplitude[:, None, None] * force
+        return out
+
+    def point_forces(
+        self, p: Float[np.ndarray, "lanes parameters"], matrix: Matrix
+    ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "lanes n 2"]]:
+        """Arclengths of point forces, and the forces in the user's units."""
+        terms = [each for each in self._amplitudes(p, matrix) if isinstance(each[0], PointForce)]
+        forces = np.zeros((len(p), len(terms), 2))
+        for i, (one, amplitude) in enumerate(terms):
+            forces[:, i] = amplitude[:, None] * np.array(one.direction)
+        return np.array([float(one.s) for one, _ in terms]), forces
+
+    def _amplitudes(
+        self, p: Float[np.ndarray, "lanes parameters"], matrix: Matrix
+    ) -> list[tuple[Any, Float[np.ndarray, " lanes"]]]:
+        """Every term with its amplitude, in the user's units."""
+        columns, out = matrix[:, -len(self.parameters) - 1 : -1], []
         for name, terms in self.terms.items():
             row = columns[self._raw.index(name)] * self.units.value(self.quantity(name))
             amplitude = np.einsum("j,lj->l", row, p)
-            for one in terms:
-                if isinstance(one, LineLoad):
-                    force = one.density().density(s)[:, None] * np.array(one.direction)
-                    out += amplitude[:, None, None] * force
+            out += [(one, amplitude) for one in terms]
         return out
 
     def identity(self) -> dict[str, Any]:

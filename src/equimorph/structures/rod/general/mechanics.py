@@ -8,8 +8,10 @@ from jaxtyping import Float
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout
 from equimorph.linalg.condensed import PIVOT_GUARD
+from equimorph.linalg.dense import solve_bordered
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Advance, Border, Direction, Symmetry
+from equimorph.structures.rod.general.area import EnclosedArea
 from equimorph.structures.rod.general.fields import Fields
 from equimorph.structures.rod.general.kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general.model import RodModel
@@ -38,6 +40,7 @@ class GeneralMechanics(Mechanics):
         self.layout = CondensedLayout(np.ascontiguousarray(model.stiffness), ends)
         self.mass = model.mesh.weights[self.unknown_nodes].copy()
         self.unknowns = len(self.mass)
+        self._area = EnclosedArea(model.mesh) if model.pressure.any() else None
 
     @property
     def unknown_nodes(self) -> slice:
@@ -79,7 +82,10 @@ class GeneralMechanics(Mechanics):
     def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
         """Angles θ at all nodes, the prescribed ends included."""
         z, p = self._checked((z, p))
-        theta = np.einsum("kj,lj->lk", self.model.turned, self.scalars(z, p))
+        return self._angles(z, self.scalars(z, p))
+
+    def _angles(self, z: Lanes, y: Scalars) -> Nodal:
+        theta = np.einsum("kj,lj->lk", self.model.turned, y)
         out = np.empty((len(z), len(self.mesh.nodes)))
         out[:, 0], out[:, -1] = theta[:, 0], theta[:, 1]
         out[:, self.unknown_nodes] = z[:, : self.unknowns]
@@ -109,6 +115,8 @@ class GeneralMechanics(Mechanics):
         total += 0.5 * np.einsum("li,ij,lj->l", y, self.model.quadratic, y)
         normal, _ = self._normal(theta, y)
         total += (normal - 0.5 * self.model.softness * normal**2).sum(axis=1)
+        if self._area is not None:
+            total -= self._pressure(y) * self._area.value(theta)
         return np.asarray(total - (y[:, :m] * self._gradient(theta, y)[:, :m]).sum(axis=1))
 
     def _normal(
@@ -120,6 +128,9 @@ class GeneralMechanics(Mechanics):
         b = np.einsum("lj,ji->li", y, self.model.cosine)
         return a * np.sin(angles) + b * np.cos(angles), angles
 
+    def _pressure(self, y: Scalars) -> Values:
+        return np.asarray(np.einsum("j,lj->l", self.model.pressure, y))
+
     def _gradient(self, theta: Nodal, y: Scalars) -> Scalars:
         """∂L/∂y at fixed θ."""
         normal, angles = self._normal(theta, y)
@@ -127,6 +138,8 @@ class GeneralMechanics(Mechanics):
         out = np.einsum("li,ji->lj", stretch * np.sin(angles), self.model.sine)
         out += np.einsum("li,ji->lj", stretch * np.cos(angles), self.model.cosine)
         out -= np.einsum("li,ji->lj", theta, self.model.slope)
+        if self._area is not None:
+            out -= self._area.value(theta)[:, None] * self.model.pressure
         return np.asarray(out + np.einsum("li,ij->lj", y, self.model.quadratic))
 
     def _end_moments(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes 2"]:
@@ -140,11 +153,18 @@ class GeneralMechanics(Mechanics):
         out -= np.einsum("lj,jk->lk", y, model.slope[:, [0, -1]])
         out[:, 0] += np.einsum("li,i->l", theta[:, : d + 1], model.stiffness[0, 0])
         out[:, 1] += np.einsum("li,i->l", theta[:, -d - 1 :], model.stiffness[-1, -1])
+        if self._area is not None:
+            out -= self._pressure(y)[:, None] * self._area.gradient(theta)[:, [0, -1]]
         return np.asarray(out)
 
     def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
         """Force of the support at A: multipliers, or what balances the loads."""
-        return np.asarray(np.einsum("kj,lj->lk", self.model.reaction, self.scalars(z, p)))
+        y = self.scalars(z, p)
+        force = np.einsum("kj,lj->lk", self.model.reaction, y)
+        if self._area is not None:  # half of the pressure on the chord is taken up at each end
+            x, rise = -np.einsum("kj,lj->kl", self.model.quadratic[: self.constraints], y)
+            force += 0.5 * self._pressure(y)[:, None] * np.stack([rise, -x], axis=1)
+        return np.asarray(force)
 
     def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
         """Couples that hold the angles, of springs too; 0 at free angles."""
@@ -172,7 +192,29 @@ class GeneralMechanics(Mechanics):
             np.empty((lanes, m, m)),
         )
         over_lanes(linearise_lanes, self._step_data, [z, p, dp], out)
+        if self._area is not None:
+            force, change = self._press(self._area, z, p, dp)
+            out = (out[0] + force, out[1] + change, *out[2:])
         return out
+
+    def _press(
+        self, area: EnclosedArea, z: Lanes, p: Parameters, dp: Parameters
+    ) -> tuple[Lanes, Lanes]:
+        """Pressure's part of F and F_p·dp."""
+        theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
+        moved, change = self._velocity(np.zeros_like(z), dp)
+        force = area.gradient(theta)
+        turn = pull * np.einsum("lij,lj->li", area.hessian(theta), moved) + change * force
+        residual, column = np.zeros((2, *z.shape))
+        residual[:, : self.unknowns] = -(pull * force)[:, self.unknown_nodes]
+        column[:, : self.unknowns] = -turn[:, self.unknown_nodes]
+        return residual, column
+
+    def _velocity(self, v_z: Lanes, v_p: Parameters) -> tuple[Nodal, Float[np.ndarray, "lanes 1"]]:
+        """Change of the nodal angles and of the pressure along a direction."""
+        y = self.scalars(v_z, v_p)
+        y[:, -1] = 0.0
+        return self._angles(v_z, y), self._pressure(y)[:, None]
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:
         """F(z; p)."""
@@ -191,6 +233,14 @@ class GeneralMechanics(Mechanics):
         sizes = np.int64(self.mesh.elements), np.int64(self.constraints), first
         shared = (sine, cosine, softness, sine_rows, cosine_rows, turned, *sizes)
         over_lanes(second_lanes, shared, arrays, [out])
+        if self._area is not None:
+            theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
+            (v_theta, v_pull), (w_theta, w_pull) = self._velocity(*v), self._velocity(*w)
+            hessian = self._area.hessian(theta)
+            total = pull * self._area.second(theta, v_theta, w_theta)
+            total += v_pull * np.einsum("lij,lj->li", hessian, w_theta)
+            total += w_pull * np.einsum("lij,lj->li", hessian, v_theta)
+            out[:, : self.unknowns] -= total[:, self.unknown_nodes]
         return out
 
     def solve(
@@ -209,23 +259,36 @@ class GeneralMechanics(Mechanics):
             nothing = np.zeros((len(z), 0, self.size))
             border = (nothing, nothing, np.zeros((len(z), 0, 0)))
         columns, rows, corner = border
+        if self._area is not None:
+            matrix = self.layout.dense(diagonal, gradients, trailing)
+            self._add_pressed(self._area, z, p, matrix)
+            return solve_bordered(matrix, columns, rows, corner, rhs)
         parts = (diagonal, gradients, columns, rows, corner, rhs)
         return self.layout.solve(*parts, trailing=trailing)
+
+    def _add_pressed(
+        self, area: EnclosedArea, z: Lanes, p: Parameters, matrix: Float[np.ndarray, "lanes n n"]
+    ) -> None:
+        """Add the pressure's part to F_z: every angle works on every other one."""
+        inner, n = self.unknown_nodes, self.unknowns
+        pull = self._pressure(self.scalars(z, p))[:, None, None]
+        matrix[:, :n, :n] -= pull * area.hessian(self.nodal_angles(z, p))[:, inner, inner]
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
-        """Fused kernel; lanes with an unsafe pivot take the general solve."""
+        """Fused kernel; lanes with an unsafe pivot, and rods under pressure, solve in general."""
+        if self._area is not None:
+            return self.plain_advance(z, p, dp, row, corner, defect)
         z, p, row, dp = self._checked((z, p), (row, dp))
         inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
         lanes = len(z)
         dz, tangent_z = np.empty((2, *z.shape))
-        dt, tangent_t, residual, ratio = np.empty((4, lanes))
+        dt, tangent_t, residual, determinant, ratio = np.empty((5, lanes))
         index = np.empty(lanes, dtype=np.int64)
-        outputs = [dz, dt, tangent_z, tangent_t, residual, index, ratio]
+        outputs = [dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio]
         over_lanes(advance_lanes, (self.layout.ends, *self._step_data), inputs, outputs)
-        unknown = np.full(lanes, np.nan)
-        out = Advance(dz, dt, tangent_z, tangent_t, residual, index, unknown)
+        out = Advance(dz, dt, tangent_z, tangent_t, residual, index, determinant)
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             unsafe = ~(ratio >= PIVOT_GUARD)
             again = self.plain_advance(*(x[unsafe] for x in inputs))

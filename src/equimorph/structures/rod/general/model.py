@@ -58,10 +58,11 @@ class Densities:
 class RodModel:
     """The Lagrangian of a rod in its nodal angles θ and *scalars* y = (multipliers, parameters, 1).
 
-    ``L = ½ θᵀKθ − θ·(slope y) + Σ (N − ½ γ N²) + ½ yᵀ Q y`` with the sum over the nodes of every
-    element and ``N = A sin θ + B cos θ``, ``A = m · across y``, ``B = m · along y``, quadrature
-    weights m. N/m is the compressive force and γ the axial compliance over m: a stretchable rod's
-    strain is eliminated node by node. Prescribed end angles are ``turned y``.
+    ``L = ½ θᵀKθ − θ·(slope y) + Σ (N − ½ γ N²) + ½ yᵀ Q y − p V`` with the sum over the nodes of
+    every element, ``N = A sin θ + B cos θ``, ``A = m · across y``, ``B = m · along y``, quadrature
+    weights m, and V as in `area.EnclosedArea`. N/m is the compressive force and γ the axial
+    compliance over m: a stretchable rod's strain is eliminated node by node. Prescribed end angles
+    are ``turned y``.
 
     Parameters
     ----------
@@ -81,6 +82,8 @@ class RodModel:
         Force of the support at A.
     origin
         Coordinates of end A (`from_start`) or B. Like all rows, they combine the scalars.
+    pressure
+        p, on the enclosed area V.
     """
 
     mesh: Mesh
@@ -100,6 +103,7 @@ class RodModel:
     reaction: Float[np.ndarray, "2 scalars"]
     origin: Float[np.ndarray, "2 scalars"]
     from_start: tuple[bool, bool]
+    pressure: Float[np.ndarray, " scalars"]
 
     @property
     def scalars(self) -> int:
@@ -144,6 +148,7 @@ class RodModel:
             rest=self.rest @ matrix,
             reaction=self.reaction @ matrix,
             origin=self.origin @ matrix,
+            pressure=self.pressure @ matrix,
         )
 
 
@@ -183,6 +188,7 @@ def raw_model(build: Build) -> RodModel:
     _add_couples(build, place, slope)
     quadratic = _curvature_energy(build, place, count)
     reaction, origin, from_start = _supports(build, opposed, place, quadratic)
+    pressure = _pressure(build, place, count)
     stiffness, springs = bending.copy(), np.zeros(2)
     turned, rest = np.zeros((2, 2, count))
     for side, (name, node) in enumerate((("theta_A", 0), ("theta_B", -1))):
@@ -212,6 +218,7 @@ def raw_model(build: Build) -> RodModel:
         reaction,
         origin,
         from_start,
+        pressure,
     )
 
 
@@ -225,6 +232,7 @@ def _summed(terms: Sequence[Term], mesh: Mesh) -> Effects:
         bending=sum((part.bending for part in parts), zero),
         natural=sum((part.natural for part in parts), zero),
         couples=tuple(couple for part in parts for couple in part.couples),
+        pressure=sum(part.pressure for part in parts),
         force=(sum(part.force[0] for part in parts), sum(part.force[1] for part in parts)),
     )
 
@@ -257,6 +265,13 @@ def _add_couples(
         for s, moment in _summed(terms, build.mesh).couples:
             node = int(np.argmin(np.abs(build.mesh.nodes - s)))
             slope[place[name], node] += moment
+
+
+def _pressure(build: Build, place: Mapping[str, int], count: int) -> Float[np.ndarray, " scalars"]:
+    out = np.zeros(count)
+    for name, terms in build.terms.items():
+        out[place[name]] = _summed(terms, build.mesh).pressure
+    return out
 
 
 def _curvature_energy(

@@ -51,6 +51,7 @@ def _features(model: RodModel, *, reverse: bool, sign: float) -> Float[np.ndarra
         model.cosine[:, ::step],
         sign * model.slope[:, ::step],
         sign * model.turned.T[:, ::step],
+        sign * step * model.pressure[:, None],
     )
     return np.concatenate(parts, axis=1)
 

@@ -51,7 +51,7 @@ class Effects:
 
     along, across: load cumulated from end A in x and y, `force` all of it; bending: the part of the
     moment that does not come from curvature; natural: intrinsic curvature; couples: (arclength,
-    moment).
+    moment); pressure: towards the left of the rod.
     """
 
     along: ElementNodes | float = 0.0
@@ -60,6 +60,7 @@ class Effects:
     natural: ElementNodes | float = 0.0
     couples: tuple[tuple[float, float], ...] = ()
     force: tuple[float, float] = (0.0, 0.0)
+    pressure: float = 0.0
 
 
 class Term:
@@ -67,7 +68,7 @@ class Term:
 
     word: ClassVar[str]
     measure: ClassVar[str]
-    """What the amplitude is: "line", "force", "couple", "curvature" or "tension"."""
+    """What the amplitude is: a key of `structures.rod.units.LABELS`."""
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -288,8 +289,30 @@ class Tendon(Term):
         return Effects(bending=there * at_nodes(self._profile(), mesh))
 
 
+@dataclass(frozen=True, eq=False)
+class Pressure(Term):
+    """Pressure all along a rod between two held ends, as of a gas in the chamber that it closes.
+
+    The amplitude is a force per arclength, normal to the rod wherever it turns, towards its left
+    (upward on an arch from A to B) if positive. Its potential is −p times the area between the
+    rod and its chord: conservative, as both ends of the rod stay where they are.
+    """
+
+    word: ClassVar[str] = "pressure"
+    measure: ClassVar[str] = "line"
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """None."""
+        return ()
+
+    def effects(self, mesh: Mesh) -> Effects:
+        """A unit of pressure."""
+        return Effects(pressure=1.0)
+
+
 TERMS: dict[str, type[Term]] = {
-    kind.word: kind for kind in (LineLoad, PointForce, Couple, Curvature, Tendon)
+    kind.word: kind for kind in (LineLoad, PointForce, Couple, Curvature, Tendon, Pressure)
 }
 REFUSED = {
     "follower": "a follower load has no potential, so that equilibria are no critical points",

@@ -9,6 +9,7 @@ from numpy.polynomial import legendre
 
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.rod.discretisation import Reference, reference_element
+from equimorph.structures.rod.general.area import EnclosedArea
 from equimorph.structures.rod.general.fields.kernels import (
     KAPPA,
     THETA,
@@ -48,6 +49,8 @@ class Fields:
         model, fine = self.model, self.model.fine
         coarse = model.mesh.reference
         spread = legendre.legvander(2.0 * self.reference.nodes - 1.0, coarse.degree)
+        area = EnclosedArea(model.mesh)
+        pressed = area.rows[:, 0] if model.pressure.any() else np.zeros((0, 0))
         return (
             model.bending_stiffness,
             model.element_slope,
@@ -64,6 +67,9 @@ class Fields:
             spread @ coarse.to_legendre,
             self.reference.integral,
             model.mesh.lengths,
+            model.pressure,
+            np.ascontiguousarray(pressed),
+            model.mesh.weights,
         )
 
     def everywhere(

@@ -40,14 +40,40 @@ def _combined(table, rows, e, i, scalars):
 
 
 @njit(**INNER)
-def _integrate(matrix, start, length, values, out, row):
-    """Integral from the left end, plus a start value, into rows from `row` on."""
+def _integrate(matrix, start, length, values, at, out, row):
+    """Integral of rows from `at` on, from the left end, plus a start value, into others."""
     count = len(matrix)
     for i in range(count):
         total = spread(0.0)
         for j in range(count):
-            total = total + spread(matrix[i, j]) * load(values, j)
+            total = total + spread(matrix[i, j]) * load(values, at + j)
         store(out, row + i, start + spread(length) * total)
+
+
+@njit(**INNER)
+def _start_pressure(pressure, pressed, weights, angles, scalars, press, moments):
+    """Pressure and half the way from A to B; what pressure adds to the left moments of elements.
+
+    pressed (elements, nodes): rows of W in `area.EnclosedArea` at the elements' left ends.
+    """
+    total = spread(0.0)
+    for j in range(len(pressure)):
+        total = total + spread(pressure[j]) * load(scalars, j)
+    degree = (len(weights) - 1) // len(pressed)
+    x, y = spread(0.0), spread(0.0)
+    for e in range(len(pressed)):
+        across, along = spread(0.0), spread(0.0)
+        for i in range(len(weights)):
+            s, c = sincos(load(angles, i))
+            across = across + spread(pressed[e, i]) * c
+            along = along + spread(pressed[e, i]) * s
+            if e == 0:
+                x, y = x + spread(weights[i]) * c, y + spread(weights[i]) * s
+        s, c = sincos(load(angles, e * degree))
+        store(moments, e, total * (across * c + along * s))
+    store(press, 0, total)
+    store(press, 1, spread(0.5) * x)
+    store(press, 2, spread(0.5) * y)
 
 
 @njit(**INNER)
@@ -65,27 +91,47 @@ def _left_moment(stiffness, slope, weight, softness, along, across, rows, e, ang
 
 
 @njit(**INNER)
-def _iterate(integral, length, left, start, pull, give, softness, e, theta, new, out):
-    """One iteration; whether some lane moved.
-
-    pull: rows of a, b and bending; give: one over rigidity; new: rate, then stretched cosine and
-    sine; out: κ and the moment. Lanes that have settled keep their θ, so that what happens to a
-    lane never depends on those beside it.
-    """
+def _place(integral, length, corner, press, theta, new, out):
+    """Places under pressure from the last angles, less half the way from A to B."""
     fine = len(integral)
     for i in range(fine):
         s, c = sincos(load(theta, i))
+        store(new, fine + i, c)
+        store(new, 2 * fine + i, s)
+    _integrate(integral, corner[0] - load(press, 1), length, new, fine, out, X * fine)
+    _integrate(integral, corner[1] - load(press, 2), length, new, 2 * fine, out, Y * fine)
+
+
+@njit(**INNER)
+def _iterate(
+    integral, length, left, start, corner, press, pull, give, softness, e, theta, new, out
+):
+    """One iteration; whether some lane moved.
+
+    left, start, corner: angle, moment and place at the left end; press: see `_start_pressure`, or
+    empty; pull: rows of a, b and bending; give: one over rigidity; new: rate, then stretched cosine
+    and sine; out: κ and the moment. Lanes that have settled keep their θ, so that what happens to a
+    lane never depends on those beside it.
+    """
+    fine = len(integral)
+    if len(press) > 0:
+        _place(integral, length, corner, press, theta, new, out)
+    for i in range(fine):
+        s, c = sincos(load(theta, i))
         a, b = load(pull, i), load(pull, fine + i)
+        if len(press) > 0:
+            a = a + load(press, 0) * load(out, X * fine + i)
+            b = b - load(press, 0) * load(out, Y * fine + i)
         stretch = spread(1.0) - spread(softness[e, i]) * (a * s + b * c)
         store(new, i, stretch * (a * c - b * s))
         store(new, fine + i, stretch * c)
         store(new, 2 * fine + i, stretch * s)
-    _integrate(integral, start, length, new, out, MOMENT * fine)
+    _integrate(integral, start, length, new, 0, out, MOMENT * fine)
     for i in range(fine):
         moment = load(out, MOMENT * fine + i) + load(pull, 2 * fine + i)
         store(out, KAPPA * fine + i, moment * spread(give[e, i]))
         store(new, i, load(out, KAPPA * fine + i))
-    _integrate(integral, left, length, new, out, THETA * fine)
+    _integrate(integral, left, length, new, 0, out, THETA * fine)
     worst = spread(0.0)
     for i in range(fine):
         turned = load(out, THETA * fine + i)
@@ -102,12 +148,13 @@ def _iterate(integral, length, left, start, pull, give, softness, e, theta, new,
 def fields_lanes(
     stiffness, slope, weight, softness, along, across, fine_along, fine_across, fine_bending,
     give, fine_softness, across_rows, along_rows, bending_rows, refine, integral, lengths,
-    angles, scalars, out,
+    pressure, pressed, weights, angles, scalars, out,
 ):  # fmt: skip
     """θ, κ, x, y and M of every lane at the finer nodes: out (lanes, elements · 5 · fine).
 
     angles (lanes, nodes); scalars (lanes, scalars); refine (fine, order) interpolates from the
-    element's nodes; give: one over rigidity; x and y begin at 0.
+    element's nodes; give: one over rigidity; pressed: see `_start_pressure`, empty without
+    pressure; x and y begin at 0.
     """
     elements, order, fine = stiffness.shape[0], stiffness.shape[1], len(integral)
     nodes, count = angles.shape[1], scalars.shape[1]
@@ -115,17 +162,22 @@ def fields_lanes(
     nodal, y = work_rows(nodes), work_rows(count)
     pull, theta, new = work_rows(3 * fine), work_rows(fine), work_rows(3 * fine)
     local, whole = work_rows(5 * fine), work_rows(size)
+    press, moments = work_rows(3 if len(pressed) > 0 else 0), work_rows(len(pressed))
     rows = (across_rows, along_rows, bending_rows)
     for block in range(0, angles.shape[0], LANES):
         start = min(block, angles.shape[0] - LANES)
         read_lanes(angles, start * nodes, nodes, nodes, nodal, 0, 1)
         read_lanes(scalars, start * count, count, count, y, 0, 1)
+        if len(pressed) > 0:
+            _start_pressure(pressure, pressed, weights, nodal, y, press, moments)
         x_left, y_left = spread(0.0), spread(0.0)
         for e in range(elements):
             base, length = e * (order - 1), lengths[e]
             moment = _left_moment(
                 stiffness, slope, weight, softness, along, across, rows, e, nodal, y
             )
+            if len(pressed) > 0:
+                moment = moment - load(moments, e)
             for i in range(fine):
                 store(pull, i, _combined(fine_across, across_rows, e, i, y))
                 store(pull, fine + i, _combined(fine_along, along_rows, e, i, y))
@@ -135,16 +187,15 @@ def fields_lanes(
                     angle = angle + spread(refine[i, j]) * load(nodal, base + j)
                 store(theta, i, angle)
             left, steps = load(nodal, base), 0
+            corner = (x_left, y_left)
             while steps < MOST and _iterate(
-                integral, length, left, moment, pull, give, fine_softness, e, theta, new, local
-            ):
+                integral, length, left, moment, corner, press, pull, give, fine_softness, e, theta,
+                new, local,
+            ):  # fmt: skip
                 steps += 1
-            for i in range(fine):  # the sums of the last iteration, as they belong to its κ
-                store(new, i, load(new, fine + i))
-            _integrate(integral, x_left, length, new, local, X * fine)
-            for i in range(fine):
-                store(new, i, load(new, 2 * fine + i))
-            _integrate(integral, y_left, length, new, local, Y * fine)
+            # the sums of the last iteration, as they belong to its κ
+            _integrate(integral, x_left, length, new, fine, local, X * fine)
+            _integrate(integral, y_left, length, new, 2 * fine, local, Y * fine)
             x_left, y_left = load(local, X * fine + fine - 1), load(local, Y * fine + fine - 1)
             for i in range(5 * fine):
                 store(whole, e * 5 * fine + i, load(local, i))

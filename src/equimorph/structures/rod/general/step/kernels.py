@@ -74,11 +74,21 @@ def _largest(force, closure, first, n, m):
     return worst + (total - total)
 
 
+@njit(**INNER)
+def _determinant(small, m, width):
+    """Determinant of the first m ≤ 2 rows and columns of the small system."""
+    if m == 0:
+        return spread(1.0)
+    if m == 1:
+        return load(small, 0)
+    return load(small, 0) * load(small, width + 1) - load(small, 1) * load(small, width)
+
+
 @njit(**FLAGS)
 def advance_lanes(
     ends, stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic,
     turned, first, z, p, dp, row, corner, defect,
-    dz, dt, tangent_z, tangent_t, residual, index, ratio,
+    dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Newton step, tangent and inertia of every lane; see `structures.contract.Advance`."""
     elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
@@ -116,6 +126,7 @@ def advance_lanes(
         _fill_small(m, closure, moved, own, row, corner, defect, start, n, small)
         subtract_products(products, tiles, border, width, small)
         count_border(small, m, width, square, extremes)
+        store(extremes, 4, _determinant(small, m, width) / load(extremes, 4))
         solve_lanes(small, border, width)
         restore_pair(stiffness, ends, border, width, 0, 1, lower, vertices, work, small, solution)
         for c in range(m):
@@ -127,4 +138,4 @@ def advance_lanes(
             at = start + k
             dt[at], tangent_t[at] = small[m * width + border, k], small[m * width + border + 1, k]
             residual[at], index[at] = worst[0, k], np.int64(extremes[0, k]) - m
-            ratio[at] = pivot_ratio(extremes, k)
+            determinant[at], ratio[at] = extremes[4, k], pivot_ratio(extremes, k)
