@@ -84,7 +84,8 @@ class ParameterLine:
 
     def take(self, lanes: Int[np.ndarray, " some"]) -> "ParameterLine":
         """Return some of the lanes."""
-        return ParameterLine(self.structure, self.start[lanes], self.velocity[lanes])
+        start, velocity = (np.take(each, lanes, axis=0) for each in (self.start, self.velocity))
+        return ParameterLine(self.structure, start, velocity)
 
     def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
         """p(t)."""

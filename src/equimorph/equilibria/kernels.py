@@ -15,19 +15,23 @@ SUMS = {**FLAGS, "fastmath": {"contract", "reassoc"}, "_nrt": False}
 """Sums over the entries of one lane may be reordered: always in the same way."""
 
 (
-    T, SLOPE, T_OLD, SLOPE_OLD, ARC, TRIAL, CORNER, DEFECT, LENGTH, TRAVELLED, LAST, WEIGHT,
-    LARGEST, TURNING, NEW_SLOPE, NORM, TURN, DET_OLD, DET, NEW_DET,
-) = range(20)  # fmt: skip
-"""Rows of `numbers`: t and dt/ds here and at the step before, its arclength; t, closing equation
-and length of the step that is tried; way so far; last correction; squared weight of dt; knobs;
-dt/ds at the end, length of the tangent and turning angle of a step that converged; determinant of
-F_z at the step before, here and at the end."""
-NUMBERS = 20
+    T, SLOPE, T_1, SLOPE_1, T_2, SLOPE_2, X_1, RATE_1, X_2, RATE_2, ARC, TRIAL, CORNER, DEFECT,
+    LENGTH, TRAVELLED, LAST, WEIGHT, LARGEST, TURNING, NEW_SLOPE, NORM, TURN, DET_OLD, DET, NEW_DET,
+    GAIN, BEND,
+) = range(28)  # fmt: skip
+"""Rows of `numbers`: t and dt/ds here, one step before and two; where those two lie along the
+tangent here, and the cosines of theirs; arclength of the step before; t, closing equation and
+length of the step that is tried; way so far; last correction; squared weight of dt; knobs; dt/ds at
+the end, length of the tangent and turning angle of a step that converged; determinant of F_z at the
+step before, here and at the end; last correction over the square of the one before; turning angle
+per length of the last step."""
+NUMBERS = 28
 
-LANE, STAGE, ITERATION, INDEX, NEW_INDEX, WHAT, STEPS, MOST, LEVEL = range(9)
+LANE, STAGE, ITERATION, INDEX, NEW_INDEX, WHAT, STEPS, MOST, LEVEL, HEAD, KNOWN = range(11)
 """Rows of `counts`: number of the lane; stage; Newton steps so far; index here and at the end of
-the step; events in the step; steps so far and their limit; number of retries."""
-COUNTS = 9
+the step; events in the step; steps so far and their limit; number of retries; which of three
+remembered points is the present one; how many points before it are known."""
+COUNTS = 11
 
 CORRECTING, AIMING, CONVERGED, REFUSED, ENDED, SHORT, LONG, STUCK = range(8)
 """Stages: in Newton's iteration; in that of a step to the end of t; step converged; step refused;
@@ -43,7 +47,11 @@ ACCEPTED, EXACT = 1e-7, 1e-10
 """Size of the last correction on the way, and where events are: Newton is quadratic, so that the
 point itself is good to the square, but the tangent belongs to the point before."""
 NEARLY, NEXT = 1e-5, 1e-11
-"""Last correction on the way if the next one, by the rate of the last two, would be below."""
+"""Last correction on the way if the next one would be below: Newton squares it, times a gain that
+the last two corrections show."""
+DOUBT = 4.0
+"""Factor of the gain where it is that of an earlier step: the first correction is the last one
+then."""
 ARRIVED = 1e-9
 """Last correction at the end of t, after which the point is exact to round-off."""
 MOST_ITERATIONS = 7
@@ -107,8 +115,9 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
     """Apply a Newton correction to each lane in its iteration; tell whether it converged.
 
     The first correction has to be below a quarter of the step and each later one below half of the
-    one before; at the end the tangents have to agree. The last one is below `accepted`, or up to
-    `nearly` if the next one would be below `NEXT`, by the rate of the last two.
+    one before; the tangent has to agree with that of the start from the guess on, which tells at
+    once where a step goes too far. The last one is below `accepted`, or up to `nearly` if the next
+    one would be below `NEXT`.
     """
     n, size = mass.shape[0], trial.shape[1]
     for i in range(active):
@@ -121,19 +130,6 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
         if not correction <= max(limit, accepted):
             counts[STAGE, i] = REFUSED
             continue
-        for j in range(size):
-            trial[i, j] += dz[i, j]
-        numbers[TRIAL, i] += dt[i]
-        ratio = 1.0 if first else correction / last
-        close = correction <= nearly and correction * ratio * ratio <= NEXT
-        if not (correction <= accepted or close):
-            counts[ITERATION, i] += 1
-            numbers[LAST, i] = correction
-            # the closing equation is linear: the correction has met it
-            numbers[DEFECT, i] = 0.0
-            if counts[ITERATION, i] == MOST_ITERATIONS:
-                counts[STAGE, i] = REFUSED
-            continue
         total = 0.0
         for j in range(n):
             total += mass[j] * tangent[i, j] * tangent[i, j]
@@ -141,6 +137,22 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
         # row·tangent = 1 by construction: the cosine of the turning is 1 over the new length
         if not LEAST_COSINE * norm <= 1.0:
             counts[STAGE, i] = REFUSED
+            continue
+        for j in range(size):
+            trial[i, j] += dz[i, j]
+        numbers[TRIAL, i] += dt[i]
+        gain = DOUBT * numbers[GAIN, i]
+        if not first:
+            gain = correction / (last * last)
+            numbers[GAIN, i] = max(gain, 1.0)
+        close = correction <= nearly and 0.0 < gain * correction * correction <= NEXT
+        if not (correction <= accepted or close):
+            counts[ITERATION, i] += 1
+            numbers[LAST, i] = correction
+            # the closing equation is linear: the correction has met it
+            numbers[DEFECT, i] = 0.0
+            if counts[ITERATION, i] == MOST_ITERATIONS:
+                counts[STAGE, i] = REFUSED
             continue
         counts[STAGE, i] = CONVERGED
         numbers[NORM, i] = norm
@@ -151,11 +163,12 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
 @njit(**SUMS)
 def correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active):
     """`correct` for steps to the end of t, where t is fixed instead of the length."""
-    _, _, z, here, trial, _ = places
+    z, here, trial, _ = places
     n = mass.shape[0]
     for i in range(active):
         if counts[STAGE, i] != AIMING:
             continue
+        head = counts[HEAD, i]
         last, weight = numbers[LAST, i], numbers[WEIGHT, i]
         first = counts[ITERATION, i] == 0
         correction = _size(i, dz, 0.0, mass, weight)
@@ -173,9 +186,9 @@ def correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active):
         for j in range(n):
             total += mass[j] * tangent[i, j] * tangent[i, j]
         for j in range(n):
-            along += mass[j] * here[i, j] * tangent[i, j]
+            along += mass[j] * here[i, head, j] * tangent[i, j]
         for j in range(n):
-            way += mass[j] * here[i, j] * (trial[i, j] - z[i, j])
+            way += mass[j] * here[i, head, j] * (trial[i, j] - z[i, head, j])
         along += weight * numbers[SLOPE, i] * slope[i]
         norm = np.sqrt(total + weight * slope[i] * slope[i])
         if not LEAST_COSINE * norm <= abs(along):

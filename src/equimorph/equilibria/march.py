@@ -26,6 +26,8 @@ DIFFERENCE = 1e-5
 """Step of differences along a curve, in the metric."""
 MISS = 0.1
 """Error of the largest value of a cubic inside a step, as a share of its rise above the ends."""
+PATIENCE = 40
+"""Share of lanes, one in so many, that may be finished before their gaps are closed."""
 WHY = {
     kernels.SHORT: "the step became too small",
     kernels.LONG: "no end in {most} steps",
@@ -72,8 +74,10 @@ class Block:
         size = curve.metric.size
         self.events = EventFile(size, events + capacity)
         self.points = PointFile(size, capacity if options.record else 0)
-        self._places = tuple(np.empty((capacity, size)) for _ in range(6))
-        self._scalars = new_scalars(capacity)
+        shapes = (2 * [(capacity, stepping.MEMORY, size)]) + (2 * [(capacity, size)])
+        self._places = tuple(np.zeros(shape) for shape in shapes)
+        self._flat = tuple(place.reshape(capacity, -1) for place in self._places)
+        self._scalars = new_scalars(_apart(capacity))
         self._excess = np.zeros((2 * len(constraints), capacity))
         self._here = curve.take(np.zeros(0, int))
         self._knobs = options.table()
@@ -108,7 +112,7 @@ class Block:
     def tick(self) -> list[Loss]:
         """One Newton step of every lane, and all that follows from it; lanes that are lost."""
         active, (numbers, counts) = self.active, self._scalars
-        _, _, _, _, trial, row = self._places
+        _, _, trial, row = self._places
         closing = numbers[kernels.CORNER, :active], numbers[kernels.DEFECT, :active]
         t = numbers[kernels.TRIAL, :active]
         move = self._here.advance(trial[:active], t, row[:active], *closing)
@@ -133,7 +137,7 @@ class Block:
                 self.points.add(trial, *record[1:])
         finished, given_up = stepping.proceed(move.tangent_z, mass, self._places, *state, smallest)
         lost = self._given_up() if given_up else []
-        if finished:
+        if given_up or finished > active // PATIENCE:
             self._close()
         return lost
 
@@ -141,7 +145,7 @@ class Block:
         """Note violated constraints; refuse steps inside which one may be violated for a while."""
         numbers, counts = self._scalars
         good = np.flatnonzero(counts[kernels.STAGE, : self.active] == CONVERGED)
-        z, t = self._places[4][good], numbers[kernels.TRIAL, good]
+        z, t = self._places[2][good], numbers[kernels.TRIAL, good]
         states = self._here.take(good).states(z, t)
         last, here = self._excess[::2, good], self._excess[1::2, good]
         new = np.array([constraint.excess(*states) for constraint in self.constraints])
@@ -168,12 +172,13 @@ class Block:
         """
         if len(at) == 0:
             return
-        (numbers, counts), (_, _, z, tangent, trial, _) = self._scalars, self._places
-        here, length = self._here.take(at), numbers[kernels.LENGTH, at]
+        numbers, counts = self._scalars
+        (z, tangent), here = self._present(at), self._here.take(at)
+        length = numbers[kernels.LENGTH, at]
         norm = numbers[kernels.NORM, at]
         ends = (
-            (z[at], numbers[kernels.T, at], tangent[at], numbers[kernels.SLOPE, at]),
-            (trial[at], numbers[kernels.TRIAL, at], move.tangent_z[at] / norm[:, None],
+            (z, numbers[kernels.T, at], tangent, numbers[kernels.SLOPE, at]),
+            (self._places[2][at], numbers[kernels.TRIAL, at], move.tangent_z[at] / norm[:, None],
              numbers[kernels.NEW_SLOPE, at]),
         )  # fmt: skip
         slopes = [_slope(here, constraint, *end) for end in ends]
@@ -199,16 +204,20 @@ class Block:
 
     def _front(self, at: Some) -> Front:
         """Where lanes are."""
-        _, _, z, tangent, _, _ = self._places
         numbers, counts = self._scalars
-        index = counts[kernels.INDEX, at]
+        (z, tangent), index = self._present(at), counts[kernels.INDEX, at]
         t, slope = numbers[kernels.T, at], numbers[kernels.SLOPE, at]
-        return Front(z[at], t, tangent[at], slope, index)
+        return Front(z, t, tangent, slope, index)
+
+    def _present(self, at: Some) -> tuple[Lanes, Lanes]:
+        """Present points and tangents, of the three that are remembered."""
+        head = self._scalars[1][kernels.HEAD, at]
+        return self._places[0][at, head], self._places[1][at, head]
 
     def _bracket(self, at: Some, move: Advance) -> Bracket:
         numbers, counts = (scalars[:, at] for scalars in self._scalars)
         after = Front(
-            self._places[4][at],
+            self._places[2][at],
             numbers[kernels.TRIAL],
             move.tangent_z[at] / numbers[kernels.NORM][:, None],
             numbers[kernels.NEW_SLOPE],
@@ -240,8 +249,13 @@ class Block:
     def _close(self) -> None:
         """Close the gaps of lanes that are finished."""
         state = (*self._scalars, self._excess)
-        self.active = kernels.close_gaps(self._places, *state, self.active)
+        self.active = kernels.close_gaps(self._flat, *state, self.active)
         self._here = self.curve.take(self.lanes)
+
+
+def _apart(lanes: int) -> int:
+    """Length of rows for so many lanes: rows an even number of cache lines apart share sets."""
+    return 8 * (-(-lanes // 8) | 1)
 
 
 def _slope(

@@ -5,6 +5,7 @@ from numba import njit
 from equimorph.equilibria.kernels import (
     CONVERGED,
     ENDED,
+    HEAD,
     INDEX,
     LANE,
     LENGTH,
@@ -25,16 +26,17 @@ from equimorph.equilibria.kernels import (
 @njit(**SUMS)
 def file_events(new_tangent, stops, places, numbers, counts, active, buffer, filled):
     """Copy the steps in which something happened behind others; end lanes; return how many."""
-    _, _, z, tangent, trial, _ = places
+    z, tangent, trial, _ = places
+    size = trial.shape[1]
     z0, tangent0, z1, tangent1, values, names = buffer
     for i in range(active):
         what = counts[WHAT, i]
         if counts[STAGE, i] != CONVERGED or what == 0:
             continue
-        norm = 1.0 / numbers[NORM, i]
-        for j in range(z.shape[1]):
-            z0[filled, j], tangent0[filled, j] = z[i, j], tangent[i, j]
-        for j in range(z.shape[1]):
+        norm, here = 1.0 / numbers[NORM, i], counts[HEAD, i]
+        for j in range(size):
+            z0[filled, j], tangent0[filled, j] = z[i, here, j], tangent[i, here, j]
+        for j in range(size):
             z1[filled, j], tangent1[filled, j] = trial[i, j], new_tangent[i, j] * norm
         values[0, filled], values[1, filled] = numbers[T, i], numbers[SLOPE, i]
         values[2, filled], values[3, filled] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]

@@ -7,6 +7,7 @@ from equimorph.equilibria.kernels import (
     AIMING,
     ARC,
     BACK,
+    BEND,
     CONVERGED,
     CORNER,
     CORRECTING,
@@ -15,8 +16,10 @@ from equimorph.equilibria.kernels import (
     DET,
     DET_OLD,
     ENDED,
+    HEAD,
     INDEX,
     ITERATION,
+    KNOWN,
     LANE,
     LARGEST,
     LAST,
@@ -30,22 +33,33 @@ from equimorph.equilibria.kernels import (
     NEW_SLOPE,
     NORM,
     NUMBERS,
+    RATE_1,
+    RATE_2,
     REFUSED,
     SHORT,
     SLOPE,
-    SLOPE_OLD,
+    SLOPE_1,
+    SLOPE_2,
     STAGE,
     STEPS,
     STUCK,
     SUMS,
-    T_OLD,
+    T_1,
+    T_2,
     TRAVELLED,
     TRIAL,
     TURN,
     TURNING,
     WEIGHT,
+    X_1,
+    X_2,
     T,
 )
+
+MEMORY = 3
+"""Points that a lane remembers, the present one included."""
+LEAST_RATE = 0.3
+"""Cosine of the angle between the present tangent and one before, above which a point counts."""
 
 
 @njit(**{**SUMS, "_nrt": True})
@@ -61,7 +75,7 @@ def proceed(new_tangent, mass, places, numbers, counts, active, smallest):
             finished += stage == ENDED
             continue
         if stage == CONVERGED:
-            _take_over(i, new_tangent, mass, places, numbers, counts)
+            _take_over(i, new_tangent, places, numbers, counts)
         else:
             numbers[LENGTH, i] *= BACK
         counts[STEPS, i] += 1
@@ -77,98 +91,154 @@ def proceed(new_tangent, mass, places, numbers, counts, active, smallest):
 
 
 @njit(**SUMS)
-def _take_over(i, new_tangent, mass, places, numbers, counts):
+def _take_over(i, new_tangent, places, numbers, counts):
     """Make the end of an accepted step the place of the lane, and choose the next length."""
-    z_old, tangent_old, z, tangent, trial, _ = places
-    n, norm = mass.shape[0], 1.0 / numbers[NORM, i]
-    chord = 0.0
-    for j in range(n):
-        dz = trial[i, j] - z[i, j]
-        chord += mass[j] * dz * dz
+    z, tangent, trial, _ = places
+    size, norm = trial.shape[1], 1.0 / numbers[NORM, i]
+    counts[HEAD, i] = (counts[HEAD, i] + 1) % MEMORY
+    counts[KNOWN, i] = min(counts[KNOWN, i] + 1, MEMORY - 1)
+    here = counts[HEAD, i]
     # loops over few arrays, so that the compiler can tell that they do not overlap
-    for j in range(z.shape[1]):
-        z_old[i, j] = z[i, j]
-    for j in range(z.shape[1]):
-        z[i, j] = trial[i, j]
-    for j in range(z.shape[1]):
-        tangent_old[i, j] = tangent[i, j]
-    for j in range(z.shape[1]):
-        tangent[i, j] = new_tangent[i, j] * norm
-    dt = numbers[TRIAL, i] - numbers[T, i]
-    chord = np.sqrt(chord + numbers[WEIGHT, i] * dt * dt)
-    half, length = 0.5 * numbers[TURN, i], numbers[LENGTH, i]
-    # arclength over chord, as on a circle
-    numbers[ARC, i] = chord * half / np.sin(half) if half > 1e-4 else chord
-    numbers[T_OLD, i], numbers[SLOPE_OLD, i] = numbers[T, i], numbers[SLOPE, i]
+    for j in range(size):
+        z[i, here, j] = trial[i, j]
+    for j in range(size):
+        tangent[i, here, j] = new_tangent[i, j] * norm
+    turn, length = numbers[TURN, i], numbers[LENGTH, i]
+    # arclength over its part along the tangent, as on a circle
+    arc = length * turn / np.sin(turn) if turn > 1e-4 else length
+    numbers[T_2, i], numbers[SLOPE_2, i] = numbers[T_1, i], numbers[SLOPE_1, i]
+    numbers[T_1, i], numbers[SLOPE_1, i] = numbers[T, i], numbers[SLOPE, i]
     numbers[T, i], numbers[SLOPE, i] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
     counts[INDEX, i] = counts[NEW_INDEX, i]
     numbers[DET_OLD, i], numbers[DET, i] = numbers[DET, i], numbers[NEW_DET, i]
     numbers[TRAVELLED, i] += length
-    growth = numbers[TURNING, i] / max(numbers[TURN, i], 1e-3)
-    numbers[LENGTH, i] = min(length * min(max(growth, 0.5), 2.0), numbers[LARGEST, i])
+    growth = numbers[TURNING, i] / max(turn, 1e-3)
+    length = min(length * min(max(growth, 0.5), 2.0), numbers[LARGEST, i])
+    numbers[LENGTH, i] = _before_bends(i, length, arc, turn / arc, numbers)
+    numbers[ARC, i], numbers[BEND, i] = arc, turn / arc
+
+
+@njit(**SUMS)
+def _before_bends(i, length, arc, bend, numbers):
+    """Shorten a step that would turn too far if the curvature of the path grows on as it did.
+
+    Towards a fold it grows within few steps, and those that go too far are the dearest.
+    """
+    old = numbers[BEND, i]
+    if not (bend > old > 0.0):
+        return length
+    trend = np.log(bend / old) / (arc + numbers[ARC, i])
+    for _ in range(8):
+        if length * bend * np.exp(trend * (length + arc)) <= numbers[TURNING, i]:
+            break
+        length *= 0.8
+    return length
 
 
 @njit(**SUMS)
 def predict(i, mass, places, numbers, counts):
     """Guess the end of the next step of lane i, and prepare the equation that closes it.
 
-    That is the pseudo-arclength, or the end of t where the step would lead beyond it.
+    That is the pseudo-arclength, which the guess obeys already, or the end of t where the step
+    would lead beyond it.
     """
-    _, _, z, tangent, trial, row = places
-    n, size = mass.shape[0], z.shape[1]
+    _look_back(i, mass, places, numbers, counts)
     numbers[LAST, i], counts[ITERATION, i] = np.inf, 0
     goal = 1.0 if numbers[SLOPE, i] > 0.0 else 0.0
-    ahead = _predicted(i, numbers[LENGTH, i], numbers)
-    if (ahead > goal) == (goal == 1.0):
-        numbers[LENGTH, i] = _length_to(i, goal, numbers)
-        _guess(i, places, numbers)
-        for j in range(size):
+    ahead = _predicted(i, numbers[LENGTH, i], numbers, counts)
+    aims = (ahead > goal) == (goal == 1.0)
+    if aims:
+        numbers[LENGTH, i] = _length_to(i, goal, numbers, counts)
+    _guess(i, places, numbers, counts)
+    numbers[TRIAL, i], numbers[DEFECT, i] = ahead, 0.0
+    numbers[CORNER, i] = numbers[WEIGHT, i] * numbers[SLOPE, i]
+    counts[STAGE, i] = AIMING if aims else CORRECTING
+    if aims:
+        row = places[3]
+        for j in range(row.shape[1]):
             row[i, j] = 0.0
-        numbers[TRIAL, i], numbers[CORNER, i], numbers[DEFECT, i] = goal, 1.0, 0.0
-        counts[STAGE, i] = AIMING
-        return
-    _guess(i, places, numbers)
-    along = 0.0
+        numbers[TRIAL, i], numbers[CORNER, i] = goal, 1.0
+
+
+@njit(**SUMS)
+def _look_back(i, mass, places, numbers, counts):
+    """Where the points before lie along the present tangent, whose row is left in `places`.
+
+    With that coordinate x the curve is a graph, and its derivative at every point is the tangent
+    there over the cosine of the angle between.
+    """
+    z, tangent, _, row = places
+    n, size = mass.shape[0], row.shape[1]
+    here = counts[HEAD, i]
+    corner = numbers[WEIGHT, i] * numbers[SLOPE, i]
     for j in range(n):
-        row[i, j] = mass[j] * tangent[i, j]
-    for j in range(n):
-        along += row[i, j] * (trial[i, j] - z[i, j])
+        row[i, j] = mass[j] * tangent[i, here, j]
     for j in range(n, size):
         row[i, j] = 0.0
-    numbers[TRIAL, i] = ahead
-    numbers[CORNER, i] = numbers[WEIGHT, i] * numbers[SLOPE, i]
-    along += numbers[CORNER, i] * (ahead - numbers[T, i])
-    numbers[DEFECT, i] = along - numbers[LENGTH, i]
-    counts[STAGE, i] = CORRECTING
+    for back in range(counts[KNOWN, i]):
+        then, along, rate = _before(i, back + 1, counts), 0.0, 0.0
+        for j in range(n):
+            along += row[i, j] * (z[i, then, j] - z[i, here, j])
+        for j in range(n):
+            rate += row[i, j] * tangent[i, then, j]
+        along += corner * (numbers[T_1 + 2 * back, i] - numbers[T, i])
+        rate += corner * numbers[SLOPE_1 + 2 * back, i]
+        behind = along < (numbers[X_1, i] if back > 0 else 0.0)
+        if not (behind and rate > LEAST_RATE):
+            counts[KNOWN, i] = back
+            return
+        numbers[X_1 + 2 * back, i], numbers[RATE_1 + 2 * back, i] = along, rate
 
 
 @njit(**SUMS)
-def _weights(length, arc):
-    """Factors of the old point, its tangent and the present one in the cubic, continued."""
-    s = 1.0 + length / arc
-    a = 2 * s * s * s - 3 * s * s + 1
-    return a, (s * s * s - 2 * s * s + s) * arc, (s * s * s - s * s) * arc
+def _before(i, steps, counts):
+    """Which of the remembered points of lane i was the present one so many steps ago."""
+    return (counts[HEAD, i] + MEMORY - min(steps, counts[KNOWN, i])) % MEMORY
 
 
 @njit(**SUMS)
-def _predicted(i, length, numbers):
-    """Predict t at the end of a step: on the cubic through the last two points, or the tangent."""
-    t, slope, arc = numbers[T, i], numbers[SLOPE, i], numbers[ARC, i]
-    if not arc > 0.0:
-        return t + length * slope
-    a, c, d = _weights(length, arc)
-    return t + (a * (numbers[T_OLD, i] - t) + c * numbers[SLOPE_OLD, i] + d * slope)
+def _weights(i, x, numbers, counts):
+    """Factors of a polynomial at x: of the points before less the present one, of all tangents.
+
+    It has the values and slopes of all known points (Hermite's interpolation).
+    """
+    x1, x2 = numbers[X_1, i], numbers[X_2, i]
+    if counts[KNOWN, i] == 0:
+        return 0.0, 0.0, x, 0.0, 0.0
+    if counts[KNOWN, i] == 1:
+        first, other = 1.0 - x / x1, x / x1
+        last = (3.0 - 2.0 * other) * other * other, (x - x1) * other * other
+        return last[0], 0.0, x * first * first, last[1] / numbers[RATE_1, i], 0.0
+    here = (x - x1) * (x - x2) / (x1 * x2)
+    one, two = x * (x - x2) / (x1 * (x1 - x2)), x * (x - x1) / (x2 * (x2 - x1))
+    slope_one, slope_two = 1.0 / x1 + 1.0 / (x1 - x2), 1.0 / x2 + 1.0 / (x2 - x1)
+    one, two, here = one * one, two * two, here * here
+    return (
+        (1.0 - 2.0 * (x - x1) * slope_one) * one,
+        (1.0 - 2.0 * (x - x2) * slope_two) * two,
+        x * here,
+        (x - x1) * one / numbers[RATE_1, i],
+        (x - x2) * two / numbers[RATE_2, i],
+    )
 
 
 @njit(**SUMS)
-def _length_to(i, goal, numbers):
+def _predicted(i, length, numbers, counts):
+    """Predict t at the end of a step."""
+    one, two, here, slope_one, slope_two = _weights(i, length, numbers, counts)
+    t = numbers[T, i]
+    back = one * (numbers[T_1, i] - t) + two * (numbers[T_2, i] - t)
+    slopes = slope_one * numbers[SLOPE_1, i] + slope_two * numbers[SLOPE_2, i]
+    return t + (back + here * numbers[SLOPE, i] + slopes)
+
+
+@njit(**SUMS)
+def _length_to(i, goal, numbers, counts):
     """Length at which t is predicted to reach its end, by bisection."""
     low, high = 0.0, numbers[LENGTH, i]
-    if not numbers[ARC, i] > 0.0:
-        return (goal - numbers[T, i]) / numbers[SLOPE, i]
-    for _ in range(40):
+    for _ in range(50):
         length = 0.5 * (low + high)
-        if (_predicted(i, length, numbers) > goal) == (goal == 1.0):
+        if (_predicted(i, length, numbers, counts) > goal) == (goal == 1.0):
             high = length
         else:
             low = length
@@ -176,19 +246,17 @@ def _length_to(i, goal, numbers):
 
 
 @njit(**SUMS)
-def _guess(i, places, numbers):
+def _guess(i, places, numbers, counts):
     """Predict the point at the end of the step."""
-    z_old, tangent_old, z, tangent, trial, _ = places
-    size, length = z.shape[1], numbers[LENGTH, i]
-    if not numbers[ARC, i] > 0.0:
-        for j in range(size):
-            trial[i, j] = z[i, j] + length * tangent[i, j]
-        return
-    a, c, d = _weights(length, numbers[ARC, i])
+    z, tangent, trial, _ = places
+    size = trial.shape[1]
+    here, one, two = counts[HEAD, i], _before(i, 1, counts), _before(i, 2, counts)
+    a, b, c, d, e = _weights(i, numbers[LENGTH, i], numbers, counts)
+    rest = 1.0 - a - b
     for j in range(size):
-        trial[i, j] = z[i, j] + a * (z_old[i, j] - z[i, j])
+        trial[i, j] = rest * z[i, here, j] + a * z[i, one, j] + b * z[i, two, j]
     for j in range(size):
-        trial[i, j] += c * tangent_old[i, j] + d * tangent[i, j]
+        trial[i, j] += c * tangent[i, here, j] + d * tangent[i, one, j] + e * tangent[i, two, j]
 
 
 @njit(**{**SUMS, "_nrt": True})
@@ -199,7 +267,7 @@ def seat(lanes, levels, knobs, start, move, mass, weight, places, numbers, count
     `knobs`: first and largest step, turning and most steps for each level of retries.
     """
     dz, tangent, slope, index, determinant = move
-    _, _, z_here, tangent_here, _, _ = places
+    z_here, tangent_here, _, _ = places
     n, size, stuck = mass.shape[0], start.shape[1], 0
     for k in range(lanes.shape[0]):
         i, level = active + k, levels[k]
@@ -209,8 +277,8 @@ def seat(lanes, levels, knobs, start, move, mass, weight, places, numbers, count
         squared = weight[k] * weight[k]
         norm = 1.0 / np.sqrt(total + squared * slope[k] * slope[k])
         for j in range(size):
-            z_here[i, j] = start[k, j] + dz[k, j]
-            tangent_here[i, j] = tangent[k, j] * norm
+            z_here[i, 0, j] = start[k, j] + dz[k, j]
+            tangent_here[i, 0, j] = tangent[k, j] * norm
         for row in range(NUMBERS):
             numbers[row, i] = 0.0
         for row in range(COUNTS):
