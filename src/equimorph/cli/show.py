@@ -1,12 +1,12 @@
 """Run a study and show its answers on the screen."""
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from equimorph.cli.compilation import are_compiled, compile_kernels
 from equimorph.cli.progress import ScreenProgress
 from equimorph.model import Descriptor
 from equimorph.structures import States
@@ -44,8 +44,10 @@ def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
         Replace the results of another study there.
     """
     screen = Console(highlight=False)
-    if not _kernels_are_cached():
-        screen.print("The first run compiles the kernels: a minute, and only once.")
+    _, _, problem = read_problem(file)
+    if not are_compiled():
+        screen.print("The first run compiles the kernels: under a minute, and only once.")
+        compile_kernels(problem)
     with ScreenProgress() as progress:
         outcome = run_study(file, out, replace=replace, progress=progress)
     _show(outcome, screen)
@@ -104,10 +106,3 @@ def _verdict(each: RouteOutcome) -> str:
         f"Route {each.name}: [bold green]arrived[/] without a snap, smallest margin "
         f"{each.route.margin:.3f}, length {each.route.length:.3f}."
     )
-
-
-def _kernels_are_cached() -> bool:
-    """Whether numba left compiled kernels beside their source."""
-    spec = find_spec("equimorph.linalg")
-    folders = (spec.submodule_search_locations or []) if spec else []
-    return any(any(Path(folder).glob("__pycache__/*.nbi")) for folder in folders)

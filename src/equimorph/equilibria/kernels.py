@@ -7,8 +7,8 @@ the same, bit for bit, whichever lanes march beside it.
 """
 
 import numpy as np
-from numba import njit
 
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS
 
 SUMS = {**FLAGS, "fastmath": {"contract", "reassoc"}, "_nrt": False}

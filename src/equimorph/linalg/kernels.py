@@ -1,7 +1,6 @@
 """Compiled kernels of small dense matrices, and the way of lanes into and out of blocks."""
 
-from numba import njit
-
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.simd import (
     LANES,
     absolute,
@@ -14,7 +13,7 @@ from equimorph.linalg.simd import (
     where_less,
 )
 
-FLAGS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+FLAGS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
 INNER = {**FLAGS, "_nrt": False}
 """Flags of kernels that are called by kernels and allocate nothing.
 

@@ -11,10 +11,11 @@ import operator
 
 import numpy as np
 from llvmlite import ir
-from numba import njit
 from numba.core import cgutils, types
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
+
+from equimorph.linalg.compiled import njit
 
 LANES = 8
 _FLAGS = ("contract",)
@@ -131,7 +132,7 @@ def set_entry(typing_context, array, position, number):
     return sig, generate
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True)
 def work_rows(rows):
     """Uninitialised array (rows, 8) that starts on a cache line: no vector straddles two lines."""
     raw = np.empty((rows + 1) * LANES)
@@ -305,7 +306,7 @@ def _quarter(typing_context, shifted, sine, cosine):
     return sig, generate
 
 
-@njit(nogil=True, cache=True, fastmath={"contract"}, _nrt=False)
+@njit(nogil=True, fastmath={"contract"}, _nrt=False)
 def sincos(angle):
     """Sine and cosine of eight angles, |angle| < 1e5, to about one unit in the last place.
 

@@ -1,10 +1,11 @@
 """Compiled kernels of the manifold layer."""
 
 import numpy as np
-from numba import njit
+
+from equimorph.linalg.compiled import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def match_or_add(vertices, z, mass, same, head, following, stored, count, ids, new):
     """Find each point among the known ones over its vertex, or add it.
 
@@ -28,7 +29,8 @@ def match_or_add(vertices, z, mass, same, head, following, stored, count, ids, n
         new[i] = best < 0
         if best < 0:
             best = count
-            stored[best] = z[i]
+            for j in range(z.shape[1]):
+                stored[best, j] = z[i, j]
             following[best] = head[vertices[i]]
             head[vertices[i]] = best
             count += 1
@@ -36,7 +38,7 @@ def match_or_add(vertices, z, mass, same, head, following, stored, count, ids, n
     return count
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def orient(cells, starts, neighbours, edge_in_cell, signs):
     """Give every cell a sign so that neighbours agree; return the number of contradictions.
 

@@ -1,7 +1,5 @@
 """Compiled kernels that copy what lanes leave behind as they march."""
 
-from numba import njit
-
 from equimorph.equilibria.kernels import (
     CONVERGED,
     ENDED,
@@ -21,6 +19,7 @@ from equimorph.equilibria.kernels import (
     WHAT,
     T,
 )
+from equimorph.linalg.compiled import njit
 
 
 @njit(**SUMS)

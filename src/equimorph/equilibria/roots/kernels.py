@@ -5,7 +5,6 @@ predicted by the cubic through the ends and corrected like any step, then the br
 """
 
 import numpy as np
-from numba import njit
 
 from equimorph.equilibria.kernels import (
     CONVERGED,
@@ -26,6 +25,7 @@ from equimorph.equilibria.kernels import (
     TRIAL,
     WEIGHT,
 )
+from equimorph.linalg.compiled import njit
 
 (
     X1, F1, T1, SLOPE1, RATE1, X2, F2, T2, SLOPE2, RATE2, X3, F3, SHARE, SMALL, T0,

@@ -1,7 +1,6 @@
 """Compiled kernels that take lanes from step to step: start, length and prediction."""
 
 import numpy as np
-from numba import njit
 
 from equimorph.equilibria.kernels import (
     AIMING,
@@ -55,6 +54,7 @@ from equimorph.equilibria.kernels import (
     X_2,
     T,
 )
+from equimorph.linalg.compiled import njit
 
 MEMORY = 3
 """Points that a lane remembers, the present one included."""

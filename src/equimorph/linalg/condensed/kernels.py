@@ -13,8 +13,8 @@ complement of the vertices in their slots there.
 """
 
 import numpy as np
-from numba import njit
 
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER
 from equimorph.linalg.simd import (
     absolute,

@@ -1,8 +1,8 @@
 """Compiled elimination of sparse symmetric matrices, eight lanes at a time."""
 
 import numpy as np
-from numba import njit
 
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
 from equimorph.linalg.simd import (
     LANES,

@@ -6,8 +6,8 @@ multiple of eight the last block overlaps the one before.
 """
 
 import numpy as np
-from numba import njit
 
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.condensed.kernels import (
     GROUP,
     TILE,

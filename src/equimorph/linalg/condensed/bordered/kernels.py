@@ -1,8 +1,8 @@
 """Compiled kernel of general bordered solves with the condensed factorisation."""
 
 import numpy as np
-from numba import njit
 
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.condensed.kernels import (
     GROUP,
     TIES,

@@ -4,8 +4,7 @@ L = Σ ½ θᵀKθ + Σᵢ (aᵢ sin θᵢ + bᵢ cos θᵢ) − λν with a = �
 `structures.rod.kernels`. At least eight lanes; the last block overlaps the one before.
 """
 
-from numba import njit
-
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, write_lanes
 from equimorph.linalg.simd import LANES, load, sincos, spread, store, work_rows
 from equimorph.structures.rod.kernels import LAMBDA, MU, NU, Q, read_state

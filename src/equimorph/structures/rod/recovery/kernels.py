@@ -6,8 +6,8 @@ of the waves obey ``k S_k = Σ_j c_{j−1} C_{k−j}`` and ``k C_k = −Σ_j c_{
 """
 
 import numpy as np
-from numba import njit
 
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, write_lanes
 from equimorph.linalg.simd import (
     LANES,

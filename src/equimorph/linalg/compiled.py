@@ -1,0 +1,86 @@
+"""Compiled kernels that stay true to their sources: numba's compiler, with files kept by our rules.
+
+numba's own cache looks only at the file that a kernel stands in, so that after a change a kernel
+would go on with old copies of those that it calls; and processes that compile the same kernel at
+the same time can mix up its files. Here a change of any kernel's source makes all of them new, and
+processes wait for each other.
+"""
+
+import fcntl
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import types
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+_HERE = Path(__file__)
+SOURCES = sorted([_HERE, _HERE.with_name("simd.py"), *_HERE.parents[1].rglob("kernels.py")])
+"""Every file with code that goes into kernels."""
+DIGEST = hashlib.sha256(b"".join(each.read_bytes() for each in SOURCES)).hexdigest()
+
+
+def njit(**options: Any) -> Callable[[Any], Any]:
+    """Compile a function when it is first called with arguments of new types, and keep the code.
+
+    Parameters
+    ----------
+    options
+        Those of `numba.njit`.
+    """
+
+    def compiled(function: Any) -> Any:
+        dispatcher = numba.njit(**options)(function)
+        dispatcher._cache = _KernelCache(function)
+        # of a literal number the compiler would make another copy of the kernel
+        resolve = dispatcher.get_call_template
+        dispatcher.get_call_template = lambda args, names: resolve(
+            [types.unliteral(each) for each in args], names
+        )
+        return dispatcher
+
+    return compiled
+
+
+def is_kept(kernel: Any) -> bool:
+    """Whether compiled code of a kernel is on disk, made from the present sources.
+
+    Parameters
+    ----------
+    kernel
+        A function that `njit` of this module returned.
+    """
+    return bool(kernel._cache.is_filled())
+
+
+class _KernelCache(FunctionCache):
+    """Compiled code of one kernel, valid as long as the sources of all kernels stay as they are."""
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        self._cache_file = _LockedFiles(self.cache_path, self._impl.filename_base, DIGEST)
+
+    def is_filled(self) -> bool:
+        """Whether there is code for any types."""
+        return bool(self._cache_file._load_index())
+
+
+class _LockedFiles(IndexDataCacheFile):
+    """Index and data of one kernel, for one process at a time."""
+
+    def load(self, key: Any) -> Any:
+        with self._lock():
+            return super().load(key)
+
+    def save(self, key: Any, data: Any) -> None:
+        with self._lock():
+            super().save(key, data)
+
+    @contextmanager
+    def _lock(self) -> Iterator[None]:
+        with Path(self._cache_path, "kernels.lock").open("w") as handle:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            yield
