@@ -5,8 +5,7 @@ The Lagrangian is that of `model.RodModel`; tables have one row per scalar (mult
 where these are not a multiple of eight the last block overlaps the one before.
 """
 
-from numba import njit
-
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes
 from equimorph.linalg.simd import LANES, load, sincos, spread, store, work_rows
 

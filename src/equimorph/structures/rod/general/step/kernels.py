@@ -1,8 +1,8 @@
 """Compiled kernel of the fused Newton step of general rods, eight lanes at a time."""
 
 import numpy as np
-from numba import njit
 
+from equimorph.linalg.compiled import njit
 from equimorph.linalg.condensed.bordered.kernels import (
     count_border,
     reduce_block,
