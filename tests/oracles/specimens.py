@@ -6,8 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.model import Parameter
-from equimorph.structures import Bar, EnergyStructure, Rod, Spring, Structure, Truss, Unknown
+from equimorph.structures import (
+    Bar,
+    EnergyStructure,
+    Frame,
+    Member,
+    Rod,
+    Spring,
+    Structure,
+    Truss,
+    Unknown,
+)
 from oracles import rods
+from oracles.frames import Twin
 
 
 @dataclass(frozen=True)
@@ -177,6 +188,53 @@ def _truss(name, truss):
     return Specimen(name, truss, centre, 0.1, 0.08, _truss_lagrangian(truss))
 
 
+def portal(axial):
+    """Two bays with an arch, a hinge, springs, a roller, and every kind of load and actuator."""
+    return Frame(
+        {"A": (0, 0), "B": (0.1, 1.2), "C": (1, 1), "D": (2, 1.1), "E": (2.2, 0), "F": (1, 0.1)},
+        [
+            Member(("A", "B"), 2.0, axial),
+            Member(("B", "C"), 1.0, 80.0, curvature=-0.7, weight=2.0),
+            Member(("D", "C"), 1.5, axial, hinges=["C"], weight=0.5),
+            Member(("E", "D"), 1.0, axial),
+            Member(("C", "F"), 0.5, axial, hinges=["C", "F"]),
+        ],
+        {
+            "A": "fixed",
+            "E": {"x": 30.0, "y": "held", "angle": 2.0},
+            "F": "xy",
+            "D": {"y": 5.0},
+        },
+        {
+            "P": {"C": (0.1, -1.0), "B": (0.3, 0.0, 0.2)},
+            "q": {"B-C": (0.1, -1.0), "weight": (0.2, -1.0)},
+        },
+        {
+            "k": {"curvature": {"A-B": 1.0, "C-D": 0.5}, "turn": {"A": 0.4, "E": 0.3}},
+            "d": {"length": {"B-C": 0.2, "C-F": -0.1}, "move": {"F": (0.1, 0.2), "E": (0.3, 0.1)}},
+        },
+        elements=1,
+        degree=5,
+    )  # fmt: skip
+
+
+def toggle():
+    """Two inextensible members between clamps: the smallest frame with multipliers alone."""
+    return Frame(
+        {"A": (-1, 0), "B": (0, 0.3), "C": (1, 0)},
+        [("A", "B"), ("B", "C")],
+        {"A": "fixed", "C": "fixed"},
+        {"P": {"B": (0, -1)}},
+        {"a": {"turn": {"A": 1.0, "C": -1.0}}},
+        degree=4,
+    )
+
+
+def _frame(name, frame):
+    centre = tuple(0.1 * np.arange(1.0, len(frame.parameters) + 1.0))
+    return Specimen(name, frame, centre, 0.1, 0.3, Twin(frame).lagrangian)
+
+
 SPECIMENS = (
     _rod("uniform"),
     _rod("left-half"),
@@ -190,5 +248,8 @@ SPECIMENS = (
     _truss("truss", arch_truss("engineering")),
     _truss("truss, Green strain", arch_truss("green")),
     _truss("truss in space", tripod()),
+    _frame("frame", portal(50.0)),
+    _frame("frame, inextensible in part", portal(None)),
+    _frame("frame of two members", toggle()),
     Specimen("chain by its energy", closed_chain(), (0.8, 0.3, 0.5), 0.15, 1.0, _chain_lagrangian),
 )

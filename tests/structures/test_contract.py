@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from equimorph.errors import InputError
 from equimorph.structures import Rod, Spring, Structure, from_identity
-from oracles.specimens import SPECIMENS, arch_truss, closed_chain, tripod, written_spring
+from oracles.specimens import (
+    SPECIMENS,
+    arch_truss,
+    closed_chain,
+    portal,
+    toggle,
+    tripod,
+    written_spring,
+)
 
 STEP = 1e-30
 DRAWN = settings(max_examples=5, deadline=None, derandomize=True, database=None)
@@ -220,8 +228,13 @@ def test_only_a_symmetric_load_has_the_mirror():
         closed_chain(),
         arch_truss("green"),
         tripod(),
+        portal(None),
+        toggle(),
     ],
-    ids=["default", "resolution", "table", "spring", "energy", "constraints", "truss", "space"],
+    ids=[
+        *("default", "resolution", "table", "spring", "energy", "constraints", "truss", "space"),
+        *("frame", "toggle"),
+    ],
 )
 def test_a_structure_is_rebuilt_from_its_identity(made):
     """Bit for bit: the identity is data."""
@@ -236,8 +249,8 @@ def test_a_structure_is_rebuilt_from_its_identity(made):
 @pytest.mark.parametrize(
     ("identity", "text"),
     [
-        ({"kind": "plate"}, "`kind` must be one of rod, spring, energy, truss; got 'plate'"),
-        ({}, "`kind` must be one of rod, spring, energy, truss; got None"),
+        ({"kind": "plate"}, "`kind` must be one of rod, spring, energy, truss, frame; got 'plate'"),
+        ({}, "`kind` must be one of rod, spring, energy, truss, frame; got None"),
         ({"kind": "rod", "colour": "red"}, "`structure` must have the data of a rod"),
     ],
 )

@@ -6,6 +6,7 @@ from typing import Any
 from equimorph.errors import InputError
 from equimorph.structures.contract import Advance, Structure, Symmetry, bordered_advance
 from equimorph.structures.energy import EnergyStructure, Unknown
+from equimorph.structures.frame import Frame, Member
 from equimorph.structures.rod import (
     Couple,
     Curvature,
@@ -25,6 +26,7 @@ KINDS: dict[str, Callable[..., Structure]] = {
     "spring": Spring,
     "energy": EnergyStructure,
     "truss": Truss,
+    "frame": Frame,
 }
 
 __all__ = [
@@ -35,7 +37,9 @@ __all__ = [
     "Curvature",
     "End",
     "EnergyStructure",
+    "Frame",
     "LineLoad",
+    "Member",
     "PointForce",
     "Pressure",
     "Rod",

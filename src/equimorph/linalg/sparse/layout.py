@@ -41,13 +41,16 @@ class SparseLayout:
         Number of rows.
     multipliers
         How many rows at the end have a zero diagonal (Lagrange multipliers): they are eliminated
-        after all others.
+        after all others, unless there are ranks.
+    ranks
+        Rows of lower rank are eliminated first.
     """
 
     rows: Int[np.ndarray, " entries"]
     columns: Int[np.ndarray, " entries"]
     size: int
     multipliers: int = 0
+    ranks: Int[np.ndarray, " size"] | None = None
 
     @cached_property
     def diagonal(self) -> Int[np.ndarray, " size"]:
@@ -58,7 +61,10 @@ class SparseLayout:
     @cached_property
     def elimination(self) -> _Elimination:
         """Order and places of the elimination."""
-        below = _eliminated(self.rows, self.columns, self.size, self.size - self.multipliers)
+        ranks = self.ranks
+        if ranks is None:
+            ranks = (np.arange(self.size) >= self.size - self.multipliers).astype(int)
+        below = _eliminated(self.rows, self.columns, ranks)
         order = np.array([variable for variable, _ in below])
         place = np.empty(self.size, int)
         place[order] = np.arange(self.size)
@@ -123,12 +129,15 @@ class SparseLayout:
 
 
 def _eliminated(
-    rows: Int[np.ndarray, " entries"], columns: Int[np.ndarray, " entries"], size: int, first: int
+    rows: Int[np.ndarray, " entries"],
+    columns: Int[np.ndarray, " entries"],
+    ranks: Int[np.ndarray, " size"],
 ) -> list[tuple[int, set[int]]]:
     """Variables in the order of elimination, each with the later ones in its column of L.
 
-    Minimum degree; the variables from `first` on come last.
+    Minimum degree among those of the lowest rank that are left.
     """
+    size, rank = len(ranks), ranks.tolist()
     near: list[set[int]] = [set() for _ in range(size)]
     for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
         if i != j:
@@ -137,7 +146,7 @@ def _eliminated(
     left = set(range(size))
     below = []
     while left:
-        variable = min(left, key=lambda i: (i >= first, len(near[i]), i))
+        variable = min(left, key=lambda i: (rank[i], len(near[i]), i))
         others = near[variable]
         left.remove(variable)
         for other in others:

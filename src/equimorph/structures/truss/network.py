@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.structures.truss.bar import Bar, bar_of
+from equimorph.structures.walk import walk_along
 
 AXES = "xyz"
 _NAME = re.compile(r"[A-Za-z0-9_]+")
@@ -66,28 +67,7 @@ class Network:
     @cached_property
     def walk(self) -> Int[np.ndarray, " steps"]:
         """Joints in the order of a walk along all bars, some of them there and back."""
-        joined: list[list[int]] = [[] for _ in self.joints]
-        for first, second in self.ends.tolist():
-            joined[first].append(second)
-            joined[second].append(first)
-        steps, way, useful = [0], [0], 0
-        seen, walked = {0}, set()
-        while way:
-            here = way[-1]
-            there = next((j for j in joined[here] if frozenset((here, j)) not in walked), None)
-            if there is None:
-                way.pop()
-                steps += way[-1:]
-                continue
-            walked.add(frozenset((here, there)))
-            steps.append(there)
-            useful = len(steps)
-            if there in seen:
-                steps.append(here)
-            else:
-                seen.add(there)
-                way.append(there)
-        return np.array(steps[:useful])
+        return walk_along(self.ends, len(self.joints))
 
     def joint(self, name: Any) -> int:
         """Place of a joint in the list."""

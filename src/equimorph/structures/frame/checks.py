@@ -1,0 +1,62 @@
+"""Frames that have no unique state at rest, and the line that says so."""
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+from equimorph.structures.frame.fields import FrameFields
+
+SINGULAR = 1e-10
+"""Eigenvalue at rest, relative to the largest one, that counts as none."""
+
+
+def refuse_singular(frame: FrameFields) -> None:
+    """Refuse mechanisms, and forces that no deformation can tell.
+
+    Raises
+    ------
+    InputError
+        With the joint or member that moves, or the members that supports stretch.
+    """
+    z, p = np.zeros((1, frame.size)), np.zeros((1, len(frame.parameters)))
+    matrix = frame.layout.dense(frame.entries(z, p))[0]
+    values, vectors = np.linalg.eigh(matrix)
+    least = int(np.argmin(np.abs(values)))
+    if np.abs(values[least]) > SINGULAR * np.abs(values).max():
+        return
+    mode = vectors[:, least]
+    turns, forces = mode[: frame.unknowns], mode[frame.unknowns :]
+    if np.abs(turns).max() > np.abs(forces).max(initial=0.0):
+        _refuse_mechanism(frame, mode)
+    _refuse_stress(frame, forces)
+
+
+def _refuse_mechanism(frame: FrameFields, mode: Float[np.ndarray, " size"]) -> None:
+    made, p = frame.model.network, np.zeros((1, len(frame.parameters)))
+    step = 1e-3 * mode[None] / np.abs(mode).max()
+    moves = (frame.displacements(step, p) - frame.displacements(-step, p))[0]
+    at = int(np.argmax(np.abs(moves).max(axis=1)))
+    if np.abs(moves).max() > 1e-6:
+        along = moves[at] / np.linalg.norm(moves[at])
+        along = along * np.sign(along[np.argmax(np.abs(along))])
+        direction = ", ".join(f"{x:.3g}" for x in np.round(along, 6) + 0.0)
+        what = f"joint {made.joints[at]} can move along ({direction})"
+    else:
+        ends = frame.turns_of_ends(step, p)[0]
+        member = int(np.argmax(np.abs(ends).max(axis=1)))
+        what = f"member {made.members[member].name} can turn"
+    raise InputError(
+        f"`frame` must be no mechanism; {what} without force. Add a member or a support, or leave "
+        "out a hinge."
+    )
+
+
+def _refuse_stress(frame: FrameFields, forces: Float[np.ndarray, " multipliers"]) -> None:
+    made, count = frame.model.network, frame.constraints
+    size = sum(np.abs(forces @ each.start[:count]) for each in frame.model.forces)
+    some = np.asarray(size) > 0.1 * np.max(size)
+    names = [member.name for member, stressed in zip(made.members, some, strict=True) if stressed]
+    raise InputError(
+        f"`supports` must not stretch or squeeze inextensible members; got {', '.join(names)} held "
+        "at a length that they have already. Give one of them EA, or release a support."
+    )

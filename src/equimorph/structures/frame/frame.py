@@ -1,0 +1,243 @@
+"""The frame: rods between rigid or hinged joints, loads on them, rods that bend or lengthen."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+from equimorph.model import Descriptor, Parameter
+from equimorph.structures.frame import descriptors
+from equimorph.structures.frame.checks import refuse_singular
+from equimorph.structures.frame.fields import FrameFields
+from equimorph.structures.frame.model import FrameModel
+from equimorph.structures.frame.network import Network, network
+from equimorph.structures.frame.patterns import Given, Patterns, patterns
+from equimorph.structures.frame.support import support_data
+from equimorph.structures.rod.discretisation import Mesh, reference_element
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+
+WALKED = 17
+"""Places along a member where it is drawn."""
+
+
+class Frame(FrameFields):
+    """Planar network of elastic rods, with displacements and turns of any size.
+
+    Members are unshearable, geometrically exact rods, straight or circular arcs as drawn, which is
+    free of stress. Without EA they are inextensible; with it they have the energy ½ EA ε² per
+    length besides ½ EI (κ − κ₀)². They meet at rigid or hinged joints. Dead loads act on joints or
+    along members. x points right, y up; angles and couples count counterclockwise. All numbers are
+    in one system of units of the user's choice.
+
+    Unknowns are the turns of Gauss–Lobatto nodes along the members; the multipliers are forces that
+    balance without loads, one for each independent cycle of members and supports in x and in y.
+
+    Parameters
+    ----------
+    joints
+        Places by name.
+    members
+        `Member`s, or pairs of joints.
+    supports
+        By joint: "fixed", "pinned", the axes that a roller holds ("x", "y"), or a table from "x",
+        "y", "angle" to "held" or the stiffness of a spring.
+    loads
+        By the name of the load parameter, which multiplies them: forces (x, y) or (x, y, couple)
+        by joint; line loads (x, y) per length by member, like ``{"q": {"A-B": (0, -1)}}``;
+        "weight": a direction, for line loads of the members' weights.
+    actuators
+        By the name of the actuator, per unit of the parameter: ``{"a": {"curvature": {"A-B": 1}}}``
+        changes intrinsic curvatures, "length" the members' lengths, "move" places of supports
+        (x, y) and "turn" their angles.
+    elements, degree
+        Elements of each member and their polynomial degree.
+
+    Raises
+    ------
+    InputError
+        For a joint without member, joints apart, stiffness that is not positive, EI and EA in
+        different units, a mechanism (with the joint that moves), supports that hold inextensible
+        members twice, a hinge or load without meaning, or a parameter without effect.
+
+    Examples
+    --------
+    A cantilever of two members under a tip load of P L²/EI = 2 [Mattiasson1981]_:
+
+    >>> from equimorph import Frame, lift
+    >>> joints = {"A": (0, 0), "B": (0.5, 0), "C": (1, 0)}
+    >>> frame = Frame(joints, [("A", "B"), ("B", "C")], {"A": "fixed"}, {"P": {"C": (0, -1)}})
+    >>> bent = lift(frame.natural_state(), to={"P": 2.0}).end.state
+    >>> round(-frame.displacement("C", "y")(bent), 5)
+    0.49346
+    """
+
+    length_unit = "length"
+
+    def __init__(  # noqa: PLR0913  # a network has that many parts
+        self,
+        joints: Mapping[str, Sequence[float]],
+        members: Iterable[Any],
+        supports: Mapping[str, Any],
+        loads: Given | None = None,
+        actuators: Given | None = None,
+        *,
+        elements: int = 2,
+        degree: int = 8,
+    ) -> None:
+        if not (isinstance(elements, int) and elements >= 1):
+            raise InputError(f"`elements` must be a whole number >= 1; got {elements!r}.")
+        if not (isinstance(degree, int) and 3 <= degree <= 16):
+            raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
+        made = network(joints, members, supports)
+        self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
+        found = patterns(made, self._actuators, self._loads)
+        self._check_drift(made)
+        length = float(made.lengths.mean())
+        bending = float(np.mean([member.EI for member in made.members]))
+        mesh = Mesh(np.linspace(0.0, 1.0, elements + 1), reference_element(degree))
+        super().__init__(FrameModel(made, found.scaled(length, bending), mesh, length, bending))
+        self.parameters = tuple(
+            self._parameter(k, name, found)
+            for k, name in enumerate([*self._actuators, *self._loads])
+        )
+        refuse_singular(self)
+        self._set_scales()
+
+    @staticmethod
+    def _check_drift(made: Network) -> None:
+        for axis, stiff in zip("xy", made.supports.T, strict=False):
+            if not stiff.any():
+                raise InputError(
+                    f"`frame` must be no mechanism; nothing holds it in {axis}. Add a support."
+                )
+
+    def _parameter(self, k: int, name: str, found: Patterns) -> Parameter:
+        if k >= len(self._actuators):
+            return Parameter(name, found.unit(k), 1.0, "load", 0.0)
+        rates, rests = found.length[k], self.model.network.lengths
+        limits = -rests[rates != 0.0] / rates[rates != 0.0]
+        lower = float(limits[limits < 0.0].max(initial=-np.inf))
+        upper = float(limits[limits > 0.0].min(initial=np.inf))
+        return Parameter(name, found.unit(k), 1.0, "actuator", 0.0, lower, upper)
+
+    def _set_scales(self) -> None:
+        """Measure parameters by what turns a node by one radian, or bends a member by as much."""
+        count = len(self.parameters)
+        z, p = np.zeros((count, self.size)), np.zeros((count, count))
+        columns = self.parameter_derivative(z, p, np.eye(count))
+        turns = np.abs(self.solve(z, p, -columns[:, None]).x[:, 0, : self.unknowns]).max(axis=1)
+        self.parameters = tuple(
+            replace(each, scale=min(self.model.patterns.typical(k), 1.0 / max(turn, 1e-300)))
+            for k, (each, turn) in enumerate(zip(self.parameters, turns.tolist(), strict=True))
+        )
+
+    def identity(self) -> dict[str, Any]:
+        """Kind, and what the frame is made from."""
+        made, mesh = self.model.network, self.model.mesh
+        supports = {
+            joint: support_data(row) for joint, row in zip(made.joints, made.supports, strict=True)
+        }
+        return {
+            "kind": self.kind,
+            "joints": dict(zip(made.joints, made.places.tolist(), strict=True)),
+            "members": [member.data() for member in made.members],
+            "supports": {joint: table for joint, table in supports.items() if table},
+            "loads": _plain(self._loads),
+            "actuators": _plain(self._actuators),
+            "elements": mesh.elements,
+            "degree": mesh.degree,
+        }
+
+    def natural_guess(self, p: Parameters) -> Lanes:
+        """The frame as drawn."""
+        return np.zeros((len(p), self.size))
+
+    def shape(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "lanes points 2"]:
+        """Places along a walk over all members, some of them there and back.
+
+        `s` runs from 0 to 1 along it, each member as long as the others.
+        """
+        made = self.model.network
+        walk = made.walk
+        place = np.linspace(0.0, 1.0, (len(walk) - 1) * (WALKED - 1) + 1) if s is None else s
+        place = np.clip(np.asarray(place, dtype=float), 0.0, 1.0) * (len(walk) - 1)
+        step = np.minimum(place.astype(int), len(walk) - 2)
+        share = place - step
+        out = np.empty((len(z), len(place), 2))
+        pairs = [frozenset(pair) for pair in made.ends.tolist()]
+        for k in np.unique(step):
+            here = step == k
+            member = pairs.index(frozenset(walk[k : k + 2].tolist()))
+            forward = made.ends[member, 0] == walk[k]
+            at = share[here] if forward else 1.0 - share[here]
+            out[:, here] = self.outline(z, p, at)[:, member]
+        return np.asarray(out * self.model.length)
+
+    # --- descriptors ----------------------------------------------------------------------------
+
+    def displacement(self, joint: str, axis: str) -> Descriptor:
+        """Move of a joint along x or y, from where it is drawn."""
+        return descriptors.displacement(self, joint, axis)
+
+    def rotation(self, where: str, joint: str | None = None) -> Descriptor:
+        """Turn of a joint, or of the end of a member there, in radians."""
+        return descriptors.rotation(self, where, joint)
+
+    def axial(self, member: str, joint: str) -> Descriptor:
+        """Axial force in a member at a joint, positive in tension."""
+        return descriptors.end_force(self, "axial", member, joint)
+
+    def shear(self, member: str, joint: str) -> Descriptor:
+        """Shear force in a member at a joint, to the left of the way from its start to its end."""
+        return descriptors.end_force(self, "shear", member, joint)
+
+    def moment(self, member: str, joint: str) -> Descriptor:
+        """Bending moment in a member at a joint, positive where it bends to its left."""
+        return descriptors.moment(self, member, joint)
+
+    @property
+    def max_curvature(self) -> Descriptor:
+        """Largest |κ| in all members."""
+        return descriptors.max_curvature(self)
+
+    def reaction(self, joint: str, axis: str) -> Descriptor:
+        """Force (axis "x" or "y"), or couple ("angle"), of a support on its joint."""
+        return descriptors.reaction(self, joint, axis)
+
+    def travel(self, load: str) -> Descriptor:
+        """Displacement along a load, work per unit of its parameter."""
+        return descriptors.travel(self, load)
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p: what actuators bear, and minus the travel of loads."""
+        return super().effort(z, p)
+
+    @property
+    def total_energy(self) -> Descriptor:
+        """Energy of the frame and its loads."""
+        return descriptors.total_energy(self)
+
+    @property
+    def elevation(self) -> Descriptor:
+        """The travel of the first load, or the turn of a joint."""
+        return descriptors.elevation(self)
+
+    def descriptor(self, text: str) -> Descriptor:
+        """Return the descriptor written like ``displacement(B,y)`` or ``moment(A-B,A)``."""
+        return descriptors.named(self, text)
+
+
+def _plain(given: Any) -> Any:
+    """Tables of numbers, as plain data."""
+    if isinstance(given, Mapping):
+        return {name: _plain(value) for name, value in given.items()}
+    if isinstance(given, int | float | np.number):
+        return float(given)
+    return [float(value) for value in given]

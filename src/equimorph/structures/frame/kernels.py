@@ -1,0 +1,147 @@
+"""Compiled forces and stiffness of frames, eight lanes at a time."""
+
+from numba import njit
+
+from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes
+from equimorph.linalg.simd import LANES, load, sincos, spread, store, work_rows
+
+
+@njit(**INNER)
+def _add(target, row, value):
+    store(target, row, load(target, row) + value)
+
+
+@njit(**INNER)
+def _combined(table, row, scalars):
+    """Row of a table times the scalars."""
+    total = spread(0.0)
+    for j in range(table.shape[1]):
+        if table[row, j] != 0.0:
+            total = total + spread(table[row, j]) * load(scalars, j)
+    return total
+
+
+@njit(**INNER)
+def _bend(stiffness, nodes, e, psi, force):
+    """Add the forces of bending in an element."""
+    order = nodes.shape[1]
+    for i in range(order):
+        total = spread(0.0)
+        for j in range(order):
+            total = total + spread(stiffness[e, i, j]) * load(psi, nodes[e, j])
+        _add(force, nodes[e, i], total)
+
+
+@njit(**INNER)
+def _bend_with_member(
+    m, elements, nodes, held, stiffness, softness, sine, cosine, which, ties, diagonal, edges,
+    corners, psi, scalars, dpsi, velocity, own, force, turn, matrix, strain, rate,
+):  # fmt: skip
+    """Add what one member contributes to forces, their change, and the matrix; see `Tables`."""
+    order, count = nodes.shape[1], len(psi)
+    for e in range(m * elements, (m + 1) * elements):
+        for i in range(order):
+            node, at = nodes[e, i], e * order + i
+            s, c = sincos(load(psi, node))
+            a, b, da, db = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+            for r in range(ties[m, 1]):
+                across, along = spread(sine[at, r]), spread(cosine[at, r])
+                y = load(scalars, which[m, r])
+                a, b = a + across * y, b + along * y
+                if r >= ties[m, 0]:
+                    dy = load(velocity, which[m, r])
+                    da, db = da + across * dy, db + along * dy
+            k = spread(softness[at])
+            pull, shear = a * s + b * c, a * c - b * s
+            stretch = strain + k * pull
+            change = rate + k * (da * s + db * c)
+            _add(force, node, spread(0.0) - stretch * shear)
+            _add(turn, node, spread(0.0) - change * shear - stretch * (da * c - db * s))
+            if diagonal[node] >= 0:
+                _add(matrix, diagonal[node], stretch * pull - k * shear * shear)
+            for r in range(ties[m, 0]):
+                across, along = spread(sine[at, r]), spread(cosine[at, r])
+                part = across * s + along * c
+                slope = stretch * (across * c - along * s) + k * shear * part
+                row = count + which[m, r]
+                _add(force, row, spread(0.0) - stretch * part)
+                _add(turn, row, spread(0.0) - change * part - slope * load(dpsi, node))
+                if edges[at, r] >= 0:
+                    _add(matrix, edges[at, r], spread(0.0) - slope)
+                if softness[at] != 0.0:
+                    store(own, r, part)
+                    for q in range(r + 1):
+                        _add(matrix, corners[m, r, q], spread(0.0) - k * part * load(own, q))
+        _bend(stiffness, nodes, e, psi, force)
+        if held[e]:
+            _bend(stiffness, nodes, e, dpsi, turn)
+
+
+@njit(**FLAGS)
+def linearise_lanes(
+    nodes, held, place, stiffness, springs, softness, sine, cosine, which, ties, diagonal, edges,
+    corners, stretch, turned, slope_at, slope_by, quadratic, constant, z, p, dp, residual, column,
+    entries,
+):  # fmt: skip
+    """F, F_p·dp and the entries of F_z; see `Tables`."""
+    lanes, size = z.shape
+    members, elements = len(which), len(nodes) // len(which)
+    count, scalars, length = len(place), quadratic.shape[1], entries.shape[1]
+    multipliers, given = quadratic.shape[0], p.shape[1]
+    y, dy, rows = work_rows(scalars), work_rows(scalars), work_rows(size)
+    psi, dpsi, own = work_rows(count), work_rows(count), work_rows(multipliers + 1)
+    force, turn = work_rows(count + multipliers), work_rows(count + multipliers)
+    matrix = work_rows(length)
+    for block in range(0, lanes, LANES):
+        lane = min(block, lanes - LANES)
+        read_lanes(z, lane * size, size, size, rows, 0, 1)
+        dy[:] = 0.0
+        read_lanes(p, lane * given, given, given, y, multipliers, 1)
+        read_lanes(dp, lane * given, given, given, dy, multipliers, 1)
+        for c in range(multipliers):
+            store(y, c, load(rows, size - multipliers + c))
+        store(y, scalars - 1, spread(1.0))
+        for i in range(count):
+            store(dpsi, i, spread(0.0))
+            if place[i] >= 0:
+                store(psi, i, load(rows, place[i]))
+            else:
+                store(psi, i, _combined(turned, i, y))
+                store(dpsi, i, _combined(turned, i, dy))
+        force[:] = 0.0
+        turn[:] = 0.0
+        for e in range(length):
+            store(matrix, e, spread(constant[e]))
+        for m in range(members):
+            strain = spread(1.0) + _combined(stretch, m, y)
+            rate = _combined(stretch, m, dy)
+            _bend_with_member(
+                m, elements, nodes, held, stiffness, softness, sine, cosine, which, ties, diagonal,
+                edges, corners, psi, y, dpsi, dy, own, force, turn, matrix, strain, rate,
+            )  # fmt: skip
+        for i in range(count):
+            if springs[i] != 0.0:
+                _add(force, i, spread(springs[i]) * load(psi, i))
+        for i in range(len(slope_by)):
+            node, j = slope_at[i, 0], slope_at[i, 1]
+            _add(force, node, spread(0.0) - spread(slope_by[i]) * load(y, j))
+            _add(turn, node, spread(0.0) - spread(slope_by[i]) * load(dy, j))
+        for c in range(multipliers):
+            _add(force, count + c, _combined(quadratic, c, y))
+            _add(turn, count + c, _combined(quadratic, c, dy))
+        _write(place, force, rows, residual, lane)
+        _write(place, turn, rows, column, lane)
+        write_lanes(matrix, 0, 1, entries, lane * length, length, length)
+
+
+@njit(**INNER)
+def _write(place, values, rows, target, lane):
+    """Write values at the unknown nodes and of the multipliers behind the nodes."""
+    count, size = len(place), target.shape[1]
+    for i in range(count):
+        if place[i] >= 0:
+            store(rows, place[i], load(values, i))
+    multipliers = len(values) - count
+    for c in range(multipliers):
+        store(rows, size - multipliers + c, load(values, count + c))
+    write_lanes(rows, 0, 1, target, lane * size, size, size)

@@ -1,0 +1,205 @@
+"""Mechanics of a frame: energy, forces, stiffness and their derivatives, for batches of lanes."""
+
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from equimorph.linalg.dense import multiply
+from equimorph.linalg.lanes import over_lanes
+from equimorph.linalg.sparse import SparseLayout
+from equimorph.structures.contract import Direction
+from equimorph.structures.discrete import DiscreteStructure
+from equimorph.structures.frame.kernels import linearise_lanes
+from equimorph.structures.frame.model import FrameModel
+from equimorph.structures.frame.tables import Tables
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+Entries = Float[np.ndarray, "lanes entries"]
+Nodal = Float[np.ndarray, "lanes nodes"]
+Points = Float[np.ndarray, "lanes points"]
+Scalars = Float[np.ndarray, "lanes scalars"]
+
+RESOLVED = 1e-3
+"""Largest of the two highest Legendre coefficients of a turn in a resolved element."""
+
+
+class Pulls(NamedTuple):
+    """Tension P times the weights, P' = dP/dψ, and the strain e, at the points."""
+
+    tension: Points
+    shear: Points
+    strain: Points
+
+
+class FrameMechanics(DiscreteStructure):
+    """Everything of a frame but its names: a structure whose Lagrangian is a `FrameModel`."""
+
+    kind: ClassVar[str] = "frame"
+
+    def __init__(self, model: FrameModel) -> None:
+        self.model, self.tables = model, Tables(model)
+        self.unknowns, self.constraints = model.unknowns, model.multipliers
+        self.mass = model.mass
+
+    @property
+    def layout(self) -> SparseLayout:
+        """Sparsity of F_z."""
+        return self.tables.layout
+
+    # --- states ---------------------------------------------------------------------------------
+
+    def scalars(self, z: Lanes, p: Parameters, constant: float = 1.0) -> Scalars:
+        """(Multipliers, parameters, 1); the constant is 0 for directions."""
+        ones = np.full((len(z), 1), constant)
+        return np.concatenate([z[:, self.unknowns :], p, ones], axis=1)
+
+    def turns(self, z: Lanes, y: Scalars) -> Nodal:
+        """ψ at all nodes."""
+        place = self.model.place
+        return np.where(place >= 0, z[:, place], multiply(y, self.model.turned.T))
+
+    def _fields(
+        self, z: Lanes, p: Parameters, constant: float = 1.0
+    ) -> tuple[Scalars, Nodal, Points]:
+        """Scalars, turns of the nodes, and strains at the points."""
+        y = self.scalars(z, p, constant)
+        return y, self.turns(z, y), multiply(y, self.model.stretch.T)[:, self.model.owner]
+
+    def _pulls(self, y: Scalars, psi: Points, strain: Points) -> Pulls:
+        """P, P' and e for turns at the points."""
+        sine, cosine = np.sin(psi), np.cos(psi)
+        across, along = multiply(y, self.model.sine.T), multiply(y, self.model.cosine.T)
+        return Pulls(across * sine + along * cosine, across * cosine - along * sine, strain)
+
+    def stretches(self, z: Lanes, p: Parameters) -> tuple[Points, Points]:
+        """Turns ψ, and lengths relative to the free ones, at the points."""
+        y, turns, strain = self._fields(z, p)
+        psi = turns[:, self.model.nodes.ravel()]
+        return psi, 1.0 + strain + self.model.softness * self._pulls(y, psi, strain).tension
+
+    # --- contract -------------------------------------------------------------------------------
+
+    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
+        """F, F_p·dp and the entries of F_z."""
+        residual, column = np.empty_like(z), np.empty_like(z)
+        entries = np.empty((len(z), len(self.layout.rows)))
+        given = [np.ascontiguousarray(array) for array in (z, p, dp)]
+        if len(z):
+            over_lanes(linearise_lanes, self.tables.shared, given, [residual, column, entries])
+        return residual, column, entries
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """Moments that are missing at the nodes, and gaps in the cycles."""
+        return self.linearised(z, p, np.zeros_like(p))[0]
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return self.linearised(z, p, dp)[1]
+
+    def entries(self, z: Lanes, p: Parameters) -> Entries:
+        """Entries of F_z."""
+        return self.linearised(z, p, np.zeros_like(p))[2]
+
+    @cached_property
+    def _assembled(self) -> Float[np.ndarray, "nodes nodes"]:
+        """K with springs."""
+        total = np.diag(self.model.springs)
+        for element, nodes in zip(self.model.stiffness, self.model.nodes, strict=True):
+            total[np.ix_(nodes, nodes)] += element
+        return np.asarray(total)
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """Energy of members, springs and loads: L − λ·∂L/∂λ, so that constraints add nothing."""
+        model, (y, turns, strain) = self.model, self._fields(z, p)
+        pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
+        total = 0.5 * (multiply(turns, self._assembled) * turns).sum(axis=1)
+        total -= (multiply(y, model.slope.T) * turns).sum(axis=1)
+        stored = (1.0 + strain + 0.5 * model.softness * pulls.tension) * pulls.tension
+        total -= stored.sum(axis=1)
+        total += 0.5 * (multiply(y, model.quadratic) * y).sum(axis=1)
+        gaps = self.residual(z, p)[:, self.unknowns :]
+        return np.asarray(total - (z[:, self.unknowns :] * gaps).sum(axis=1))
+
+    def nodal_moments(self, z: Lanes, p: Parameters) -> Nodal:
+        """∂L/∂ψ at all nodes: zero at unknown ones, a support's couple where it is prescribed."""
+        model, (y, turns, strain) = self.model, self._fields(z, p)
+        pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
+        stretch = 1.0 + strain + model.softness * pulls.tension
+        total = multiply(turns, self._assembled) - multiply(y, model.slope.T)
+        return np.asarray(total - multiply(stretch * pulls.shear, self._gather))
+
+    @cached_property
+    def _gather(self) -> Float[np.ndarray, "points nodes"]:
+        """Sum at the nodes."""
+        return np.eye(len(self.model.place))[self.model.nodes.ravel()]
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p: what actuators bear, and minus the travel of loads."""
+        model, (y, turns, strain) = self.model, self._fields(z, p)
+        psi = turns[:, model.nodes.ravel()]
+        pulls = self._pulls(y, psi, strain)
+        stretch = 1.0 + strain + model.softness * pulls.tension
+        own = model.own
+        total = multiply(y, model.quadratic[:, own]) - multiply(turns, model.slope[:, own])
+        total -= multiply(stretch * np.sin(psi), model.sine[:, own])
+        total -= multiply(stretch * np.cos(psi), model.cosine[:, own])
+        total -= multiply(pulls.tension, model.stretch[model.owner][:, own])
+        held = model.place < 0
+        total += multiply(self.nodal_moments(z, p)[:, held], model.turned[held][:, own])
+        return np.asarray(total)
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        model, at = self.model, self.model.nodes.ravel()
+        (y, turns, e), *both = self._fields(z, p), *(self._fields(*each, 0.0) for each in (v, w))
+        psi, gamma = turns[:, at], model.softness
+        (yv, tv, ev), (yw, tw, ew) = both
+        dv, dw = tv[:, at], tw[:, at]
+        here, by_v, by_w = (self._pulls(each, psi, e) for each in (y, yv, yw))
+        # first changes of P and P', and second ones
+        pv, pw = by_v.tension + here.shear * dv, by_w.tension + here.shear * dw
+        sv, sw = by_v.shear - here.tension * dv, by_w.shear - here.tension * dw
+        p_vw = by_v.shear * dw + by_w.shear * dv - here.tension * dv * dw
+        s_vw = -by_v.tension * dw - by_w.tension * dv - here.shear * dv * dw
+        stretch, first_v, first_w = 1.0 + e + gamma * here.tension, ev + gamma * pv, ew + gamma * pw
+        moments = stretch * s_vw + first_v * sw + first_w * sv + gamma * p_vw * here.shear
+        out = np.empty_like(z)
+        out[:, : self.unknowns] = -multiply(moments, self._gather)[:, model.place >= 0]
+        # a multiplier's P = along cos ψ + across sin ψ, its first and second changes
+        twice = gamma * p_vw - stretch * dv * dw
+        once = first_v * dw + first_w * dv
+        sine, cosine = np.sin(psi), np.cos(psi)
+        m = self.constraints
+        total = multiply(twice * sine + once * cosine, model.sine[:, :m])
+        total += multiply(twice * cosine - once * sine, model.cosine[:, :m])
+        out[:, self.unknowns :] = -total
+        return out
+
+    # --- guesses --------------------------------------------------------------------------------
+
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Random turns of the joints, waves along the members, and forces.
+
+        A few half waves in each member and forces of the size of its buckling load.
+        """
+        model, lanes = self.model, len(p)
+        nodes = np.zeros((lanes, len(model.place)))
+        turn = generator.normal(size=(lanes, len(model.network.joints)))
+        modes, s = np.arange(1, 4), np.linspace(0.0, 1.0, model.member_nodes.shape[1])
+        size = generator.uniform(size=(lanes, 1))
+        for row, ends in zip(model.member_nodes, model.network.ends, strict=True):
+            base = turn[:, ends[:1]] * (1.0 - s) + turn[:, ends[1:]] * s
+            waves = generator.normal(size=(lanes, len(modes))) * (1.5 / modes)
+            nodes[:, row] = size * (0.5 * base + waves @ np.sin(np.pi * np.outer(modes, s)))
+        forces = 10.0 * size * generator.normal(size=(lanes, self.constraints))
+        return np.concatenate([nodes[:, model.place >= 0], forces], axis=1)
+
+    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """Whether the highest Legendre coefficients of ψ are small in every element."""
+        psi = self.turns(z, self.scalars(z, p))[:, self.model.nodes]
+        tail = np.abs(psi @ self.model.mesh.reference.to_legendre[-2:].T)
+        return np.asarray(tail.max(axis=(1, 2)) < RESOLVED)

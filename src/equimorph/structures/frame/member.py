@@ -1,0 +1,108 @@
+"""One member of a frame."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from equimorph.errors import InputError
+
+SLENDER = 0.5
+"""Largest radius of gyration √(EI/EA) of a member, relative to its length."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """An elastic rod between two joints, straight or a circular arc where it is free of stress.
+
+    Parameters
+    ----------
+    ends
+        Names of its two joints, start and end.
+    EI
+        Bending stiffness, in units of force · length²; positive.
+    EA
+        Axial stiffness, in units of force; None: inextensible.
+    curvature
+        Curvature of the arc, in units of 1/length; positive turns left on the way from start to
+        end. 0: straight.
+    hinges
+        Names of those of its ends that transmit no moment.
+    weight
+        Weight per length, for loads on "weight"; None: without.
+    """
+
+    ends: Sequence[str]
+    EI: float = 1.0
+    EA: float | None = None
+    curvature: float = 0.0
+    hinges: Sequence[str] = ()
+    weight: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check ends and numbers."""
+        two = not isinstance(self.ends, str) and len(self.ends) == 2
+        if not (two and all(isinstance(end, str) for end in self.ends)):
+            raise InputError(
+                f"`ends` of a member must be the names of two joints; got {self.ends!r}."
+            )
+        if self.ends[0] == self.ends[1]:
+            raise InputError(f"`ends` of a member must differ; got {self.ends[0]} twice.")
+        for name, value in (("EI", self.EI), ("EA", self.EA), ("weight", self.weight)):
+            if value is None and name != "EI":
+                continue
+            if not (isinstance(value, int | float) and 0.0 < value < np.inf):
+                raise InputError(f"`{name}` of member {self.name} must be positive; got {value!r}.")
+        if not (isinstance(self.curvature, int | float) and np.isfinite(self.curvature)):
+            raise InputError(
+                f"`curvature` of member {self.name} must be finite; got {self.curvature!r}."
+            )
+        fine = not isinstance(self.hinges, str) and all(end in self.ends for end in self.hinges)
+        if not fine or len(set(self.hinges)) < len(self.hinges):
+            raise InputError(
+                f"`hinges` of member {self.name} must name some of its ends, each once; got "
+                f"{self.hinges!r}."
+            )
+
+    @property
+    def name(self) -> str:
+        """Its joints, joined: A-B."""
+        return "-".join(self.ends)
+
+    def length(self, chord: float) -> float:
+        """Length of the arc over a chord; InputError if there is none, or none slender enough."""
+        half = 0.5 * abs(self.curvature) * chord
+        if half >= 1.0:
+            raise InputError(
+                f"`curvature` of member {self.name} must be less than 2 over the distance of its "
+                f"joints, {2.0 / chord:.6g}, a half circle; got {self.curvature!r}."
+            )
+        length = chord if half == 0.0 else chord * float(np.arcsin(half)) / half
+        gyration = 0.0 if self.EA is None else float(np.sqrt(self.EI / self.EA))
+        if gyration > SLENDER * length:
+            raise InputError(
+                f"`EI` and `EA` of member {self.name} must be those of a slender rod in one system "
+                f"of units; got a radius of gyration of {gyration:.3g} and a "
+                f"length of {length:.3g}."
+            )
+        return length
+
+    def data(self) -> dict[str, Any]:
+        """Return what it is made from."""
+        given = {key: value for key, value in asdict(self).items() if value is not None}
+        return {**given, "ends": list(self.ends), "hinges": list(self.hinges)}
+
+
+def member_of(given: Any) -> Member:
+    """Member from a `Member`, its data, or the names of its ends."""
+    if isinstance(given, Member):
+        return given
+    data = given if isinstance(given, Mapping) else {"ends": given}
+    try:
+        return Member(**data)
+    except TypeError:
+        raise InputError(
+            "`members` must hold Members (ends, EI, EA, curvature, hinges, weight) or pairs of "
+            f"joints; got {given!r}."
+        ) from None

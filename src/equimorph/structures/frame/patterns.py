@@ -1,0 +1,178 @@
+"""What the parameters of a frame do: loads and actuators as arrays."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+from equimorph.structures.frame.network import WEIGHT, Network, items, numbers
+
+Given = Mapping[str, Mapping[str, Any]]
+KINDS = ("curvature", "length", "move", "turn")
+
+
+@dataclass(frozen=True, eq=False)
+class Patterns:
+    """Forces, couples, line loads, curvatures, elongations, moves and turns by parameter."""
+
+    forces: Float[np.ndarray, "parameters joints 2"]
+    couples: Float[np.ndarray, "parameters joints"]
+    lines: Float[np.ndarray, "parameters members 2"]
+    curvature: Float[np.ndarray, "parameters members"]
+    length: Float[np.ndarray, "parameters members"]
+    moves: Float[np.ndarray, "parameters joints 2"]
+    turns: Float[np.ndarray, "parameters joints"]
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+        return len(self.forces)
+
+    def scaled(self, length: float, bending: float) -> "Patterns":
+        """The same with lengths in units of `length`, bending stiffnesses of `bending`."""
+        force = bending / length**2
+        return Patterns(
+            self.forces / force,
+            self.couples / (force * length),
+            self.lines * (length / force),
+            self.curvature * length,
+            self.length / length,
+            self.moves / length,
+            self.turns,
+        )
+
+    def unit(self, k: int) -> str:
+        """Unit of a parameter; "1" if it stands for several kinds."""
+        given = {
+            "force": self.forces,
+            "force·length": self.couples,
+            "force/length": self.lines,
+            "1/length": self.curvature,
+            "length": np.concatenate([self.length, self.moves[..., 0], self.moves[..., 1]], axis=1),
+            "rad": self.turns,
+        }
+        found = [unit for unit, array in given.items() if array[k].any()]
+        return found[0] if len(found) == 1 else "1"
+
+    def typical(self, k: int) -> float:
+        """Value of a non-dimensional parameter that bends a member of length 1 by about 1."""
+        euler = 10.0
+        sizes = (
+            np.abs(self.forces[k]).max(initial=0.0) / euler,
+            np.abs(self.lines[k]).max(initial=0.0) / euler,
+            np.abs(self.couples[k]).max(initial=0.0) / 2.0,
+            np.abs(self.curvature[k]).max(initial=0.0),
+            np.abs(self.length[k]).max(initial=0.0) * 10.0,
+            np.abs(self.moves[k]).max(initial=0.0) * 10.0,
+            np.abs(self.turns[k]).max(initial=0.0),
+        )
+        return 1.0 / float(max(sizes))
+
+
+def patterns(made: Network, actuators: Given, loads: Given) -> Patterns:
+    """Patterns of all parameters, actuators first.
+
+    Raises
+    ------
+    InputError
+        For names without meaning or used twice, unknown joints or members, or a parameter that has
+        no effect.
+    """
+    _check_names([*actuators, *loads])
+    count, joints, members = len(actuators) + len(loads), len(made.joints), len(made.members)
+    both, single = (count, joints, 2), (count, joints)
+    found = Patterns(
+        np.zeros(both), np.zeros(single), np.zeros((count, members, 2)),
+        np.zeros((count, members)), np.zeros((count, members)), np.zeros(both), np.zeros(single),
+    )  # fmt: skip
+    for k, (name, given) in enumerate(actuators.items()):
+        _fill_actuator(made, found, k, f"actuators.{name}", given)
+    for k, (name, given) in enumerate(loads.items(), len(actuators)):
+        _fill_load(made, found, k, f"loads.{name}", given)
+    return found
+
+
+def _check_names(names: list[Any]) -> None:
+    if not names:
+        raise InputError("`loads` or `actuators` must name a parameter; got none.")
+    for i, name in enumerate(names):
+        if not (isinstance(name, str) and name.isidentifier()) or name in names[:i]:
+            raise InputError(
+                "`loads` and `actuators` must have names of their own, of letters, digits and "
+                f"underscores; got {name!r}."
+            )
+
+
+def _number(value: Any, what: str) -> float:
+    if not (isinstance(value, int | float) and np.isfinite(value) and value):
+        raise InputError(f"`{what}` must be a finite number other than 0; got {value!r}.")
+    return float(value)
+
+
+def _fill_actuator(made: Network, into: Patterns, k: int, what: str, given: Any) -> None:
+    pairs = list(items(given, what, f"effect ({', '.join(KINDS)})"))
+    if not pairs:
+        raise InputError(f"`{what}` must have an effect ({', '.join(KINDS)}); got none.")
+    for kind, table in pairs:
+        if kind not in KINDS:
+            raise InputError(f"`{what}` must have effects {', '.join(KINDS)}; got {kind!r}.")
+        where = f"{what}.{kind}"
+        entries = list(items(table, where, "member" if kind in KINDS[:2] else "joint"))
+        if not entries:
+            raise InputError(f"`{where}` must say where it acts; got an empty table.")
+        for name, value in entries:
+            here = f"{where}.{name}"
+            if kind == "move":
+                _fill_move(made, into, k, here, (name, value))
+            elif kind == "turn":
+                into.turns[k, made.supported(name, "angle")[0]] = _number(value, here)
+            else:
+                member, sign = made.member(name)
+                array = into.curvature if kind == "curvature" else into.length
+                array[k, member] = _number(value, here) * (sign if kind == "curvature" else 1.0)
+
+
+def _fill_move(made: Network, into: Patterns, k: int, what: str, entry: tuple[Any, Any]) -> None:
+    name, given = entry
+    vector = numbers(given, [2], what)
+    for axis, value in enumerate(vector):
+        if value:
+            into.moves[k, made.supported(name, "xy"[axis])[0], axis] = value
+    if not any(vector):
+        raise InputError(f"`{what}` must not be zero; got {given!r}.")
+
+
+def _fill_load(made: Network, into: Patterns, k: int, what: str, given: Any) -> None:
+    entries = list(items(given, what, f"joint, member, or {WEIGHT}"))
+    for name, value in entries:
+        here = f"{what}.{name}"
+        if name == WEIGHT:
+            weights = np.array([member.weight or 0.0 for member in made.members])
+            if not weights.any():
+                raise InputError(f"`{here}` must act on members with a weight; got none that has.")
+            into.lines[k] += weights[:, None] * np.array(numbers(value, [2], here))
+        elif name in made.joints:
+            vector = numbers(value, [2, 3], here)
+            joint = made.joint(name)
+            into.forces[k, joint] = vector[:2]
+            into.couples[k, joint] = vector[2] if len(vector) == 3 else 0.0
+            if into.couples[k, joint] and not made.rigid[joint]:
+                raise InputError(
+                    f"`{here}` must have no couple where every member is hinged; got {value!r}."
+                )
+        elif isinstance(name, str) and "-" in name:
+            into.lines[k, made.member(name)[0]] += numbers(value, [2], here)
+        else:
+            made.joint(name)
+    _check_effect(made, into, k, what)
+
+
+def _check_effect(made: Network, into: Patterns, k: int, what: str) -> None:
+    """Refuse a load that supports alone bear."""
+    fast = np.isinf(made.supports)
+    forces, couples = into.forces[k], into.couples[k]
+    if not (forces[~fast[:, :2]].any() or couples[~fast[:, 2]].any() or into.lines[k].any()):
+        raise InputError(f"`{what}` must act on a member, or on a joint that is free to move.")

@@ -1,0 +1,52 @@
+"""Supports of a frame's joints: what is held, what is sprung."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+
+AXES = ("x", "y", "angle")
+WORDS = {"fixed": AXES, "pinned": ("x", "y")}
+HELD = "held"
+
+
+def stiffnesses(joint: str, given: Any) -> Float[np.ndarray, "3"]:
+    """Stiffness of a support against moves in x, in y and against turning; ∞ where it holds.
+
+    Parameters
+    ----------
+    joint
+        Name of the joint, for messages.
+    given
+        "fixed", "pinned", the axes that a roller holds ("x", "y", "xy"), or a table from axes
+        ("x", "y", "angle") to "held" or a spring's stiffness.
+    """
+    table = given
+    if isinstance(given, str):
+        axes = WORDS.get(given, tuple(given))
+        table = dict.fromkeys(axes, HELD)
+        if len(table) < len(axes):
+            table = {}
+    if not isinstance(table, Mapping) or not table or not set(table) <= set(AXES):
+        raise InputError(
+            f"`supports.{joint}` must be fixed, pinned, axes to hold (x, y or xy), or a table of "
+            f"x, y, angle; got {given!r}."
+        )
+    values = np.zeros(3)
+    for axis, value in table.items():
+        spring = isinstance(value, int | float) and 0.0 < value < np.inf
+        if value != HELD and not spring:
+            raise InputError(
+                f"`supports.{joint}.{axis}` must be held or a positive stiffness; got {value!r}."
+            )
+        values[AXES.index(axis)] = float(value) if spring else np.inf
+    return values
+
+
+def support_data(values: Float[np.ndarray, "3"]) -> dict[str, Any]:
+    """Return the table from which the stiffnesses come."""
+    pairs = zip(AXES, values.tolist(), strict=True)
+    return {axis: HELD if np.isinf(value) else value for axis, value in pairs if value > 0.0}

@@ -1,0 +1,146 @@
+"""What may be wrong with a frame, and the line that says so."""
+
+import pytest
+
+from equimorph.errors import InputError
+from equimorph.structures import Frame, Member
+
+JOINTS = {"A": (0, 0), "B": (0, 1), "C": (1, 1)}
+MEMBERS = [("A", "B"), ("B", "C")]
+HELD = {"A": "pinned", "C": "pinned"}
+LOADS = {"P": {"B": (0, -1)}}
+NAN = float("nan")
+HINGED = [("A", "B"), Member(("B", "C"), hinges=["B"])]
+
+
+def made(joints=JOINTS, members=MEMBERS, supports=HELD, loads=LOADS, actuators=None, **more):
+    return Frame(joints, members, supports, loads, actuators, **more)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        # mechanisms, and members held twice
+        ({"supports": {"A": "y"}}, "`frame` must be no mechanism; nothing holds it in x"),
+        ({"supports": {"A": "x"}}, "`frame` must be no mechanism; nothing holds it in y"),
+        ({"supports": {"A": "pinned"}}, "no mechanism; joint B can move along (1, 0) without"),
+        (
+            {"supports": {"A": "pinned", "C": "y"}, "members": HINGED},
+            "no mechanism; joint B can move along (1, 0) without force. Add a member or a support",
+        ),
+        (
+            {"joints": {"A": (0, 0), "B": (1, 0), "C": (2, 0)}},
+            "`supports` must not stretch or squeeze inextensible members; got A-B, B-C held",
+        ),
+        # joints
+        ({"joints": {**JOINTS, "D": (0, 2)}}, "`members` must reach every joint; got none at D"),
+        (
+            {"joints": {**JOINTS, "D": (2, 1), "E": (2, 2)}, "members": [*MEMBERS, ("D", "E")]},
+            "`members` must join all joints; got D, E apart from A. Join them, or make two frames",
+        ),
+        ({"joints": {"A": (0, 0)}}, "`joints` must be at least two; got 1"),
+        ({"joints": {**JOINTS, "B": (0, 0, 1)}}, "`joints.B` must be 2 finite numbers; got (0, 0"),
+        ({"joints": {**JOINTS, "B": (0, NAN)}}, "`joints.B` must be 2 finite numbers"),
+        ({"joints": {**JOINTS, "B": (0, 0)}}, "`joints` of member A-B must lie apart"),
+        ({"joints": {**JOINTS, "B-1": (2, 0)}}, "underscores, other than weight; got 'B-1'"),
+        ({"joints": {**JOINTS, "weight": (2, 0)}}, "other than weight; got 'weight'"),
+        # members
+        ({"members": []}, "`members` must be one at least; got none"),
+        ({"members": [*MEMBERS, ("A", "D")]}, "`ends` of member A-D must be joints (A, B, C)"),
+        ({"members": [*MEMBERS, ("C", "B")]}, "join each pair of joints once; got C-B again"),
+        ({"members": [*MEMBERS, ("B", "B")]}, "`ends` of a member must differ; got B twice"),
+        ({"members": ["AB", "BC"]}, "`ends` of a member must be the names of two joints; got 'AB'"),
+        ({"members": [{"ends": ("A", "B"), "E": 1}]}, "`members` must hold Members (ends, EI, EA"),
+        (
+            {"members": [*MEMBERS[:1], Member(("B", "C"), curvature=2.5)]},
+            "`curvature` of member B-C must be less than 2 over the distance of its joints, 2,",
+        ),
+        (
+            {"members": [*MEMBERS[:1], Member(("B", "C"), 1e6, 2.0)]},
+            "`EI` and `EA` of member B-C must be those of a slender rod in one system of units",
+        ),
+        # supports
+        ({"supports": {**HELD, "D": "x"}}, "`supports` must be at joints (A, B, C); got D"),
+        ({"supports": {**HELD, "B": "xx"}}, "`supports.B` must be fixed, pinned, axes to hold"),
+        ({"supports": {**HELD, "B": {"z": 1.0}}}, "`supports.B` must be fixed, pinned, axes"),
+        ({"supports": {**HELD, "B": ""}}, "`supports.B` must be fixed, pinned"),
+        ({"supports": {**HELD, "B": {"x": -1.0}}}, "`supports.B.x` must be held or a positive"),
+        ({"supports": {**HELD, "B": {"x": 0.0}}}, "`supports.B.x` must be held or a positive"),
+        (
+            {
+                "members": [MEMBERS[0], Member(("B", "C"), hinges=["C"])],
+                "supports": {**HELD, "C": "fixed"},
+            },
+            "`supports.C` must not hold an angle where every member is hinged",
+        ),
+        # loads and actuators
+        ({"loads": {"P": {"D": (0, 1)}}}, "`joint` must be one of A, B, C; got 'D'"),
+        ({"loads": {"P": {"A-C": (0, 1)}}}, "`member` must be one of A-B, B-C; got 'A-C'"),
+        ({"loads": {"P": {"A": (0, 1)}}}, "`loads.P` must act on a member, or on a joint"),
+        ({"loads": {"P": {}}}, "`loads.P` must act on a member, or on a joint"),
+        ({"loads": {"P": {"B": (0,)}}}, "`loads.P.B` must be 2 or 3 finite numbers; got (0,)"),
+        ({"loads": {"P": {"weight": (0, -1)}}}, "`loads.P.weight` must act on members with a wei"),
+        ({"loads": {"P 1": {"B": (0, 1)}}}, "must have names of their own"),
+        ({"loads": None}, "`loads` or `actuators` must name a parameter; got none"),
+        ({"actuators": {"P": {"turn": {"A": 1.0}}}}, "must have names of their own"),
+        ({"actuators": {"a": {}}}, "`actuators.a` must have an effect (curvature, length, move"),
+        ({"actuators": {"a": {"bend": {}}}}, "must have effects curvature, length, move, turn"),
+        ({"actuators": {"a": {"curvature": {}}}}, "`actuators.a.curvature` must say where it acts"),
+        ({"actuators": {"a": {"curvature": {"A-C": 1.0}}}}, "`member` must be one of A-B, B-C"),
+        ({"actuators": {"a": {"length": {"A-B": 0.0}}}}, "`actuators.a.length.A-B` must be a fin"),
+        ({"actuators": {"a": {"turn": {"A": 1.0}}}}, "`A.angle` must be held or sprung by a supp"),
+        ({"actuators": {"a": {"move": {"B": (1, 0)}}}}, "`B.x` must be held or sprung by a supp"),
+        ({"actuators": {"a": {"move": {"A": (0, 0)}}}}, "`actuators.a.move.A` must not be zero"),
+        # resolution
+        ({"elements": 0}, "`elements` must be a whole number >= 1; got 0"),
+        ({"degree": 2}, "`degree` must be a whole number from 3 to 16; got 2"),
+    ],
+)  # fmt: skip
+def test_a_wrong_frame_is_refused_by_name(arguments, text):
+    with pytest.raises(InputError) as caught:
+        made(**arguments)
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, NAN, float("inf")])
+@pytest.mark.parametrize("name", ["EI", "EA", "weight"])
+def test_stiffness_and_weight_are_positive(name, value):
+    with pytest.raises(InputError, match=f"`{name}` of member A-B must be positive; got"):
+        Member(("A", "B"), **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        ({"hinges": "A"}, "`hinges` of member A-B must name some of its ends, each once; got 'A'"),
+        ({"hinges": ["C"]}, "`hinges` of member A-B must name some of its ends"),
+        ({"hinges": ["A", "A"]}, "`hinges` of member A-B must name some of its ends"),
+        ({"curvature": NAN}, "`curvature` of member A-B must be finite; got nan"),
+    ],
+)
+def test_a_wrong_member_is_refused(data, text):
+    with pytest.raises(InputError) as caught:
+        Member(("A", "B"), **data)
+    assert text in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("forces(A-B)", r"`descriptor` must be one of displacement\(joint,axis\), .*forces\(A-B\)"),
+        ("moment(A-B)", "`descriptor` must be one of"),
+        ("moment(A-C,A)", "`member` must be one of A-B, B-C; got 'A-C'"),
+        ("moment(A-B,C)", "`joint` must be an end of member A-B; got 'C'"),
+        ("displacement(D, x)", "`joint` must be one of A, B, C; got 'D'"),
+        ("displacement(B, z)", "`axis` must be x or y; got 'z'"),
+        ("reaction(B, x)", "`B.x` must be held or sprung by a support; it is free"),
+        ("reaction(A, z)", "`axis` must be one of x, y, angle; got 'z'"),
+        ("rotation(C)", r"`rotation\(C\)` must be of a joint where a member is not hinged"),
+        ("travel(G)", "`G` must be a parameter"),
+    ],
+)
+def test_a_wrong_descriptor_is_refused(text, line):
+    frame = made(members=[MEMBERS[0], Member(("B", "C"), hinges=["C"])])
+    with pytest.raises(InputError, match=line):
+        frame.descriptor(text)
