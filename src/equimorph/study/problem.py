@@ -240,6 +240,53 @@ class TrussSection(_Section):
     strain: Literal["engineering", "green"] = "engineering"
 
 
+def _support(given: Any) -> Any:
+    table = given if isinstance(given, dict) else {}
+    fine = table and all(value == "held" or type(value) in (int, float) for value in table.values())
+    if not (isinstance(given, str) or fine):
+        raise _requirement(
+            'be "fixed", "pinned", axes to hold like "y", or a table like '
+            '{ x = "held", angle = 2.0 }'
+        )
+    return given
+
+
+class MemberSection(_Section):
+    """A member of a frame; see `equimorph.Member`."""
+
+    ends: list[str] = Field(min_length=2, max_length=2)
+    EI: float = Field(default=1.0, gt=0, le=LARGEST)
+    EA: float | None = Field(default=None, gt=0, le=LARGEST)
+    curvature: Number = 0.0
+    hinges: list[str] = Field(default_factory=list)
+    weight: float | None = Field(default=None, gt=0, le=LARGEST)
+
+
+Plane = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class EffectSection(_Section):
+    """What an actuator of a frame does, per unit of its parameter."""
+
+    curvature: dict[str, Number] | None = None
+    length: dict[str, Number] | None = None
+    move: dict[str, Plane] | None = None
+    turn: dict[str, Number] | None = None
+
+
+class FrameSection(_Section):
+    """Rods between joints; see `equimorph.Frame`."""
+
+    kind: Literal["frame"]
+    joints: dict[str, Plane] = Field(min_length=2)
+    members: list[MemberSection] = Field(min_length=1)
+    supports: dict[str, Annotated[Any, AfterValidator(_support)]]
+    loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
+    actuators: dict[str, EffectSection] = Field(default_factory=dict)
+    elements: int = Field(default=2, ge=1, le=1000)
+    degree: int = Field(default=8, ge=3, le=16)
+
+
 class SetSection(_Section):
     """The part of the equilibrium set that is wanted."""
 
@@ -311,7 +358,8 @@ class MapSection(_Section):
 
 
 StructureSection = Annotated[
-    RodSection | SpringSection | EnergySection | TrussSection, Field(discriminator="kind")
+    RodSection | SpringSection | EnergySection | TrussSection | FrameSection,
+    Field(discriminator="kind"),
 ]
 
 

@@ -4,7 +4,7 @@ from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.lanes import over_lanes
@@ -135,7 +135,7 @@ class FrameMechanics(DiscreteStructure):
     @cached_property
     def _gather(self) -> Float[np.ndarray, "points nodes"]:
         """Sum at the nodes."""
-        return np.eye(len(self.model.place))[self.model.nodes.ravel()]
+        return np.asarray(np.eye(len(self.model.place))[self.model.nodes.ravel()])
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p: what actuators bear, and minus the travel of loads."""
@@ -198,8 +198,27 @@ class FrameMechanics(DiscreteStructure):
         forces = 10.0 * size * generator.normal(size=(lanes, self.constraints))
         return np.concatenate([nodes[:, model.place >= 0], forces], axis=1)
 
+    @cached_property
+    def _turning(self) -> Int[np.ndarray, " parts"]:
+        """A node of each rigidly joined part whose turn nothing holds."""
+        model = self.model
+        part = np.arange(len(model.place))
+        for _ in part:
+            lowest = part[model.nodes].min(axis=1)
+            before = part.copy()
+            np.minimum.at(part, model.nodes, lowest[:, None])
+            if np.array_equal(part, before):
+                break
+        held = np.unique(part[(model.place < 0) | (model.springs > 0.0)])
+        return np.setdiff1d(part, held)
+
     def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
-        """Whether the highest Legendre coefficients of ψ are small in every element."""
-        psi = self.turns(z, self.scalars(z, p))[:, self.model.nodes]
-        tail = np.abs(psi @ self.model.mesh.reference.to_legendre[-2:].T)
-        return np.asarray(tail.max(axis=(1, 2)) < RESOLVED)
+        """Whether the highest Legendre coefficients of ψ are small in every element.
+
+        What nothing keeps from turning is the same after a whole turn: less than half of one
+        counts.
+        """
+        psi = self.turns(z, self.scalars(z, p))
+        tail = np.abs(psi[:, self.model.nodes] @ self.model.mesh.reference.to_legendre[-2:].T)
+        whole = np.abs(psi[:, self._turning]).max(axis=1, initial=0.0) <= np.pi
+        return np.asarray((tail.max(axis=(1, 2)) < RESOLVED) & whole)
