@@ -1,7 +1,6 @@
 """Compiled forces and stiffness of frames, eight lanes at a time."""
 
 from equimorph.linalg.compiled import njit
-
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes
 from equimorph.linalg.simd import LANES, load, sincos, spread, store, work_rows
 
