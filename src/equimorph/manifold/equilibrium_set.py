@@ -188,6 +188,7 @@ class EquilibriumSet:
             np.array(free),
             self.cells,
             self.cell_index,
+            self.component,
             folded,
             capped,
             self.constraints,

@@ -11,6 +11,8 @@ from equimorph.equilibria import ParameterLine, TraceOptions, distinct
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.manifold.cell_index import CellIndex, Hits
+from equimorph.manifold.simplices import volumes
+from equimorph.manifold.topology import adjacency, orientation
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
 
@@ -21,6 +23,8 @@ ROUND_OFF = 1e-12
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
 SAME = 1e-6
 """Distance in the metric below which two states over one point are the same."""
+CLOSEST = 1e-3
+"""Least share of a cell between its fold and a guess: at the fold Newton's matrix is singular."""
 CHUNK = 2048
 """Points that are served together: their work arrays stay small."""
 
@@ -91,8 +95,8 @@ class Sheets:
         States of the vertices.
     free
         Places of the free parameters.
-    cells, cell_index
-        Vertices and index of the cells.
+    cells, cell_index, component
+        Vertices of the cells, their index, and the pieces that they belong to.
     folded, capped
         Whether vertices lie on folds, and on constraints.
     constraints
@@ -103,6 +107,7 @@ class Sheets:
     free: Int[np.ndarray, " d"]
     cells: Int[np.ndarray, "C corners"]
     cell_index: Int[np.ndarray, " C"]
+    component: Int[np.ndarray, " C"]
     folded: Bool[np.ndarray, " V"]
     capped: Bool[np.ndarray, " V"]
     constraints: tuple[Constraint, ...]
@@ -126,6 +131,15 @@ class Sheets:
     @cached_property
     def _at_a_cap(self) -> Bool[np.ndarray, " C"]:
         return np.asarray(self.capped[self.cells].any(axis=1))
+
+    @cached_property
+    def _overturned(self) -> Bool[np.ndarray, " C"]:
+        """Cells that project against the orientation that their index demands."""
+        signs, _ = orientation(self.cells, adjacency(self.cells))
+        volume = volumes(self.points.p[:, self.free][self.cells])
+        volume *= signs * np.where(self.cell_index % 2 == 0, 1, -1)
+        total = np.bincount(self.component, volume)
+        return np.asarray(volume * np.sign(total)[self.component] < 0.0)
 
     def over(self, p: Points) -> tuple[States, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
         """States over points (all parameters given), sorted by point; the points; the cells.
@@ -164,10 +178,16 @@ class Sheets:
         return z, first + point, cell
 
     def _guess(self, hits: Hits) -> Lanes:
-        """Interpolation between the corners, at the nearest point of the cell."""
+        """Interpolation between the corners, at the nearest point of the cell.
+
+        From a fold on, states move like the root of the way in the parameters.
+        """
         weights = np.maximum(hits.weights, 0.0)
         weights /= weights.sum(axis=1, keepdims=True)
         corners = self.cells[hits.cell]
+        folded = self.folded[corners]
+        some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
+        weights[some] = _rooted(weights[some], folded[some])
         z = weights[:, :1] * self.points.z[corners[:, 0]]
         for k in range(1, corners.shape[1]):
             z += weights[:, k : k + 1] * self.points.z[corners[:, k]]
@@ -201,15 +221,15 @@ class Sheets:
         count: int,
     ) -> Bool[np.ndarray, " points"]:
         """Points over which the states cannot be other than those kept."""
-        capped = self._at_a_cap[hits.cell]
-        failed = ~good & (hits.inside & ~self._at_an_edge[hits.cell] | capped)
+        # a constraint takes single states away: all cells near it have to give a state
+        capped = np.bincount(hits.point, self._at_a_cap[hits.cell], count) > 0
+        failed = ~good & (hits.inside & ~self._at_an_edge[hits.cell] | capped[hits.point])
         sign = 1 - 2 * (self.cell_index[hits.cell] % 2)
         found = np.bincount(hits.point[kept], sign[kept], count)
+        sign = np.where(self._overturned[hits.cell], -sign, sign)
         expected = np.bincount(hits.point, sign * hits.inside, count)
-        # a constraint takes single states away
-        exempt = np.bincount(hits.point, capped, count) > 0
         whole = np.bincount(hits.point, failed, count) == 0
-        return np.asarray(whole & (exempt | (found == expected)))
+        return np.asarray(whole & (capped | (found == expected)))
 
     def _allowed(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
         good = np.ones(len(z), bool)
@@ -220,16 +240,19 @@ class Sheets:
     def _searched(
         self, p: Points, near: Hits, number: np.int64
     ) -> tuple[Lanes, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
-        """States over one point by lifts from all regular vertices of the cells near it."""
+        """States over one point by lifts and Newton from all regular vertices near it."""
         mine = near.take(near.point == number)
         corners = np.unique(self.cells[mine.cell])
         corners = corners[~self.folded[corners]]
         target = p[number]
-        z = lift_to(self.points[corners], target, self.constraints)
         guess = self._guess(mine)
-        solved, good = self._polished(guess, p, mine)
-        good &= self._allowed(solved, p[mine.point])
-        z = np.concatenate([solved[good], z])
+        starts = np.concatenate([guess, self.points.z[corners]])
+        solved, good, _ = _newton(self.structure, starts, np.tile(target, (len(starts), 1)))
+        solved = solved[good]
+        everywhere = np.tile(target, (len(solved), 1))
+        good = self.structure.resolved(solved, everywhere) & self._allowed(solved, everywhere)
+        lifted = lift_to(self.points[corners], target, self.constraints)
+        z = np.concatenate([solved[good], lifted])
         z = z[distinct(self.structure, z)]
         index = self.structure.index(z, np.tile(target, (len(z), 1)))
         return z, np.full(len(z), number), self._nearest(z, index, guess, mine)
@@ -246,6 +269,18 @@ class Sheets:
         best = gap.argmin(axis=1)
         near = np.isfinite(gap[np.arange(len(z)), best])
         return np.where(near, mine.cell[best], -1)
+
+
+def _rooted(
+    weights: Float[np.ndarray, "n corners"], folded: Bool[np.ndarray, "n corners"]
+) -> Float[np.ndarray, "n corners"]:
+    """Weights of corners with the root of the share of those off the fold as their share."""
+    # all of them count where the share is zero
+    off = np.where(folded, 0.0, weights + 1e-12)
+    share = off.sum(axis=1, keepdims=True)
+    root = np.sqrt(np.maximum(share, CLOSEST))
+    on = np.where(folded, weights + 1e-12, 0.0)
+    return np.asarray(off / share * root + on / on.sum(axis=1, keepdims=True) * (1.0 - root))
 
 
 def lift_to(
