@@ -1,14 +1,26 @@
 """Results and schedules as files that other programs open."""
 
 from equimorph.storage.map_table import write_map
-from equimorph.storage.results import Results, read_results, write_results
+from equimorph.storage.results import (
+    Results,
+    append_results,
+    load_set,
+    read_results,
+    save_set,
+    write_results,
+)
 from equimorph.storage.schedule import read_schedule, write_schedule
+from equimorph.storage.surface import write_surface
 
 __all__ = [
     "Results",
+    "append_results",
+    "load_set",
     "read_results",
     "read_schedule",
+    "save_set",
     "write_map",
     "write_results",
     "write_schedule",
+    "write_surface",
 ]

@@ -1,6 +1,6 @@
 """Results as one HDF5 file for everybody: xarray opens its groups, ParaView its ``/VTKHDF``.
 
-Groups: ``set`` (vertices and triangles of the equilibrium set), ``equilibria/<number>`` (states
+Groups: ``set`` (vertices and cells of the equilibrium set), ``equilibria/<number>`` (states
 over one point each), ``routes/<name>`` and ``maps/<name>`` (one each), and ``VTKHDF``, an
 unstructured grid whose arrays are hard links to those of ``set``. The points of the grid are the
 free parameters and a descriptor: that embedding is for looking at, the states are in ``set``.
@@ -12,17 +12,18 @@ from pathlib import Path
 
 import h5py
 
+from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.storage import map_group, route_group, set_group, states_group
 from equimorph.storage.files import write_bytes
-from equimorph.storage.hdf import content, get_json, opened, put_json
+from equimorph.storage.hdf import content, extended, get_json, opened, put_json
 from equimorph.storage.vtkhdf import link_grid
 from equimorph.structures import States, from_identity
 from equimorph.tasks import ActuatorMap, Route
 
 FORMAT = "equimorph results"
-VERSION = 1
+VERSION = 2
 SET, ROUTES, MAPS, EQUILIBRIA = "set", "routes", "maps", "equilibria"
 STRUCTURE = "structure"
 
@@ -54,7 +55,7 @@ def write_results(
     eset
         The set.
     height
-        Third coordinate of the surface that ParaView shows.
+        Coordinate after the free parameters in what ParaView shows.
     routes
         Routes by name.
     equilibria
@@ -72,15 +73,99 @@ def write_results(
     def fill(file: h5py.File) -> None:
         put_json(file, STRUCTURE, identity)
         set_group.write(file.create_group(SET), eset, height)
-        link_grid(file, file[SET])
-        for number, states in enumerate(equilibria):
-            states_group.write(file.create_group(f"{EQUILIBRIA}/{number}"), states)
-        for name, route in (routes or {}).items():
-            route_group.write(file.create_group(f"{ROUTES}/{name}"), route)
-        for name, amap in (maps or {}).items():
-            map_group.write(file.create_group(f"{MAPS}/{name}"), amap)
+        link_grid(file, file[SET], eset.cells.shape[1])
+        _add(file, routes or {}, equilibria, maps or {})
 
     return write_bytes(Path(path), content(FORMAT, VERSION, fill))
+
+
+def append_results(
+    path: str | Path,
+    *,
+    routes: Mapping[str, Route] | None = None,
+    equilibria: Sequence[States] = (),
+    maps: Mapping[str, ActuatorMap] | None = None,
+) -> Path:
+    """Add to a results file, in one step: readers find the old file or the new one.
+
+    Parameters
+    ----------
+    path
+        Name of a file that `write_results` or `save_set` wrote.
+    routes, maps
+        By names that the file does not have yet.
+    equilibria
+        States over one point each; they follow those that are there.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged or newer, cannot be written, has a route or map of such a
+        name, or holds a set of another structure.
+    """
+    path = Path(path)
+
+    def fill(file: h5py.File) -> None:
+        for group, given in ((ROUTES, routes), (MAPS, maps)):
+            known = [name for name in given or {} if f"{group}/{name}" in file]
+            if known:
+                raise InputError(f"`{group}` must have new names; got {', '.join(known)}.")
+        signature = from_identity(get_json(file, STRUCTURE)).signature
+        others = [*equilibria, *(amap.states for amap in (maps or {}).values())]
+        others += [route.path.states for route in (routes or {}).values() if route.path]
+        if any(states.structure.signature != signature for states in others):
+            raise InputError(f"`{path}` must hold results of the same structure; got another one.")
+        _add(file, routes or {}, equilibria, maps or {})
+
+    return write_bytes(path, extended(path, FORMAT, VERSION, fill))
+
+
+def save_set(path: str | Path, eset: EquilibriumSet, height: Descriptor | None = None) -> Path:
+    """Write an equilibrium set alone; see `write_results`.
+
+    Parameters
+    ----------
+    path
+        Name of the file.
+    eset
+        The set, over one, two or three parameters.
+    height
+        Coordinate after the free parameters in what ParaView shows; by default the descriptor that
+        tells the structure's states apart.
+
+    Raises
+    ------
+    InputError
+        If `path` cannot be written, or the structure has a callable and cannot be written down.
+    """
+    return write_results(path, eset, height or eset.structure.elevation)
+
+
+def load_set(path: str | Path) -> EquilibriumSet:
+    """Read the equilibrium set of a results file.
+
+    Raises
+    ------
+    InputError
+        If it is missing, no results file, newer than this release, truncated or damaged.
+    """
+    with opened(Path(path), FORMAT, VERSION) as file:
+        return set_group.read(file[SET], from_identity(get_json(file, STRUCTURE)))
+
+
+def _add(
+    file: h5py.File,
+    routes: Mapping[str, Route],
+    equilibria: Sequence[States],
+    maps: Mapping[str, ActuatorMap],
+) -> None:
+    first = len(file[EQUILIBRIA]) if EQUILIBRIA in file else 0
+    for number, states in enumerate(equilibria, first):
+        states_group.write(file.create_group(f"{EQUILIBRIA}/{number}"), states)
+    for name, route in routes.items():
+        route_group.write(file.create_group(f"{ROUTES}/{name}"), route)
+    for name, amap in maps.items():
+        map_group.write(file.create_group(f"{MAPS}/{name}"), amap)
 
 
 def read_results(path: str | Path) -> Results:

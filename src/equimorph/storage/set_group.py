@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.errors import InputError
 from equimorph.manifold import Audit, Boundary, Component, EquilibriumSet, Stratum
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.model import Box, Constraint, Descriptor, names_of
@@ -15,8 +16,11 @@ from equimorph.storage.hdf import add_dimension, get, get_json, put, put_json
 from equimorph.structures import States, Structure
 
 ABOUT = "about"
-GRID = ("vertices", "edges", "triangles", "sides")
+GRID = ("vertices", "edges", "triangles", "sides", "tetrahedra", "faces")
 """Arrays of the triangulation of the box."""
+LARGEST_RESIDUAL = 1e-6
+SAMPLE = 1000
+"""States whose residuals are looked at when a set is read."""
 
 
 def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
@@ -29,7 +33,7 @@ def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
     eset
         The set.
     height
-        Third coordinate of the embedding.
+        Coordinate of the embedding after the free parameters.
     """
     points, parameters = eset.points, names_of(eset.structure.parameters)
     # At the top, so that the arrays keep their dimensions where the grid links to them.
@@ -43,15 +47,14 @@ def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
     put(group, "grid_vertex", eset.grid_vertex, ["vertex"], "vertex of the grid below, or -1")
     put(group, "index", eset.index, ["vertex"], "negative eigenvalues; 0 is stable")
     put(group, "energy", points.energy, ["vertex"], "potential energy")
-    for each in {d.name: d for d in [height, *(c.descriptor for c in eset.constraints)]}.values():
-        put(group, each.name.replace("/", "_over_"), each(points), ["vertex"], each.unit)
-    put(
-        group, "connectivity", eset.cells.ravel(), ["corner"], "vertices of each triangle, by three"
-    )
+    for one in {d.name: d for d in [height, *(c.descriptor for c in eset.constraints)]}.values():
+        put(group, one.name.replace("/", "_over_"), one(points), ["vertex"], one.unit)
+    each = f"vertices of each cell, {eset.cells.shape[1]} at a time"
+    put(group, "connectivity", eset.cells.ravel(), ["corner"], each)
     put(group, "cell_index", eset.cell_index, ["cell"], "index of the stratum")
     put(group, "component", eset.component, ["cell"])
     put(group, "stratum", eset.stratum, ["cell"])
-    put(group, "embedding", _embedding(eset, height), ["vertex", "space"], "for looking at")
+    put(group, "embedding", embedding(eset, height), ["vertex", "space"], "for looking at")
     for name in GRID:
         put(group, f"grid_{name}", getattr(eset.mesh, name), [f"grid_{name}_entry", f"of_{name}"])
     _put_chains(group, "fold", eset.folds)
@@ -60,10 +63,19 @@ def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
 
 
 def read(group: h5py.Group, structure: Structure) -> EquilibriumSet:
-    """Read what `write` wrote."""
+    """Read what `write` wrote.
+
+    Raises
+    ------
+    ValueError
+        If the parts do not belong together.
+    InputError
+        If the states are no equilibria of the structure.
+    """
     about = get_json(group, ABOUT)
-    chains = zip(_chains(group, "boundary"), about["boundary_kinds"], strict=True)
-    return EquilibriumSet(
+    d = len(about["box"])
+    chains = zip(_chains(group, "boundary", d), about["boundary_kinds"], strict=True)
+    eset = EquilibriumSet(
         structure=structure,
         box=Box(**about["box"]),
         fixed=about["fixed"],
@@ -75,18 +87,61 @@ def read(group: h5py.Group, structure: Structure) -> EquilibriumSet:
         points=States(structure, get(group, "z"), get(group, "p")),
         kinds=get(group, "kind"),
         index=get(group, "index"),
-        cells=get(group, "connectivity").reshape(-1, 3),
+        cells=get(group, "connectivity").reshape(-1, d + 1),
         cell_index=get(group, "cell_index"),
         component=get(group, "component"),
         stratum=get(group, "stratum"),
-        folds=tuple(_chains(group, "fold")),
+        folds=tuple(_chains(group, "fold", d)),
         boundaries=tuple(Boundary(vertices, kind) for vertices, kind in chains),
         components=tuple(Component(**_tuples(each)) for each in about["components"]),
         strata=tuple(Stratum(**_tuples(each)) for each in about["strata"]),
         audit=Audit(**_tuples(about["audit"])),
-        mesh=BaseMesh(**{name: get(group, f"grid_{name}") for name in GRID}),
+        # sets over two parameters were once stored without tetrahedra
+        mesh=BaseMesh(
+            **{name: get(group, f"grid_{name}") for name in GRID if f"grid_{name}" in group}
+        ),
         grid_vertex=get(group, "grid_vertex"),
     )
+    _check_parts(eset)
+    _check_states(eset)
+    return eset
+
+
+def _check_parts(eset: EquilibriumSet) -> None:
+    """All arrays fit together, and every number of a thing is that of one."""
+    points, count, cells = eset.points, len(eset.points), len(eset.cells)
+    shapes = (points.z.shape, points.p.shape)
+    sizes = eset.structure.size, len(eset.structure.parameters)
+    pieces = [*eset.folds, *(each.vertices for each in eset.boundaries)]
+    fits = (
+        shapes == ((count, sizes[0]), (count, sizes[1])),
+        all(len(each) == count for each in (eset.kinds, eset.index, eset.grid_vertex)),
+        all(len(each) == cells for each in (eset.cell_index, eset.component, eset.stratum)),
+        all(_below(each, count) for each in (eset.cells, *pieces)),
+        _below(eset.component, len(eset.components)),
+        _below(eset.stratum, len(eset.strata)),
+        _below(eset.grid_vertex + 1, len(eset.mesh.vertices) + 1),
+        _below(eset.mesh.cells, len(eset.mesh.vertices)),
+        bool(np.isfinite(points.z).all() and np.isfinite(points.p).all()),
+    )
+    if not all(fits):
+        raise ValueError("the arrays of the set do not belong together")
+
+
+def _below(numbers: Int[np.ndarray, "..."], count: int) -> bool:
+    return bool(((numbers >= 0) & (numbers < count)).all())
+
+
+def _check_states(eset: EquilibriumSet) -> None:
+    """Some of the states, spread over all, are equilibria."""
+    some = np.unique(np.linspace(0, max(len(eset.points) - 1, 0), SAMPLE).astype(int))
+    states = eset.points[some[some < len(eset.points)]]
+    largest = float(states.residual.max(initial=0.0))
+    if not largest <= LARGEST_RESIDUAL:
+        raise InputError(
+            "`path` must hold equilibria of its structure; got states with a residual of "
+            f"{largest:.1e}. Compute the set again."
+        )
 
 
 def _about(eset: EquilibriumSet) -> dict[str, object]:
@@ -111,18 +166,25 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(each) for each in value) if isinstance(value, list) else value
 
 
-def _embedding(eset: EquilibriumSet, height: Descriptor) -> Float[np.ndarray, "vertices 3"]:
-    return np.column_stack([eset.coordinates, height(eset.points)])
+def embedding(eset: EquilibriumSet, height: Descriptor) -> Float[np.ndarray, "vertices 3"]:
+    """Points in space: the free parameters, then the height, then zeros; the first three."""
+    columns = [eset.coordinates, height(eset.points), np.zeros(len(eset.points))]
+    return np.ascontiguousarray(np.column_stack(columns)[:, :3])
 
 
-def _put_chains(group: h5py.Group, name: str, chains: Sequence[Int[np.ndarray, " _"]]) -> None:
-    """Write chains of vertices one after the other, and where each of them ends."""
-    joined = np.concatenate([np.zeros(0, dtype=np.int64), *chains])
-    ends = np.cumsum([len(chain) for chain in chains], dtype=np.int64)
+def _put_chains(group: h5py.Group, name: str, chains: Sequence[Int[np.ndarray, "..."]]) -> None:
+    """Write vertices of pieces one after the other, and where each of them ends."""
+    flat = [chain.ravel() for chain in chains]
+    joined = np.concatenate([np.zeros(0, dtype=np.int64), *flat])
+    ends = np.cumsum([len(chain) for chain in flat], dtype=np.int64)
     put(group, f"{name}_vertex", joined, [f"{name}_entry"], f"vertices of each {name} in order")
     put(group, f"{name}_end", ends, [name], f"entries before the end of each {name}")
 
 
-def _chains(group: h5py.Group, name: str) -> list[Int[np.ndarray, " _"]]:
-    ends = get(group, f"{name}_end")
-    return list(np.split(get(group, f"{name}_vertex"), ends[:-1])) if len(ends) else []
+def _chains(group: h5py.Group, name: str, d: int) -> list[Int[np.ndarray, "..."]]:
+    """Pieces as they are in a set over d parameters; see `Boundary`."""
+    ends, joined = get(group, f"{name}_end"), get(group, f"{name}_vertex")
+    if len(joined) != (ends[-1] if len(ends) else 0) or (np.diff(ends, prepend=0) < 0).any():
+        raise ValueError(f"pieces named {name} do not end where they should")
+    flat = np.split(joined, ends[:-1]) if len(ends) else []
+    return [piece.reshape(-1, 3) for piece in flat] if d == 3 else list(flat)

@@ -1,4 +1,4 @@
-"""The grid that ParaView opens: an unstructured grid of triangles made of hard links.
+"""The grid that ParaView opens: an unstructured grid made of hard links.
 
 References
 ----------
@@ -10,11 +10,11 @@ import numpy as np
 
 from equimorph.storage.hdf import put
 
-TRIANGLE = 5
-"""Cell type of VTK."""
+TYPES = {2: 3, 3: 5, 4: 10}
+"""Cell types of VTK by their number of corners: line, triangle, tetrahedron."""
 
 
-def link_grid(file: h5py.File, group: h5py.Group) -> None:
+def link_grid(file: h5py.File, group: h5py.Group, size: int) -> None:
     """Add ``/VTKHDF`` to a file whose `group` holds an equilibrium set.
 
     Parameters
@@ -23,6 +23,8 @@ def link_grid(file: h5py.File, group: h5py.Group) -> None:
         Where the grid goes.
     group
         With ``embedding``, ``connectivity`` and arrays along the file's dimensions vertex and cell.
+    size
+        Corners of a cell.
     """
     grid = file.create_group("VTKHDF")
     grid.attrs["Version"] = np.array([2, 0])
@@ -31,12 +33,12 @@ def link_grid(file: h5py.File, group: h5py.Group) -> None:
     points, corners = len(group["embedding"]), len(group["connectivity"])
     for name, number in (
         ("NumberOfPoints", points),
-        ("NumberOfCells", corners // 3),
+        ("NumberOfCells", corners // size),
         ("NumberOfConnectivityIds", corners),
     ):
         put(grid, name, np.array([number], dtype=np.int64), ["piece"])
-    put(grid, "Offsets", np.arange(0, corners + 1, 3, dtype=np.int64), ["offset"])
-    put(grid, "Types", np.full(corners // 3, TRIANGLE, dtype=np.uint8), ["cell"])
+    put(grid, "Offsets", np.arange(0, corners + 1, size, dtype=np.int64), ["offset"])
+    put(grid, "Types", np.full(corners // size, TYPES[size], dtype=np.uint8), ["cell"])
     for kind, dimension in (("PointData", "vertex"), ("CellData", "cell")):
         fields = grid.create_group(kind)
         for name, dataset in group.items():

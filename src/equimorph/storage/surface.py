@@ -1,0 +1,162 @@
+"""Curves and surfaces of equilibrium sets as PLY and VTP files, for programs that draw.
+
+References
+----------
+Turk, The PLY polygon file format, 1994; VTK XML formats, https://docs.vtk.org/en/latest/.
+"""
+
+import base64
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Descriptor
+from equimorph.storage.files import write_bytes
+from equimorph.storage.set_group import embedding
+
+FOLD, BOX, CAP, MIXED = range(4)
+"""Kinds of surfaces of sets over three parameters."""
+KINDS = {"box": BOX, "cap": CAP, "mixed": MIXED}
+
+PLY_TYPES = {"f": "double", "i": "int"}
+VTK_TYPES = {"f": "Float64", "i": "Int64"}
+SIMPLEX = {2: ("Lines", "edge"), 3: ("Polys", "face")}
+"""What VTP and PLY call segments and triangles."""
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """Points in space, segments or triangles between them, and numbers on both."""
+
+    points: Float[np.ndarray, "V 3"]
+    cells: Int[np.ndarray, "C corners"]
+    on_points: dict[str, Shaped[np.ndarray, " V"]]
+    on_cells: dict[str, Int[np.ndarray, " C"]]
+
+
+def write_surface(path: str | Path, eset: EquilibriumSet, height: Descriptor | None = None) -> Path:
+    """Write what a set looks like: its curve, its surface, or the surfaces that bound its strata.
+
+    Points are the free parameters, then the height. Sets over one or two parameters give segments
+    or triangles with their index, component and stratum; sets over three the fold surfaces and
+    the boundary, with ``kind`` 0 on folds, 1 on the box, 2 on constraints, 3 on both.
+
+    Parameters
+    ----------
+    path
+        Name of the file, ending in ``.ply`` or ``.vtp``.
+    eset
+        The set.
+    height
+        Coordinate after the free parameters, by default the descriptor that tells states apart; in
+        three parameters a number on the points.
+
+    Raises
+    ------
+    InputError
+        For another ending, or if `path` cannot be written.
+    """
+    path = Path(path)
+    writers = {".ply": _ply, ".vtp": _vtp}
+    if path.suffix.lower() not in writers:
+        raise InputError(f"`path` must end in .ply or .vtp; got {path.name!r}.")
+    surface = _surface(eset, height or eset.structure.elevation)
+    return write_bytes(path, writers[path.suffix.lower()](surface))
+
+
+def _surface(eset: EquilibriumSet, height: Descriptor) -> _Surface:
+    on_cells = {
+        "index": eset.cell_index,
+        "component": eset.component,
+        "stratum": eset.stratum,
+    }
+    cells = eset.cells
+    if len(eset.names) == 3:
+        pieces = [(FOLD, piece) for piece in eset.folds]
+        pieces += [(KINDS[each.kind], each.vertices) for each in eset.boundaries]
+        cells = np.concatenate([np.zeros((0, 3), int), *(piece for _, piece in pieces)])
+        on_cells = {"kind": np.repeat([k for k, _ in pieces], [len(p) for _, p in pieces])}
+    used, corners = np.unique(cells, return_inverse=True)
+    points = eset.points[used]
+    on_points = {"index": eset.index[used], "energy": points.energy, height.name: height(points)}
+    return _Surface(
+        embedding(eset, height)[used],
+        corners.reshape(cells.shape),
+        on_points,
+        {name: np.asarray(values, dtype=int) for name, values in on_cells.items()},
+    )
+
+
+def _ply(surface: _Surface) -> bytes:
+    """Binary, least significant byte first."""
+    _, simplex = SIMPLEX[surface.cells.shape[1]]
+    vertices = {**dict(zip("xyz", surface.points.T, strict=True)), **surface.on_points}
+    corners = {f"vertex{k + 1}": column for k, column in enumerate(surface.cells.T)}
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(surface.points)}"]
+    lines += [f"property {PLY_TYPES[v.dtype.kind]} {_word(name)}" for name, v in vertices.items()]
+    lines.append(f"element {simplex} {len(surface.cells)}")
+    fields = [(name, "<i4", column) for name, column in corners.items()]
+    if simplex == "face":
+        lines.append("property list uchar int vertex_indices")
+        fields.insert(0, ("count", "u1", np.full(len(surface.cells), 3)))
+    else:
+        lines += [f"property int {name}" for name in corners]
+    lines += [f"property int {_word(name)}" for name in surface.on_cells]
+    fields += [(f"cell {name}", "<i4", values) for name, values in surface.on_cells.items()]
+    header = "\n".join([*lines, "end_header\n"]).encode("ascii")
+    columns = [(name, f"<{v.dtype.kind}{8 if v.dtype.kind == 'f' else 4}", v)
+               for name, v in vertices.items()]  # fmt: skip
+    return header + _rows(columns) + _rows(fields)
+
+
+def _rows(columns: list[tuple[str, str, Shaped[np.ndarray, " n"]]]) -> bytes:
+    rows = np.zeros(len(columns[0][2]), [(f"{k} {name}", kind) for k, (name, kind, _) in
+                                         enumerate(columns)])  # fmt: skip
+    for field, (_, _, values) in zip(rows.dtype.names or (), columns, strict=True):
+        rows[field] = values
+    return rows.tobytes()
+
+
+def _word(name: str) -> str:
+    """Name without what the format takes for the end of a word, or cannot hold."""
+    plain = name.replace("|", "").replace(" ", "_").replace("/", "_over_")
+    return plain.encode("ascii", "ignore").decode() or "value"
+
+
+def _vtp(surface: _Surface) -> bytes:
+    """XML with its numbers in base64."""
+    group, _ = SIMPLEX[surface.cells.shape[1]]
+    ends = surface.cells.shape[1] * np.arange(1, len(surface.cells) + 1)
+    number = dict.fromkeys(("Verts", "Lines", "Strips", "Polys"), 0)
+    number[group] = len(surface.cells)
+    counts = " ".join(f'NumberOf{name}="{count}"' for name, count in number.items())
+    parts = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
+        f'<PolyData><Piece NumberOfPoints="{len(surface.points)}" {counts}>',
+        _data("Points", {"Points": surface.points}),
+        _data(group, {"connectivity": surface.cells.ravel(), "offsets": ends}),
+        _data("PointData", surface.on_points),
+        _data("CellData", surface.on_cells),
+        "</Piece></PolyData></VTKFile>\n",
+    ]
+    return "\n".join(parts).encode("utf-8")
+
+
+def _data(group: str, arrays: dict[str, Shaped[np.ndarray, "..."]]) -> str:
+    lines = [f"<{group}>"]
+    for name, values in arrays.items():
+        content = np.ascontiguousarray(values, dtype=f"<{values.dtype.kind}8").tobytes()
+        text = base64.b64encode(np.array([len(content)], "<u8").tobytes() + content).decode()
+        several = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+        kind = VTK_TYPES[values.dtype.kind]
+        lines.append(
+            f'<DataArray type="{kind}" Name={quoteattr(name)}{several} format="binary">{text}'
+            "</DataArray>"
+        )
+    return "\n".join([*lines, f"</{group}>"])
