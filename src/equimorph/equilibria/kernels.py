@@ -13,6 +13,8 @@ from equimorph.linalg.kernels import FLAGS
 
 SUMS = {**FLAGS, "fastmath": {"contract", "reassoc"}, "_nrt": False}
 """Sums over the entries of one lane may be reordered: always in the same way."""
+BRIEF = {**SUMS, "nogil": False}
+"""Of kernels too short to let another thread in: taking turns would cost more than they do."""
 
 (
     T, SLOPE, T_1, SLOPE_1, T_2, SLOPE_2, X_1, RATE_1, X_2, RATE_2, ARC, TRIAL, CORNER, DEFECT,
@@ -160,7 +162,7 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
         numbers[TURN, i] = np.arccos(min(1.0 / norm, 1.0))
 
 
-@njit(**SUMS)
+@njit(**BRIEF)
 def correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active):
     """`correct` for steps to the end of t, where t is fixed instead of the length."""
     z, here, trial, _ = places
@@ -202,7 +204,7 @@ def correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active):
         numbers[LENGTH, i], counts[STAGE, i] = way, CONVERGED
 
 
-@njit(**{**SUMS, "_nrt": True})
+@njit(**{**BRIEF, "_nrt": True})
 def judge(index, determinant, numbers, counts, active, smallest, locates, plain):
     """Tell what happened in steps that converged, and refuse those that hide something.
 
@@ -281,7 +283,7 @@ def _dips(i, numbers):
     return here - slope * slope / (4.0 * bow) < DIP * min(here, there)
 
 
-@njit(**{**SUMS, "_nrt": True})
+@njit(**{**BRIEF, "_nrt": True})
 def may_graze(last, here, new, good, numbers, out):
     """Whether constraints may be violated inside steps that obey them at both ends.
 
@@ -306,7 +308,7 @@ def may_graze(last, here, new, good, numbers, out):
     return found
 
 
-@njit(**SUMS)
+@njit(**BRIEF)
 def close_gaps(places, numbers, counts, values, active):
     """Move lanes from the end into the places of those that are finished; return how many stay."""
     i = 0

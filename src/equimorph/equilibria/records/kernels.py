@@ -1,6 +1,7 @@
 """Compiled kernels that copy what lanes leave behind as they march."""
 
 from equimorph.equilibria.kernels import (
+    BRIEF,
     CONVERGED,
     ENDED,
     HEAD,
@@ -22,7 +23,7 @@ from equimorph.equilibria.kernels import (
 from equimorph.linalg.compiled import njit
 
 
-@njit(**SUMS)
+@njit(**BRIEF)
 def file_events(new_tangent, stops, places, numbers, counts, active, buffer, filled):
     """Copy the steps in which something happened behind others; end lanes; return how many."""
     z, tangent, trial, _ = places
