@@ -174,3 +174,29 @@ def inflated_rod():
         return out - lam * nu - (mu - q) * rise - pressure * area
 
     return rod, (0.8, 1.2, 0.5, 0.85, 0.05), lagrangian
+
+
+def pulled_rod():
+    """Cables along a part of a stretchable rod: they bend and compress it."""
+    rod = Rod(
+        ends=("clamped", End(angle="free", y="free")),
+        axial=[[0, 4.0], [1, 6.0]],
+        actuators={"T": [Tendon(0.1, 0.2, 0.8), Tendon([[0, -0.05], [1, 0.05]])]},
+        loads={"q": LineLoad()},
+        elements=4,
+        degree=5,
+    )
+    g = Quadrature(rod)
+
+    def lagrangian(z, p):
+        start, pull, q, nu = p.T
+        theta = np.concatenate([start[:, None], z[:, :-1]], axis=1)
+        angles, inside = theta[:, g.at], (g.s > 0.2) & (g.s < 0.8)
+        normal = column(z[:, -1]) * np.cos(angles) + column(q) * (1 - g.s) * np.sin(angles)
+        compressed = normal + column(pull) * (1.0 + inside)
+        out = bending(g, theta, 1 / (4 * np.pi**2), 0.0)
+        offset = 0.1 * inside + 0.1 * g.s - 0.05
+        out = out - pull * g.total(offset * g.kappa(theta)) - z[:, -1] * nu
+        return out + g.total(normal - compressed**2 / (2 * (4.0 + 2.0 * g.s)))
+
+    return rod, (0.3, 0.6, 0.4, 0.85), lagrangian

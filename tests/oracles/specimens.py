@@ -243,6 +243,7 @@ SPECIMENS = (
     _general("sliding rod", rods.sliding_rod),
     _general("stretchable arch", rods.stretchable_arch),
     _general("inflated rod", rods.inflated_rod),
+    _general("pulled rod", rods.pulled_rod),
     Specimen("spring", Spring(1.3), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     Specimen("spring by its energy", written_spring(), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     _truss("truss", arch_truss("engineering")),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 from PIL import Image
 
 from equimorph import plotting
@@ -13,8 +14,8 @@ from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Schedule, names_of
 from equimorph.plotting.curves import states_along
-from equimorph.plotting.furniture import moving_parts
-from equimorph.structures import Rod
+from equimorph.plotting.furniture import draw_supports, moving_parts
+from equimorph.structures import PointForce, Rod
 from equimorph.tasks import Route
 
 NOWHERE = Route("refused", "the goal is unstable", [])
@@ -130,6 +131,33 @@ def test_load_arrows_point_down_where_there_is_load():
 def test_an_unloaded_arch_has_no_arrows():
     states = lift(Rod().natural_state(Theta=0.9), {"Theta": 1.0}).states
     assert moving_parts(Figure().add_subplot(), states).arrows is None
+
+
+def test_point_forces_have_arrows_that_end_at_the_rod():
+    """One arrow along the force, as long as the picture allows; units of the user."""
+    rod = Rod(ends=("clamped", "free"), loads={"P": PointForce(1.0, (0.6, -0.8))}, EI=2.0, length=3)
+    path = lift(rod.natural_state(), {"P": 0.5})
+    ax = Figure().add_subplot()
+    draw_supports(ax, path.states)
+    parts = moving_parts(ax, path.states)
+    head, tail = parts.heads[-1, -1], parts.tails[-1, -1]
+    np.testing.assert_allclose(head / np.hypot(*head), [0.6, -0.8], rtol=1e-12)
+    tip = path.states.shape()[-1, -1]
+    assert np.hypot(*(tail + head - tip)) == pytest.approx(0.012 * 3, rel=1e-9)
+    hubs = [patch for patch in ax.patches if isinstance(patch, Circle)]
+    assert [hub.radius for hub in hubs] == pytest.approx([0.026 * 3])
+
+
+def test_a_hinge_and_a_rail_show_how_a_rod_is_held():
+    """The pinned end moves along a rail; no hub there."""
+    rod = Rod(ends=("clamped", "pinned"), curvature=-2.0)
+    states = lift(rod.natural_state(theta_A=1.0), {"nu": 0.8}).states
+    ax = Figure().add_subplot()
+    draw_supports(ax, states)
+    kinds = [type(patch).__name__ for patch in ax.patches]
+    assert kinds == ["Circle", "Polygon", "Polygon"]
+    rails = [line for line in ax.lines if line.get_linewidth() == 3.0]
+    np.testing.assert_allclose(rails[0].get_xdata()[[0, -1]], [states["nu"][0], 0.8], atol=1e-9)
 
 
 def _route_of(path, descriptors):

@@ -82,10 +82,6 @@ WRONG = {
         {"span": 1.2, "curvature": 1.0},
         "`nu` must be a finite number between",
     ),
-    "tendon in a stretchable rod": (
-        {"actuators": {"T": em.Tendon(0.1)}, "axial": 5.0},
-        "`axial` must be left out for rods with tendons",
-    ),
 }
 
 

@@ -8,15 +8,17 @@ from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Polygon
 from matplotlib.quiver import Quiver
 
 from equimorph.plotting import style
 from equimorph.structures import Rod, Spring, States
 
 _HUB = 0.026  # radius of a rotary actuator, in lengths of the rod
+_MOVED = 1e-3  # way of a support, in lengths of the rod, that is worth a rail
 _STATIONS = np.linspace(0.05, 0.95, 13)
-_LONGEST_ARROW = 0.1  # as a share of the width of the picture
+_LONGEST_ARROW = 0.1  # of a line load, as a share of the width of the picture
+_FORCE_ARROW = 1.6  # longest arrow of a point force, in longest ones of line loads
 _CLEARANCE = 0.012  # between arrow heads and rod, in lengths of the rod
 _GROUND = "#d9d9d9"
 
@@ -34,7 +36,7 @@ def frame_shapes(ax: Axes, outlines: Float[np.ndarray, "lanes points 2"], room: 
 def draw_supports(ax: Axes, states: States) -> None:
     """Supports of a structure, where they stay on the way through the states."""
     if isinstance(states.structure, Rod):
-        _draw_rotary_actuators(ax, states)
+        _draw_rod_supports(ax, states.structure, states)
     elif isinstance(states.structure, Spring):
         _draw_guides(ax, states)
 
@@ -85,13 +87,13 @@ def moving_parts(ax: Axes, states: States) -> MovingParts:
         lines = states.shape()[None]
         tails, heads = _tip_arrow(states)
     pointers = tuple(ax.plot([], [], **look)[0] for _ in lines)
-    longest = float(np.abs(heads).max(initial=0.0))
-    if longest == 0.0:
+    if not heads.any():
         return MovingParts(pointers, lines, None, tails, heads)
-    # As long as reads well, whatever the unit of the load.
-    heads = heads * (_LONGEST_ARROW * np.ptp(ax.get_xlim()) / longest)
-    if isinstance(structure, Rod):  # the line load presses on the rod, the force pulls its point
-        tails = tails - np.minimum(heads, 0.0) + [0.0, _CLEARANCE]
+    heads = heads * _LONGEST_ARROW * np.ptp(ax.get_xlim())
+    if isinstance(structure, Rod):  # loads press on the rod, the spring's force pulls its point
+        size = np.hypot(*np.moveaxis(heads, -1, 0))[:, :, None]
+        clearance = _CLEARANCE * structure.units.value("length")
+        tails = tails - heads * (1.0 + clearance / np.where(size > 0.0, size, np.inf))
     arrows = ax.quiver(
         *tails[0].T, *heads[0].T, angles="xy", scale_units="xy", scale=1.0, color=style.FAINT,
         width=0.0045, headwidth=4.0, headlength=4.5, headaxislength=4.2, zorder=3,
@@ -104,15 +106,28 @@ def _pointer_lines(rod: Rod, states: States) -> Float[np.ndarray, "ends states 2
     held = np.flatnonzero(rod.mechanics.held)
     hubs = states.shape()[:, [0, -1]].swapaxes(0, 1)[held]
     angles = rod.nodal_angles(states.z, states.p)[:, [0, -1]].T[held]
-    along = 1.7 * _HUB * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    along = 1.7 * _hub(rod) * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return np.stack([hubs - along, hubs + along], axis=2)
 
 
 def _rod_arrows(
     rod: Rod, states: States
 ) -> tuple[Float[np.ndarray, "states arrows 2"], Float[np.ndarray, "states arrows 2"]]:
-    """Line load at stations along the rod."""
-    return states.shape(_STATIONS), rod.line_load(states.p, _STATIONS)
+    """Line loads at stations along the rod, and point forces where they act."""
+    places, forces = rod.point_forces(states.p)
+    tails = states.shape(np.concatenate([_STATIONS, places]))
+    line = _longest_one(rod.line_load(states.p, _STATIONS))
+    return tails, np.concatenate([line, _FORCE_ARROW * _longest_one(forces)], axis=1)
+
+
+def _longest_one(vectors: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+    """Scale vectors so that the longest has length 1: what reads well, whatever the unit."""
+    longest = float(np.linalg.norm(vectors, axis=-1).max(initial=0.0))
+    return vectors / longest if longest > 0.0 else vectors
+
+
+def _hub(rod: Rod) -> float:
+    return _HUB * rod.units.value("length")
 
 
 def _tip_arrow(
@@ -120,16 +135,33 @@ def _tip_arrow(
 ) -> tuple[Float[np.ndarray, "states arrows 2"], Float[np.ndarray, "states arrows 2"]]:
     """Force F on the free end of the spring, downward if positive."""
     down = states["F"][:, None]
-    return states.shape()[:, -1:], np.stack([np.zeros_like(down), -down], axis=-1)
+    heads = np.stack([np.zeros_like(down), -down], axis=-1)
+    return states.shape()[:, -1:], _longest_one(heads)
 
 
-def _draw_rotary_actuators(ax: Axes, states: States) -> None:
-    """Hubs at both ends and the line between them."""
-    ends = states[0].shape()[[0, -1]]
-    ax.plot(*ends.T, color=style.FAINT, linewidth=0.5, linestyle=(0, (6, 3)), zorder=0)
-    for end in ends:
-        ax.add_patch(Circle(end, _HUB, facecolor=_GROUND, edgecolor=style.INK, lw=0.6, zorder=5))
-        ax.plot(*end, ".", color=style.INK, markersize=2.5, zorder=7)
+def _draw_rod_supports(ax: Axes, rod: Rod, states: States) -> None:
+    """Hubs where an angle is held, hinges where it is free, rails where a support moves."""
+    ends = states.shape(np.array([0.0, 1.0]))
+    supported = [end.x != "free" and end.y != "free" for end in rod.ends]
+    if all(supported):
+        ax.plot(*ends[0].T, color=style.FAINT, linewidth=0.5, linestyle=(0, (6, 3)), zorder=0)
+    for end, places in zip(rod.ends, ends.swapaxes(0, 1), strict=True):
+        if end.x == "free" and end.y == "free":
+            continue
+        way = np.ptp(places, axis=0).max()
+        moves = way > _MOVED * rod.units.value("length")
+        if moves:
+            ax.plot(*places.T, color=_GROUND, linewidth=3.0, solid_capstyle="butt", zorder=0)
+        for place in places[[0, -1]] if moves else places[:1]:
+            _draw_support(ax, place, _hub(rod), hinged=end.angle == "free")
+
+
+def _draw_support(ax: Axes, place: Float[np.ndarray, " 2"], radius: float, *, hinged: bool) -> None:
+    """Hub of an actuator, or hinge."""
+    look: dict[str, Any] = {"facecolor": _GROUND, "edgecolor": style.INK, "lw": 0.6, "zorder": 5}
+    foot = place + radius * np.array([[0.0, 0.0], [-1.2, -2.0], [1.2, -2.0]])
+    ax.add_patch(Polygon(foot, **look) if hinged else Circle((place[0], place[1]), radius, **look))
+    ax.plot(*place, ".", color=style.INK, markersize=2.5, zorder=7)
 
 
 def _draw_guides(ax: Axes, states: States) -> None:

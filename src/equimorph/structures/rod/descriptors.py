@@ -10,13 +10,14 @@ from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
 from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.rod.measured import Measured
+from equimorph.structures.rod.validity import clearance
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
 
 WRITTEN = (
-    *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy"),
+    *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy", "clearance(s)"),
     *("support_force(lambda)", "support_force(mu)", "end_moment(0)", "end_moment(1)"),
 )
 REFINING = 6
@@ -133,6 +134,8 @@ def named(rod: Measured, text: str) -> Descriptor:
         return max_curvature(rod) if name == "max_curvature" else total_energy(rod)
     if argument is not None and name == "support_force":
         return support_force(rod, argument)
+    if argument is not None and name == "clearance":
+        return clearance(rod, _fraction(argument))
     if argument in {"0", "1"} and name == "end_moment":
         return end_moment(rod, int(argument))
     if argument is not None and name in {"height", "x", "angle", "curvature"}:

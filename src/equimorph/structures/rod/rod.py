@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.errors import InputError
-from equimorph.model import Descriptor, Parameter, names_of, parameter_vector
+from equimorph.model import Parameter, names_of, parameter_vector
 from equimorph.structures.rod import descriptors
+from equimorph.structures.rod.described import Described
 from equimorph.structures.rod.discretisation import mesh_with_kinks
 from equimorph.structures.rod.general.assembly import Description
 from equimorph.structures.rod.general.ends import End
@@ -18,7 +19,6 @@ from equimorph.structures.rod.general.natural import natural_rod
 from equimorph.structures.rod.general.terms import LineLoad
 from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.rod.loads import LoadShape, LoadSpec, load_shape
-from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.mechanics import ClampedMechanics
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch
 from equimorph.structures.rod.units import Units
@@ -58,7 +58,7 @@ def _why_not(natural: Natural) -> str:
     )
 
 
-class Rod(Measured):
+class Rod(Described):
     """Planar, unshearable elastic rod.
 
     Without options below `elements` it is the clamped, uniform, inextensible arch of length 1 under
@@ -325,47 +325,15 @@ class Rod(Measured):
         """
         return descriptors.discretisation_error(self.mechanics, self.refined, z, p)
 
-    # --- descriptors ------------------------------------------------------------------------
-
-    def height(self, s: float) -> Descriptor:
-        """y(s), in units of L."""
-        return descriptors.coordinate(self, s, 1)
-
-    def position(self, s: float) -> tuple[Descriptor, Descriptor]:
-        """(x(s), y(s)), in units of L."""
-        return descriptors.coordinate(self, s, 0), descriptors.coordinate(self, s, 1)
-
-    def angle(self, s: float) -> Descriptor:
-        """θ(s) in radians."""
-        return descriptors.angle(self, s)
-
-    def curvature(self, s: float) -> Descriptor:
-        """κ(s) in units of 1/L."""
-        return descriptors.curvature(self, s)
-
     @cached_property
-    def max_curvature(self) -> Descriptor:
-        """max_s |κ(s)| in units of 1/L, ends and interior extrema included."""
-        return descriptors.max_curvature(self)
-
-    @cached_property
-    def total_energy(self) -> Descriptor:
-        """Potential energy E, in units of 4π²B/L."""
-        return descriptors.total_energy(self)
-
-    def support_force(self, component: str) -> Descriptor:
-        """Force of the support at A on the rod: "lambda" (horizontal) or "mu" (vertical)."""
-        return descriptors.support_force(self, component)
-
-    def end_moment(self, end: int) -> Descriptor:
-        """Couple of the actuator at end 0 or 1: ∂L/∂θ(end), in units of 4π²B/L."""
-        return descriptors.end_moment(self, end)
-
-    @property
-    def elevation(self) -> Descriptor:
-        """y(½)."""
-        return self.height(0.5)
-
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
-        return descriptors.named(self, text)
+    def general_mechanics(self) -> GeneralMechanics:
+        """The arch as a general rod with a rise; general rods as they are."""
+        if isinstance(self.mechanics, GeneralMechanics):
+            return self.mechanics
+        assert self._load is not None
+        uniform = LineLoad(self._load.density, kinks=self._load.kinks.tolist())
+        twin = Description(
+            CLAMPED, 1.0, 0.0, None, {"q": uniform}, {}, None, DEFAULT_SPAN, 0.0, (), self.units
+        )
+        raw, matrix = twin.mechanics(*self._resolution)
+        return GeneralMechanics(raw.model.mapped(names_of(twin.parameters), matrix))

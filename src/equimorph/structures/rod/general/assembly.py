@@ -99,11 +99,6 @@ class Description:
                 f"`kinks`, of loads and profiles together, must lie {CLOSEST:g} apart at least; "
                 f"got {kinks.tolist()}."
             )
-        if axial is not None and any(self.quantity(name) == "tension" for name in self.terms):
-            raise InputError(
-                "`axial` must be left out for rods with tendons: their axial pull is not modelled; "
-                f"got axial = {self.axial!r}."
-            )
         self._check_pressure()
         mesh = mesh_with_kinks(kinks, elements, degree)
         _check_positive(rigid, "stiffness", mesh.nodes)

@@ -93,8 +93,8 @@ def _write(rows, first, n, m, constraints, target, start):
 
 @njit(**INNER)
 def assemble_block(
-    stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic, turned,
-    first, z, p, dp, start, theta, scalars, velocity, ends,
+    stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
+    slope_rows, quadratic, turned, first, z, p, dp, start, theta, scalars, velocity, ends,
     force, turn, curved, edges, closure, moved, corner,
 ):  # fmt: skip
     """F, F_p·dp and F_z of a block of lanes from `start` on.
@@ -131,11 +131,11 @@ def assemble_block(
             a = _combined(sine, sine_rows, at, scalars)
             b = _combined(cosine, cosine_rows, at, scalars)
             normal, shear = a * s + b * c, a * c - b * s
-            stretch = spread(1.0) - k * normal
+            stretch = spread(1.0) - k * (normal + _combined(tension, tension_rows, at, scalars))
             soft = k * shear
             a = _combined(sine, sine_rows, at, velocity)
             b = _combined(cosine, cosine_rows, at, velocity)
-            change = a * s + b * c
+            change = a * s + b * c + _combined(tension, tension_rows, at, velocity)
             _add(force, node, stretch * shear)
             _add(curved, node, zero - normal * stretch - soft * shear)
             _add(turn, node, stretch * (a * c - b * s) - soft * change)
@@ -158,8 +158,8 @@ def assemble_block(
 
 @njit(**FLAGS)
 def linearise_lanes(
-    stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic, turned,
-    first, z, p, dp, residual, column, diagonal, border, trailing,
+    stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
+    slope_rows, quadratic, turned, first, z, p, dp, residual, column, diagonal, border, trailing,
 ):  # fmt: skip
     """F, F_p·dp and the parts of F_z of every lane.
 
@@ -175,8 +175,8 @@ def linearise_lanes(
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         assemble_block(
-            stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic,
-            turned, first, z, p, dp, start, theta, scalars, velocity, ends,
+            stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
+            slope_rows, quadratic, turned, first, z, p, dp, start, theta, scalars, velocity, ends,
             force, turn, curved, edges, closure, moved, corner,
         )  # fmt: skip
         write_lanes(curved, 0, 1, diagonal, start * nodes, nodes, nodes)
@@ -191,8 +191,8 @@ def linearise_lanes(
 
 @njit(**FLAGS)
 def second_lanes(
-    sine, cosine, softness, sine_rows, cosine_rows, turned, elements, m, first,
-    z, p, v_z, v_p, w_z, w_p, out,
+    sine, cosine, tension, softness, sine_rows, cosine_rows, tension_rows, turned, elements, m,
+    first, z, p, v_z, v_p, w_z, w_p, out,
 ):  # fmt: skip
     """D²F[v, w] of every lane."""
     order = len(softness) // elements
@@ -227,12 +227,14 @@ def second_lanes(
                 a = _combined(sine, sine_rows, at, w_scalars)
                 b = _combined(cosine, cosine_rows, at, w_scalars)
                 w_normal, w_shear = a * s + b * c, a * c - b * s
-                # second change of N and of N', then first changes of N and N'
+                # second change of N and of N', then first changes of N + T and N'
                 normal_vw = v_shear * dw + w_shear * dv - normal * dv * dw
                 shear_vw = zero - shear * dv * dw - v_normal * dw - w_normal * dv
                 shear_v, shear_w = v_shear - normal * dv, w_shear - normal * dw
-                normal_v, normal_w = v_normal + shear * dv, w_normal + shear * dw
-                stretch = spread(1.0) - k * normal
+                normal_v = v_normal + shear * dv + _combined(tension, tension_rows, at, v_scalars)
+                normal_w = w_normal + shear * dw + _combined(tension, tension_rows, at, w_scalars)
+                pull = _combined(tension, tension_rows, at, scalars)
+                stretch = spread(1.0) - k * (normal + pull)
                 mixed = normal_v * shear_w + normal_w * shear_v + shear * normal_vw
                 _add(force, node, stretch * shear_vw - k * mixed)
                 for j in range(m):

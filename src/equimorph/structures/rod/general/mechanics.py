@@ -11,6 +11,7 @@ from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.dense import solve_bordered
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Advance, Border, Direction, Symmetry
+from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.general.area import EnclosedArea
 from equimorph.structures.rod.general.fields import Fields
 from equimorph.structures.rod.general.kernels import linearise_lanes, second_lanes
@@ -24,6 +25,7 @@ Parameters = Float[np.ndarray, "lanes parameters"]
 Nodal = Float[np.ndarray, "lanes nodes"]
 Values = Float[np.ndarray, " lanes"]
 Scalars = Float[np.ndarray, "lanes scalars"]
+Points = Float[np.ndarray, "lanes points"]
 
 FORCES = 8.0
 """Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
@@ -51,7 +53,7 @@ class GeneralMechanics(Mechanics):
     def _tables(self) -> tuple[np.ndarray, ...]:
         model = self.model
         slope = np.ascontiguousarray(model.slope)
-        return model.sine, model.cosine, model.softness, slope, *model.rows
+        return model.sine, model.cosine, model.tension, model.softness, slope, *model.rows
 
     @cached_property
     def _step_data(self) -> tuple[object, ...]:
@@ -95,6 +97,15 @@ class GeneralMechanics(Mechanics):
     def _fields(self) -> Fields:
         return Fields(self.model)
 
+    @property
+    def fine_reference(self) -> Reference:
+        """Rule on whose nodes `recovered` gives fields."""
+        return self._fields.reference
+
+    def recovered(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes elements 5 fine"]:
+        """θ, κ, x, y and the moment at the nodes of a finer rule in every element."""
+        return self._fields.everywhere(theta, y)
+
     def fields(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
     ) -> Float[np.ndarray, "lanes points 4"]:
@@ -113,30 +124,30 @@ class GeneralMechanics(Mechanics):
         total = 0.5 * np.einsum("li,ij,lj->l", theta, self.layout.assembled, theta)
         total -= np.einsum("li,ji,lj->l", theta, self.model.slope, y)
         total += 0.5 * np.einsum("li,ij,lj->l", y, self.model.quadratic, y)
-        normal, _ = self._normal(theta, y)
-        total += (normal - 0.5 * self.model.softness * normal**2).sum(axis=1)
+        normal, pull, _ = self._normal(theta, y)
+        total += (normal - 0.5 * self.model.softness * (normal + pull) ** 2).sum(axis=1)
         if self._area is not None:
             total -= self._pressure(y) * self._area.value(theta)
         return np.asarray(total - (y[:, :m] * self._gradient(theta, y)[:, :m]).sum(axis=1))
 
-    def _normal(
-        self, theta: Nodal, y: Scalars
-    ) -> tuple[Float[np.ndarray, "lanes points"], Float[np.ndarray, "lanes points"]]:
-        """N at the nodes of every element, and θ there."""
+    def _normal(self, theta: Nodal, y: Scalars) -> tuple[Points, Points, Points]:
+        """N, T and θ at the nodes of every element."""
         angles = theta[:, self.mesh.element_nodes.ravel()]
         a = np.einsum("lj,ji->li", y, self.model.sine)
         b = np.einsum("lj,ji->li", y, self.model.cosine)
-        return a * np.sin(angles) + b * np.cos(angles), angles
+        pull = np.einsum("lj,ji->li", y, self.model.tension)
+        return a * np.sin(angles) + b * np.cos(angles), pull, angles
 
     def _pressure(self, y: Scalars) -> Values:
         return np.asarray(np.einsum("j,lj->l", self.model.pressure, y))
 
     def _gradient(self, theta: Nodal, y: Scalars) -> Scalars:
         """∂L/∂y at fixed θ."""
-        normal, angles = self._normal(theta, y)
-        stretch = 1.0 - self.model.softness * normal
+        normal, pull, angles = self._normal(theta, y)
+        stretch = 1.0 - self.model.softness * (normal + pull)
         out = np.einsum("li,ji->lj", stretch * np.sin(angles), self.model.sine)
         out += np.einsum("li,ji->lj", stretch * np.cos(angles), self.model.cosine)
+        out += np.einsum("li,ji->lj", stretch - 1.0, self.model.tension)
         out -= np.einsum("li,ji->lj", theta, self.model.slope)
         if self._area is not None:
             out -= self._area.value(theta)[:, None] * self.model.pressure
@@ -145,10 +156,10 @@ class GeneralMechanics(Mechanics):
     def _end_moments(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes 2"]:
         """∂L/∂θ at both ends of the rod."""
         d, model = self.mesh.degree, self.model
-        normal, angles = self._normal(theta, y)
+        normal, pull, angles = self._normal(theta, y)
         a = np.einsum("lj,ji->li", y, model.sine[:, [0, -1]])
         b = np.einsum("lj,ji->li", y, model.cosine[:, [0, -1]])
-        angles, normal = angles[:, [0, -1]], normal[:, [0, -1]]
+        angles, normal = angles[:, [0, -1]], (normal + pull)[:, [0, -1]]
         out = (1.0 - model.softness[[0, -1]] * normal) * (a * np.cos(angles) - b * np.sin(angles))
         out -= np.einsum("lj,jk->lk", y, model.slope[:, [0, -1]])
         out[:, 0] += np.einsum("li,i->l", theta[:, : d + 1], model.stiffness[0, 0])
@@ -228,10 +239,10 @@ class GeneralMechanics(Mechanics):
         """D²F[v, w]."""
         arrays = self._checked((z, p), v, w)
         out = np.empty_like(arrays[0])
-        sine, cosine, softness, _, sine_rows, cosine_rows, _ = self._tables
+        sine, cosine, tension, softness, _, *rows, _ = self._tables
         _, _, turned, first = self._step_data[-4:]
         sizes = np.int64(self.mesh.elements), np.int64(self.constraints), first
-        shared = (sine, cosine, softness, sine_rows, cosine_rows, turned, *sizes)
+        shared = (sine, cosine, tension, softness, *rows, turned, *sizes)
         over_lanes(second_lanes, shared, arrays, [out])
         if self._area is not None:
             theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]

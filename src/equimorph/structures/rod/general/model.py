@@ -37,32 +37,35 @@ class Densities:
     """Fields that a state is a combination of, at nodes of one rule in every element.
 
     Rows belong to the scalars. The force on the cross-section is (−b, −a): ``b = Σ y along``,
-    ``a = Σ y across``; the moment is ``rigidity · κ − Σ y bending``.
+    ``a = Σ y across``; the moment is ``rigidity · κ − Σ y bending``; cables pull along the axis of
+    a stretchable rod with ``Σ y tension``.
     """
 
     along: Rows
     across: Rows
     bending: Rows
+    tension: Rows
     rigidity: Float[np.ndarray, "elements order"]
     softness: Float[np.ndarray, "elements order"]
 
     def mapped(self, matrix: Float[np.ndarray, "scalars others"]) -> "Densities":
         """For other scalars that determine these as ``matrix @ others``."""
-        along, across, bending = (
-            np.einsum("jk,jei->kei", matrix, a) for a in (self.along, self.across, self.bending)
+        along, across, bending, tension = (
+            np.einsum("jk,jei->kei", matrix, a)
+            for a in (self.along, self.across, self.bending, self.tension)
         )
-        return Densities(along, across, bending, self.rigidity, self.softness)
+        return Densities(along, across, bending, tension, self.rigidity, self.softness)
 
 
 @dataclass(frozen=True, eq=False)
 class RodModel:
     """The Lagrangian of a rod in its nodal angles θ and *scalars* y = (multipliers, parameters, 1).
 
-    ``L = ½ θᵀKθ − θ·(slope y) + Σ (N − ½ γ N²) + ½ yᵀ Q y − p V`` with the sum over the nodes of
-    every element, ``N = A sin θ + B cos θ``, ``A = m · across y``, ``B = m · along y``, quadrature
-    weights m, and V as in `area.EnclosedArea`. N/m is the compressive force and γ the axial
-    compliance over m: a stretchable rod's strain is eliminated node by node. Prescribed end angles
-    are ``turned y``.
+    ``L = ½ θᵀKθ − θ·(slope y) + Σ (N − ½ γ (N + T)²) + ½ yᵀ Q y − p V`` with the sum over the nodes
+    of every element, ``N = A sin θ + B cos θ``, ``A = m · across y``, ``B = m · along y``,
+    ``T = m · tension y`` of cables, quadrature weights m, and V as in `area.EnclosedArea`. N/m is
+    the compressive force and γ the axial compliance over m: a stretchable rod's strain is
+    eliminated node by node. Prescribed end angles are ``turned y``.
 
     Parameters
     ----------
@@ -123,14 +126,21 @@ class RodModel:
         return np.ascontiguousarray(rows.reshape(self.scalars, -1))
 
     @cached_property
+    def tension(self) -> Float[np.ndarray, "scalars points"]:
+        """Coefficients of the cables' pull along the axis."""
+        rows = self.mesh.element_weights * self.nodal.tension
+        return np.ascontiguousarray(rows.reshape(self.scalars, -1))
+
+    @cached_property
     def softness(self) -> Float[np.ndarray, " points"]:
         """γ: axial compliance over the quadrature weight."""
         return np.ascontiguousarray((self.nodal.softness / self.mesh.element_weights).ravel())
 
     @cached_property
     def rows(self) -> tuple[Int[np.ndarray, " some"], ...]:
-        """Scalars with coefficients of sin θ, of cos θ and of θ that are not all zero."""
-        return tuple(np.flatnonzero(a.any(axis=1)) for a in (self.sine, self.cosine, self.slope))
+        """Scalars with coefficients of sin θ, cos θ, tension and θ that are not all zero."""
+        tables = (self.sine, self.cosine, self.tension, self.slope)
+        return tuple(np.flatnonzero(a.any(axis=1)) for a in tables)
 
     def mapped(
         self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
@@ -233,6 +243,7 @@ def _summed(terms: Sequence[Term], mesh: Mesh) -> Effects:
         natural=sum((part.natural for part in parts), zero),
         couples=tuple(couple for part in parts for couple in part.couples),
         pressure=sum(part.pressure for part in parts),
+        tension=sum((part.tension for part in parts), zero),
         force=(sum(part.force[0] for part in parts), sum(part.force[1] for part in parts)),
     )
 
@@ -242,7 +253,7 @@ def _densities(
 ) -> Densities:
     """Rows of all scalars on a mesh with the elements of the rod."""
     rigidity = at_nodes(build.stiffness, mesh) / FOUR_PI_SQUARED
-    along, across, bending = np.zeros((3, count, mesh.elements, mesh.degree + 1))
+    along, across, bending, tension = np.zeros((4, count, mesh.elements, mesh.degree + 1))
     for c, axis in enumerate(opposed):
         (along if axis == "x" else across)[c] = 1.0
     bending[-1] = rigidity * at_nodes(build.curvature, mesh)
@@ -252,10 +263,11 @@ def _densities(
         along[row] = effects.along - (effects.force[0] if build.ends[1].x == FREE else 0.0)
         across[row] = effects.across - (effects.force[1] if build.ends[1].y == FREE else 0.0)
         bending[row] = effects.bending + rigidity * effects.natural
+        tension[row] = 0.0 if build.axial is None else effects.tension
     softness = np.zeros_like(rigidity)
     if build.axial is not None:
         softness = 1.0 / at_nodes(build.axial, mesh)
-    return Densities(along, across, bending, rigidity, softness)
+    return Densities(along, across, bending, tension, rigidity, softness)
 
 
 def _add_couples(

@@ -88,7 +88,7 @@ def _forces(rod: GeneralMechanics) -> Bool[np.ndarray, " parameters"]:
     couples = model.slope.copy()
     for e, nodes in enumerate(model.mesh.element_nodes):
         couples[:, nodes] -= model.element_slope[:, e]
-    some = np.concatenate([model.sine, model.cosine, couples], axis=1)
+    some = np.concatenate([model.sine, model.cosine, model.tension, couples], axis=1)
     large = np.abs(some).max(axis=1) > 1e-12 * max(np.abs(some).max(), 1.0)
     large |= model.pressure != 0.0
     return np.asarray(large[model.multipliers : -1])

@@ -49,6 +49,7 @@ def _features(model: RodModel, *, reverse: bool, sign: float) -> Float[np.ndarra
     parts = (
         sign * model.sine[:, ::step],
         model.cosine[:, ::step],
+        model.tension[:, ::step],
         sign * model.slope[:, ::step],
         sign * model.turned.T[:, ::step],
         sign * step * model.pressure[:, None],

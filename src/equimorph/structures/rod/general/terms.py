@@ -51,7 +51,7 @@ class Effects:
 
     along, across: load cumulated from end A in x and y, `force` all of it; bending: the part of the
     moment that does not come from curvature; natural: intrinsic curvature; couples: (arclength,
-    moment); pressure: towards the left of the rod.
+    moment); pressure: towards the left of the rod; tension: of cables along the rod.
     """
 
     along: ElementNodes | float = 0.0
@@ -61,6 +61,7 @@ class Effects:
     couples: tuple[tuple[float, float], ...] = ()
     force: tuple[float, float] = (0.0, 0.0)
     pressure: float = 0.0
+    tension: ElementNodes | float = 0.0
 
 
 class Term:
@@ -252,8 +253,8 @@ class Tendon(Term):
     """Cable guided along the rod at an offset from its axis, pulled with a given tension.
 
     Between `start` and `stop` the cable at offset d(s), positive to the left of the axis, has the
-    length ``∫ (1 − dκ) ds``: tension T bends the rod as the moment T d does, and works on the
-    shortening. Friction is left out; the compression of the axis matters for extensible rods only.
+    length ``∫ (1 + ε − d θ') ds``: tension T bends the rod as the moment T d does, compresses a
+    rod with axial stiffness, and works on the shortening. Friction is left out.
 
     Parameters
     ----------
@@ -284,9 +285,10 @@ class Tendon(Term):
         return _interior([self.start, self.stop, *self._profile().kinks.tolist()])
 
     def effects(self, mesh: Mesh) -> Effects:
-        """A moment T d."""
+        """A moment T d, and a thrust T."""
         there = inside(self.start, self.stop, mesh)[:, None]
-        return Effects(bending=there * at_nodes(self._profile(), mesh))
+        along = there * np.ones(mesh.degree + 1)
+        return Effects(bending=there * at_nodes(self._profile(), mesh), tension=along)
 
 
 @dataclass(frozen=True, eq=False)

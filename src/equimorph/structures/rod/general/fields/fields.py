@@ -49,6 +49,7 @@ class Fields:
         model, fine = self.model, self.model.fine
         coarse = model.mesh.reference
         spread = legendre.legvander(2.0 * self.reference.nodes - 1.0, coarse.degree)
+        rows = (fine.across, fine.along, fine.bending, fine.tension)
         area = EnclosedArea(model.mesh)
         pressed = area.rows[:, 0] if model.pressure.any() else np.zeros((0, 0))
         return (
@@ -58,12 +59,14 @@ class Fields:
             model.nodal.softness,
             model.nodal.along,
             model.nodal.across,
+            model.nodal.tension,
             fine.along,
             fine.across,
             fine.bending,
+            fine.tension,
             1.0 / fine.rigidity,
             fine.softness,
-            *(np.flatnonzero(a.any(axis=(1, 2))) for a in (fine.across, fine.along, fine.bending)),
+            *(np.flatnonzero(a.any(axis=(1, 2))) for a in rows),
             spread @ coarse.to_legendre,
             self.reference.integral,
             model.mesh.lengths,

@@ -77,8 +77,13 @@ def _start_pressure(pressure, pressed, weights, angles, scalars, press, moments)
 
 
 @njit(**INNER)
-def _left_moment(stiffness, slope, weight, softness, along, across, rows, e, angles, scalars):
-    """Moment at the left end of an element, by its balance; rows: of across, along, slope."""
+def _left_moment(
+    stiffness, slope, weight, softness, along, across, tension, rows, e, angles, scalars
+):
+    """Moment at the left end of an element by its balance.
+
+    rows: those of across, along, slope and tension.
+    """
     order = stiffness.shape[1]
     base = e * (order - 1)
     moment = _combined(slope, rows[2], e, 0, scalars)
@@ -86,7 +91,8 @@ def _left_moment(stiffness, slope, weight, softness, along, across, rows, e, ang
         moment = moment - spread(stiffness[e, 0, i]) * load(angles, base + i)
     s, c = sincos(load(angles, base))
     a, b = _combined(across, rows[0], e, 0, scalars), _combined(along, rows[1], e, 0, scalars)
-    stretch = spread(1.0) - spread(softness[e, 0]) * (a * s + b * c)
+    normal = a * s + b * c + _combined(tension, rows[3], e, 0, scalars)
+    stretch = spread(1.0) - spread(softness[e, 0]) * normal
     return moment - spread(weight[e, 0]) * stretch * (a * c - b * s)
 
 
@@ -109,9 +115,9 @@ def _iterate(
     """One iteration; whether some lane moved.
 
     left, start, corner: angle, moment and place at the left end; press: see `_start_pressure`, or
-    empty; pull: rows of a, b and bending; give: one over rigidity; new: rate, then stretched cosine
-    and sine; out: κ and the moment. Lanes that have settled keep their θ, so that what happens to a
-    lane never depends on those beside it.
+    empty; pull: rows of a, b, bending and tension; give: one over rigidity; new: rate, then
+    stretched cosine and sine; out: κ and the moment. Lanes that have settled keep their θ, so that
+    what happens to a lane never depends on those beside it.
     """
     fine = len(integral)
     if len(press) > 0:
@@ -122,7 +128,8 @@ def _iterate(
         if len(press) > 0:
             a = a + load(press, 0) * load(out, X * fine + i)
             b = b - load(press, 0) * load(out, Y * fine + i)
-        stretch = spread(1.0) - spread(softness[e, i]) * (a * s + b * c)
+        normal = a * s + b * c + load(pull, 3 * fine + i)
+        stretch = spread(1.0) - spread(softness[e, i]) * normal
         store(new, i, stretch * (a * c - b * s))
         store(new, fine + i, stretch * c)
         store(new, 2 * fine + i, stretch * s)
@@ -146,8 +153,9 @@ def _iterate(
 
 @njit(**FLAGS)
 def fields_lanes(
-    stiffness, slope, weight, softness, along, across, fine_along, fine_across, fine_bending,
-    give, fine_softness, across_rows, along_rows, bending_rows, refine, integral, lengths,
+    stiffness, slope, weight, softness, along, across, tension, fine_along, fine_across,
+    fine_bending, fine_tension, give, fine_softness, across_rows, along_rows, bending_rows,
+    tension_rows, refine, integral, lengths,
     pressure, pressed, weights, angles, scalars, out,
 ):  # fmt: skip
     """θ, κ, x, y and M of every lane at the finer nodes: out (lanes, elements · 5 · fine).
@@ -160,10 +168,10 @@ def fields_lanes(
     nodes, count = angles.shape[1], scalars.shape[1]
     size = elements * 5 * fine
     nodal, y = work_rows(nodes), work_rows(count)
-    pull, theta, new = work_rows(3 * fine), work_rows(fine), work_rows(3 * fine)
+    pull, theta, new = work_rows(4 * fine), work_rows(fine), work_rows(3 * fine)
     local, whole = work_rows(5 * fine), work_rows(size)
     press, moments = work_rows(3 if len(pressed) > 0 else 0), work_rows(len(pressed))
-    rows = (across_rows, along_rows, bending_rows)
+    rows = (across_rows, along_rows, bending_rows, tension_rows)
     for block in range(0, angles.shape[0], LANES):
         start = min(block, angles.shape[0] - LANES)
         read_lanes(angles, start * nodes, nodes, nodes, nodal, 0, 1)
@@ -174,7 +182,7 @@ def fields_lanes(
         for e in range(elements):
             base, length = e * (order - 1), lengths[e]
             moment = _left_moment(
-                stiffness, slope, weight, softness, along, across, rows, e, nodal, y
+                stiffness, slope, weight, softness, along, across, tension, rows, e, nodal, y
             )
             if len(pressed) > 0:
                 moment = moment - load(moments, e)
@@ -182,6 +190,7 @@ def fields_lanes(
                 store(pull, i, _combined(fine_across, across_rows, e, i, y))
                 store(pull, fine + i, _combined(fine_along, along_rows, e, i, y))
                 store(pull, 2 * fine + i, _combined(fine_bending, bending_rows, e, i, y))
+                store(pull, 3 * fine + i, _combined(fine_tension, tension_rows, e, i, y))
                 angle = spread(0.0)
                 for j in range(order):
                     angle = angle + spread(refine[i, j]) * load(nodal, base + j)

@@ -86,8 +86,8 @@ def _determinant(small, m, width):
 
 @njit(**FLAGS)
 def advance_lanes(
-    ends, stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic,
-    turned, first, z, p, dp, row, corner, defect,
+    ends, stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
+    slope_rows, quadratic, turned, first, z, p, dp, row, corner, defect,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Newton step, tangent and inertia of every lane; see `structures.contract.Advance`."""
@@ -111,8 +111,8 @@ def advance_lanes(
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         assemble_block(
-            stiffness, sine, cosine, softness, slope, sine_rows, cosine_rows, slope_rows, quadratic,
-            turned, first, z, p, dp, start, theta, scalars, velocity, moving,
+            stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
+            slope_rows, quadratic, turned, first, z, p, dp, start, theta, scalars, velocity, moving,
             force, turn, curved, edges, closure, moved, own,
         )  # fmt: skip
         store(worst, 0, _largest(force, closure, first, n, m))

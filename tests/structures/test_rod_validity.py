@@ -1,0 +1,87 @@
+"""Where the planar model of a rod ends."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+
+TIP = {"P": em.PointForce(1.0)}
+
+
+def cantilever(**options):
+    return em.Rod(ends=("clamped", "free"), EI=1.0, length=1.0, **options)
+
+
+@pytest.mark.parametrize(("torsion", "lateral"), [(1e-3, 1e-3), (4e-3, 1e-3)])
+def test_a_narrow_cantilever_tips_over_at_prandtls_load(torsion, lateral):
+    """P L² = 4.0126 √(A C), to first order in A/B and C/B: the strip hardly bends before."""
+    rod = cantilever(loads=TIP)
+    critical = 4.0126 * np.sqrt(torsion * lateral)
+    margin = rod.lateral_margin(torsion, lateral)
+    path = em.lift(rod.natural_state(), {"P": 1.3 * critical}, within=[margin >= 0.0])
+    assert path.end.kind == "constraint"
+    assert path.end.state["P"] == pytest.approx(critical, rel=4e-3)
+
+
+def test_a_column_buckles_about_its_weaker_axis():
+    """P = π² A/4 for a cantilever, 4 π² A for clamped ends that stay in the plane."""
+    push = {"P": em.PointForce(1.0, (-1.0, 0.0))}
+    free = cantilever(loads=push)
+    margin = free.lateral_margin(1.0, 0.5)
+    path = em.lift(free.natural_state(), {"P": 1.3}, within=[margin >= 0.0])
+    assert path.end.state["P"] == pytest.approx(0.5 * np.pi**2 / 4, rel=1e-8)
+    clamped = em.Rod(ends=("clamped", "sliding"), loads=push, EI=1.0, length=1.0)
+    margin = clamped.lateral_margin(1.0, 0.5)
+    path = em.lift(clamped.natural_state(), {"P": 25.0}, within=[margin >= 0.0])
+    assert path.end.state["P"] == pytest.approx(0.5 * 4 * np.pi**2, rel=1e-8)
+
+
+def test_the_margin_of_the_arch_is_that_of_the_same_general_rod():
+    """Two ways to the same second variation: 1e-9."""
+    arch, general = em.Rod(), em.Rod(loads={"q": em.LineLoad()})
+    state = em.lift(arch.natural_state(Theta=0.9), {"q": 1.0}).end.state
+    other = em.lift(general.natural_state(Theta=0.9), {"q": 1.0}).end.state
+    one, two = (rod.lateral_margin(0.7, 1.0) for rod in (arch, general))
+    assert one(state) == pytest.approx(two(other), rel=1e-9)
+    assert one(state) > 0.0
+    assert arch.warnings(state, torsion=0.7, lateral=1.0) == ()
+
+
+def test_stress_free_rods_do_not_buckle_out_of_their_plane():
+    """Without forces the second variation is a sum of squares."""
+    rod = em.Rod(ends=("clamped", "free"), curvature=5.0)
+    assert rod.lateral_margin(0.1, 0.1)(rod.natural_state()) > 0.0
+
+
+def test_the_clearance_of_a_hairpin_is_the_distance_of_its_legs():
+    """Straight, half a circle of radius r, straight: 2 r between the legs. Third order: 1e-6."""
+    r, turn = 0.08, 0.08 * np.pi
+    start, stop = 0.5 - turn / 2, 0.5 + turn / 2
+    hairpin = em.Rod(ends=("clamped", "free"), actuators={"k": em.Curvature(1.0, start, stop)})
+    state = hairpin.natural_state(k=1 / r)
+    assert hairpin.clearance(0.4)(state) == pytest.approx(2 * r, rel=1e-6)
+    assert hairpin.warnings(state) == ()
+    (line,) = hairpin.warnings(state, thickness=0.17)
+    assert "touches itself" in line
+    assert hairpin.descriptor("clearance(0.4)") == hairpin.clearance(0.4)
+
+
+def test_a_loop_that_crosses_itself_has_no_clearance():
+    """More than a turn, tighter in the middle: the ends cross. Polished below 1e-9."""
+    rod = em.Rod(ends=("clamped", "free"), curvature=[[0, 5.0], [0.5, 9.0], [1, 5.0]])
+    state = rod.natural_state()
+    assert rod.clearance()(state) == pytest.approx(0.0, abs=1e-9)
+    assert len(rod.warnings(state)) == 1
+
+
+def test_the_clearance_of_a_straight_rod_is_the_least_distance_along_it():
+    rod = em.Rod(ends=("clamped", "free"))
+    assert rod.clearance(0.125)(rod.natural_state()) == pytest.approx(0.125, rel=1e-12)
+
+
+def test_wrong_input_gets_one_line():
+    rod = em.Rod()
+    with pytest.raises(em.InputError, match="`apart` must be a share of the rod's length"):
+        rod.clearance(1.5)
+    with pytest.raises(em.InputError, match="`torsion` must be positive everywhere; got -1"):
+        rod.lateral_margin(-1.0, 1.0)
