@@ -66,9 +66,11 @@ _HOMES = {
         "LimitLoadMap",
         "MapCurve",
         "Route",
+        "Tracking",
         "curvature_map",
         "limit_load_map",
         "plan",
+        "track",
     ),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -12,6 +12,7 @@ from equimorph.equilibria.critical_curves import (
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
 from equimorph.equilibria.deflation import deflated_newton
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
+from equimorph.equilibria.lifting.legs import Leg, Waypoint
 from equimorph.equilibria.limit import LimitLoad, LimitLoads, limit_load
 from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import Outcome, follow
@@ -28,6 +29,7 @@ __all__ = [
     "Event",
     "FoundStates",
     "Landing",
+    "Leg",
     "Lifts",
     "LimitLoad",
     "LimitLoads",
@@ -36,6 +38,7 @@ __all__ = [
     "ParameterLine",
     "Path",
     "TraceOptions",
+    "Waypoint",
     "branch_curve",
     "branches",
     "check_start",

@@ -12,6 +12,7 @@ from equimorph.tasks.maps import (
 )
 from equimorph.tasks.plan import plan
 from equimorph.tasks.route import Route
+from equimorph.tasks.tracking import Tracking, track
 
 __all__ = [
     "ActuatorMap",
@@ -19,9 +20,11 @@ __all__ = [
     "LimitLoadMap",
     "MapCurve",
     "Route",
+    "Tracking",
     "curvature_map",
     "limit_load_map",
     "natural_states_over",
     "plan",
+    "track",
     "unloaded_base",
 ]

@@ -82,7 +82,7 @@ def verified(
     if not (margins > 0.0).all():
         k = int(np.argmin(margins))
         return refused(f"unstable at {place(path.states[k], names)}", way_points, path)
-    schedule = _schedule(path, margins, (*(c.descriptor for c in within), *monitor))
+    schedule = scheduled(path, margins, (*(c.descriptor for c in within), *monitor))
     length = float(path.length[-1])
     return Route("arrived", "", way_points, path, float(margins.min()), length, schedule)
 
@@ -116,9 +116,10 @@ def _identity(structure: Structure) -> dict[str, Any] | None:
         return None
 
 
-def _schedule(
+def scheduled(
     path: Path, margins: Float[np.ndarray, " steps"], descriptors: Sequence[Descriptor]
 ) -> Schedule:
+    """Schedule of a path, with its margins and values of descriptors at every step."""
     structure, states = path.states.structure, path.states
     parameters = structure.parameters
     corners = np.flatnonzero(np.isclose(path.at, np.round(path.at), rtol=0, atol=1e-12))

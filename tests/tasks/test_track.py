@@ -1,0 +1,135 @@
+"""Tracking: the spring against closed forms of [Feher2025]_ section 2.3, and the arch's square.
+
+F/k = (1 − x_l/cos δ) sin δ; states are stable where x_l > cos³ δ.
+"""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.errors import InputError
+from equimorph.structures import State
+from typecheck import unchecked
+
+LOAD = (1 - 0.8 / np.cos(0.62)) * np.sin(0.62)
+SPRING = em.Spring()
+ANGLE = SPRING.descriptor("angle")
+
+
+def support(delta: float, load: float) -> float:
+    return float(np.cos(delta) * (1 - load / np.sin(delta)))
+
+
+@pytest.fixture(scope="module")
+def start() -> State:
+    return State(SPRING, np.array([0.62]), np.array([0.80, LOAD, 1.0]))
+
+
+@pytest.fixture(scope="module")
+def middle() -> State:
+    """The arch at q = 2.5 with both heights 0.15: Θ = 1.621098, Δ = 0."""
+    arch = em.Rod()
+    loaded = em.lift(arch.natural_state(Theta=1.0), {"q": 2.5}).end.state
+    heights = {arch.height(1 / 3): 0.15, arch.height(2 / 3): 0.15}
+    found = em.track(loaded, heights, actuators=["Theta", "Delta"])
+    assert found.arrived
+    return found.path.end.state
+
+
+def test_angle_is_lowered_at_fixed_load(start):
+    """δ = 0.40 at the level of C_s needs x_l = 0.89763."""
+    found = em.track(start, {ANGLE: 0.40}, actuators=["x_l"])
+    assert found.arrived
+    assert found.schedule.values[-1, 0] == pytest.approx(support(0.40, LOAD), abs=1e-11)
+    assert found.schedule.values[-1, 0] == pytest.approx(0.89763, abs=5e-6)
+    delta = found.states[ANGLE.name]
+    assert found.path.states["x_l"] == pytest.approx([support(d, LOAD) for d in delta], abs=1e-11)
+    assert found.margin > 0
+
+
+def test_angle_beyond_the_stability_boundary_is_a_snap(start):
+    """cos³ δ = x_l is met at (0.2165, 0.9316): sin³ δ = F/k."""
+    found = em.track(start, {ANGLE: -0.62}, actuators=["x_l"])
+    assert (found.status, found.failure) == ("refused", "snap-through")
+    edge = float(np.arcsin(np.cbrt(LOAD)))
+    assert ANGLE(found.path.end.state) == pytest.approx(edge, abs=1e-9)
+    assert found.path.end.state["x_l"] == pytest.approx(np.cos(edge) ** 3, abs=1e-9)
+    assert found.last_good == pytest.approx((0.62 - edge) / 1.24, abs=1e-9)
+    assert found.why.startswith("stability is lost")
+    assert found.schedule is None
+
+
+def test_load_moves_while_the_actuator_answers(start):
+    """δ is held while F falls to −0.05: x_l = cos δ (1 − F/sin δ)."""
+    found = em.track(start, {ANGLE: 0.62, "F": -0.05}, actuators=["x_l"])
+    assert found.arrived
+    assert found.states[ANGLE.name] == pytest.approx(0.62, abs=1e-11)
+    assert found.schedule.values[-1, 0] == pytest.approx(support(0.62, -0.05), abs=1e-11)
+
+
+def test_actuator_limit_is_met_where_the_closed_form_says(start):
+    found = em.track(start, {ANGLE: 0.40}, actuators={"x_l": (0.5, 0.85)})
+    assert (found.status, found.failure) == ("refused", "actuator limit")
+    end = found.path.end.state
+    assert end["x_l"] == pytest.approx(0.85, abs=1e-9)
+    assert support(ANGLE(end), LOAD) == pytest.approx(0.85, abs=1e-9)
+
+
+def test_constraint_is_told_from_a_limit(start):
+    found = em.track(start, {ANGLE: 0.40}, actuators=["x_l"], within=[ANGLE >= 0.5])
+    assert (found.failure, ANGLE(found.path.end.state)) == (
+        "constraint",
+        pytest.approx(0.5, abs=1e-9),
+    )
+
+
+def test_square_of_heights_is_closed_and_stable(middle):
+    """PHYSICS §4.6: stable all around; by symmetry Δ = 0 where both heights are the same."""
+    arch = middle.structure
+    left, right = arch.height(1 / 3), arch.height(2 / 3)
+    corners = [(0.1, 0.1), (0.2, 0.1), (0.2, 0.2), (0.1, 0.2), (0.1, 0.1)]
+    around = em.track(
+        middle, [{left: x, right: y} for x, y in corners], actuators=["Theta", "Delta"]
+    )
+    assert around.arrived
+    assert around.margin > 0
+    first, last = np.flatnonzero(np.isin(around.path.at, [1.0, 5.0]))
+    assert around.path.states.p[last] == pytest.approx(around.path.states.p[first], abs=1e-10)
+    values = around.schedule.descriptors
+    assert set(values) == {left.name, right.name}
+    assert values[left.name].max() == pytest.approx(0.2, abs=1e-9)
+
+
+def test_heights_out_of_reach_end_with_a_class_and_a_place(middle):
+    """No arch of length 1 between supports sin 1 apart can have heights of 0.3."""
+    arch = middle.structure
+    found = em.track(
+        middle,
+        {arch.height(1 / 3): 0.3, arch.height(2 / 3): 0.3},
+        actuators={"Theta": (0.2, 2.5), "Delta": (-2, 2)},
+    )
+    assert found.status == "refused"
+    assert found.failure in ("snap-through", "singular Jacobian", "actuator limit")
+    assert 0 < found.last_good < 1
+    assert "Theta = " in found.why
+
+
+@pytest.mark.parametrize(
+    ("targets", "actuators", "words"),
+    [
+        ({ANGLE: 0.4}, ["x_l", "F"], r"as many descriptors as there are actuators \(2\); got 1"),
+        ({ANGLE: 0.4, "x_l": 0.9}, ["x_l"], "leave the actuator x_l free; got 0.9"),
+        ({ANGLE: 0.4}, {"x_l": (1.0, 0.5)}, "limits in order"),
+        ({ANGLE: 0.4}, ["y"], "`y` must be a parameter"),
+        ([0.4], ["x_l"], "must be made of way-points|must give"),
+    ],
+)
+def test_bad_questions_are_refused(start, targets, actuators, words):
+    with unchecked(), pytest.raises(InputError, match=words):
+        em.track(start, targets, actuators=actuators)
+
+
+def test_an_unstable_start_is_refused():
+    unstable = State(SPRING, np.array([0.0]), np.array([0.80, 0.0, 1.0]))
+    with pytest.raises(InputError, match="must be stable; got a state of index 1"):
+        em.track(unstable, {ANGLE: 0.1}, actuators=["x_l"])
