@@ -5,7 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from equimorph.manifold.cutting import can_be_triangulated, cut, match_folds, triangulate
+from equimorph.manifold.cutting import (
+    can_be_triangulated,
+    chords_to_split,
+    cut,
+    match_folds,
+    triangulate,
+)
+
+FLAT = np.array([[0.0, 0.0], [3.0, -1.0], [6.0, 0.0], [3.0, 1.0]])
 
 
 def matched(index_or_fold):
@@ -84,47 +92,62 @@ def test_pieces_of_a_cut_keep_orientation_and_area(chords):
     assert sum(areas) == pytest.approx(area(corners), rel=1e-14)
 
 
+def triangles_of(corners, sides=None):
+    """Triangles of one piece; None if there is no way."""
+    masks = [0] * len(corners) if sides is None else sides
+    triangles, possible = triangulate(np.asarray(corners, float)[None], np.array([masks]))
+    return triangles[0].tolist() if possible[0] else None
+
+
 @given(st.lists(st.floats(0.0, 6.28), min_size=3, max_size=9, unique=True))
 def test_triangles_of_a_convex_polygon_fill_it(angles):
     """n − 2 triangles of positive orientation whose areas sum to that of the polygon."""
     corners = np.stack([np.cos(np.sort(angles)), np.sin(np.sort(angles))], axis=1)
-    count = len(corners)
-    triangles = triangulate(tuple(range(count)), [frozenset([k]) for k in range(count)], corners)
+    triangles = triangles_of(corners)
     assert triangles is not None
-    assert len(triangles) == count - 2
-    areas = [area(corners[list(triangle)]) for triangle in triangles]
+    assert len(triangles) == len(corners) - 2
+    areas = [area(corners[triangle]) for triangle in triangles]
     assert min(areas) >= -1e-15
     assert sum(areas) == pytest.approx(area(corners), rel=1e-12, abs=1e-15)
 
 
+@given(st.integers(4, 8), st.integers(0, 99))
+def test_pieces_are_triangulated_together_as_alone(count, seed):
+    generator = np.random.default_rng(seed)
+    places, sides = generator.normal(size=(5, count, 3)), generator.integers(0, 4, (5, count))
+    triangles, possible = triangulate(places, sides)
+    for place, side, own, good in zip(places, sides, triangles, possible, strict=True):
+        assert triangles_of(place, side) == (own.tolist() if good else None)
+
+
 def test_triangulation_takes_the_shorter_diagonal():
-    place = np.array([[0.0, 0.0], [3.0, -1.0], [6.0, 0.0], [3.0, 1.0]])
-    triangles = triangulate((5, 6, 7, 8), [frozenset([k]) for k in range(4)], place)
+    triangles = triangles_of(FLAT)
     assert triangles is not None
-    assert all({6, 8} <= set(triangle) for triangle in triangles)
+    assert all({1, 3} <= set(triangle) for triangle in triangles)
 
 
 def test_triangulation_avoids_diagonals_along_a_side_of_the_grid_triangle():
-    """Corners 6 and 8 lie on one side: the longer diagonal is taken."""
-    place = np.array([[0.0, 0.0], [3.0, -1.0], [6.0, 0.0], [3.0, 1.0]])
-    sides = [frozenset([0]), frozenset([1]), frozenset([2]), frozenset([1])]
-    triangles = triangulate((5, 6, 7, 8), sides, place)
+    """Corners 1 and 3 lie on one side: the longer diagonal is taken."""
+    triangles = triangles_of(FLAT, [0b001, 0b010, 0b100, 0b010])
     assert triangles is not None
-    assert all({5, 7} <= set(triangle) for triangle in triangles)
+    assert all({0, 2} <= set(triangle) for triangle in triangles)
 
 
 def test_triangulation_reports_that_all_diagonals_are_forbidden():
-    place = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    assert triangulate((0, 1, 2, 3), [frozenset([0])] * 4, place) is None
+    assert triangles_of(FLAT, [1, 1, 1, 1]) is None
 
 
 def test_triangle_needs_no_diagonal():
-    assert triangulate((3, 1, 2), [frozenset([0])] * 3, np.zeros((3, 2))) == [(3, 1, 2)]
+    assert triangles_of(np.zeros((3, 2)), [1, 1, 1]) == [[0, 1, 2]]
 
 
 def test_band_over_one_corner_needs_a_point_on_its_fold():
     """Both fold curves cross the sides 1 and 2 of one corner: all short diagonals lie on a side."""
-    corner, one, two = frozenset([1, 2]), frozenset([1]), frozenset([2])
-    band = [corner, one, two, corner, one, two]
+    band = (0b11, 0b01, 0b10, 0b11, 0b01, 0b10)
     assert not can_be_triangulated(band)
-    assert can_be_triangulated([*band[:2], frozenset(), *band[2:]])
+    assert can_be_triangulated((*band[:2], 0, *band[2:]))
+
+
+def test_chord_along_a_side_of_the_grid_triangle_is_split():
+    assert chords_to_split((0b101, 0b001, 0b011, 0b010, 0b110), ((1, 3),)) == ()
+    assert chords_to_split((0b101, 0b001, 0b000, 0b001, 0b011, 0b110), ((1, 3),)) == ((1, 3),)

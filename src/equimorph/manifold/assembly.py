@@ -1,5 +1,6 @@
 """Sheet lifting, part four: polygons become triangulated discs that fit together."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,7 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.manifold.cutting import (
     Chord,
     Piece,
-    can_be_triangulated,
+    chords_to_split,
     cut,
     match_folds,
     triangulate,
@@ -18,7 +19,7 @@ from equimorph.manifold.normals import existence_normals
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.pins import pin
 from equimorph.manifold.points import CAP, CORNER, FOLD
-from equimorph.manifold.polygons import Loops, Polygon, edges_at
+from equimorph.manifold.polygons import Loops, Polygon
 from equimorph.manifold.simplices import plane_bases
 
 SAME_SIDE = 0.3
@@ -60,8 +61,9 @@ class _Plan:
 
     polygon: Polygon
     points: list[int]
-    sides: dict[int, frozenset[int]]
-    """Sides of the grid triangle on which each point lies; extra points inside it lie on none."""
+    sides: dict[int, int]
+    """Sides of the grid triangle on which each point lies, one bit each; extra points inside it lie
+    on none."""
     chords: list[Chord] = field(default_factory=list)
     middle: dict[Chord, int] = field(default_factory=dict)
 
@@ -74,8 +76,7 @@ def assemble(pairing: Pairing, loops: Loops) -> Discs:
     _close(pairing, plans, found)
     plans = _join_folds(pairing, plans, found)
     _split_chords(pairing, plans, found)
-    for plan in plans:
-        _fill(pairing, plan, found)
+    _fill(pairing, plans, found)
     return Discs(
         np.concatenate([loops.plain, np.array(found.corners, int).reshape(-1, 3)]),
         np.concatenate([pairing.points.index[loops.plain[:, 0]], np.array(found.index, int)]),
@@ -87,13 +88,16 @@ def assemble(pairing: Pairing, loops: Loops) -> Discs:
 
 
 def _plan(pairing: Pairing, polygon: Polygon) -> _Plan:
+    mesh, store = pairing.mesh, pairing.points
+    at_edge = {edge: 1 << k for k, edge in enumerate(mesh.sides[polygon.triangle].tolist())}
     at_corner = {
-        vertex: frozenset(pair) for vertex, pair in edges_at(pairing, polygon.triangle).items()
+        vertex: (1 << k) | (1 << (k + 2) % 3)
+        for k, vertex in enumerate(mesh.triangles[polygon.triangle].tolist())
     }
     points = np.array(polygon.points)
-    vertices, edges = pairing.points.vertex[points].tolist(), pairing.points.edge[points].tolist()
+    vertices, edges = store.vertex[points].tolist(), store.edge[points].tolist()
     sides = {
-        point: at_corner[vertex] if vertex >= 0 else frozenset([edge])
+        point: at_corner[vertex] if vertex >= 0 else at_edge[edge]
         for point, vertex, edge in zip(polygon.points, vertices, edges, strict=True)
     }
     return _Plan(polygon, list(polygon.points), sides)
@@ -204,24 +208,15 @@ def _split_chords(pairing: Pairing, plans: list[_Plan], found: _Found) -> None:
 
 
 def _chords_to_split(plan: _Plan) -> list[Chord]:
-    """Chords between ends on one grid edge, and as many others as free all pieces for triangles.
-
-    Where a corner of the grid triangle sees two fold curves cross both its sides, one of them with
-    a cusp, the sheet between them lies over the corner twice, and has no allowed diagonal.
-    """
-    chosen = [chord for chord in plan.chords if _same_side(plan, chord)]
-    for chord in plan.chords:
-        stand_in = {split: -1 - number for number, split in enumerate(chosen)}
-        pieces = cut(plan.points, plan.chords, stand_in)
-        if all(can_be_triangulated(_sides_of(plan, piece)) for piece in pieces):
-            break
-        if chord not in chosen:
-            chosen.append(chord)
-    return chosen
+    """Chords that need a point of their own; see `chords_to_split`."""
+    place = {point: at for at, point in enumerate(plan.points)}
+    chords = {(place[a], place[b]): (a, b) for a, b in plan.chords}
+    chosen = chords_to_split(tuple(_sides_of(plan, plan.points)), tuple(chords))
+    return [chords[chord] for chord in chosen]
 
 
-def _sides_of(plan: _Plan, piece: Piece) -> list[frozenset[int]]:
-    return [plan.sides.get(point, frozenset()) for point in piece]
+def _sides_of(plan: _Plan, piece: Sequence[int]) -> list[int]:
+    return [plan.sides.get(point, 0) for point in piece]
 
 
 def _pinned(pairing: Pairing, wanted: list[tuple[_Plan, Chord, int]]) -> list[int | None]:
@@ -241,32 +236,48 @@ def _pinned(pairing: Pairing, wanted: list[tuple[_Plan, Chord, int]]) -> list[in
     return out
 
 
-def _fill(pairing: Pairing, plan: _Plan, found: _Found) -> None:
-    """Cut a polygon and triangulate its pieces."""
-    for chord in plan.chords:
-        if chord in plan.middle:
-            found.folds.update(_chord(end, plan.middle[chord]) for end in chord)
-        else:
-            found.folds.add(chord)
-    for piece in cut(plan.points, plan.chords, plan.middle):
-        index = {
-            int(pairing.points.index[point]) for point in piece if not _is_fold(pairing, point)
-        }
-        triangles = _triangles(pairing, plan, piece)
-        if len(index) != 1 or triangles is None:
+def _fill(pairing: Pairing, plans: list[_Plan], found: _Found) -> None:
+    """Cut polygons and triangulate their pieces, all pieces with equally many corners together."""
+    by_size: dict[int, list[tuple[_Plan, Piece, int]]] = {}
+    for plan in plans:
+        for chord in plan.chords:
+            if chord in plan.middle:
+                found.folds.update(_chord(end, plan.middle[chord]) for end in chord)
+            else:
+                found.folds.add(chord)
+        for piece in cut(plan.points, plan.chords, plan.middle):
+            index = _index(pairing, piece)
+            if index is None or len(piece) < 3:
+                found.undecided.add(plan.polygon.triangle)
+            else:
+                by_size.setdefault(len(piece), []).append((plan, piece, index))
+    for pieces in by_size.values():
+        _triangulate(pairing, pieces, found)
+
+
+def _index(pairing: Pairing, piece: Piece) -> int | None:
+    """Index of the points of a piece that are not on folds; None if they differ."""
+    index = {int(pairing.points.index[point]) for point in piece if not _is_fold(pairing, point)}
+    return index.pop() if len(index) == 1 else None
+
+
+def _triangulate(pairing: Pairing, pieces: list[tuple[_Plan, Piece, int]], found: _Found) -> None:
+    """Enter the triangles of pieces with equally many corners."""
+    store = pairing.points
+    corners = np.array([piece for _, piece, _ in pieces])
+    places = embed(pairing.setting, store.z[corners.ravel()], store.p[corners.ravel()])
+    sides = np.array([_sides_of(plan, piece) for plan, piece, _ in pieces])
+    triangles, possible = triangulate(places.reshape(*corners.shape, -1), sides)
+    rows = np.arange(len(corners))[:, None, None]
+    for (plan, _, index), own, good in zip(
+        pieces, corners[rows, triangles].tolist(), possible.tolist(), strict=True
+    ):
+        if not good:
             found.undecided.add(plan.polygon.triangle)
             continue
-        found.corners.extend(triangles)
-        found.index.extend([index.pop()] * len(triangles))
-        found.owner.extend([plan.polygon.triangle] * len(triangles))
-
-
-def _triangles(pairing: Pairing, plan: _Plan, piece: Piece) -> list[tuple[int, int, int]] | None:
-    if len(piece) <= 3:
-        return [(piece[0], piece[1], piece[2])] if len(piece) == 3 else None
-    own = np.array(piece)
-    place = embed(pairing.setting, pairing.points.z[own], pairing.points.p[own])
-    return triangulate(piece, _sides_of(plan, piece), place)
+        found.corners.extend(own)
+        found.index.extend([index] * len(own))
+        found.owner.extend([plan.polygon.triangle] * len(own))
 
 
 def _chord(a: int, b: int) -> Chord:

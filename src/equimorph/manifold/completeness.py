@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.equilibria import find_equilibria
+from equimorph.equilibria import search_points
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.over import lift_to
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.seeds import Seeds, polished
-from equimorph.model import Progress, names_of
+from equimorph.model import Progress
 from equimorph.structures import States
 
 APART = 1e-5
@@ -36,25 +36,25 @@ def check(
     eset: EquilibriumSet, generator: np.random.Generator, points: int, progress: Progress
 ) -> Check:
     """Search at random points, half of them anywhere in the box, half below the set."""
-    found, missing = 0, []
-    for number in range(points):
-        progress.report("independent checks", number, points)
-        anywhere = number % 2 == 1 or len(eset.cells) == 0
-        point = _in_the_box(eset, generator) if anywhere else _below(eset, generator)
-        at = dict(zip(eset.names, point.tolist(), strict=True))
-        names = names_of(eset.structure.parameters)
-        states = find_equilibria(
-            eset.structure,
-            dict(zip(names, eset.parameters_at(at).tolist(), strict=True)),
-            within=eset.constraints,
-            starts=STARTS,
-            seed=int(generator.integers(2**31)),
-        )
-        found += len(states)
-        lacking = _lacking(states, eset.at(**at))
-        if len(lacking):
-            missing.append(lacking)
-    return Check(found, tuple(missing))
+    progress.report("independent checks", 0, points)
+    chosen = [
+        _in_the_box(eset, generator)
+        if number % 2 == 1 or len(eset.cells) == 0
+        else _below(eset, generator)
+        for number in range(points)
+    ]
+    places = [dict(zip(eset.names, point.tolist(), strict=True)) for point in chosen]
+    if not places:
+        return Check(0, ())
+    found = search_points(
+        eset.structure,
+        np.stack([eset.parameters_at(at) for at in places]),
+        within=eset.constraints,
+        starts=STARTS,
+        seed=int(generator.integers(2**31)),
+    )
+    lacking = [_lacking(states, eset.at(**at)) for states, at in zip(found, places, strict=True)]
+    return Check(sum(map(len, found)), tuple(states for states in lacking if len(states)))
 
 
 def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:

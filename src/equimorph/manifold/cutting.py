@@ -1,6 +1,7 @@
 """Cut polygons along folds into pieces of one index, and pieces into triangles."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -78,71 +79,99 @@ def cut(polygon: Sequence[int], chords: Sequence[Chord], middle: dict[Chord, int
 
 
 def triangulate(
-    corners: Piece,
-    sides: Sequence[frozenset[int]],
-    place: Float[np.ndarray, "corners dims"],
-) -> list[tuple[int, int, int]] | None:
-    """Triangles of a piece, with the least sum of squared diagonals; None if there is no way.
+    places: Float[np.ndarray, "pieces corners dims"], sides: Int[np.ndarray, "pieces corners"]
+) -> tuple[Int[np.ndarray, "pieces triangles 3"], Bool[np.ndarray, " pieces"]]:
+    """Triangles of pieces with equally many corners, with the least sum of squared diagonals.
 
-    `sides` tells on which sides of the grid triangle each corner lies: a diagonal between corners
-    on one side could coincide with one of the neighbour's.
+    Returned are the places of the triangles' corners in their piece, and which pieces can be
+    triangulated. `sides` tells, one bit each, on which sides of the grid triangle a corner lies: a
+    diagonal between corners on one side could coincide with one of the neighbour's.
     """
-    count = len(corners)
-    if count == 3:
-        return [(corners[0], corners[1], corners[2])]
-    gap = ((place[:, None] - place[None]) ** 2).sum(axis=2)
-    diagonal = np.where(_allowed(sides), gap, np.inf)
+    count = places.shape[1]
+    gap = ((places[:, :, None] - places[:, None]) ** 2).sum(axis=3)
+    diagonal = np.where((sides[:, :, None] & sides[:, None]) == 0, gap, np.inf)
     around = np.arange(count)
     # the polygon's own sides cost nothing
-    diagonal[around, around - 1] = diagonal[around - 1, around] = 0.0
-    apex = _cheapest_apexes(diagonal)
-    return None if apex is None else [_named(corners, triple) for triple in _fan_out(apex)]
+    diagonal[:, around, around - 1] = diagonal[:, around - 1, around] = 0.0
+    apex, cost = _cheapest_apexes(diagonal)
+    return _fan_out(apex), np.isfinite(cost)
 
 
-def can_be_triangulated(sides: Sequence[frozenset[int]]) -> bool:
+@lru_cache(maxsize=4096)
+def chords_to_split(sides: tuple[int, ...], chords: tuple[Chord, ...]) -> tuple[Chord, ...]:
+    """Chords between ends on one grid edge, and as many others as free all pieces for triangles.
+
+    Where a corner of the grid triangle sees two fold curves cross both its sides, one of them with
+    a cusp, the sheet between them lies over the corner twice, and has no allowed diagonal.
+
+    Parameters
+    ----------
+    sides
+        Of the grid triangle, on which each corner of the polygon lies, one bit each.
+    chords
+        Pairs of places in the polygon.
+    """
+    chosen = [chord for chord in chords if sides[chord[0]] & sides[chord[1]]]
+    for chord in chords:
+        stand_in = {split: -1 - number for number, split in enumerate(chosen)}
+        pieces = cut(range(len(sides)), chords, stand_in)
+        if all(
+            can_be_triangulated(tuple(sides[at] if at >= 0 else 0 for at in piece))
+            for piece in pieces
+        ):
+            break
+        if chord not in chosen:
+            chosen.append(chord)
+    return tuple(chosen)
+
+
+@lru_cache(maxsize=4096)
+def can_be_triangulated(sides: tuple[int, ...]) -> bool:
     """Whether corners that lie on these sides of the grid triangle have enough diagonals."""
     if len(sides) <= 3:
         return len(sides) == 3
-    places = np.zeros((len(sides), 1))
-    return triangulate(tuple(range(len(sides))), sides, places) is not None
-
-
-def _allowed(sides: Sequence[frozenset[int]]) -> Bool[np.ndarray, "corners corners"]:
-    return np.array([[not (a & b) for b in sides] for a in sides])
+    return bool(triangulate(np.zeros((1, len(sides), 1)), np.array([sides]))[1][0])
 
 
 def _cheapest_apexes(
-    diagonal: Float[np.ndarray, "corners corners"],
-) -> Int[np.ndarray, "corners corners"] | None:
+    diagonal: Float[np.ndarray, "pieces corners corners"],
+) -> tuple[Int[np.ndarray, "pieces corners corners"], Float[np.ndarray, " pieces"]]:
     """Corner k that completes the triangle on each chord (i, j), by dynamic programming.
 
     ``cost(i, j) = diagonal(i, j) + min_k (cost(i, k) + cost(k, j))``, i < k < j.
     """
-    count = len(diagonal)
-    cost = np.full((count, count), np.inf)
-    apex = np.full((count, count), -1)
-    cost[np.arange(count - 1), np.arange(1, count)] = 0.0
+    pieces, count, _ = diagonal.shape
+    cost, apex = np.full(diagonal.shape, np.inf), np.full(diagonal.shape, -1)
+    cost[:, np.arange(count - 1), np.arange(1, count)] = 0.0
+    own = np.arange(pieces)
     for width in range(2, count):
         for i in range(count - width):
             j = i + width
-            ways = cost[i, i + 1 : j] + cost[i + 1 : j, j]
-            best = int(ways.argmin())
-            cost[i, j], apex[i, j] = ways[best] + diagonal[i, j], i + 1 + best
-    return apex if np.isfinite(cost[0, count - 1]) else None
+            ways = cost[:, i, i + 1 : j] + cost[:, i + 1 : j, j]
+            best = ways.argmin(axis=1)
+            cost[:, i, j] = ways[own, best] + diagonal[:, i, j]
+            apex[:, i, j] = i + 1 + best
+    return apex, cost[:, 0, count - 1]
 
 
-def _fan_out(apex: Int[np.ndarray, "corners corners"]) -> list[tuple[int, int, int]]:
+def _fan_out(
+    apex: Int[np.ndarray, "pieces corners corners"],
+) -> Int[np.ndarray, "pieces triangles 3"]:
     """Places of the triangles' corners, from the triangle on the last side inwards."""
-    triangles, todo = [], [(0, len(apex) - 1)]
-    while todo:
-        i, j = todo.pop()
-        if j - i >= 2:
-            k = int(apex[i, j])
-            triangles.append((i, k, j))
-            todo += [(i, k), (k, j)]
+    pieces, count, _ = apex.shape
+    own = np.arange(pieces)
+    triangles = np.empty((pieces, count - 2, 3), int)
+    # chords that wait for their triangle: never more than there are triangles
+    waiting = np.zeros((pieces, count, 2), int)
+    waiting[:, 0, 1] = count - 1
+    waiting_for = np.ones(pieces, int)
+    for number in range(count - 2):
+        waiting_for -= 1
+        i, j = waiting[own, waiting_for].T
+        k = apex[own, i, j]
+        triangles[:, number] = np.stack([i, k, j], axis=1)
+        for first, last in ((i, k), (k, j)):
+            wide = last - first >= 2
+            waiting[own[wide], waiting_for[wide]] = np.stack([first, last], axis=1)[wide]
+            waiting_for += wide
     return triangles
-
-
-def _named(corners: Piece, places: tuple[int, int, int]) -> tuple[int, int, int]:
-    i, k, j = places
-    return corners[i], corners[k], corners[j]

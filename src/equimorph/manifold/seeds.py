@@ -3,19 +3,21 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria import ParameterLine, TraceOptions, find_equilibria
+from equimorph.equilibria import ParameterLine, TraceOptions, search_points
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.manifold.directly import lift_directly
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.pairing import Setting
-from equimorph.model import names_of, position
+from equimorph.model import position
 
 COARSE = 5
 """Natural states are lifted at about so many vertices along each parameter."""
 SEARCHED = 3
 """Vertices, beside the middle one, at which a random search looks for equilibria that no natural
 path reaches."""
+STARTS = 100
+"""Random guesses over each of them."""
 
 Seeds = tuple[
     Int[np.ndarray, " n"],
@@ -94,19 +96,15 @@ def _from_search(
     setting: Setting, mesh: BaseMesh, searchable: Int[np.ndarray, " some"], seed: int
 ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
     generator = np.random.default_rng(seed)
-    names = names_of(setting.structure.parameters)
-    vertices, z = [np.zeros(0, int)], [np.zeros((0, setting.structure.size))]
     away = (mesh.vertices[searchable] - mesh.vertices[searchable].mean(axis=0)) / setting.scales
     middle = searchable[(away**2).sum(axis=1).argmin()]
-    for vertex in (middle, *generator.choice(searchable, SEARCHED)):
-        p = setting.parameters(mesh.vertices[[vertex]])[0]
-        found = find_equilibria(
-            setting.structure,
-            dict(zip(names, p.tolist(), strict=True)),
-            within=setting.constraints,
-            starts=100,
-            seed=seed,
-        )
-        vertices.append(np.full(len(found), vertex))
-        z.append(found.z)
-    return np.concatenate(vertices), np.concatenate(z)
+    chosen = np.unique([middle, *generator.choice(searchable, SEARCHED)])
+    found = search_points(
+        setting.structure,
+        setting.parameters(mesh.vertices[chosen]),
+        within=setting.constraints,
+        starts=STARTS,
+        seed=seed,
+    )
+    vertices = np.repeat(chosen, [len(states) for states in found])
+    return vertices, np.concatenate([states.z for states in found])
