@@ -9,6 +9,7 @@ from equimorph.manifold.equilibrium_set import (
     Stratum,
 )
 from equimorph.manifold.over import StatesOver, lift_to
+from equimorph.manifold.refinement import refine
 
 __all__ = [
     "INTERVALS",
@@ -20,4 +21,5 @@ __all__ = [
     "Stratum",
     "equilibrium_set",
     "lift_to",
+    "refine",
 ]

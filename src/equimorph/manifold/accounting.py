@@ -1,6 +1,7 @@
 """From numbered cells to an equilibrium set: pieces, folds, boundaries and the audit."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -13,7 +14,9 @@ from equimorph.manifold.equilibrium_set import (
     EquilibriumSet,
     Stratum,
 )
-from equimorph.manifold.pairing import Pairing, abandoned
+from equimorph.manifold.hard import EFFORTS
+from equimorph.manifold.mesh import BaseMesh
+from equimorph.manifold.pairing import Pairing, Setting, abandoned
 from equimorph.manifold.topology import (
     Adjacency,
     adjacency,
@@ -29,6 +32,47 @@ from equimorph.model import Box
 from equimorph.structures import States
 
 
+@dataclass(frozen=True)
+class Complex:
+    """Vertices, cells and marked facets, from which everything else about a set follows.
+
+    index: negative eigenvalues at the vertices, kinds and grid_vertex as in `EquilibriumSet`;
+    folds, caps (n, d): facets on folds and on constraints.
+    """
+
+    points: States
+    kinds: Int[np.ndarray, " V"]
+    index: Int[np.ndarray, " V"]
+    grid_vertex: Int[np.ndarray, " V"]
+    cells: Int[np.ndarray, "C corners"]
+    cell_index: Int[np.ndarray, " C"]
+    folds: Int[np.ndarray, "f d"]
+    caps: Int[np.ndarray, "c d"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a set is about: the problem and the grid."""
+
+    setting: Setting
+    mesh: BaseMesh
+    box: Box
+    fixed: Mapping[str, float]
+    intervals: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Lifting:
+    """The part of the audit that tells how the lifting of the grid went; see `Audit`."""
+
+    unpaired: int
+    conflicts: int
+    retraced: int
+    parity_violations: int
+    undecided: int
+    bisected: int
+
+
 def account(
     pairing: Pairing,
     cells: Cells,
@@ -36,46 +80,66 @@ def account(
     bisected: int,
 ) -> EquilibriumSet:
     """Number the used points, find pieces, folds and boundaries, and write the audit."""
-    box, fixed, intervals = given
-    used = np.unique(cells.corners)
+    used = np.flatnonzero(np.bincount(cells.corners.ravel(), minlength=pairing.points.count))
     number = np.full(pairing.points.count, -1)
     number[used] = np.arange(len(used))
-    corners, store = number[cells.corners], pairing.points
-    points = States(pairing.setting.structure, store.z[used].copy(), store.p[used].copy())
+    store = pairing.points
+    whole = Complex(
+        States(pairing.setting.structure, store.z[used].copy(), store.p[used].copy()),
+        store.kind[used].copy(),
+        store.index[used].copy(),
+        store.vertex[used].copy(),
+        number[cells.corners],
+        cells.index,
+        _kept(number[cells.folds]),
+        _kept(number[cells.caps]),
+    )
+    lost = abandoned(pairing)
+    lifting = Lifting(
+        len(lost),
+        sum(int(pairing.effort[edge]) >= EFFORTS for _, edge in lost),
+        pairing.conflicts,
+        _parity_violations(pairing),
+        cells.doubtful,
+        bisected,
+    )
+    return described(Frame(pairing.setting, pairing.mesh, *given), whole, lifting)
+
+
+def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
+    """Pieces, folds, boundaries and audit of a complex."""
+    corners, points = given.cells, given.points
     whole = adjacency(corners)
-    folds = flags_of(whole.facets, _kept(number[cells.folds]))
-    caps = flags_of(whole.facets, _kept(number[cells.caps]))
+    folds, caps = (flags_of(whole.facets, each) for each in (given.folds, given.caps))
     component = labels(len(corners), whole.links)
     stratum = labels(len(corners), whole.links[whole.manifold & ~folds[whole.across]])
     boundaries = _boundaries(whole, caps)
     strata = tuple(
-        Stratum(int(cells.index[own[0]]), len(own), int(component[own[0]]))
+        Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
-    coordinates = points.p[:, pairing.setting.free]
-    audit = _audit(
-        pairing, cells, bisected, (corners, cells.index, component, whole, coordinates), boundaries
-    )
+    coordinates = points.p[:, frame.setting.free]
+    parts = (corners, given.cell_index, component, whole, coordinates)
     return EquilibriumSet(
-        structure=pairing.setting.structure,
-        box=box,
-        fixed=fixed,
-        constraints=pairing.setting.constraints,
-        intervals=intervals,
+        structure=frame.setting.structure,
+        box=frame.box,
+        fixed=frame.fixed,
+        constraints=frame.setting.constraints,
+        intervals=frame.intervals,
         points=points,
-        kinds=store.kind[used].copy(),
-        index=store.index[used].copy(),
+        kinds=given.kinds,
+        index=given.index,
         cells=corners,
-        cell_index=cells.index,
+        cell_index=given.cell_index,
         component=component,
         stratum=stratum,
         folds=tuple(pieces(whole.facets[folds])),
         boundaries=boundaries,
-        components=_components(corners, cells.index, component, boundaries),
+        components=_components(corners, given.cell_index, component, boundaries),
         strata=strata,
-        audit=audit,
-        mesh=pairing.mesh,
-        grid_vertex=store.vertex[used].copy(),
+        audit=_audit(points, lifting, parts, boundaries),
+        mesh=frame.mesh,
+        grid_vertex=given.grid_vertex,
     )
 
 
@@ -124,9 +188,8 @@ def _components(
 
 
 def _audit(
-    pairing: Pairing,
-    cells: Cells,
-    bisected: int,
+    points: States,
+    lifting: Lifting,
     parts: tuple[
         Int[np.ndarray, "C corners"],
         Int[np.ndarray, " C"],
@@ -143,27 +206,17 @@ def _audit(
     total = np.bincount(component, weights=volume) if len(volume) else np.zeros(0)
     overturned = int((volume * np.sign(total)[component] < 0).sum()) if len(volume) else 0
     kinds = [boundary.kind for boundary in boundaries]
-    points = np.unique(corners)
-    store = pairing.points
-    live = store.vertex[: store.count] >= 0
-    residual = pairing.setting.structure.residual(store.z[: store.count], store.p[: store.count])
-    lost = abandoned(pairing)
     return Audit(
         vertices=len(points),
         cells=len(corners),
-        unpaired=len(lost),
-        conflicts=sum(int(pairing.effort[edge]) >= 4 for _, edge in lost),
-        retraced=pairing.conflicts,
-        parity_violations=_parity_violations(pairing),
-        undecided=cells.doubtful,
-        bisected=bisected,
+        **vars(lifting),
         non_manifold=int((whole.counts > 2).sum()),
         contradictions=contradictions,
         overturned=overturned,
         euler_characteristic=euler_characteristic(corners),
         components=int(component.max(initial=-1)) + 1,
         loops=tuple((kind, kinds.count(kind)) for kind in sorted(set(kinds))),
-        largest_residual=float(np.abs(residual[live]).max(initial=0.0)),
+        largest_residual=float(points.residual.max(initial=0.0)),
         checked=0,
         missing=0,
         recovered=0,

@@ -13,6 +13,10 @@ class Audit:
     `overturned` cells project against the orientation that their index demands: slivers at folds.
     Of the equilibria found by random search at random points, `recovered` were missing and have
     been added; in the last round, `missing` of `checked` were, which must be zero too.
+
+    Of refined sets: the `accuracy` that was asked for, the largest `deviation` of straight cells
+    from the set as their edges show it, how many edges are `unrefined` (they could not be
+    bisected), and the `smallest_angle` of the triangles in degrees. All are zero otherwise.
     """
 
     vertices: int
@@ -33,6 +37,10 @@ class Audit:
     checked: int
     missing: int
     recovered: int
+    accuracy: float = 0.0
+    deviation: float = 0.0
+    unrefined: int = 0
+    smallest_angle: float = 0.0
 
     @property
     def clean(self) -> bool:
@@ -45,12 +53,18 @@ class Audit:
             self.non_manifold,
             self.contradictions,
             self.missing,
+            self.unrefined,
         )
         return not any(faults) and self.largest_residual < 1e-9
 
     def rows(self) -> list[tuple[str, str]]:
         """Lines to print: what, and how many."""
         loops = ", ".join(f"{count} {kind}" for kind, count in self.loops) or "none"
+        refined = [
+            ("deviation of cells", f"{self.deviation:.1e} (asked for: {self.accuracy:.1e})"),
+            ("edges too long", str(self.unrefined)),
+            ("smallest angle", f"{self.smallest_angle:.1f}°"),
+        ]
         return [
             ("equilibria (vertices)", str(self.vertices)),
             ("cells", str(self.cells)),
@@ -72,4 +86,5 @@ class Audit:
                 if self.checked
                 else "not made",
             ),
+            *(refined if self.accuracy else []),
         ]

@@ -15,6 +15,7 @@ from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.flooding import flood
 from equimorph.manifold.mesh import Lines, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.pairing import Pairing, Setting, start_pairing
+from equimorph.manifold.refinement import check_accuracy, refine
 from equimorph.manifold.seeds import Seeds, seeds
 from equimorph.model import (
     Box,
@@ -47,6 +48,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     intervals: tuple[int, ...] | None = None,
     seed: int = 0,
     checks: int = 2,
+    accuracy: float | None = None,
     progress: Progress | None = None,
 ) -> EquilibriumSet:
     """All equilibria over a box in one to three parameters that are connected to the seeds.
@@ -72,6 +74,9 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
         Random points, half of them below the set, half anywhere in the box, at which an independent
         search looks for equilibria that the set lacks. They are added and lifted like seeds, and
         other points are checked, until nothing is missing or four rounds are over.
+    accuracy
+        Largest distance of the straight cells from the set, in the metric, to which the set is
+        refined (see `refine`); it is left as it was lifted if not given.
     progress
         Sink for progress reports.
 
@@ -82,10 +87,12 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     Raises
     ------
     InputError
-        For a box in more than three parameters, unknown names, parameters both free and fixed, or
-        values without meaning.
+        For a box in more than three parameters, unknown names, parameters both free and fixed,
+        values without meaning, or an accuracy that is not positive.
     """
     progress = progress or Silent()
+    if accuracy is not None:
+        check_accuracy(accuracy)
     intervals = _intervals(box, intervals)
     setting = _setting(structure, box, fixed or {}, tuple(within))
     lines = grid_lines(box, intervals, _mirrored(setting))
@@ -104,7 +111,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
         recovered += found.lacking
         pairing.points.over_vertices(*seeds_from(setting, pairing.mesh, found.missing))
     audit = replace(eset.audit, checked=found.found, missing=found.lacking, recovered=recovered)
-    return replace(eset, audit=audit)
+    eset = replace(eset, audit=audit)
+    return eset if accuracy is None else refine(eset, accuracy, progress)
 
 
 def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:

@@ -59,7 +59,7 @@ class EquilibriumSet:
         States of the vertices.
     kinds
         0 over the grid, 1 on a fold, 2 on a constraint, 3 between folds of one grid edge, 4 where a
-        fold meets a constraint, 5 amid others over a grid tetrahedron.
+        fold meets a constraint, 5 amid others over a grid tetrahedron, 6 added by refinement.
     index
         Negative eigenvalues at the vertices; on folds that of the lower side.
     cells, cell_index, component, stratum

@@ -41,7 +41,7 @@ class _Condition:
 
 
 @dataclass(frozen=True)
-class _Aim:
+class Aim:
     """What is solved for: conditions, and the normal space through the middle of each group."""
 
     setting: Setting
@@ -52,10 +52,10 @@ class _Aim:
     middle: Float[np.ndarray, "lanes coordinates"]
     rows: Float[np.ndarray, "lanes m coordinates"]
 
-    def take(self, some: Int[np.ndarray, " some"]) -> "_Aim":
+    def take(self, some: Int[np.ndarray, " some"]) -> "Aim":
         """Return some of the lanes."""
         span, middle, rows = self.span[some], self.middle[some], self.rows[some]
-        return _Aim(self.setting, self.fold, self.cap, span, middle, rows)
+        return Aim(self.setting, self.fold, self.cap, span, middle, rows)
 
     def moved(self, p: Parameters, step: Float[np.ndarray, "lanes k"]) -> Parameters:
         """Return parameters after a step along the span."""
@@ -93,8 +93,19 @@ def pin(
     z, p, deviations = _middles(setting, points, groups)
     fold, cap = kind in {FOLD, CORNER}, kind in {CAP, CORNER}
     rows = principal_directions(deviations, span.shape[1] - fold - cap)
-    aim = _Aim(setting, fold, cap, span, embed(setting, z, p), rows)
-    b = null_border(setting.structure, z, p) if fold else np.zeros_like(z)
+    around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
+    return corrected(Aim(setting, fold, cap, span, embed(setting, z, p), rows), z, p, around)
+
+
+def corrected(aim: Aim, z: Lanes, p: Parameters, around: Values) -> Pinned:
+    """Newton on F = 0, the conditions of an aim, and its normal space.
+
+    Points farther from the middle than `REACH` times `around` cannot be trusted.
+    """
+    z, p, setting = z.copy(), p.copy(), aim.setting
+    b = null_border(setting.structure, z, p) if aim.fold else np.zeros_like(z)
+    # only without further conditions are all derivatives exact, so that small steps are squared
+    last = 1e-12 if aim.fold or aim.cap else 1e-8
     size, todo = np.full(len(z), np.inf), np.arange(len(z))
     for _ in range(NEWTON_STEPS):
         step, null = _newton_step(aim.take(todo), z[todo], p[todo], b[todo])
@@ -103,10 +114,9 @@ def pin(
         z[todo] += share[:, : z.shape[1]]
         p[todo] = aim.take(todo).moved(p[todo], share[:, z.shape[1] :])
         b[todo] = null
-        todo = todo[(size[todo] >= 1e-12) & np.isfinite(z[todo]).all(axis=1)]
+        todo = todo[(size[todo] >= last) & np.isfinite(z[todo]).all(axis=1)]
         if len(todo) == 0:
             break
-    around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
     gap = np.linalg.norm(embed(setting, z, p) - aim.middle, axis=1)
     found = (size < 1e-8) & (gap <= REACH * around + 1e-3)
     for constraint in setting.constraints:
@@ -132,7 +142,7 @@ def _middles(
 
 
 def _newton_step(
-    aim: _Aim, z: Lanes, p: Parameters, b: Lanes
+    aim: Aim, z: Lanes, p: Parameters, b: Lanes
 ) -> tuple[Float[np.ndarray, "lanes bordered"], Lanes]:
     """Step in z and along the span, and the null vector for the next round."""
     structure, k = aim.setting.structure, aim.span.shape[1]
@@ -154,7 +164,7 @@ def _newton_step(
     return structure.solve(z, p, rhs[:, None], border).x[:, 0], b
 
 
-def _fold_condition(aim: _Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[_Condition, Lanes]:
+def _fold_condition(aim: Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[_Condition, Lanes]:
     """Test function g of ``[F_z b; bᵀ 0] [v; g] = [0; 1]``, and v for the next round."""
     structure, lanes = aim.setting.structure, len(z)
     rhs = np.zeros((lanes, 1, structure.size + 1))
@@ -172,7 +182,7 @@ def _fold_condition(aim: _Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[_Cond
     return _Condition(g, by_z, by_step), v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def _cap_condition(aim: _Aim, z: Lanes, p: Parameters) -> _Condition:
+def _cap_condition(aim: Aim, z: Lanes, p: Parameters) -> _Condition:
     """Largest excess over the constraints, its gradients by central differences."""
     lanes, size = z.shape
 
@@ -192,7 +202,7 @@ def _cap_condition(aim: _Aim, z: Lanes, p: Parameters) -> _Condition:
     return _Condition(worst(z, p), by_z, by_step)
 
 
-def _amid(aim: _Aim, z: Lanes, p: Parameters) -> list[_Condition]:
+def _amid(aim: Aim, z: Lanes, p: Parameters) -> list[_Condition]:
     """Distances from the middle along the directions of each group."""
     setting, n = aim.setting, aim.setting.structure.unknowns
     away = embed(setting, z, p) - aim.middle

@@ -1,0 +1,267 @@
+"""A complex whose cells are being cut and rearranged: vertices with tangent frames, marked facets.
+
+Marks say on what a facet lies: a fold, a constraint, sides of the box. Vertices that are added to
+an edge must lie on what the edge lies on.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.manifold.accounting import Complex
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.equilibrium_set import EquilibriumSet
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.points import CAP, CORNER, FOLD
+from equimorph.manifold.tangents import (
+    Ends,
+    best_corners,
+    cap_slopes,
+    fold_slopes,
+    placed_frames,
+    tangent_frames,
+)
+from equimorph.manifold.topology import adjacency, flags_of, keys_of, rows_of
+from equimorph.structures import States
+
+ON_FOLD, ON_CAP, SIDES = 1, 2, 4
+"""Marks; from `SIDES` on two for each free parameter: its lower and its upper bound."""
+HOLE = 1 << 20
+"""Mark of facets on the boundary that lie on nothing: the set is incomplete there."""
+ON_BOX = 1e-9
+ON_BOUND = 1e-7
+
+
+@dataclass(frozen=True)
+class Vertices:
+    """Exact points with their tangent frames."""
+
+    z: Float[np.ndarray, "V size"]
+    p: Float[np.ndarray, "V P"]
+    kinds: Int[np.ndarray, " V"]
+    index: Int[np.ndarray, " V"]
+    grid_vertex: Int[np.ndarray, " V"]
+    place: Float[np.ndarray, "V coordinates"]
+    frame: Float[np.ndarray, "V d full"]
+    rows: Float[np.ndarray, "V d coordinates"]
+    fold_slope: Float[np.ndarray, "V d"]
+    """Slope, along the frame, of what vanishes on folds; zero off folds. So for constraints."""
+    cap_slope: Float[np.ndarray, "V d"]
+
+    def __len__(self) -> int:
+        """Return the number of vertices."""
+        return len(self.z)
+
+    def take(self, some: Int[np.ndarray, " some"]) -> "Vertices":
+        """Return some of the vertices."""
+        return Vertices(*(column[some] for column in vars(self).values()))
+
+    def joined(self, more: "Vertices") -> "Vertices":
+        """Return these vertices and more."""
+        pairs = zip(vars(self).values(), vars(more).values(), strict=True)
+        return Vertices(*(np.concatenate(pair) for pair in pairs))
+
+
+@dataclass(frozen=True)
+class Fabric:
+    """Vertices, cells with their index, and marked facets.
+
+    box: lower and upper bounds of the free parameters; squared: lengths of the sides of the cells,
+    squared, in the order 01, 02, 12 and so on.
+    """
+
+    setting: Setting
+    box: Float[np.ndarray, "2 d"]
+    vertices: Vertices
+    cells: Int[np.ndarray, "C corners"]
+    cell_index: Int[np.ndarray, " C"]
+    facets: Int[np.ndarray, "F d"]
+    marks: Int[np.ndarray, " F"]
+    squared: Float[np.ndarray, "C sides"]
+
+    @property
+    def dimension(self) -> int:
+        """Number of free parameters."""
+        return len(self.setting.free)
+
+    def edge_marks(self, edges: Int[np.ndarray, "E 2"]) -> Int[np.ndarray, " E"]:
+        """All marks of the facets around each edge; `edges` with sorted ends, in order."""
+        base = len(self.vertices)
+        out = np.zeros(len(edges), int)
+        keys = keys_of(edges, base)
+        for pair in combinations(range(self.facets.shape[1]), 2):
+            own = keys_of(self.facets[:, list(pair)], base)
+            np.bitwise_or.at(out, np.searchsorted(keys, own), self.marks)
+        return out
+
+    @property
+    def vertex_marks(self) -> Int[np.ndarray, " V"]:
+        """All marks of the facets around each vertex."""
+        out = np.zeros(len(self.vertices), int)
+        for column in self.facets.T:
+            np.bitwise_or.at(out, column, self.marks)
+        return out
+
+    def end(self, at: Int[np.ndarray, " edges"], mark: int) -> Ends:
+        """Ends of edges with a mark: at its vertices, and what stays zero along the edges."""
+        store = self.vertices
+        frame = store.frame[at]
+        slopes = []
+        if mark & ON_FOLD:
+            slopes.append(store.fold_slope[at])
+        if mark & ON_CAP:
+            slopes.append(store.cap_slope[at])
+        first = frame.shape[2] - self.dimension
+        slopes.extend(frame[:, :, first + k] for k in held(mark, self.dimension))
+        stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, self.dimension))
+        return Ends(store.place[at], frame, store.rows[at], stacked)
+
+    def bisected(
+        self,
+        edges: Int[np.ndarray, "E 2"],
+        more: Vertices,
+    ) -> "Fabric":
+        """Cut edges at new vertices, and all cells and facets around them; each at most once."""
+        middles = len(self.vertices) + np.arange(len(edges))
+        base = len(self.vertices)
+        cells, of_cells = _bisected(self.cells, edges, middles, base)
+        facets, of_facets = _bisected(self.facets, edges, middles, base)
+        vertices = self.vertices.joined(more)
+        squared = np.concatenate([self.squared, self.squared[of_cells]])
+        changed = np.concatenate([of_cells, np.arange(len(self.cells), len(cells))])
+        squared[changed] = squared_sides(vertices.place, cells[changed])
+        return replace(
+            self,
+            vertices=vertices,
+            squared=squared,
+            cells=cells,
+            cell_index=np.concatenate([self.cell_index, self.cell_index[of_cells]]),
+            facets=facets,
+            marks=np.concatenate([self.marks, self.marks[of_facets]]),
+        )
+
+    def complex(self) -> Complex:
+        """Return what is needed to describe the set; vertices without cells are left out."""
+        used = np.flatnonzero(np.bincount(self.cells.ravel(), minlength=len(self.vertices)))
+        number = np.full(len(self.vertices), -1)
+        number[used] = np.arange(len(used))
+        own = self.vertices.take(used)
+        return Complex(
+            States(self.setting.structure, own.z, own.p),
+            own.kinds,
+            own.index,
+            own.grid_vertex,
+            number[self.cells],
+            self.cell_index,
+            number[self.facets[(self.marks & ON_FOLD) > 0]],
+            number[self.facets[(self.marks & ON_CAP) > 0]],
+        )
+
+
+def squared_sides(
+    place: Float[np.ndarray, "V coordinates"], cells: Int[np.ndarray, "n corners"]
+) -> Float[np.ndarray, "n sides"]:
+    """Squared lengths of the sides 01, 02, 12 and so on of cells."""
+    out = []
+    for i, j in combinations(range(cells.shape[1]), 2):
+        side = place[cells[:, i]] - place[cells[:, j]]
+        out.append(np.einsum("ni,ni->n", side, side))
+    return np.stack(out, axis=1)
+
+
+def held(mark: int, dimension: int) -> list[int]:
+    """Free parameters that sides of the box hold."""
+    return [k for k in range(dimension) if mark & (3 * SIDES << 2 * k)]
+
+
+def vertices_of(
+    setting: Setting,
+    states: tuple[Float[np.ndarray, "V size"], Float[np.ndarray, "V P"]],
+    kinds: Int[np.ndarray, " V"],
+    others: tuple[Int[np.ndarray, " V"], Int[np.ndarray, " V"]],
+    rows: Float[np.ndarray, "V d coordinates"],
+) -> Vertices:
+    """Vertices with their frames; `others` are index and grid vertex, `rows` nearby planes."""
+    z, p = states
+    frame = tangent_frames(setting, z, p, rows)
+    slopes = [np.zeros((len(z), len(setting.free))) for _ in range(2)]
+    for out, function, wanted in (
+        (slopes[0], fold_slopes, (FOLD, CORNER)),
+        (slopes[1], cap_slopes, (CAP, CORNER)),
+    ):
+        own = np.flatnonzero(np.isin(kinds, wanted))
+        if len(own):
+            out[own] = function(setting, z[own], p[own], frame[own])
+    place = embed(setting, z, p)
+    placed = placed_frames(setting, frame)
+    return Vertices(z, p, kinds, *others, place, frame, placed, *slopes)
+
+
+def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
+    """Return a set as a fabric."""
+    z, p = eset.points.z, eset.points.p
+    rows = best_corners(setting, z, p, eset.cells)
+    others = (eset.index, eset.grid_vertex)
+    vertices = vertices_of(setting, (z, p), eset.kinds, others, rows)
+    whole = adjacency(eset.cells)
+    d = len(eset.names)
+    folds = [np.zeros((0, d), int), *(_facets(piece, d) for piece in eset.folds)]
+    folded = flags_of(whole.facets, np.concatenate(folds))
+    outer = whole.counts == 1
+    marks = np.where(folded, ON_FOLD, 0)
+    marks[outer] |= _outer_marks(eset, whole.facets[outer])
+    marked = marks > 0
+    box = np.stack([eset.box.lower, eset.box.upper])
+    squared = squared_sides(vertices.place, eset.cells)
+    facets = (whole.facets[marked], marks[marked])
+    return Fabric(setting, box, vertices, eset.cells, eset.cell_index, *facets, squared)
+
+
+def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+
+
+def _outer_marks(eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
+    """On what facets of the boundary lie: on a side of the box, else on the constraint."""
+    places = eset.coordinates[facets]
+    size = eset.box.upper - eset.box.lower
+    marks = np.zeros(len(facets), int)
+    for side, bound in enumerate((eset.box.lower, eset.box.upper)):
+        on = (np.abs(places - bound) <= ON_BOX * size).all(axis=1)
+        for k in range(len(size)):
+            marks |= np.where(on[:, k], SIDES << (2 * k + side), 0)
+    capped = np.isin(eset.kinds, (CAP, CORNER))[facets].all(axis=1)
+    return np.where(marks > 0, marks, np.where(capped, ON_CAP, HOLE))
+
+
+def _bisected(
+    rows: Int[np.ndarray, "n k"],
+    edges: Int[np.ndarray, "E 2"],
+    middles: Int[np.ndarray, " E"],
+    base: int,
+) -> tuple[Int[np.ndarray, "m k"], Int[np.ndarray, " parents"]]:
+    """Rows that hold one of the edges are cut in two; the second halves come last."""
+    keys = keys_of(edges, base)
+    order = np.argsort(keys)
+    which = np.full(len(rows), -1)
+    for pair in combinations(range(rows.shape[1]), 2):
+        own = keys_of(rows[:, list(pair)], base)
+        at = order[np.minimum(np.searchsorted(keys, own, sorter=order), len(order) - 1)]
+        which = np.where(keys[at] == own, at, which)
+    cut = np.flatnonzero(which >= 0)
+    (a, b), m = edges[which[cut]].T, middles[which[cut]][:, None]
+    halves = rows.copy()
+    halves[cut] = np.where(rows[cut] == b[:, None], m, rows[cut])
+    return np.concatenate([halves, np.where(rows[cut] == a[:, None], m, rows[cut])]), cut
+
+
+def edges_of(
+    cells: Int[np.ndarray, "C corners"], base: int
+) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, "C sides"]]:
+    """All edges, sorted, and the numbers of those of each cell (pairs 01, 02, 12 and so on)."""
+    pairs = combinations(range(cells.shape[1]), 2)
+    keys = np.stack([keys_of(cells[:, list(pair)], base) for pair in pairs], axis=1)
+    distinct, inverse = np.unique(keys.ravel(), return_inverse=True)
+    return rows_of(distinct, base, 2), inverse.reshape(keys.shape)

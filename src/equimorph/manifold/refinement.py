@@ -1,0 +1,289 @@
+"""Refinement: edges are bisected until straight cells are within a tolerance of the set.
+
+The longest edge of a cell goes first, so that angles do not shrink from one bisection to the next
+[Rivara1984]_. New vertices are predicted by the cubic that touches the tangent spaces at both ends
+of the edge, and corrected orthogonally to the mean of both spaces; on folds, constraints and sides
+of the box along these.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.errors import InputError
+from equimorph.manifold.accounting import Frame, Lifting, described
+from equimorph.manifold.equilibrium_set import EquilibriumSet
+from equimorph.manifold.fabric import (
+    HOLE,
+    ON_CAP,
+    ON_FOLD,
+    Fabric,
+    Vertices,
+    edges_of,
+    fabric_of,
+    held,
+    vertices_of,
+)
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.pins import Aim, corrected
+from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
+from equimorph.manifold.surgery import collapse, flip, smallest_angle
+from equimorph.manifold.tangents import hermite, split_step
+from equimorph.manifold.topology import keys_of
+from equimorph.model import Progress, Silent
+
+ROUNDS = 200
+TIDIED = 2
+"""How often slivers are taken away in between."""
+SHARE = {1: 1.0, 2: 0.75, 3: 2.0 / 3.0}
+"""Part of the tolerance that edges may use up: inside a cell their deviations add up to 2d/(d + 1)
+of the largest."""
+PREFERENCE = 1.6
+"""How much longer an edge must be than those that deviate to be bisected before them."""
+REACH = 0.5
+"""How far from its prediction a new vertex may be corrected, relative to its edge."""
+MOST = 2_000_000
+"""Vertices beyond which refinement ends."""
+
+
+def refine(
+    eset: EquilibriumSet, accuracy: float, progress: Progress | None = None
+) -> EquilibriumSet:
+    """Return the set with cells so small that they are within a tolerance of it.
+
+    Parameters
+    ----------
+    eset
+        A set as it was lifted.
+    accuracy
+        Largest distance, in the metric of the embedding (configuration and scaled parameters),
+        between the straight cells and the set.
+    progress
+        Sink for progress reports.
+
+    Returns
+    -------
+    The refined set; its audit tells the largest deviation that remains, how many edges could not be
+    bisected, and the smallest angle.
+
+    Raises
+    ------
+    InputError
+        If `accuracy` is not positive.
+    """
+    check_accuracy(accuracy)
+    free = np.array([[q.name for q in eset.structure.parameters].index(n) for n in eset.names])
+    base = eset.points.p[0].copy() if len(eset.points) else np.zeros(0)
+    setting = Setting(eset.structure, base, free, eset.constraints)
+    fabric = _tidied(fabric_of(setting, eset)) if len(eset.cells) else None
+    if fabric is None:
+        return eset
+    memory = _Memory()
+    fabric = _refined(fabric, SHARE[len(free)] * accuracy, memory, progress or Silent())
+    edges = _known(fabric, memory)
+    audit = eset.audit
+    lifting = Lifting(
+        audit.unpaired, audit.conflicts, audit.retraced,
+        audit.parity_violations, audit.undecided, audit.bisected,
+    )  # fmt: skip
+    frame = Frame(setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
+    out = described(frame, fabric.complex(), lifting)
+    quality = replace(
+        out.audit,
+        checked=audit.checked,
+        missing=audit.missing,
+        recovered=audit.recovered,
+        accuracy=accuracy,
+        deviation=float(edges.error.max(initial=0.0) / SHARE[len(free)]),
+        unrefined=int((edges.error > SHARE[len(free)] * accuracy).sum()),
+        smallest_angle=smallest_angle(fabric),
+    )
+    return replace(out, audit=quality)
+
+
+def check_accuracy(accuracy: float) -> None:
+    """Refuse what is no accuracy."""
+    if not 0.0 < accuracy < np.inf:
+        raise InputError(f"`accuracy` must be positive and finite; got {accuracy!r}.")
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """Edges of a fabric, those of each cell, their marks, length and deviation from the set."""
+
+    ends: Int[np.ndarray, "E 2"]
+    of_cells: Int[np.ndarray, "C sides"]
+    marks: Int[np.ndarray, " E"]
+    length: Float[np.ndarray, " E"]
+    error: Float[np.ndarray, " E"]
+    stuck: Bool[np.ndarray, " E"]
+
+
+@dataclass
+class _Memory:
+    """Deviations of edges that were measured before, and edges that could not be bisected."""
+
+    keys: Int[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, int))
+    error: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
+    stuck: set[tuple[int, int]] = field(default_factory=set)
+
+
+def _refined(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progress) -> Fabric:
+    """Bisect and flip until nothing is left to do; then take slivers away, and begin again."""
+    tidied = 0
+    for _ in range(ROUNDS):
+        edges = _known(fabric, memory)
+        wanted = (edges.error > tolerance) & ~edges.stuck
+        if len(fabric.vertices) > MOST:
+            break
+        if not wanted.any():
+            if tidied == TIDIED:
+                break
+            tidied += 1
+            cells, fabric = fabric.cells, _tidied(fabric)
+            if fabric.cells is cells:
+                break
+            continue
+        progress.report("refining", int((edges.error <= tolerance).sum()), len(edges.error))
+        fabric = _bisect(fabric, edges, _terminal(edges, wanted), memory)
+        if fabric.dimension == 2:
+            fabric = flip(fabric, passes=2)
+    return fabric
+
+
+def _tidied(fabric: Fabric) -> Fabric:
+    """Take slivers away."""
+    if fabric.dimension != 2:
+        return fabric
+    return flip(collapse(flip(fabric, passes=4), passes=4), passes=4)
+
+
+def _known(fabric: Fabric, memory: _Memory) -> _Edges:
+    """Edges with their deviations; only those that are new are measured."""
+    base = len(fabric.vertices)
+    ends, of_cells = edges_of(fabric.cells, base)
+    marks = fabric.edge_marks(ends)
+    # keys that stay the same while vertices are added
+    keys = ends[:, 1] * (ends[:, 1] - 1) // 2 + ends[:, 0]
+    at = np.minimum(np.searchsorted(memory.keys, keys), max(len(memory.keys) - 1, 0))
+    old = memory.keys[at] == keys if len(memory.keys) else np.zeros(len(keys), bool)
+    error = np.empty(len(keys))
+    error[old] = memory.error[at[old]]
+    new = np.flatnonzero(~old)
+    error[new] = _deviations(fabric, ends[new], marks[new])
+    order = np.argsort(keys)
+    memory.keys, memory.error = keys[order], error[order]
+    length = np.empty(len(ends))
+    length[of_cells] = np.sqrt(fabric.squared)
+    stuck = (marks & HOLE) > 0
+    if memory.stuck:
+        refused = np.array(sorted(memory.stuck))
+        stuck |= np.isin(keys_of(ends, base), keys_of(refused, base))
+    return _Edges(ends, of_cells, marks, length, error, stuck)
+
+
+def _deviations(
+    fabric: Fabric, ends: Int[np.ndarray, "E 2"], marks: Int[np.ndarray, " E"]
+) -> Float[np.ndarray, " E"]:
+    """How far the set is from straight edges."""
+    out = np.zeros(len(ends))
+    for mark in np.unique(marks).tolist():
+        own = np.flatnonzero(marks == mark)
+        for some in np.array_split(own, len(own) // 8192 + 1):
+            first, second = (fabric.end(ends[some, side], mark) for side in range(2))
+            out[some] = hermite(first, second)[0]
+    return out
+
+
+def _terminal(edges: _Edges, wanted: Bool[np.ndarray, " E"]) -> Int[np.ndarray, " n"]:
+    """Edges to be bisected now: those that all cells around them choose.
+
+    A cell with a wanted edge chooses the longest of these, or its longest edge, which is wanted
+    then, too, if that is longer by more than `PREFERENCE`.
+    """
+    chosen, sides = wanted.copy(), edges.of_cells
+    own = np.arange(len(sides))
+    while True:
+        weight = np.where(edges.stuck, -1.0, np.where(chosen, PREFERENCE, 1.0) * edges.length)
+        rank = np.empty(len(weight), int)
+        rank[np.argsort(weight, kind="stable")] = np.arange(len(weight))
+        choice = sides[own, rank[sides].argmax(axis=1)]
+        active = chosen[sides].any(axis=1)
+        count = np.count_nonzero(chosen)
+        chosen[choice[active]] = True
+        if np.count_nonzero(chosen) == count:
+            break
+    around = np.bincount(sides.ravel(), minlength=len(weight))
+    agreeing = np.bincount(choice[active], minlength=len(weight))
+    return np.flatnonzero((agreeing == around) & chosen & ~edges.stuck)
+
+
+def _bisect(
+    fabric: Fabric, edges: _Edges, chosen: Int[np.ndarray, " n"], memory: _Memory
+) -> Fabric:
+    """Put exact vertices on edges; remember where that failed."""
+    ends, parts, done = edges.ends, [], []
+    lowest = np.full(len(ends), np.iinfo(int).max)
+    for side in edges.of_cells.T:
+        np.minimum.at(lowest, side, fabric.cell_index)
+    for mark in np.unique(edges.marks[chosen]).tolist():
+        own = chosen[edges.marks[chosen] == mark]
+        found, vertices = _middles(fabric, ends[own], mark, lowest[own])
+        parts.append(vertices)
+        done.append(own[found])
+        memory.stuck.update(map(tuple, ends[own[~found]].tolist()))
+    if not done:
+        return fabric
+    more = parts[0]
+    for part in parts[1:]:
+        more = more.joined(part)
+    at = np.concatenate(done)
+    if np.isin(edges.marks[at], (ON_FOLD, ON_CAP)).any():
+        memory.stuck.clear()  # beside a fold that is better known they may succeed
+    return fabric.bisected(ends[at], more) if len(at) else fabric
+
+
+def _middles(
+    fabric: Fabric, ends: Int[np.ndarray, "n 2"], mark: int, lowest: Int[np.ndarray, " n"]
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Exact vertices amid edges with a mark, and for which edges they were found."""
+    setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
+    first, second = (fabric.end(ends[:, side], mark) for side in range(2))
+    dz, dp = split_step(setting, hermite(first, second)[1])
+    z = 0.5 * (store.z[ends[:, 0]] + store.z[ends[:, 1]]) + dz
+    p = 0.5 * (store.p[ends[:, 0]] + store.p[ends[:, 1]]) + dp
+    keep = held(mark, d)
+    for k in keep:
+        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
+    # the second space seen from the first, so that both bases point the same way
+    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
+    plane = first.rows + turned @ second.rows
+    inside = replace(first, rows=plane).allowed
+    rows = np.swapaxes(inside, 1, 2) @ plane
+    aim_span = np.delete(np.eye(d), keep, axis=0)
+    place = _embedded(fabric, z, p)
+    fold, cap = bool(mark & ON_FOLD), bool(mark & ON_CAP)
+    aim = Aim(setting, fold, cap, np.tile(aim_span, (len(z), 1, 1)), place, rows)
+    chord = np.linalg.norm(second.place - first.place, axis=1)
+    pinned = corrected(aim, z, p, chord)
+    gap = np.linalg.norm(_embedded(fabric, pinned.z, pinned.p) - place, axis=1)
+    found = pinned.found & (gap <= REACH * chord)
+    free = pinned.p[:, setting.free]
+    found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
+    if not fold:
+        found[found] &= setting.structure.index(pinned.z[found], pinned.p[found]) == lowest[found]
+    kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
+    count = int(found.sum())
+    kinds = np.full(count, kind[fold, cap])
+    others = (lowest[found], np.full(count, -1))
+    states = (pinned.z[found], pinned.p[found])
+    return found, vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
+
+
+def _embedded(
+    fabric: Fabric, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Float[np.ndarray, "n coordinates"]:
+    setting = fabric.setting
+    u = z[:, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
+    return np.concatenate([u, p[:, setting.free] / setting.scales], axis=1)

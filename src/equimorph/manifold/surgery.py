@@ -1,0 +1,303 @@
+"""Better triangles with the same vertices or fewer: flips of edges, and collapses of short ones.
+
+Angles are measured in the embedding. Nothing may fold over: seen in the tangent planes of all
+vertices involved, new triangles keep the orientation of those that they replace.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.fabric import Fabric, edges_of, squared_sides
+from equimorph.manifold.topology import keys_of
+
+SLENDER = np.radians(20.0)
+"""Triangles with a smaller angle lose an edge, if that helps."""
+GAIN = 1e-3
+"""Least gain of a flip: minus the sum of the cotangents of both opposite angles."""
+LONGER = 1.5
+"""How much longer than the longest edge around a vertex edges may get that replace them."""
+WORSE = 0.7
+"""Least share of the smallest angle around a vertex that must remain when it goes."""
+
+Triangles = Int[np.ndarray, "T 3"]
+
+
+def smallest_angle(fabric: Fabric) -> float:
+    """Smallest angle of all triangles, in degrees; 0 where there are none."""
+    if fabric.dimension == 1:
+        return 0.0
+    angles = [
+        _angles(fabric, fabric.cells[:, list(chosen)]).min()
+        for chosen in combinations(range(fabric.cells.shape[1]), 3)
+    ]
+    return float(np.degrees(min(angles)))
+
+
+def flip(fabric: Fabric, passes: int) -> Fabric:
+    """Flip edges whose opposite angles add up to more than π, as far as nothing folds over."""
+    for _ in range(passes):
+        pairs = _flippable(fabric, _cotangents(fabric.squared))
+        if len(pairs.left) == 0:
+            break
+        cells = fabric.cells.copy()
+        cells[pairs.left] = np.stack([pairs.a, pairs.d, pairs.c], axis=1)
+        cells[pairs.right] = np.stack([pairs.d, pairs.b, pairs.c], axis=1)
+        changed, squared = np.concatenate([pairs.left, pairs.right]), fabric.squared.copy()
+        squared[changed] = squared_sides(fabric.vertices.place, cells[changed])
+        fabric = replace(fabric, cells=cells, squared=squared)
+    return fabric
+
+
+def _cotangents(squared: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3"]:
+    """Cotangents of the angles at the corners of triangles, from their squared sides."""
+    total = squared.sum(axis=1)
+    area = total**2 - 2.0 * (squared**2).sum(axis=1)
+    four_areas = np.sqrt(np.maximum(area, 1e-28 * total**2))
+    # the side opposite to corner 0 comes last
+    return np.asarray((total[:, None] - 2.0 * squared[:, ::-1]) / four_areas[:, None])
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Edges ab between cells `left` = abc and `right` = bad."""
+
+    a: Int[np.ndarray, " n"]
+    b: Int[np.ndarray, " n"]
+    c: Int[np.ndarray, " n"]
+    d: Int[np.ndarray, " n"]
+    left: Int[np.ndarray, " n"]
+    right: Int[np.ndarray, " n"]
+
+    def take(self, some: Int[np.ndarray, " m"] | Bool[np.ndarray, " n"]) -> "_Pairs":
+        """Return some of the pairs."""
+        return _Pairs(*(column[some] for column in vars(self).values()))
+
+
+def _flippable(fabric: Fabric, cotangents: Float[np.ndarray, "T 3"]) -> _Pairs:
+    """Pairs of triangles to flip, no triangle in two of them."""
+    cells, base = fabric.cells, len(fabric.vertices)
+    keys = keys_of(cells[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), base)
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    same = np.concatenate([[False], keys[1:] == keys[:-1], [False]])
+    two = np.flatnonzero(same[1:-1] & ~same[:-2] & ~same[2:])
+    gain = -cotangents.ravel()[order[two]] - cotangents.ravel()[order[two + 1]]
+    two, gain = two[gain > GAIN], gain[gain > GAIN]
+    left, right = order[two], order[two + 1]
+    pairs = _Pairs(
+        cells[left // 3, (left + 1) % 3], cells[left // 3, (left + 2) % 3],
+        cells[left // 3, left % 3], cells[right // 3, right % 3],
+        left // 3, right // 3,
+    )  # fmt: skip
+    new = keys_of(np.stack([pairs.c, pairs.d], axis=1), base)
+    allowed = keys[np.minimum(np.searchsorted(keys, new), len(keys) - 1)] != new
+    allowed &= fabric.cell_index[pairs.left] == fabric.cell_index[pairs.right]
+    allowed &= ~np.isin(keys[two], keys_of(fabric.facets, base))
+    allowed[allowed] = _unfolded(fabric, pairs.take(allowed))
+    chosen = np.flatnonzero(allowed)
+    chosen = chosen[np.argsort(-gain[chosen], kind="stable")]
+    return pairs.take(chosen[_first_come(pairs.take(chosen), new[chosen])])
+
+
+def _first_come(pairs: _Pairs, new: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Pairs that are the first to ask for both their triangles, and for their new edge."""
+    rank = np.arange(len(new))
+    both = np.concatenate([pairs.left, pairs.right])
+    best = np.full(int(both.max(initial=-1)) + 1, len(new))
+    np.minimum.at(best, both, np.concatenate([rank, rank]))
+    first = (best[pairs.left] == rank) & (best[pairs.right] == rank)
+    return np.asarray(first & np.isin(rank, np.unique(new, return_index=True)[1]))
+
+
+def _unfolded(fabric: Fabric, pairs: _Pairs) -> Bool[np.ndarray, " n"]:
+    """Whether the triangles after a flip keep their side up in the tangent planes at all corners.
+
+    The same must hold of those before, else nothing is known.
+    """
+    good = np.ones(len(pairs.a), bool)
+    for plane in (pairs.a, pairs.b, pairs.c, pairs.d):
+        old = [
+            _area(fabric, plane, t)
+            for t in ((pairs.a, pairs.b, pairs.c), (pairs.b, pairs.a, pairs.d))
+        ]
+        new = [
+            _area(fabric, plane, t)
+            for t in ((pairs.a, pairs.d, pairs.c), (pairs.d, pairs.b, pairs.c))
+        ]
+        signs = np.sign(np.stack([*old, *new]))
+        # slivers may look either way
+        whole = np.abs(old[0] + old[1])
+        flat = np.minimum(np.abs(new[0]), np.abs(new[1])) < 1e-3 * whole
+        good &= (signs[2] == signs[3]) & (signs[2] == np.sign(old[0] + old[1])) & ~flat
+    return good
+
+
+def _area(
+    fabric: Fabric, plane: Int[np.ndarray, " n"], triangle: tuple[Int[np.ndarray, " n"], ...]
+) -> Float[np.ndarray, " n"]:
+    """Signed area of triangles, twice, in the tangent planes at vertices."""
+    place, rows = fabric.vertices.place, fabric.vertices.rows[plane]
+    a, b, c = (
+        np.einsum("ndc,nc->nd", rows, place[corner] - place[triangle[0]]) for corner in triangle
+    )
+    del a
+    return np.asarray(b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+
+
+def _angles(fabric: Fabric, triangles: Triangles) -> Float[np.ndarray, " T"]:
+    """Smallest angle of triangles."""
+    return _smallest(squared_sides(fabric.vertices.place, triangles))
+
+
+def _smallest(squared: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, " T"]:
+    largest = _cotangents(squared).max(axis=1, initial=-np.inf)
+    return np.asarray(np.arctan2(1.0, largest))
+
+
+def collapse(fabric: Fabric, passes: int) -> Fabric:
+    """Draw vertices of slender triangles into a neighbour, where all angles around get larger."""
+    for _ in range(passes):
+        moves = _moves(fabric)
+        if len(moves) == 0:
+            break
+        target = np.arange(len(fabric.vertices))
+        target[moves[:, 0]] = moves[:, 1]
+        cells, facets = target[fabric.cells], target[fabric.facets]
+        kept, whole = _proper(cells), _proper(facets)
+        moved, squared = kept & (cells != fabric.cells).any(axis=1), fabric.squared.copy()
+        squared[moved] = squared_sides(fabric.vertices.place, cells[moved])
+        fabric = replace(
+            fabric,
+            cells=cells[kept],
+            squared=squared[kept],
+            cell_index=fabric.cell_index[kept],
+            facets=facets[whole],
+            marks=fabric.marks[whole],
+        )
+    return fabric
+
+
+def _proper(rows: Int[np.ndarray, "n k"]) -> Bool[np.ndarray, " n"]:
+    """Which rows have different corners."""
+    return np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))
+
+
+def _moves(fabric: Fabric) -> Int[np.ndarray, "m 2"]:
+    """Vertices that go, and into which neighbours; stars of those that go do not overlap."""
+    cells, base = fabric.cells, len(fabric.vertices)
+    slender = np.flatnonzero(_smallest(fabric.squared) < SLENDER)
+    if len(slender) == 0:
+        return np.zeros((0, 2), int)
+    corners = cells[slender]
+    around = [corners[:, [i, j]] for i in range(3) for j in range(3) if i != j]
+    moves = np.unique(np.concatenate(around), axis=0)
+    edges, _ = edges_of(cells, base)
+    moves = moves[_free_to_move(fabric, moves, edges)]
+    gain = _gains(fabric, moves)
+    moves, gain = moves[gain > 0], gain[gain > 0]
+    moves = moves[np.argsort(-gain, kind="stable")]
+    return _apart(moves, edges, base)
+
+
+def _free_to_move(
+    fabric: Fabric, moves: Int[np.ndarray, "m 2"], edges: Int[np.ndarray, "E 2"]
+) -> Bool[np.ndarray, " m"]:
+    """Whether what the vertex lies on goes on along the edge, and the surface stays one."""
+    base = len(fabric.vertices)
+    keys, marks = keys_of(edges, base), fabric.edge_marks(edges)
+    own = fabric.vertex_marks[moves[:, 0]]
+    along = marks[np.searchsorted(keys, keys_of(moves, base))]
+    ends = np.bincount(fabric.facets.ravel(), minlength=base)[moves[:, 0]]
+    good = (own == along) & ((own == 0) | (ends == 2))
+    # common neighbours of both ends: only those across the triangles beside the edge
+    starts, around = _neighbours(edges, base)
+    row, at = _spread(starts, moves[:, 0])
+    other = around[at]
+    common = np.isin(keys_of(np.stack([moves[row, 1], other], axis=1), base), keys)
+    common &= other != moves[row, 1]
+    shared = np.bincount(row[common], minlength=len(moves))
+    return np.asarray(good & (shared == np.where(own == 0, 2, np.where(own == 1, 2, 1))))
+
+
+def _neighbours(
+    edges: Int[np.ndarray, "E 2"], base: int
+) -> tuple[Int[np.ndarray, " starts"], Int[np.ndarray, " ends"]]:
+    both = np.concatenate([edges, edges[:, ::-1]])
+    order = np.argsort(both[:, 0], kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(both[:, 0], minlength=base))])
+    return starts, both[order, 1]
+
+
+def _spread(
+    starts: Int[np.ndarray, " starts"], chosen: Int[np.ndarray, " m"]
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    """Rows and places of all entries of the chosen lists."""
+    count = starts[chosen + 1] - starts[chosen]
+    row = np.repeat(np.arange(len(chosen)), count)
+    offset = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    return row, starts[chosen][row] + offset
+
+
+def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, " m"]:
+    """How many slender triangles fewer there are if a vertex is drawn into a neighbour.
+
+    And, less than one, by how much the smallest angle around it grows. Minus one where a triangle
+    would fold over, get much more slender or much longer.
+    """
+    cells, base = fabric.cells, len(fabric.vertices)
+    order = np.argsort(cells.ravel(), kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(cells.ravel(), minlength=base))])
+    row, at = _spread(starts, moves[:, 0])
+    old = cells[order[at] // 3]
+    gone, into = moves[row, 0][:, None], moves[row, 1][:, None]
+    new = np.where(old == gone, into, old)
+    stays = _proper(new)
+    before, after = np.full(len(moves), np.inf), np.full(len(moves), np.inf)
+    old_angle, new_angle = _angles(fabric, old), _angles(fabric, new[stays])
+    np.minimum.at(before, row, old_angle)
+    np.minimum.at(after, row[stays], new_angle)
+    fewer = np.bincount(row[old_angle < SLENDER], minlength=len(moves))
+    fewer -= np.bincount(row[stays][new_angle < SLENDER], minlength=len(moves))
+    good = np.ones(len(moves), bool)
+    turned = _turned(fabric, old[stays], new[stays])
+    good[row[stays][turned]] = False
+    reach, longest = np.zeros(len(moves)), np.zeros(len(moves))
+    np.maximum.at(reach, row, _longest(fabric, old))
+    np.maximum.at(longest, row[stays], _longest(fabric, new[stays]))
+    good &= (longest <= LONGER * reach) & np.isfinite(after) & (after >= WORSE * before)
+    return np.where(good, fewer + (after - before) / np.pi, -1.0)
+
+
+def _turned(fabric: Fabric, old: Triangles, new: Triangles) -> Bool[np.ndarray, " n"]:
+    """Whether triangles turn over in the tangent plane at a corner of the new one."""
+    out = np.zeros(len(old), bool)
+    for corner in range(3):
+        plane = new[:, corner]
+        before = _area(fabric, plane, (old[:, 0], old[:, 1], old[:, 2]))
+        after = _area(fabric, plane, (new[:, 0], new[:, 1], new[:, 2]))
+        out |= before * after <= 0.0
+    return out
+
+
+def _longest(fabric: Fabric, triangles: Triangles) -> Float[np.ndarray, " T"]:
+    return np.asarray(np.sqrt(squared_sides(fabric.vertices.place, triangles).max(axis=1)))
+
+
+def _apart(
+    moves: Int[np.ndarray, "m 2"], edges: Int[np.ndarray, "E 2"], base: int
+) -> Int[np.ndarray, "k 2"]:
+    """Moves in order, without those that touch the star of an earlier one."""
+    starts, around = _neighbours(edges, base)
+    touched = np.zeros(base, bool)
+    kept = []
+    for gone, into in moves.tolist():
+        star = around[starts[gone] : starts[gone + 1]]
+        if touched[gone] or touched[star].any():
+            continue
+        touched[gone] = True
+        touched[star] = True
+        kept.append((gone, into))
+    return np.array(kept, int).reshape(-1, 2)

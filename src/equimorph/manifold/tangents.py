@@ -1,0 +1,154 @@
+"""Tangent spaces of the set at its vertices, and how far straight edges are from it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.pairing import Setting
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Rows = Float[np.ndarray, "lanes d coordinates"]
+Frames = Float[np.ndarray, "lanes d full"]
+"""Bases of tangent spaces, orthonormal in the metric: changes of z and of the scaled free
+parameters."""
+
+CHUNK = 2048
+DIFFERENCE = 1e-5
+S_SHAPE = 0.1
+"""Farthest a cubic whose slopes at both ends are the same leaves its chord: √3/18, in slopes."""
+
+
+def tangent_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
+    """Orthonormal bases of the tangent spaces at points of the set, regular at folds, too.
+
+    ``[F_z F_p; R] t_i = (0, e_i)`` with rows R of the embedding that span nearby spaces.
+    """
+    out = np.empty((len(z), rows.shape[1], z.shape[1] + rows.shape[1]))
+    for at in range(0, len(z), CHUNK):
+        own = slice(at, at + CHUNK)
+        out[own] = _frames(setting, z[own], p[own], rows[own])
+    return out
+
+
+def _frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
+    structure, free = setting.structure, setting.free
+    lanes, size, d, n = len(z), z.shape[1], len(free), structure.unknowns
+    columns = np.empty((lanes, d, size))
+    for k in range(d):
+        dp = np.zeros_like(p)
+        dp[:, free[k]] = setting.scales[k]
+        columns[:, k] = structure.parameter_derivative(z, p, dp)
+    by_z = np.zeros((lanes, d, size))
+    by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(structure.mass)
+    rhs = np.zeros((lanes, d, size + d))
+    rhs[:, :, size:] = np.eye(d)
+    border = (columns, by_z, np.ascontiguousarray(rows[:, :, n:]))
+    raw = structure.solve(z, p, rhs, border).x
+    placed = placed_frames(setting, raw)
+    gram = placed @ np.swapaxes(placed, 1, 2)
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(gram), raw))
+
+
+def placed_frames(setting: Setting, frames: Frames) -> Rows:
+    """Bases of tangent spaces in the coordinates of the embedding."""
+    n, d = setting.structure.unknowns, len(setting.free)
+    u = frames[:, :, :n] * np.sqrt(setting.structure.mass)
+    return np.concatenate([u, frames[:, :, frames.shape[2] - d :]], axis=2)
+
+
+def split_step(setting: Setting, step: Float[np.ndarray, "lanes full"]) -> tuple[Lanes, Parameters]:
+    """Changes of z and of all parameters of a step along a tangent space."""
+    d = len(setting.free)
+    dp = np.zeros((len(step), len(setting.base)))
+    dp[:, setting.free] = step[:, step.shape[1] - d :] * setting.scales
+    return np.ascontiguousarray(step[:, : step.shape[1] - d]), dp
+
+
+def fold_slopes(
+    setting: Setting, z: Lanes, p: Parameters, frames: Frames
+) -> Float[np.ndarray, "lanes d"]:
+    """Slope along the frame of the function that vanishes on folds."""
+    critical = Critical(setting.structure, z, p, null_border(setting.structure, z, p))
+    steps = (split_step(setting, frames[:, k]) for k in range(frames.shape[1]))
+    return np.stack([critical.second(*step) for step in steps], axis=1)
+
+
+def cap_slopes(
+    setting: Setting, z: Lanes, p: Parameters, frames: Frames
+) -> Float[np.ndarray, "lanes d"]:
+    """Slope along the frame of the largest excess over the constraints."""
+
+    def worst(sign: float, k: int) -> Float[np.ndarray, " lanes"]:
+        dz, dp = split_step(setting, sign * DIFFERENCE * frames[:, k])
+        return np.asarray(np.max([c.excess(z + dz, p + dp) for c in setting.constraints], axis=0))
+
+    slopes = [worst(1.0, k) - worst(-1.0, k) for k in range(frames.shape[1])]
+    return np.stack(slopes, axis=1) / (2.0 * DIFFERENCE)
+
+
+@dataclass(frozen=True)
+class Ends:
+    """One end of edges: its point, frame, and the slopes of what must stay zero along the edge."""
+
+    place: Float[np.ndarray, "edges coordinates"]
+    frame: Frames
+    rows: Rows
+    slopes: Float[np.ndarray, "edges m d"]
+
+    def along(self, chord: Float[np.ndarray, "edges coordinates"]) -> Float[np.ndarray, "edges d"]:
+        """Coordinates, in the frame, of the tangent vector that a chord is nearest to.
+
+        As long as the chord.
+        """
+        flat = np.einsum("edc,ec->ed", self.rows, chord)
+        if self.slopes.shape[1]:
+            basis = self.allowed
+            flat = np.einsum("edk,ek->ed", basis, np.einsum("edk,ed->ek", basis, flat))
+        length = np.linalg.norm(flat, axis=1)
+        share = np.linalg.norm(chord, axis=1) / np.maximum(length, 1e-300)
+        # where chord and tangent space are far apart, the vector stays short
+        return np.asarray(flat * np.minimum(share, 2.0)[:, None])
+
+    @property
+    def allowed(self) -> Float[np.ndarray, "edges d k"]:
+        """Orthonormal directions in the frame along which the conditions stay zero."""
+        m = self.slopes.shape[1]
+        columns = np.swapaxes(self.slopes, 1, 2)
+        return np.asarray(np.linalg.qr(columns, mode="complete")[0][:, :, m:])
+
+
+def hermite(first: Ends, second: Ends) -> tuple[Float[np.ndarray, " edges"], np.ndarray]:
+    """How far the set is from the middle part of edges, and the step from their middles to it.
+
+    The cubic that touches the tangent spaces at both ends leaves the chord c by
+    ``t(1 − t)² n₀ − t²(1 − t) n₁`` with nᵢ = tᵢ − c: in the middle by (n₀ − n₁)/8.
+    """
+    chord = second.place - first.place
+    a, b = first.along(chord), second.along(chord)
+    off_a = np.einsum("ed,edc->ec", a, first.rows) - chord
+    off_b = np.einsum("ed,edc->ec", b, second.rows) - chord
+    middle = np.linalg.norm(off_a - off_b, axis=1) / 8.0
+    slope = np.maximum(np.linalg.norm(off_a, axis=1), np.linalg.norm(off_b, axis=1))
+    step = np.einsum("ed,edf->ef", a, first.frame) - np.einsum("ed,edf->ef", b, second.frame)
+    return np.maximum(middle, S_SHAPE * slope), step / 8.0
+
+
+def best_corners(
+    setting: Setting, z: Lanes, p: Parameters, cells: Int[np.ndarray, "C corners"]
+) -> Rows:
+    """Orthonormal bases of the planes of the cell around each vertex that is the least slender."""
+    place = embed(setting, z, p)
+    corners = cells.shape[1]
+    owner = cells.T.ravel()
+    sides = np.concatenate(
+        [place[np.delete(cells, k, axis=1)] - place[cells[:, k]][:, None] for k in range(corners)]
+    )
+    sides = sides / np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-300)
+    breadth = np.linalg.det(sides @ np.swapaxes(sides, 1, 2))
+    order = np.lexsort((-breadth, owner))
+    first = order[np.diff(owner[order], prepend=-1) > 0]
+    return np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(sides[first], 1, 2))[0], 1, 2))

@@ -1,0 +1,182 @@
+"""Refined sets: closed forms tell how far cells are from surfaces; topology must not change."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from equimorph.errors import InputError
+from equimorph.manifold import equilibrium_set, refine
+from equimorph.manifold.accounting import Complex
+from equimorph.manifold.fabric import Fabric, fabric_of
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.surgery import collapse, flip, smallest_angle
+from equimorph.manifold.topology import euler_characteristic
+from equimorph.model import Box, Descriptor
+from oracles.complexes import assert_faithful, assert_folds_are_singular
+from oracles.polynomial import bead_on_a_circle, fold_form
+from oracles.surfaces import cusp, sphere, torus
+from typecheck import unchecked
+
+few = settings(
+    max_examples=4, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
+)
+
+
+def lifted(structure, box, intervals):
+    with unchecked():
+        return equilibrium_set(structure, box, checks=0, intervals=intervals)
+
+
+def refined(eset, accuracy):
+    with unchecked():
+        return refine(eset, accuracy)
+
+
+def topology(eset):
+    pieces = sorted((c.euler_characteristic, c.loops, c.indices) for c in eset.components)
+    return pieces, sorted(stratum.index for stratum in eset.strata), len(eset.folds)
+
+
+def inside_cells(eset, seed=0):
+    """A random point of every cell, in the embedding of a structure with one unknown."""
+    place = np.concatenate([eset.points.z[:, :1], eset.coordinates], axis=1)
+    weights = np.random.default_rng(seed).dirichlet(np.ones(eset.cells.shape[1]), len(eset.cells))
+    return np.einsum("ck,ckd->cd", weights, place[eset.cells])
+
+
+@few
+@given(st.tuples(st.integers(6, 10), st.integers(6, 10)), st.floats(0.004, 0.1))
+def test_cells_of_the_refined_sphere_are_within_the_accuracy(grid, accuracy):
+    """Distance from the unit sphere: | |x| − 1 |."""
+    eset = lifted(sphere(), Box(a=(-1.3, 1.2), b=(-1.5, 1.5)), grid)
+    fine = refined(eset, accuracy)
+    assert_faithful(fine)
+    assert_folds_are_singular(fine, 1e-8)
+    assert topology(fine) == topology(eset)
+    assert np.abs(np.linalg.norm(inside_cells(fine), axis=1) - 1.0).max() <= accuracy
+    assert fine.audit.deviation <= accuracy
+    equator = fine.coordinates[fine.kinds == 1]
+    np.testing.assert_allclose((equator**2).sum(axis=1), 1.0, rtol=1e-12)
+
+
+def test_number_of_vertices_grows_inversely_with_the_accuracy():
+    """Cells of size h deviate by h²: a hundredth of the deviation takes a hundred times the cells.
+
+    A quarter more or less for vertices that the lifted grid has in excess.
+    """
+    eset = lifted(sphere(), Box(a=(-1.3, 1.2), b=(-1.5, 1.5)), (7, 8))
+    coarse, fine = refined(eset, 0.02), refined(eset, 0.002)
+    assert len(fine.points) / len(coarse.points) == pytest.approx(10.0, rel=0.25)
+
+
+@pytest.mark.parametrize("accuracy", [0.1, 0.01])
+def test_refined_torus_keeps_its_topology_and_has_no_slivers(accuracy):
+    eset = lifted(torus(0.5), Box(a=(-1.7, 1.6), b=(-1.5, 1.5)), (12, 12))
+    fine = refined(eset, accuracy)
+    assert_faithful(fine)
+    assert topology(fine) == topology(eset)
+    assert fine.audit.smallest_angle > 15.0
+
+
+def test_folds_and_sides_of_the_box_carry_the_new_vertices_on_them():
+    """a = −3x², b = 2x³ on the fold of the cusp; the boundary stays on the box."""
+    eset = lifted(cusp(), Box(a=(-2, 1), b=(-3, 3)), (7, 8))
+    fine = refined(eset, 0.001)
+    assert_faithful(fine)
+    x, folded = fine.points.z[:, 0], fine.kinds == 1
+    assert folded.sum() > 2 * (eset.kinds == 1).sum()
+    np.testing.assert_allclose(fine.points["a"][folded], -3 * x[folded] ** 2, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(fine.points["b"][folded], 2 * x[folded] ** 3, rtol=0, atol=1e-9)
+    at = fine.folds[0]
+    a, b = fine.points["a"][at], fine.points["b"][at]
+    middle = 0.5 * (x[at][1:] + x[at][:-1])
+    off = np.hypot(0.5 * (a[1:] + a[:-1]) + 3 * middle**2, 0.5 * (b[1:] + b[:-1]) - 2 * middle**3)
+    assert off.max() < 0.001 * 2.0  # it is measured at the chord's x, not across the curve
+
+
+def test_constraints_carry_the_new_vertices_on_them():
+    """x² + a² = 2, a curve on the surface."""
+    round_ = Descriptor("x^2 + a^2", "1", lambda z, p: z[:, 0] ** 2 + p[:, 0] ** 2)
+    box = Box(a=(-2, 1), b=(-3, 3))
+    with unchecked():
+        eset = equilibrium_set(cusp(), box, within=[round_ <= 2], checks=0, intervals=(7, 8))
+    fine = refined(eset, 0.002)
+    assert_faithful(fine)
+    assert (fine.kinds == 2).sum() > 1.5 * (eset.kinds == 2).sum()
+    assert topology(fine) == topology(eset)
+
+
+def test_bead_on_a_circle_with_its_multiplier_is_refined():
+    eset = lifted(bead_on_a_circle(), Box(h=(-1.5, 1.4), g=(-1.3, 1.5)), (9, 9))
+    fine = refined(eset, 0.02)
+    assert_faithful(fine)
+    assert topology(fine) == topology(eset)
+    h, g = fine.coordinates[fine.kinds == 1].T
+    np.testing.assert_allclose(np.cbrt(h**2) + np.cbrt(g**2), 1.0, rtol=1e-8)
+
+
+def test_parabola_over_one_parameter_is_refined():
+    """x² = a: no segment is farther from the curve than asked for."""
+    eset = refine(lifted(fold_form(), Box(a=(-1, 1)), (5,)), 1e-3)
+    assert_faithful(eset)
+    x, a = inside_cells(eset).T
+    assert np.abs(a - x**2).max() < 2.5e-3  # the distance is less by the slope, √5 at most
+    assert eset.audit.smallest_angle == 0.0
+
+
+def test_refinement_is_deterministic():
+    eset = lifted(sphere(), Box(a=(-1.3, 1.2), b=(-1.5, 1.5)), (7, 8))
+    first, second = refined(eset, 0.05), refined(eset, 0.05)
+    assert np.array_equal(first.points.z, second.points.z)
+    assert np.array_equal(first.cells, second.cells)
+
+
+def test_accuracy_in_the_call_is_that_of_refine():
+    form, box = sphere(), Box(a=(-1.3, 1.2), b=(-1.5, 1.5))
+    with unchecked():
+        at_once = equilibrium_set(form, box, checks=0, intervals=(7, 8), accuracy=0.05)
+    later = refined(lifted(form, box, (7, 8)), 0.05)
+    assert np.array_equal(at_once.cells, later.cells)
+    assert at_once.audit.accuracy == 0.05
+
+
+@pytest.mark.parametrize("accuracy", [0.0, -1.0, np.nan, np.inf])
+def test_accuracy_must_be_positive(accuracy):
+    eset = lifted(fold_form(), Box(a=(-1, 1)), (3,))
+    with pytest.raises(InputError, match="`accuracy` must be positive"):
+        refine(eset, accuracy)
+
+
+@pytest.fixture(scope="module")
+def coarse() -> Fabric:
+    eset = lifted(torus(0.5), Box(a=(-1.7, 1.6), b=(-1.5, 1.5)), (12, 12))
+    setting = Setting(eset.structure, eset.points.p[0], np.array([0, 1]), ())
+    return fabric_of(setting, eset)
+
+
+def test_flips_keep_vertices_and_topology_and_widen_angles(coarse):
+    flipped = flip(coarse, passes=4)
+    assert len(flipped.cells) == len(coarse.cells)
+    assert euler_characteristic(flipped.cells) == euler_characteristic(coarse.cells)
+    assert set(np.unique(flipped.cells)) == set(np.unique(coarse.cells))
+    assert not np.array_equal(flipped.cells, coarse.cells)
+    assert_sides_are_known(flipped)
+
+
+def test_collapses_take_slivers_away_and_keep_the_topology(coarse):
+    less = collapse(flip(coarse, passes=4), passes=6)
+    assert len(less.cells) < len(coarse.cells)
+    assert euler_characteristic(less.cells) == euler_characteristic(coarse.cells)
+    assert smallest_angle(less) > 2 * smallest_angle(coarse)
+    assert_sides_are_known(less)
+    rest: Complex = less.complex()
+    assert len(np.unique(rest.cells)) == len(rest.points)
+
+
+def assert_sides_are_known(fabric: Fabric) -> None:
+    """Lengths that were carried along are those measured anew."""
+    place = fabric.vertices.place[fabric.cells]
+    for k, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
+        wanted = ((place[:, i] - place[:, j]) ** 2).sum(axis=1)
+        np.testing.assert_allclose(fabric.squared[:, k], wanted, rtol=1e-12)
