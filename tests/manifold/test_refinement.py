@@ -98,7 +98,7 @@ def test_folds_and_sides_of_the_box_carry_the_new_vertices_on_them():
 def test_constraints_carry_the_new_vertices_on_them():
     """x² + a² = 2, a curve on the surface."""
     round_ = Descriptor("x^2 + a^2", "1", lambda z, p: z[:, 0] ** 2 + p[:, 0] ** 2)
-    box = Box(a=(-2, 1), b=(-3, 3))
+    box = Box(a=(-2, 1), b=(-4, 4))
     with unchecked():
         eset = equilibrium_set(cusp(), box, within=[round_ <= 2], checks=0, intervals=(7, 8))
     fine = refined(eset, 0.002)

@@ -100,7 +100,7 @@ def follow(
     count = max(1, min(batching.threads or threads(), len(z) // LANES_PER_THREAD))
     queue = _Queue(len(z))
     ledger = _Ledger.of(z)
-    capacity = min(batching.capacity, -(-len(z) // count))
+    capacity = max(1, min(batching.capacity, -(-len(z) // count)))
     jobs = [
         _Job(Block(curve, constraints, options, capacity, EVENTS_AT_ONCE), queue, ledger, z)
         for _ in range(count)
