@@ -60,7 +60,7 @@ _HOMES = {
         "limit_load",
         "snap_landing",
     ),
-    "equimorph.manifold": ("Audit", "EquilibriumSet", "equilibrium_set"),
+    "equimorph.manifold": ("Audit", "EquilibriumSet", "SnapGraph", "equilibrium_set", "snap_graph"),
     "equimorph.tasks": (
         "CurvatureMap",
         "LimitLoadMap",

@@ -10,6 +10,7 @@ from equimorph.manifold.equilibrium_set import (
 )
 from equimorph.manifold.over import StatesOver, lift_to
 from equimorph.manifold.refinement import refine
+from equimorph.manifold.snap_graph import Snap, SnapGraph, snap_graph
 
 __all__ = [
     "INTERVALS",
@@ -17,9 +18,12 @@ __all__ = [
     "Boundary",
     "Component",
     "EquilibriumSet",
+    "Snap",
+    "SnapGraph",
     "StatesOver",
     "Stratum",
     "equilibrium_set",
     "lift_to",
     "refine",
+    "snap_graph",
 ]
