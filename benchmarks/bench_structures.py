@@ -15,6 +15,7 @@ from equimorph.structures import (
     Curvature,
     End,
     EnergyStructure,
+    Frame,
     LineLoad,
     PointForce,
     Rod,
@@ -74,12 +75,31 @@ def bridge(bars):
     )
 
 
+def ladder(unknowns):
+    """Bays of three inextensible members of 16 nodes, held at one end; one chord actuated."""
+    bays = round(unknowns / 49)
+    joints = {f"{row}{i}": (i, height) for i in range(bays + 1) for row, height in ("b0", "t1")}
+    joints = {name: (float(x), float(y)) for name, (x, y) in joints.items()}
+    pairs = []
+    for i in range(bays):
+        pairs += [(f"b{i}", f"b{i + 1}"), (f"t{i}", f"t{i + 1}"), (f"b{i + 1}", f"t{i + 1}")]
+    return Frame(
+        joints,
+        pairs,
+        {"b0": "fixed", "t0": "fixed"},
+        {"F": {f"t{bays}": (0.0, -1.0)}},
+        {"a": {"curvature": {"b0-b1": 1.0}}},
+    )
+
+
 @pytest.mark.parametrize("lanes", [100, 4096])
 @pytest.mark.parametrize(
-    "make", [chain, dense_energy, bridge], ids=["chain of 40", "dense 40", "truss of 40 bars"]
+    ("make", "size"),
+    [(chain, 40), (dense_energy, 40), (bridge, 40), (ladder, 300)],
+    ids=["chain of 40", "dense 40", "truss of 40 bars", "frame of 294"],
 )
-def bench_newton_step(benchmark, make, lanes):
-    structure = make(40)
+def bench_newton_step(benchmark, make, size, lanes):
+    structure = make(size)
     generator = np.random.default_rng(0)
     p = np.tile([parameter.default for parameter in structure.parameters], (lanes, 1))
     z = 0.1 * structure.sample(p, generator)

@@ -316,6 +316,14 @@ def test_descriptors_are_read_as_they_are_written():
     assert frame.descriptor("travel(P)") == portal(50.0).descriptor("travel(P)")
 
 
+def test_no_states_have_no_values():
+    frame = portal(50.0)
+    nothing = frame.natural_state().batch[:0]
+    for text in ("displacement(B,y)", "moment(C-F,C)", "max_curvature", "reaction(E,x)", "energy"):
+        assert frame.descriptor(text)(nothing).shape == (0,)
+    assert nothing.shape().shape[0] == len(nothing.error_estimate) == 0
+
+
 def test_the_largest_curvature_is_that_of_a_fine_frame():
     """Against 16 elements. 1e-6: interpolated between nodes of two elements of degree 8."""
     coarse, fine = (
@@ -328,6 +336,27 @@ def test_the_largest_curvature_is_that_of_a_fine_frame():
     one, two = loaded(coarse, q=20.0), loaded(fine, q=20.0)
     assert coarse.max_curvature(one) == pytest.approx(fine.max_curvature(two), rel=1e-6)
     assert coarse.moment("A-B", "B")(one) == pytest.approx(fine.moment("A-B", "B")(two), rel=1e-8)
+
+
+@pytest.mark.parametrize("degree", [4, 6, 8])
+def test_the_error_estimate_bounds_the_error(degree):
+    """Against elements of degree 14. Not more than a hundred times too large."""
+    frame, exact = (
+        Frame(
+            {"A": (0, 0), "B": (0, 1), "C": (1.3, 1)}, [("A", "B"), ("B", "C")],
+            {"A": "fixed", "C": "pinned"}, {"q": {"B-C": (0.2, -1)}}, degree=n,
+        )
+        for n in (degree, 14)
+    )  # fmt: skip
+    one, two = loaded(frame, q=12.0), loaded(exact, q=12.0)
+    unit = frame.model.length
+    errors = [
+        abs(frame.descriptor(text)(one) - exact.descriptor(text)(two)) / unit
+        for text in ("displacement(B,x)", "displacement(B,y)")
+    ]
+    errors.append(abs(frame.max_curvature(one) - exact.max_curvature(two)) * unit)
+    errors.append(abs(frame.rotation("A-B", "B")(one) - exact.rotation("A-B", "B")(two)))
+    assert max(errors) <= one.error_estimate <= max(100.0 * max(errors), 1e-11)
 
 
 # --- against a rod --------------------------------------------------------------------------------

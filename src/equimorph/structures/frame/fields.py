@@ -13,8 +13,10 @@ Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
 
-FINE = 41
-"""Places in each element between which an extremum of the curvature is interpolated."""
+FINE = 21
+"""Places in each element among which an extremum of the curvature is sought."""
+POLISHING = 5
+"""Newton iterations from there."""
 
 
 class FrameFields(FrameMechanics):
@@ -110,19 +112,34 @@ class FrameFields(FrameMechanics):
         change = -np.einsum("ij,lej->lei", model.mesh.reference.integral, density) * lengths
         gap = last - first - change[:, :, -1]
         inside = first[:, :, None] + change + gap[:, :, None] * model.mesh.reference.nodes
-        return np.asarray(inside.reshape(len(z), len(model.lengths), model.mesh.elements, -1))
+        return np.asarray(inside.reshape(len(z), *self._elements))
+
+    @property
+    def _elements(self) -> tuple[int, int, int]:
+        """Members, elements of each, and nodes of these."""
+        mesh = self.model.mesh
+        return len(self.model.lengths), mesh.elements, mesh.degree + 1
 
     def largest_curvatures(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes members"]:
-        """max |κ| in every member: of a fine grid, and of parabolas through its largest values."""
-        basis = legendre.legvander(np.linspace(-1.0, 1.0, FINE), self.model.mesh.degree)
-        matrix = basis @ self.model.mesh.reference.to_legendre
-        found = np.abs(np.einsum("ij,lmej->lmei", matrix, self.curvatures(z, p)))
-        left, middle, right = found[..., :-2], found[..., 1:-1], found[..., 2:]
-        bend = left - 2.0 * middle + right
-        peak = (bend < 0.0) & (middle >= left) & (middle >= right)
-        top = middle - (right - left) ** 2 / (8.0 * np.where(peak, bend, -1.0))
-        inner = np.where(peak, top, 0.0).max(axis=(2, 3))
-        return np.asarray(np.maximum(inner, found.max(axis=(2, 3))))
+        """max |κ| in every member: the largest value on a fine grid, polished in each element."""
+        to_legendre, degree = self.model.mesh.reference.to_legendre, self.model.mesh.degree
+        grid = np.linspace(-1.0, 1.0, FINE)
+        series = np.einsum("ij,lmej->lmei", to_legendre, self.curvatures(z, p))
+        values = np.abs(np.einsum("ij,lmej->lmei", legendre.legvander(grid, degree), series))
+        start = grid[values.argmax(axis=3)]
+        slope = np.pad(legendre.legder(np.eye(degree + 1)), ((0, 1), (0, 0)))
+        first = np.einsum("ij,lmej->lmei", slope, series)
+        second = np.einsum("ij,lmej->lmei", slope, first)
+        place, step = start, grid[1] - grid[0]
+        for _ in range(POLISHING):
+            basis = legendre.legvander(place, degree)
+            bend = (basis * second).sum(axis=3)
+            move = (basis * first).sum(axis=3) / np.where(bend == 0.0, np.inf, bend)
+            place = np.clip(
+                place - move, np.maximum(start - step, -1.0), np.minimum(start + step, 1.0)
+            )
+        polished = np.abs((legendre.legvander(place, degree) * series).sum(axis=3))
+        return np.asarray(np.maximum(polished, values.max(axis=3)).max(axis=2))
 
     def outline(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
@@ -130,9 +147,10 @@ class FrameFields(FrameMechanics):
         """Places along the members at shares of their lengths, moves of the joints included."""
         model, (psi, stretch) = self.model, self.stretches(z, p)
         matrix = model.mesh.integration(s)[:, : model.mesh.elements * model.mesh.degree + 1]
-        shape = (len(z), len(model.lengths), model.mesh.elements, -1)
+        shape = (len(z), *self._elements)
         angles = (model.directions + psi).reshape(shape)
         longer = stretch.reshape(shape)
+        count = model.mesh.elements * model.mesh.degree
         parts = []
         starts = (model.network.places[None] / model.length + self.displacements(z, p))[
             :, model.network.ends[:, 0]
@@ -140,7 +158,7 @@ class FrameFields(FrameMechanics):
         for axis, function in enumerate((np.cos, np.sin)):
             field = longer * function(angles)
             whole = np.concatenate(
-                [field[..., :-1].reshape(*shape[:2], -1), field[:, :, -1, -1:]], axis=2
+                [field[..., :-1].reshape(*shape[:2], count), field[:, :, -1, -1:]], axis=2
             )
             moved = np.einsum("ij,lmj->lmi", matrix, whole) * model.lengths[:, None]
             parts.append(starts[:, :, None, axis] + moved)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from jaxtyping import Float
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.frame import descriptors
+from equimorph.structures.frame.accuracy import discretisation_error
 from equimorph.structures.frame.checks import refuse_singular
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.model import FrameModel
@@ -156,6 +158,20 @@ class Frame(FrameFields):
     def natural_guess(self, p: Parameters) -> Lanes:
         """The frame as drawn."""
         return np.zeros((len(p), self.size))
+
+    @cached_property
+    def refined(self) -> "Frame":
+        """The same frame with elements of a degree higher by four."""
+        data = self.identity()
+        del data["kind"]
+        return Frame(**{**data, "degree": min(data["degree"] + 4, 16)})
+
+    def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+        """Bound of the errors of displacements, turns of ends and max |κ|, by a higher degree.
+
+        Displacements and curvature are relative to the mean length of the members.
+        """
+        return discretisation_error(self, self.refined, z, p)
 
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
