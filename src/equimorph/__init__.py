@@ -66,10 +66,12 @@ _HOMES = {
         "LimitLoadMap",
         "MapCurve",
         "Route",
+        "Shapes",
         "Tracking",
         "curvature_map",
         "limit_load_map",
         "plan",
+        "solve_shape",
         "track",
     ),
 }

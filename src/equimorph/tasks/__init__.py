@@ -12,6 +12,7 @@ from equimorph.tasks.maps import (
 )
 from equimorph.tasks.plan import plan
 from equimorph.tasks.route import Route
+from equimorph.tasks.shapes import Shapes, solve_shape
 from equimorph.tasks.tracking import Tracking, track
 
 __all__ = [
@@ -20,11 +21,13 @@ __all__ = [
     "LimitLoadMap",
     "MapCurve",
     "Route",
+    "Shapes",
     "Tracking",
     "curvature_map",
     "limit_load_map",
     "natural_states_over",
     "plan",
+    "solve_shape",
     "track",
     "unloaded_base",
 ]
