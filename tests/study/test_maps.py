@@ -14,7 +14,9 @@ from equimorph.study import run_study
 from equimorph.study.prepare import prepare
 from equimorph.study.problem import parse_study
 from studies import SPRING
+from typecheck import unchecked
 
+STRUCTURE = SPRING[: SPRING.index("[set]")]
 LIMIT = """
 [[map]]
 name = "limits"
@@ -41,7 +43,9 @@ def run(tmp_path_factory):
     """The spring study with both maps: its outcome, its file and its folder."""
     base = tmp_path_factory.mktemp("maps")
     (base / "spring.toml").write_text(SPRING + LIMIT + ANGLES)
-    return run_study(base / "spring.toml", base / "out"), base / "spring.toml", base / "out"
+    with unchecked():  # the layers below check themselves
+        outcome = run_study(base / "spring.toml", base / "out")
+    return outcome, base / "spring.toml", base / "out"
 
 
 def test_a_study_has_the_maps_that_it_asks_for(run):
@@ -106,10 +110,56 @@ def test_a_second_run_takes_maps_from_the_folder(run, monkeypatch):
     np.testing.assert_array_equal(again.maps[0].map.value, run[0].maps[0].map.value)
 
 
-def test_the_example_with_maps_is_sound():
+def test_the_example_asks_for_maps_alone():
     path = Path(__file__).parents[2] / "examples" / "maps.toml"
     problem = prepare(parse_study(path.read_text(encoding="utf-8"), path.name))
     assert [task.section.kind for task in problem.maps] == ["limit_load_map", "curvature_map"]
+    assert problem.equilibrium_set is None
+
+
+@pytest.fixture(scope="module")
+def maps_alone(tmp_path_factory):
+    """A study of one map, without a set: its outcome and its folder."""
+    base = tmp_path_factory.mktemp("alone")
+    (base / "limits.toml").write_text(STRUCTURE + LIMIT)
+    with unchecked():
+        return run_study(base / "limits.toml", base / "out"), base / "out"
+
+
+def test_maps_need_no_set(maps_alone, run):
+    """The same map as in a study with a set."""
+    outcome, out = maps_alone
+    assert outcome.equilibrium_set is None
+    names = {file.name for file in out.iterdir()}
+    ends = (".png", ".svg", ".csv", "-curves.csv")
+    ours = {"study.toml", "results.h5", "index.html", "equimorph.json", ".equimorph"}
+    assert names == ours | {f"limits-map{end}" for end in ends}
+    np.testing.assert_array_equal(outcome.maps[0].map.value, run[0].maps[0].map.value)
+
+
+def test_a_results_file_without_a_set_gives_its_maps_back(maps_alone):
+    outcome, out = maps_alone
+    stored = read_results(out / "results.h5")
+    assert stored.equilibrium_set is None
+    np.testing.assert_array_equal(stored.maps["limits"].value, outcome.maps[0].map.value)
+
+
+def test_the_page_without_a_set_says_what_was_asked(maps_alone):
+    page = (maps_alone[1] / "index.html").read_text(encoding="utf-8")
+    assert "x_l ∈ [0.5, 1.3] · k ∈ [0.5, 2]" in page
+    assert "Audit" not in page
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"must ask for something: a \[set\] or a \[\[map\]\]"),
+        (LIMIT + "[[equilibria]]\nat = { x_l = 1.0 }\n", r"must have a \[set\] in which its"),
+    ],
+)
+def test_what_needs_a_set_is_not_asked_for_without_one(text, message):
+    with pytest.raises(InputError, match=message):
+        parse_study(STRUCTURE + text, "spring.toml")
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,10 @@ def _prepare(text: str) -> Problem:
 
 def test_a_study_becomes_objects(arch_text: str):
     problem = _prepare(arch_text)
-    assert problem.box.names == ("Theta", "Delta")
-    assert [str(constraint) for constraint in problem.constraints] == ["max_curvature <= 20"]
+    assert problem.equilibrium_set.box.names == ("Theta", "Delta")
+    assert [str(constraint) for constraint in problem.equilibrium_set.constraints] == [
+        "max_curvature <= 20"
+    ]
     assert problem.tasks[0].constraints[0].bound == 20.0
 
 
@@ -31,7 +33,10 @@ def test_a_load_table_reaches_the_rod(arch_text: str):
 
 
 def test_a_study_without_intervals_takes_those_of_the_library(arch_text: str):
-    assert _prepare(arch_text.replace("intervals = [5, 9]", "")).intervals == INTERVALS[2]
+    assert (
+        _prepare(arch_text.replace("intervals = [5, 9]", "")).equilibrium_set.intervals
+        == INTERVALS[2]
+    )
 
 
 # What is changed in the study, and what the line must say.

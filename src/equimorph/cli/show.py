@@ -8,10 +8,12 @@ from rich.table import Table
 
 from equimorph.cli.compilation import are_compiled, compile_kernels
 from equimorph.cli.progress import ScreenProgress
-from equimorph.model import Descriptor
-from equimorph.structures import States
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Box, Descriptor, names_of
+from equimorph.structures import States, Structure
 from equimorph.study import Outcome, Problem, RouteOutcome, read_problem, run_study
-from equimorph.study.memory import amount, estimated_memory
+from equimorph.study.memory import amount, estimated_memory, intervals_of
+from equimorph.tasks import unloaded_base
 
 
 def check_and_show(file: Path) -> None:
@@ -24,11 +26,12 @@ def check_and_show(file: Path) -> None:
     """
     screen = Console(highlight=False)
     _, study, problem = read_problem(file)
-    points, routes = _count(len(study.equilibria), "point"), _count(len(study.routes), "route")
-    screen.print(
-        f"{escape(str(file))} is a sound study with {points} and {routes}.", soft_wrap=True
-    )
-    screen.print(_extent(problem), soft_wrap=True)
+    counts = {"point": len(study.equilibria), "route": len(study.routes), "map": len(study.maps)}
+    asked = [_count(number, word) for word, number in counts.items() if number]
+    what = " and ".join(asked) or "an equilibrium set"
+    screen.print(f"{escape(str(file))} is a sound study with {what}.", soft_wrap=True)
+    for line in _extents(problem):
+        screen.print(line, soft_wrap=True)
 
 
 def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
@@ -54,15 +57,34 @@ def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
     screen.print(f"Report: {out / 'index.html'}", soft_wrap=True)
 
 
-def _extent(problem: Problem) -> str:
-    """Every parameter with its values, also those that the study leaves at their defaults."""
-    box, known = problem.box, problem.structure.parameters
-    limits = zip(box.names, box.lower, box.upper, problem.intervals, strict=True)
+def _extents(problem: Problem) -> list[str]:
+    """Every parameter of the set and of each map with its values, also those at defaults."""
+    wanted, structure = problem.equilibrium_set, problem.structure
+    lines = []
+    if wanted is not None:
+        values = {
+            each.name: wanted.fixed.get(each.name, each.default) for each in structure.parameters
+        }
+        fixed = [
+            f"{name} = {value:g}" for name, value in values.items() if name not in wanted.box.names
+        ]
+        lines.append(_extent(structure, wanted.box, wanted.intervals, fixed))
+    for task in problem.maps:
+        grid, load = task.grid, task.section.load
+        base = unloaded_base(structure, grid, load, task.section.fixed).tolist()
+        start = dict(zip(names_of(structure.parameters), base, strict=True))
+        load_range = f"{load} from {start.pop(load):g} on"
+        fixed = [f"{name} = {value:g}" for name, value in start.items() if name not in grid.names]
+        words = _extent(structure, grid.box, intervals_of(task), [load_range, *fixed])
+        lines.append(f"Map {task.section.name}: {words}")
+    return lines
+
+
+def _extent(structure: Structure, box: Box, intervals: tuple[int, int], others: list[str]) -> str:
+    limits = zip(box.names, box.lower, box.upper, intervals, strict=True)
     free = [f"{name} from {low:g} to {up:g} in {n} intervals" for name, low, up, n in limits]
-    values = {each.name: problem.fixed.get(each.name, each.default) for each in known}
-    fixed = [f"{name} = {value:g}" for name, value in values.items() if name not in box.names]
-    memory = amount(estimated_memory(problem.structure.size, problem.intervals))
-    return f"{', '.join(free)}; {', '.join(fixed)}. Memory: about {memory}."
+    memory = amount(estimated_memory(structure.size, intervals))
+    return f"{', '.join(free)}; {', '.join(others)}. Memory: about {memory}."
 
 
 def _count(number: int, word: str) -> str:
@@ -70,14 +92,9 @@ def _count(number: int, word: str) -> str:
 
 
 def _show(outcome: Outcome, screen: Console) -> None:
-    eset, heights = outcome.equilibrium_set, outcome.problem.height
-    audit = "clean" if eset.audit.clean else "NOT CLEAN, see the report"
-    origin = "read from an earlier run" if outcome.reused else "computed"
-    pieces = "1 component" if len(eset.components) == 1 else f"{len(eset.components)} components"
-    screen.print(
-        f"Equilibrium set {origin}: {len(eset.points)} vertices, {pieces}, audit {audit}.",
-        soft_wrap=True,
-    )
+    heights = outcome.problem.height
+    if outcome.equilibrium_set is not None:
+        screen.print(_set_line(outcome.equilibrium_set, reused=outcome.reused), soft_wrap=True)
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):
         where = ", ".join(f"{name} = {value:g}" for name, value in point.items())
         screen.print(f"Equilibria at {where}:", soft_wrap=True)
@@ -87,6 +104,13 @@ def _show(outcome: Outcome, screen: Console) -> None:
     for amap in outcome.maps:
         counts = ", ".join(f"{count} {kind}" for kind, count in amap.map.counts.items() if count)
         screen.print(f"Map {amap.name}: {counts}.", soft_wrap=True)
+
+
+def _set_line(eset: EquilibriumSet, *, reused: bool) -> str:
+    audit = "clean" if eset.audit.clean else "NOT CLEAN, see the report"
+    origin = "read from an earlier run" if reused else "computed"
+    pieces = "1 component" if len(eset.components) == 1 else f"{len(eset.components)} components"
+    return f"Equilibrium set {origin}: {len(eset.points)} vertices, {pieces}, audit {audit}."
 
 
 def _table(heights: Descriptor, states: States) -> Table:

@@ -30,9 +30,12 @@ STRUCTURE = "structure"
 
 @dataclass(frozen=True)
 class Results:
-    """What a results file holds: a set, routes and maps by name, and equilibria over points."""
+    """What a results file holds: a set, routes and maps by name, and equilibria over points.
 
-    equilibrium_set: EquilibriumSet
+    Without a set there are maps only.
+    """
+
+    equilibrium_set: EquilibriumSet | None
     routes: dict[str, Route]
     equilibria: tuple[States, ...]
     maps: dict[str, ActuatorMap] = field(default_factory=dict)
@@ -40,20 +43,20 @@ class Results:
 
 def write_results(
     path: str | Path,
-    eset: EquilibriumSet,
+    eset: EquilibriumSet | None,
     height: Descriptor,
     routes: Mapping[str, Route] | None = None,
     equilibria: Sequence[States] = (),
     maps: Mapping[str, ActuatorMap] | None = None,
 ) -> Path:
-    """Write an equilibrium set and what was found on it, in one step.
+    """Write an equilibrium set and what was found on it, and maps, in one step.
 
     Parameters
     ----------
     path
         Name of the file.
     eset
-        The set.
+        The set; without one, there must be a map.
     height
         Coordinate after the free parameters in what ParaView shows.
     routes
@@ -66,14 +69,20 @@ def write_results(
     Raises
     ------
     InputError
-        If `path` cannot be written, or the structure has a callable and cannot be written down.
+        If `path` cannot be written, the structure has a callable and cannot be written down, or
+        there is neither a set nor a map.
     """
-    identity = eset.structure.identity()
+    described: list[EquilibriumSet | ActuatorMap] = [] if eset is None else [eset]
+    described += (maps or {}).values()
+    if not described:
+        raise InputError("`eset` must be an equilibrium set where there is no map; got none.")
+    identity = described[0].structure.identity()
 
     def fill(file: h5py.File) -> None:
         put_json(file, STRUCTURE, identity)
-        set_group.write(file.create_group(SET), eset, height)
-        link_grid(file, file[SET], eset.cells.shape[1])
+        if eset is not None:
+            set_group.write(file.create_group(SET), eset, height)
+            link_grid(file, file[SET], eset.cells.shape[1])
         _add(file, routes or {}, equilibria, maps or {})
 
     return write_bytes(Path(path), content(FORMAT, VERSION, fill))
@@ -183,7 +192,7 @@ def read_results(path: str | Path) -> Results:
     """
     with opened(Path(path), FORMAT, VERSION) as file:
         structure = from_identity(get_json(file, STRUCTURE))
-        eset = set_group.read(file[SET], structure)
+        eset = set_group.read(file[SET], structure) if SET in file else None
         names = list(file[ROUTES]) if ROUTES in file else []
         routes = {name: route_group.read(file[ROUTES][name], structure) for name in names}
         count = len(file[EQUILIBRIA]) if EQUILIBRIA in file else 0

@@ -8,6 +8,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 
 from equimorph import plotting
+from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
 from equimorph.study.folder import ResultsFolder
 from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE, map_files, route_figures
@@ -45,7 +46,13 @@ def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) ->
 
 
 def _figures(outcome: Outcome) -> list[Figure]:
-    eset, arrived = outcome.equilibrium_set, [each for each in outcome.routes if each.arrived]
+    eset = outcome.equilibrium_set
+    of_set = [] if eset is None else _figures_of_set(outcome, eset)
+    return [*of_set, *(_figure_of_map(each) for each in outcome.maps)]
+
+
+def _figures_of_set(outcome: Outcome, eset: EquilibriumSet) -> list[Figure]:
+    arrived = [each for each in outcome.routes if each.arrived]
     first = arrived[0].route if arrived else None
     height = outcome.problem.height
     figures = [
@@ -56,8 +63,8 @@ def _figures(outcome: Outcome) -> list[Figure]:
     if not outcome.routes:
         figures.append(_still(PLANE, partial(plotting.parameter_plane, eset)))
     for each in outcome.routes:
-        figures += _figures_of_route(outcome, each)
-    return [*figures, *(_figure_of_map(each) for each in outcome.maps)]
+        figures += _figures_of_route(eset, each)
+    return figures
 
 
 def _figure_of_map(each: MapOutcome) -> Figure:
@@ -70,8 +77,8 @@ def _figure_of_map(each: MapOutcome) -> Figure:
     return _still(map_files(each.name), draw)
 
 
-def _figures_of_route(outcome: Outcome, each: RouteOutcome) -> list[Figure]:
-    names, route, eset = route_figures(each.name), each.route, outcome.equilibrium_set
+def _figures_of_route(eset: EquilibriumSet, each: RouteOutcome) -> list[Figure]:
+    names, route = route_figures(each.name), each.route
     plane = _still(names.plane, partial(plotting.parameter_plane, eset, route))
     if not each.arrived:
         return [plane]
@@ -79,7 +86,7 @@ def _figures_of_route(outcome: Outcome, each: RouteOutcome) -> list[Figure]:
         plane,
         _still(names.shapes, partial(plotting.shapes, route)),
         _still(names.margins, partial(plotting.margins, route)),
-        Figure((names.film,), lambda folder: _draw_film(outcome, each, folder)),
+        Figure((names.film,), lambda folder: _draw_film(eset, each, folder)),
     ]
 
 
@@ -90,6 +97,6 @@ def _still(name: str, draw: Callable[[], Axes]) -> Figure:
     return Figure((f"{name}.png", f"{name}.svg"), into)
 
 
-def _draw_film(outcome: Outcome, each: RouteOutcome, folder: Path) -> None:
+def _draw_film(eset: EquilibriumSet, each: RouteOutcome, folder: Path) -> None:
     path = folder / route_figures(each.name).film
-    plotting.film(each.route, path, eset=outcome.equilibrium_set)
+    plotting.film(each.route, path, eset=eset)

@@ -7,7 +7,7 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.model import Progress
-from equimorph.study.prepare import Problem
+from equimorph.study.prepare import MapTask, Problem
 
 PROGRAM = 550e6
 """Bytes of libraries, compiled kernels, and the frames of a film."""
@@ -55,24 +55,30 @@ def check_memory(problem: Problem) -> float:
     InputError
         If there is less: with what is needed, what there is, and what to reduce.
     """
-    needed = estimated_memory(problem.structure.size, problem.intervals)
-    available = available_memory()
-    for task in problem.maps:
-        count = (task.grid.intervals[0], task.grid.intervals[1])
-        wanted = estimated_memory(problem.structure.size, count)
-        if wanted > available:
+    available, most = available_memory(), 0.0
+    for key, intervals in _grids(problem).items():
+        needed = estimated_memory(problem.structure.size, intervals)
+        most = max(most, needed)
+        if needed > available:
             raise InputError(
-                f"`{task.key}.intervals` must fit into memory; got {list(count)}, for which about "
-                f"{amount(wanted)} are needed and {amount(available)} are available. "
-                f"Reduce `{task.key}.intervals`."
+                f"`{key}.intervals` must fit into memory; got {list(intervals)}, for which about "
+                f"{amount(needed)} are needed and {amount(available)} are available. "
+                f"Reduce `{key}.intervals`."
             )
-    if needed > available:
-        raise InputError(
-            f"`set.intervals` must fit into memory; got {list(problem.intervals)}, for which about "
-            f"{amount(needed)} are needed and {amount(available)} are available. "
-            "Reduce `set.intervals`."
-        )
-    return needed
+    return most
+
+
+def intervals_of(task: MapTask) -> tuple[int, int]:
+    """Intervals of a map's grid."""
+    first, second = task.grid.intervals
+    return first, second
+
+
+def _grids(problem: Problem) -> dict[str, tuple[int, int]]:
+    """Intervals of the set's grid and of those of maps, by their key in the study file."""
+    wanted = problem.equilibrium_set
+    of_set = {} if wanted is None else {"set": wanted.intervals}
+    return {**of_set, **{task.key: intervals_of(task) for task in problem.maps}}
 
 
 class MemoryWatch:
@@ -95,8 +101,8 @@ class MemoryWatch:
         if available < RESERVE:
             raise InputError(
                 f"the study must fit into memory; got {amount(available)} left while {stage}. "
-                "Reduce `set.intervals` or `set.box`, or tighten `set.within`; what is finished "
-                "is kept."
+                "Reduce `intervals` or `box`, or tighten `within`, of the set or map; what is "
+                "finished is kept."
             )
         self._sink.report(stage, done, total)
 

@@ -51,7 +51,7 @@ class Outcome:
     study, problem
         What was asked.
     equilibrium_set
-        The set in the box.
+        The set in the box, if it was asked for.
     points
         Equilibria at each wanted point, in the order of the file.
     routes
@@ -66,7 +66,7 @@ class Outcome:
 
     study: Study
     problem: Problem
-    equilibrium_set: EquilibriumSet
+    equilibrium_set: EquilibriumSet | None
     points: tuple[States, ...]
     routes: tuple[RouteOutcome, ...]
     maps: tuple[MapOutcome, ...]

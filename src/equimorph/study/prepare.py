@@ -46,14 +46,21 @@ class MapTask:
 
 
 @dataclass(frozen=True)
-class Problem:
-    """A study whose names all mean something."""
+class SetTask:
+    """The part of the equilibrium set that is wanted, as objects."""
 
-    structure: Structure
     box: Box
     fixed: dict[str, float]
     constraints: tuple[Constraint, ...]
     intervals: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A study whose names all mean something."""
+
+    structure: Structure
+    equilibrium_set: SetTask | None
     points: tuple[dict[str, float], ...]
     tasks: tuple[Task, ...]
     maps: tuple[MapTask, ...]
@@ -75,27 +82,35 @@ def prepare(study: Study) -> Problem:
         For a parameter or descriptor that the structure does not have, a value without meaning, or
         a point outside the box; the line names the key.
     """
-    wanted = study.equilibrium_set
     with at_key("structure"):
         structure = build_structure(study.structure)
+    wanted = study.equilibrium_set
+    extent = None if wanted is None else _set_task(structure, wanted)
+    points: tuple[dict[str, float], ...] = ()
+    tasks: tuple[Task, ...] = ()
+    if extent is not None:
+        for i, point in enumerate(study.equilibria):
+            check_point(extent.box, point.at, f"equilibria[{i}].at")
+        points = tuple(point.at for point in study.equilibria)
+        tasks = tuple(_task(structure, extent.box, each, i) for i, each in enumerate(study.routes))
+    return Problem(
+        structure=structure,
+        equilibrium_set=extent,
+        points=points,
+        tasks=tasks,
+        maps=tuple(_map_task(structure, each, i) for i, each in enumerate(study.maps)),
+        height=structure.elevation,
+    )
+
+
+def _set_task(structure: Structure, wanted: SetSection) -> SetTask:
     with at_key("set.box"):
         box = Box(**{name: (bounds[0], bounds[1]) for name, bounds in wanted.box.items()})
         for name, corner in zip(box.names * 2, [*box.lower, *box.upper], strict=True):
             _check_value(structure, name, corner)
     _check_fixed(structure, box, wanted.fixed)
-    for i, point in enumerate(study.equilibria):
-        check_point(box, point.at, f"equilibria[{i}].at")
-    return Problem(
-        structure=structure,
-        box=box,
-        fixed=wanted.fixed,
-        constraints=_bounds(structure, wanted.within),
-        intervals=_intervals(wanted),
-        points=tuple(point.at for point in study.equilibria),
-        tasks=tuple(_task(structure, box, route, i) for i, route in enumerate(study.routes)),
-        maps=tuple(_map_task(structure, each, i) for i, each in enumerate(study.maps)),
-        height=structure.elevation,
-    )
+    constraints = _bounds(structure, wanted.within)
+    return SetTask(box, wanted.fixed, constraints, _intervals(wanted))
 
 
 def build_structure(section: StructureSection) -> Structure:

@@ -1,7 +1,8 @@
 """Study files: what a user may write, checked before anything is computed.
 
-A study is data only. It names a structure, a part of its equilibrium set, points whose equilibria
-are wanted, and routes between states. Types are strict and unknown keys are refused.
+A study is data only. It names a structure and what is wanted: a part of its equilibrium set, with
+equilibria at points and routes between states, or maps over actuators, or both. Types are strict
+and unknown keys are refused.
 """
 
 from pathlib import Path
@@ -368,7 +369,7 @@ class Study(_Section):
 
     title: str | None = None
     structure: StructureSection
-    equilibrium_set: SetSection = Field(alias="set")
+    equilibrium_set: SetSection | None = Field(default=None, alias="set")
     equilibria: list[PointSection] = Field(default_factory=list)
     routes: list[RouteSection] = Field(default_factory=list, alias="route")
     maps: list[MapSection] = Field(default_factory=list, alias="map")
@@ -380,6 +381,15 @@ class Study(_Section):
             raise _requirement("give every route a name of its own")
         if len({each.name for each in self.maps}) < len(self.maps):
             raise _requirement("give every map a name of its own")
+        return self
+
+    @model_validator(mode="after")
+    def _asks_for_something(self) -> "Study":
+        if self.equilibrium_set is None:
+            if self.equilibria or self.routes:
+                raise _requirement("have a [set] in which its equilibria and routes are")
+            if not self.maps:
+                raise _requirement("ask for something: a [set] or a [[map]]")
         return self
 
 

@@ -1,5 +1,6 @@
 """The page that shows a study's answers: offline, in one file."""
 
+from collections.abc import Mapping
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -7,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.model import Descriptor
+from equimorph.manifold import Audit
+from equimorph.model import Box, Constraint, Descriptor
 from equimorph.structures import States
 from equimorph.study import html
 from equimorph.study.names import (
@@ -46,24 +48,29 @@ def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
         body += _map(amap, folder)
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):
         body += _equilibria(point, states, _shown_descriptors(outcome.problem))
-    body += _set(outcome, folder)
+    if outcome.equilibrium_set is not None:
+        body += _set(outcome, outcome.equilibrium_set.audit, folder)
     body += ["<h2>Study</h2>", f"<pre>{escape(text.strip())}</pre>", _colophon(outcome)]
     return html.page(title, body)
 
 
 def _question(problem: Problem) -> str:
-    box = problem.box
+    words = [problem.structure.kind]
+    if problem.equilibrium_set is not None:
+        wanted = problem.equilibrium_set
+        words += _extent(wanted.box, wanted.fixed, wanted.constraints)
+    return f'<p class="lead">{escape(" · ".join(words))}</p>'
+
+
+def _extent(box: Box, fixed: Mapping[str, float], constraints: tuple[Constraint, ...]) -> list[str]:
+    """Ranges, values and bounds in words."""
     ranges = [
         f"{name} ∈ [{html.number(low)}, {html.number(high)}]"
         for name, low, high in zip(box.names, box.lower, box.upper, strict=True)
     ]
-    caps = [str(cap).replace("<=", "≤").replace(">=", "≥") for cap in problem.constraints]
-    fixed = [f"{name} = {html.number(value)}" for name, value in problem.fixed.items()]
-    caps = [
-        str(constraint).replace("<=", "≤").replace(">=", "≥") for constraint in problem.constraints
-    ]
-    words = escape(" · ".join([problem.structure.kind, *ranges, *fixed, *caps]))
-    return f'<p class="lead">{words}</p>'
+    values = [f"{name} = {html.number(value)}" for name, value in fixed.items()]
+    caps = [str(each).replace("<=", "≤").replace(">=", "≥") for each in constraints]
+    return [*ranges, *values, *caps]
 
 
 def _route(each: RouteOutcome, folder: Path) -> list[str]:
@@ -97,8 +104,10 @@ def _map(each: MapOutcome, folder: Path) -> list[str]:
     if section.at is not None:
         what = f"States at {section.load} = {html.number(section.at)}"
         caption = "The first stable state on each path; dots: a real loading snaps on the way."
+    extent = _extent(each.map.grid.box, each.map.fixed, each.map.within)
     return [
         f"<h2>Map {escape(each.name)}</h2>",
+        f'<p class="lead">{escape(" · ".join(extent))}</p>',
         f"<p>{escape(what)} at {each.map.value.size} settings: {escape(', '.join(counts))}.</p>",
         f'<div class="figures">{_still(folder, files, caption)}</div>',
         f'<p>Tables: <a href="{files}.csv">{files}.csv</a> (settings) and '
@@ -121,7 +130,8 @@ def _still(folder: Path, name: str, caption: str) -> str:
 
 def _shown_descriptors(problem: Problem) -> list[Descriptor]:
     """Descriptors that the study speaks of, each once."""
-    bounded = [constraint.descriptor for constraint in problem.constraints]
+    wanted = problem.equilibrium_set
+    bounded = [] if wanted is None else [each.descriptor for each in wanted.constraints]
     return list({each.name: each for each in [problem.height, *bounded]}.values())
 
 
@@ -160,8 +170,7 @@ def _numbers(values: Float[np.ndarray, " lanes"]) -> list[str]:
     return [html.number(value) for value in values]
 
 
-def _set(outcome: Outcome, folder: Path) -> list[str]:
-    audit = outcome.equilibrium_set.audit
+def _set(outcome: Outcome, audit: Audit, folder: Path) -> list[str]:
     word = "clean" if audit.clean else "not clean: do not rely on the set where it says so"
     pictures = [
         html.figure(

@@ -22,7 +22,7 @@ from equimorph.study.maps import answered_map
 from equimorph.study.memory import MemoryWatch, check_memory
 from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, map_files, schedule_table
 from equimorph.study.outcome import Outcome, RouteOutcome
-from equimorph.study.prepare import Problem, Task, at_key, prepare
+from equimorph.study.prepare import Problem, SetTask, Task, at_key, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
 from equimorph.study.report import report
 from equimorph.tasks import plan
@@ -109,17 +109,21 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
     """
     seconds: dict[str, float] = {}
     answers = Checkpoints(folder, problem.structure)
-    with _timed(seconds, "equilibrium set"):
-        eset = _equilibrium_set(study, problem, answers, progress)
-    reused = bool(answers.found)
-    with _timed(seconds, "equilibria"):
-        points = tuple(_equilibria(study, eset, point, answers) for point in problem.points)
-    routes = []
-    for i, task in enumerate(problem.tasks):
-        progress.report("routes", i, len(problem.tasks))
-        with _timed(seconds, f"route {task.section.name}"):
-            routes.append(_route(study, problem, eset, task, answers))
-    progress.report("routes", len(routes), len(routes))
+    eset: EquilibriumSet | None = None
+    reused = False
+    points: tuple[States, ...] = ()
+    routes: list[RouteOutcome] = []
+    if problem.equilibrium_set is not None:
+        with _timed(seconds, "equilibrium set"):
+            eset = _equilibrium_set(study, problem, problem.equilibrium_set, answers, progress)
+        reused = bool(answers.found)
+        with _timed(seconds, "equilibria"):
+            points = tuple(_equilibria(study, eset, point, answers) for point in problem.points)
+        for i, task in enumerate(problem.tasks):
+            progress.report("routes", i, len(problem.tasks))
+            with _timed(seconds, f"route {task.section.name}"):
+                routes.append(_route(study, problem, eset, task, answers))
+        progress.report("routes", len(routes), len(routes))
     maps = []
     for map_task in problem.maps:
         with _timed(seconds, f"map {map_task.section.name}"):
@@ -135,16 +139,16 @@ def _set_question(study: Study) -> dict[str, Any]:
 
 
 def _equilibrium_set(
-    study: Study, problem: Problem, answers: Checkpoints, progress: Progress
+    study: Study, problem: Problem, wanted: SetTask, answers: Checkpoints, progress: Progress
 ) -> EquilibriumSet:
     def compute() -> EquilibriumSet:
         with at_key("set"):
             return equilibrium_set(
                 problem.structure,
-                problem.box,
-                fixed=problem.fixed,
-                within=problem.constraints,
-                intervals=problem.intervals,
+                wanted.box,
+                fixed=wanted.fixed,
+                within=wanted.constraints,
+                intervals=wanted.intervals,
                 progress=progress,
             )
 
