@@ -1,5 +1,11 @@
 """Shape-control tasks."""
 
+from equimorph.tasks.calibration import (
+    Calibration,
+    MeasuredShape,
+    MeasuredValues,
+    calibrate,
+)
 from equimorph.tasks.maps import (
     ActuatorMap,
     CurvatureMap,
@@ -17,12 +23,16 @@ from equimorph.tasks.tracking import Tracking, track
 
 __all__ = [
     "ActuatorMap",
+    "Calibration",
     "CurvatureMap",
     "LimitLoadMap",
     "MapCurve",
+    "MeasuredShape",
+    "MeasuredValues",
     "Route",
     "Shapes",
     "Tracking",
+    "calibrate",
     "curvature_map",
     "limit_load_map",
     "natural_states_over",

@@ -1,0 +1,141 @@
+"""What was measured: descriptors or shapes, with standard deviations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from equimorph.errors import InputError
+from equimorph.model import Descriptor
+from equimorph.structures import States, Structure
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Columns = Float[np.ndarray, "lanes columns"]
+
+STEP = 1e-3
+"""Of differences along a direction of length one: fourth order, so that they err by 1e-12."""
+WEIGHTS = ((1.0, 8.0 / 12.0), (-1.0, -8.0 / 12.0), (2.0, -1.0 / 12.0), (-2.0, 1.0 / 12.0))
+
+
+@runtime_checkable
+class Measurement(Protocol):
+    """Measured numbers, some for each state, and how to compute them."""
+
+    def table(self, start: States) -> tuple[Columns, Columns | None]:
+        """Measured numbers and standard deviations; `InputError` if they do not fit the states."""
+
+    def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
+        """Return what a measurement without errors would give."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredValues:
+    """Measured values of a descriptor, one for each state; not a number where there is none.
+
+    Parameters
+    ----------
+    descriptor
+        What was measured, in its unit.
+    values
+        One per state.
+    sigma
+        Standard deviation of the errors, one for all states or one for each; all measurements of a
+        calibration have one, or none has.
+    """
+
+    descriptor: Descriptor
+    values: ArrayLike
+    sigma: ArrayLike | None = None
+
+    def table(self, start: States) -> tuple[Columns, Columns | None]:
+        """Measured numbers and standard deviations."""
+        name, shape = f"values of {self.descriptor.name}", (len(start), 1)
+        values = _fitting(name, np.atleast_1d(self.values), (len(start),)).reshape(shape)
+        return values, _deviations(self.sigma, shape, 1)
+
+    def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
+        """Return the values of the descriptor."""
+        del structure
+        return np.asarray(self.descriptor.function(z, p)[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredShape:
+    """Measured points of the shape, the same material points in each state.
+
+    Parameters
+    ----------
+    points
+        Coordinates (states, points, 2) in the structure's unit of length; not a number where there
+        is none.
+    s
+        Places of the points along the structure; None for those that the structure draws.
+    sigma
+        Standard deviation of both coordinates, one for all, or one for each state or point
+        (states, points, 2).
+    """
+
+    points: ArrayLike
+    s: Sequence[float] | None = None
+    sigma: ArrayLike | None = None
+
+    def table(self, start: States) -> tuple[Columns, Columns | None]:
+        """Measured numbers and standard deviations."""
+        drawn = start.shape(self._places).shape
+        points = _fitting("points of the shape", np.asarray(self.points), drawn)
+        return points.reshape(len(start), -1), _deviations(self.sigma, drawn, 3)
+
+    def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
+        """Return the coordinates of the points."""
+        return structure.shape(z, p, self._places).reshape(len(z), -1)
+
+    @property
+    def _places(self) -> Float[np.ndarray, " points"] | None:
+        return None if self.s is None else np.asarray(self.s, float)
+
+
+def derivative(
+    measurement: Measurement, structure: Structure, at: tuple[Lanes, Parameters], along: Lanes,
+    dp: Parameters,
+) -> Columns:  # fmt: skip
+    """Derivative of what is measured along directions (dz, dp), by differences of fourth order."""
+    z, p = at
+    squared = along[:, : structure.unknowns] ** 2 @ structure.mass
+    length = np.sqrt(squared + ((dp / structure.scales) ** 2).sum(axis=1))
+    h = (STEP / np.maximum(length, 1e-300))[:, None]
+    total = sum(
+        weight * measurement.predicted(structure, z + steps * h * along, p + steps * h * dp)
+        for steps, weight in WEIGHTS
+    )
+    return np.asarray(total / h)
+
+
+def _fitting(name: str, given: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    if given.shape != shape:
+        raise InputError(f"`{name}` must have the shape {shape}, states first; got {given.shape}.")
+    numbers = np.asarray(given, float)
+    if np.isinf(numbers).any():
+        raise InputError(f"`{name}` must be finite numbers, or nan where there is none; got inf.")
+    return numbers
+
+
+def _deviations(sigma: ArrayLike | None, shape: tuple[int, ...], axes: int) -> Columns | None:
+    if sigma is None:
+        return None
+    given = np.asarray(sigma, float)
+    if given.ndim == 1 and axes > 1:
+        given = given[:, None, None]
+    if given.ndim == 1:
+        given = given[:, None]
+    if not (given > 0.0).all() or not np.isfinite(given).all():
+        raise InputError(f"`sigma` must be positive and finite; got {sigma!r}.")
+    try:
+        return np.broadcast_to(given, shape).reshape(shape[0], -1)
+    except ValueError as error:
+        raise InputError(
+            f"`sigma` must be one number, or have one per state; got the shape {given.shape}."
+        ) from error
