@@ -203,3 +203,9 @@ def test_the_same_results_give_the_same_file(spring_set: EquilibriumSet, tmp_pat
     angle = spring_set.structure.descriptor("angle")
     files = [write_results(tmp_path / name, spring_set, angle) for name in ("a.h5", "b.h5")]
     assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_a_file_needs_a_set_or_a_map(spring_set: EquilibriumSet, tmp_path: Path):
+    angle = spring_set.structure.descriptor("angle")
+    with pytest.raises(InputError, match="`eset` must be an equilibrium set where there is no map"):
+        write_results(tmp_path / "results.h5", None, angle)

@@ -50,10 +50,15 @@ def march() -> None:
 
 def evaluate(problem: Problem) -> None:
     """Evaluate everything that the structure of a study knows of one state."""
-    structure = problem.structure
+    structure, wanted = problem.structure, problem.equilibrium_set
+    if wanted is not None:
+        box, fixed, constraints = wanted.box, wanted.fixed, wanted.constraints
+    else:
+        task = problem.maps[0]
+        box, fixed, constraints = task.grid.box, task.section.fixed, task.constraints
     values = {each.name: each.default for each in structure.parameters}
-    values |= dict(zip(problem.box.names, (problem.box.lower + problem.box.upper) / 2, strict=True))
-    values |= problem.fixed | dict(structure.unloaded())
+    values |= dict(zip(box.names, (box.lower + box.upper) / 2, strict=True))
+    values |= fixed | dict(structure.unloaded())
     p = np.array([[values[each.name] for each in structure.parameters]])
     z, _ = structure.natural(p)
     zero, one = np.zeros(1), np.ones_like(p)
@@ -64,5 +69,5 @@ def evaluate(problem: Problem) -> None:
     structure.resolved(z, p)
     structure.error_estimate(z, p)
     structure.shape(z, p)
-    for each in (problem.height, *(limit.descriptor for limit in problem.constraints)):
+    for each in (problem.height, *(limit.descriptor for limit in constraints)):
         each.function(z, p)

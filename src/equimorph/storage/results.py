@@ -156,9 +156,12 @@ def load_set(path: str | Path) -> EquilibriumSet:
     Raises
     ------
     InputError
-        If it is missing, no results file, newer than this release, truncated or damaged.
+        If it is missing, no results file, newer than this release, truncated, damaged, or without
+        a set.
     """
     with opened(Path(path), FORMAT, VERSION) as file:
+        if SET not in file:
+            raise InputError(f"`{path}` must hold an equilibrium set; got a file without one.")
         return set_group.read(file[SET], from_identity(get_json(file, STRUCTURE)))
 
 

@@ -15,8 +15,9 @@ K, OFFSET = 1.3, 0.02
 LENGTHS, FORCES = np.meshgrid([1.15, 1.3, 1.5], [-0.2, 0.1, 0.3], indexing="ij")
 
 
-@pytest.fixture(autouse=True)
-def _without_checks_of_shapes():
+@pytest.fixture
+def quick():
+    """Without checks of shapes, which the tests of few small states make."""
     with unchecked():
         yield
 
@@ -83,12 +84,13 @@ def test_the_jacobian_is_that_of_the_equilibria(nominal):
     np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.usefixtures("quick")
 def test_the_covariance_is_that_of_repeated_fits(nominal, angles):
     """Normalised errors of k unknowns have the mean square k: variance 2 k over the trials.
 
-    Tolerance: four standard deviations, and 25 % on the variances (200 trials: 10 % each).
+    Tolerance: four standard deviations, and 40 % on the variances (120 trials: 13 % each).
     """
-    generator, sigma, trials = np.random.default_rng(1), 1e-3, 200
+    generator, sigma, trials = np.random.default_rng(1), 1e-3, 120
     errors, squares = [], []
     for _ in range(trials):
         fit = _fit(nominal, angles + sigma * generator.standard_normal(9), sigma)
@@ -98,9 +100,10 @@ def test_the_covariance_is_that_of_repeated_fits(nominal, angles):
     mean = np.mean(squares, axis=0)
     assert mean[0] == pytest.approx(2.0, abs=4.0 * np.sqrt(2.0 * 2.0 / trials))
     assert mean[1] == pytest.approx(7.0, abs=4.0 * np.sqrt(2.0 * 7.0 / trials))
-    np.testing.assert_allclose(np.cov(np.transpose(errors)), fit.covariance, rtol=0.25, atol=0)
+    np.testing.assert_allclose(np.cov(np.transpose(errors)), fit.covariance, rtol=0.4, atol=0)
 
 
+@pytest.mark.usefixtures("quick")
 def test_without_deviations_the_scatter_gives_the_covariance(nominal, angles):
     """(JᵀJ)⁻¹ Σ r²/(m − k): the covariance with σ times χ²/(m − k)."""
     noisy = angles + 1e-3 * np.random.default_rng(2).standard_normal(9)
@@ -117,6 +120,7 @@ def test_missing_values_do_not_count(nominal, angles):
     assert fit.freedom == 5
 
 
+@pytest.mark.usefixtures("quick")
 def test_stiffness_and_offsets_of_an_arch_from_its_shape():
     """Of a dimensionless rod the stiffness is the inverse of the gain of its load."""
     arch, places = Rod(), np.linspace(0.1, 0.9, 9)
@@ -141,6 +145,7 @@ def test_stiffness_and_offsets_of_an_arch_from_its_shape():
     assert (fit.states.index == 0).all()
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_fit_stays_on_its_branch(angles):
     """The arch upright and inverted: both give the load's gain, each from its own side."""
     arch = Rod()
@@ -153,8 +158,9 @@ def test_a_fit_stays_on_its_branch(angles):
     assert (rise(fit.states) > 0.2).all()
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_truss_tells_how_wrong_its_actuators_are():
-    bars = [Bar("A", "B"), Bar("B", "C")]
+    bars = [Bar(("A", "B")), Bar(("B", "C"))]
     joints = {"A": (-1.0, 0.0), "B": (0.0, 0.3), "C": (1.0, 0.0)}
     truss = Truss(
         joints, bars, {"A": "xy", "C": "xy"},
@@ -170,6 +176,7 @@ def test_a_truss_tells_how_wrong_its_actuators_are():
     np.testing.assert_allclose(fit.values, [0.004, -0.002], atol=1e-9)
 
 
+@pytest.mark.usefixtures("quick")
 def test_what_the_measurements_do_not_tell_is_named(nominal, angles):
     """Angles depend on F/k only."""
     angle = nominal.structure.descriptor("angle")
@@ -180,6 +187,7 @@ def test_what_the_measurements_do_not_tell_is_named(nominal, angles):
     assert np.isnan(fit.covariance).all()
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_fit_beyond_a_fold_is_refused():
     """With x_l = 0.8 the spring snaps at F/k = (1 − 0.8^⅔)^{3/2} = 0.0509 and δ = 0.3801."""
     spring = Spring()
@@ -193,6 +201,7 @@ def test_a_fit_beyond_a_fold_is_refused():
     assert fit.states.index[0] == 0
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_parameter_keeps_its_meaning(nominal):
     """Stiffer than infinitely stiff: k runs to 0 or away for angles of the wrong sign."""
     angle = nominal.structure.descriptor("angle")
@@ -220,6 +229,7 @@ def test_a_parameter_keeps_its_meaning(nominal):
         ({"k": "value"}, np.zeros(9), np.ones(4), "`sigma` must be one number, or have one per"),
     ],
 )
+@pytest.mark.usefixtures("quick")
 def test_wrong_input_is_named(unknown, values, sigma, message, nominal):
     measured = MeasuredValues(nominal.structure.descriptor("angle"), values, sigma)
     with pytest.raises(InputError) as error:

@@ -111,7 +111,7 @@ class Branch:
         if len(near):
             z[near], found = newton(structure, z[near], p[near])
             if not found.all():
-                self.failure = ("lost", f"Newton's method fails in state {near[~found][0]}")
+                self._note("lost", int(near[~found][0]))
                 return None
         lanes = np.flatnonzero(far)
         if len(lanes):
@@ -121,8 +121,12 @@ class Branch:
             )
             short = np.flatnonzero(ended.code != ARRIVAL)
             if len(short):
-                kind = KINDS[int(ended.code[short[0]])]
-                self.failure = (kind, f"the branch of state {lanes[short[0]]} ends: {kind}")
+                self._note(KINDS[int(ended.code[short[0]])], int(lanes[short[0]]))
                 return None
             z[lanes] = ended.z
         return z
+
+    def _note(self, kind: str, lane: int) -> None:
+        """Remember why a trial was not reached; "lost" says less than what was met before."""
+        if kind != "lost" or not self.failure[0]:
+            self.failure = (kind, f"the branch of state {lane} ends: {kind}")
