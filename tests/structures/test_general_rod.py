@@ -258,3 +258,18 @@ def test_errors_are_estimated_for_general_rods():
     (rod, state), (fine, exact) = bent(4), bent(12)
     error = abs(rod.max_curvature(state) - fine.max_curvature(exact))
     assert error <= state.error_estimate < 1e3 * error + 1e-12
+
+
+def test_a_rod_under_pressure_agrees_in_both_unit_systems():
+    """p in N/m of a strip: force over length. Round-off."""
+    EI, L = 0.02, 0.4
+    force = 4 * np.pi**2 * EI / L**2
+    options = {"ends": ("clamped", "pinned"), "loads": {"p": em.Pressure()}}
+    plain = em.Rod(curvature=-2.0, span=0.82, **options)
+    si = em.Rod(curvature=-2.0 / L, span=0.82 * L, EI=EI, length=L, **options)
+    here = em.lift(plain.natural_state(theta_A=1.1), {"p": -0.5}).end.state
+    there = em.lift(si.natural_state(theta_A=1.1), {"p": -0.5 * force / L}).end.state
+    np.testing.assert_allclose(there.z, here.z, atol=1e-10)
+    assert si.support_force("mu")(there) == pytest.approx(
+        plain.support_force("mu")(here) * force, rel=1e-10
+    )

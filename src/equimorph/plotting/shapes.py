@@ -83,8 +83,11 @@ def _height(outlines: Float[np.ndarray, "shapes points 2"]) -> float:
 def _name_ends(
     ax: Axes, first: Float[np.ndarray, "points 2"], last: Float[np.ndarray, "points 2"]
 ) -> None:
-    """Write "start" and "goal" on the outer sides of the first and the last shape."""
-    start, goal = first[len(first) // 2], last[len(last) // 2]
+    """Write "start" and "goal" on the outer sides of both shapes, where they are far apart."""
+    apart = np.linalg.norm(last - first, axis=1)
+    middle = len(apart) // 2
+    at = middle if apart[middle] > 0.9 * apart.max() else int(apart.argmax())
+    start, goal = first[at], last[at]
     above = 1 if start[1] >= goal[1] else -1
     for name, place, side in (("start", start, above), ("goal", goal, -above)):
         ax.annotate(

@@ -7,7 +7,7 @@ from equimorph.linalg import BorderedSolution
 from equimorph.structures.contract import Advance, Border, Direction, Structure, Symmetry
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.interface import Mechanics
-from equimorph.structures.rod.units import Units
+from equimorph.structures.units import Units
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]

@@ -21,8 +21,8 @@ from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.rod.loads import LoadShape, LoadSpec, load_shape
 from equimorph.structures.rod.mechanics import ClampedMechanics
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch
-from equimorph.structures.rod.units import Units
 from equimorph.structures.states import State, States
+from equimorph.structures.units import Units
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]

@@ -18,7 +18,7 @@ from equimorph.structures.rod.general.model import Build, RodModel, raw_model
 from equimorph.structures.rod.general.terms import LineLoad, PointForce, Pressure, Term, term
 from equimorph.structures.rod.loads import LoadShape
 from equimorph.structures.rod.profiles import profile
-from equimorph.structures.rod.units import Units
+from equimorph.structures.units import Units
 
 Terms = Mapping[str, Any]
 Matrix = Float[np.ndarray, "scalars others"]

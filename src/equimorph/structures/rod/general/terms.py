@@ -69,7 +69,7 @@ class Term:
 
     word: ClassVar[str]
     measure: ClassVar[str]
-    """What the amplitude is: a key of `structures.rod.units.LABELS`."""
+    """What the amplitude is: a key of `structures.units.LABELS`."""
 
     @property
     def breaks(self) -> tuple[float, ...]:

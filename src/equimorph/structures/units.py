@@ -1,4 +1,4 @@
-"""Units of a rod: numbers of the user to and from the non-dimensional ones inside."""
+"""Units of bending structures: numbers of the user to and from the non-dimensional ones inside."""
 
 from dataclasses import dataclass
 

@@ -1,0 +1,49 @@
+"""A buckled strip whose two ends turn: it flips over without a snap.
+
+Rod of length 1, ends clamped in actuators a span ν = 0.95 apart: E = ∫ θ'²/(8π²) ds; θ(0) = Δ + Θ,
+θ(1) = Δ − Θ. Turned at one end alone it snaps at about α = 1.7818 √(1 − ν) = 0.398, at both ends
+against the arch at about 2 √(1 − ν) = 0.447. Both turned the same way it becomes an S, from which
+it goes either way.
+
+Run it: python examples/strip.py
+"""
+
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+import equimorph as em
+
+
+@dataclass(frozen=True)
+class Result:
+    """The set over both end angles, the snap when one end turns alone, and the way around."""
+
+    eset: em.EquilibriumSet
+    snap: em.Path
+    route: em.Route
+
+
+def main(intervals: tuple[int, int] = (25, 25)) -> Result:
+    """Compute the set and both ways from the arch above to the arch below."""
+    strip = em.Rod(loads={}, span=0.95)
+    box = em.Box(Theta=(-1.0, 1.0), Delta=(-1.0, 1.0))
+    eset = em.equilibrium_set(strip, box, within=[strip.max_curvature <= 12], intervals=intervals)
+    flat = eset.at(Theta=0.0, Delta=0.0).stable
+    up, down = max(flat, key=strip.height(0.5)), min(flat, key=strip.height(0.5))
+    snap = em.lift(up, {"Theta": -0.45, "Delta": -0.45})
+    return Result(eset, snap, em.plan(eset, up, down, margin=0.05))
+
+
+def figure(result: Result) -> Figure:
+    """Shapes along the way."""
+    return em.plotting.shapes(result.route).figure
+
+
+if __name__ == "__main__":
+    found = main()
+    print(found.eset.audit)
+    turned = -2 * found.snap.end.state["Theta"]
+    print(f"one end alone: {found.snap.end.kind} at {turned:.4f} rad")
+    print(found.route)
+    em.plotting.save(figure(found), "strip.png")
