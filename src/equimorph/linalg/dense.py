@@ -14,13 +14,15 @@ class BorderedSolution:
 
     x holds one solution per right-hand side; `negative` counts the negative eigenvalues of A;
     `pivot_ratio` is the smallest over the largest pivot (1 where pivoting made it irrelevant);
-    `pivoted` tells which lanes took the pivoted dense factorisation.
+    `pivoted` tells which lanes took the pivoted dense factorisation; `determinant` is that of A, nan
+    where it is not at hand or beyond the range of numbers.
     """
 
     x: Float[np.ndarray, "lanes sides bordered"]
     negative: Int[np.ndarray, " lanes"]
     pivot_ratio: Float[np.ndarray, " lanes"]
     pivoted: Bool[np.ndarray, " lanes"]
+    determinant: Float[np.ndarray, " lanes"]
 
 
 def multiply(
@@ -80,10 +82,15 @@ def solve_bordered(
     full[:, n:, :n] = rows
     full[:, n:, n:] = corner
     x = _solve(full, rhs.transpose(0, 2, 1)).transpose(0, 2, 1)
-    lanes = len(matrix)
-    return BorderedSolution(
-        np.ascontiguousarray(x), negative_eigenvalues(matrix), np.ones(lanes), np.ones(lanes, bool)
-    )
+    ratio, pivoted = np.ones(len(matrix)), np.ones(len(matrix), bool)
+    x, negative = np.ascontiguousarray(x), negative_eigenvalues(matrix)
+    return BorderedSolution(x, negative, ratio, pivoted, _determinant(matrix))
+
+
+def _determinant(matrix: Float[np.ndarray, "lanes n n"]) -> Float[np.ndarray, " lanes"]:
+    with np.errstate(all="ignore"):
+        product = np.linalg.det(matrix)
+    return np.asarray(np.where(np.isfinite(product), product, np.nan))
 
 
 def _solve(

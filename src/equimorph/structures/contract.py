@@ -228,5 +228,5 @@ def solved_advance(
         tangent[:, -1].copy(),
         np.abs(residual).max(axis=1),
         solution.negative - constraints,
-        np.full(len(row), np.nan),
+        solution.determinant,
     )

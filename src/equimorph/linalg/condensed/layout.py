@@ -107,7 +107,7 @@ class CondensedLayout:
         self._check(*given)
         arrays = [np.ascontiguousarray(a) for a in given]
         x, negative, ratio = self._solve(*arrays)
-        pivoted = np.zeros(len(x), bool)
+        pivoted, determinant = np.zeros(len(x), bool), np.full(len(x), np.nan)
         doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
         if len(doubtful):
             refined = doubtful[ratio[doubtful] >= REFINABLE]
@@ -118,7 +118,8 @@ class CondensedLayout:
             matrix = self.dense(diagonal[pivoted], border[pivoted], trailing[pivoted])
             again = solve_bordered(matrix, *(a[pivoted] for a in arrays[2:6]))
             x[pivoted], negative[pivoted] = again.x, again.negative
-        return BorderedSolution(x, negative, ratio, pivoted)
+            determinant[pivoted] = again.determinant
+        return BorderedSolution(x, negative, ratio, pivoted, determinant)
 
     def _check(self, *arrays: np.ndarray) -> None:
         """Refuse shapes that do not fit: the kernel does not check what it reads."""

@@ -22,14 +22,15 @@ def eliminate(start, target, factors, columns):
 
     `factors` holds the pivots, then the columns of L one after the other; `target` the places that
     each pair of entries of a column updates. `columns` has room for the longest column. Returns
-    (number of negative pivots, largest change of a diagonal entry).
+    (number of negative pivots, largest change of a diagonal entry, product of the pivots).
     """
     size = len(start) - 1
     negative, growth = spread(0.0), spread(0.0)
     zero, one = spread(0.0), spread(1.0)
-    pair = 0
+    pair, product = 0, one
     for k in range(size - 1):
         pivot = load(factors, k)
+        product = product * pivot
         negative = negative + where_less(pivot, zero, one, zero)
         inverse = one / pivot
         first, count = size + start[k], start[k + 1] - start[k]
@@ -43,7 +44,7 @@ def eliminate(start, target, factors, columns):
                 at = target[pair + j]
                 store(factors, at, load(factors, at) - factor * load(columns, j))
             pair += i + 1
-    return negative, growth
+    return negative, growth, product
 
 
 @njit(**INNER)
@@ -110,9 +111,9 @@ def backward(start, rows, factors, x, width, first):
 @njit(**FLAGS)
 def solve_sparse(
     start, rows, target, scatter, order, values, columns, border_rows, corner, rhs,
-    x, negative, growth,
+    x, negative, growth, determinant,
 ):  # fmt: skip
-    """Bordered solutions, negative pivots and growth of all lanes; see `SparseLayout.solve`."""
+    """Bordered solutions, inertia, growth and determinant of all lanes: `SparseLayout.solve`."""
     lanes, entries = values.shape
     size, k, sides = len(order), columns.shape[1], rhs.shape[1]
     width, across, full = 2 * k + sides, k + 1 + sides, size + k
@@ -131,7 +132,7 @@ def solve_sparse(
             value = load(raw, e)
             store(factors, scatter[e], value)
             largest = larger(largest, absolute(value))
-        below, grown = eliminate(start, target, factors, column)
+        below, grown, product = eliminate(start, target, factors, column)
         one, zero = spread(1.0), spread(0.0)
         below = below + where_less(load(factors, size - 1), zero, one, zero)
         store(column, 0, below)
@@ -140,6 +141,9 @@ def solve_sparse(
         store(column, 0, grown / largest)
         for i in range(LANES):
             growth[lane + i] = column[0, i]
+        store(column, 0, product * load(factors, size - 1))
+        for i in range(LANES):
+            determinant[lane + i] = column[0, i]
         if sides == 0:
             continue
         for c in range(k):

@@ -115,17 +115,20 @@ class SparseLayout:
             nothing = np.zeros((lanes, 0, self.size))
             border = (nothing, nothing, np.zeros((lanes, 0, 0)))
         arrays = [np.ascontiguousarray(a) for a in (values, *border, rhs)]
-        x, growth = np.empty(rhs.shape), np.empty(lanes)
+        x, (growth, determinant) = np.empty(rhs.shape), np.empty((2, lanes))
         negative = np.empty(lanes, dtype=np.int64)
         how = self.elimination
         shared = (how.start, how.rows, how.target, how.scatter, how.order)
         if lanes:
-            over_lanes(solve_sparse, shared, arrays, [x, negative, growth])
+            over_lanes(solve_sparse, shared, arrays, [x, negative, growth, determinant])
         pivoted = ~(growth <= GROWTH)
         if pivoted.any():
             again = solve_bordered(self.dense(values[pivoted]), *(a[pivoted] for a in arrays[1:]))
             x[pivoted], negative[pivoted] = again.x, again.negative
-        return BorderedSolution(x, negative, 1.0 / np.maximum(growth, 1.0), pivoted)
+            determinant[pivoted] = again.determinant
+        determinant[~np.isfinite(determinant)] = np.nan
+        ratio = 1.0 / np.maximum(growth, 1.0)
+        return BorderedSolution(x, negative, ratio, pivoted, determinant)
 
 
 def _eliminated(
