@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.equilibria.hidden import with_hidden_events
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, FOLD
 from oracles.polynomial import Polynomial, slaved
 from typecheck import unchecked
 
@@ -96,6 +96,42 @@ def test_eigenvalue_that_touches_zero_is_a_degenerate_branch_point(centre, c, k,
     end = em.lift(form.state(0.0, 0.0, a=-1.0), {"a": 1.0}).end
     assert end.kind == "branch point"
     assert end.state["a"] == pytest.approx(centre, abs=1e-10)
+
+
+TOUCHING = [(0.27, 1.1, 2.0, 0.3), (-0.41, 4.0, 0.8, -0.9), (0.05, 0.4, 3.1, 0.0)]
+
+
+@pytest.mark.parametrize(("centre", "c", "k", "m"), TOUCHING)
+def test_eigenvalues_that_touch_zero_show_in_many_lanes(centre, c, k, m):
+    """Each lane by itself, from the determinants of its steps: it ends there or passes.
+
+    A point of a lane within 1e-8 of the place has an index of round-off's: then it shows twice.
+    """
+    form = slaved(dipping(0.0, centre, c), k, m)
+    stop = np.linspace(0.8, 1.0, 3)
+    curve = ParameterLine(form, np.full((3, 1), -1.0), stop[:, None] + 1.0)
+    outcome = follow(curve, np.zeros((3, 2)), options=TraceOptions(record=False))
+    assert outcome.code.tolist() == [BRANCH] * 3
+    assert -1.0 + outcome.t * (stop + 1.0) == pytest.approx(np.full(3, centre), abs=1e-8)
+    through = TraceOptions(through_folds=True, through_branch_points=True, record=False)
+    outcome = follow(curve, np.zeros((3, 2)), options=through)
+    assert outcome.code.tolist() == [ARRIVAL] * 3
+    lanes = outcome.passed.lanes
+    assert np.unique(lanes).tolist() == [0, 1, 2]
+    places = -1.0 + outcome.passed.t * (stop + 1.0)[lanes]
+    assert places == pytest.approx(np.full(len(lanes), centre), abs=1e-8)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(-1.3, 0.7), (-0.4, 1.6)])
+def test_folds_in_which_paths_do_not_turn_show_in_many_lanes(start, stop):
+    """x³ = a, as below."""
+    form = slaved(Polynomial(lambda x, a: x**4 * 0.25 - a * x, 1, ("a",)), 1.4, 0.5)
+    x = np.cbrt(start)
+    z, p = np.tile([x, 0.5 * x**2], (2, 1)), np.full((2, 1), start)
+    curve = ParameterLine(form, p, np.array([[stop], [stop + 0.1]]) - start)
+    outcome = follow(curve, z, options=TraceOptions(record=False))
+    assert outcome.code.tolist() == [FOLD] * 2
+    assert start + outcome.t * curve.velocity[:, 0] == pytest.approx([0.0, 0.0], abs=1e-10)
 
 
 @QUICK

@@ -15,7 +15,7 @@ from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.fronts import Front
 from equimorph.equilibria.happenings import Happenings, locate_all
 from equimorph.equilibria.outcome import LOST, Outcome
-from equimorph.equilibria.probing import CLOSE, look_inside, probed, step_between
+from equimorph.equilibria.probing import AT_EVENT, CLOSE, look_inside, probed, step_between
 from equimorph.equilibria.tracing import (
     ARRIVAL,
     CONSTRAINT,
@@ -32,8 +32,6 @@ Some = Int[np.ndarray, " some"]
 DOUBTFUL = 0.4
 """Least value of the test function between two points, as a share of those at its ends, from which
 on the eigenvalue is looked at."""
-AT_EVENT = 1e-6
-"""Value at one end of a step over that at the other below which the end is itself an event."""
 COLUMNS = 3
 """Right-hand sides of the solve for the test function: the smallest eigenvalues that it sees."""
 AT_ONCE = 1024

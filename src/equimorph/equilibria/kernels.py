@@ -41,6 +41,8 @@ lane finished; given up: step too short, too many steps, or a singular start."""
 
 ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT, CRITICAL = 1, 2, 4, 8, 16, 32
 """Bits of what can happen in a step."""
+HIDDEN, ENDING = 64, 128
+"""Bits of steps with events that their ends do not show, and of those that such an event ends."""
 
 LEVEL_SLOPE = 1e-6
 """Slope dt/ds of a start that counts as zero: it lies on a fold, and leads nowhere in t."""
@@ -65,9 +67,12 @@ MULTIPLIER_WEIGHT = 1e-2
 """Weight of the multipliers' squares in the norm of corrections (they are not in the metric)."""
 BACK = 0.4
 """Factor of a step's length after a refusal."""
-DIP, WIDE = 0.1, 1e-3
+DIP, NEAR, WIDE = 0.3, 0.1, 1e-3
 """Least determinant inside a step, as a share of those at its ends, below which the step may hide
-two events; length from which on it is refused then."""
+two events; below which it is searched for them; length from which on it is refused first."""
+SLACK = 0.01
+"""Slope of t that is no turn inside such a short step, as a share of those at its ends."""
+
 
 BROAD = 0.05
 """Length of a step above which one that seems to pass a branch point is refused: most jump to
@@ -209,10 +214,10 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
     """Tell what happened in steps that converged, and refuse those that hide something.
 
     `plain`: whether dt/ds vanishes where the index changes, and only there; on other curves each
-    has a meaning of its own. Returns how many steps are good, and in how many of them something
-    happened that only a branch point explains.
+    has a meaning of its own. Returns how many steps are good, in how many of them something
+    happened that only a branch point explains, and how many come close to a singular state.
     """
-    good, doubtful = 0, 0
+    good, doubtful, close = 0, 0, 0
     for i in range(active):
         if counts[STAGE, i] != CONVERGED:
             continue
@@ -235,14 +240,17 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
         hidden = reach >= 1.0 if old > 0.0 else reach <= 0.0
         hidden = (hidden or (what & (ARRIVAL | RETURN)) != 0) and length > 10 * smallest
         bad = changed > 1 or (flipped and hidden) or _turns_twice(old, new, end - start, length)
-        bad = bad or (length > WIDE and changed == 0 and _dips(i, numbers))
+        bad = bad or (length > WIDE and changed == 0 and _dips(i, DIP, numbers))
         bad = bad or (locates and length > BROAD and (what & BRANCH) != 0)
         if bad or (flipped and not fold and not locates):
             counts[STAGE, i] = REFUSED
             continue
         good += 1
         doubtful += (what & BRANCH) != 0
-    return good, doubtful
+        if changed == 0 and plain and (_dips(i, NEAR, numbers) or _lowest(i, numbers)):
+            counts[WHAT, i] |= HIDDEN
+            close += 1
+    return good, doubtful, close
 
 
 @njit(**SUMS)
@@ -250,7 +258,8 @@ def _turns_twice(old, new, gain, length):
     """Whether t runs back inside a step that leaves it rising, or falling, at both ends.
 
     By the least slope of the cubic through both ends and slopes: near a cusp two folds lie close
-    together, with the same index before and behind.
+    together, with the same index before and behind. In a short step that may be an error of the
+    cubic, where the slope touches zero.
     """
     sign = np.sign(old)
     rise, a, b = sign * gain / length, sign * old, sign * new
@@ -259,11 +268,12 @@ def _turns_twice(old, new, gain, length):
     # slope at share s: a + 2 s (3 rise - 2 a - b) + 3 s² (a + b - 2 rise)
     bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
     share = min(max(-bend / (3 * bow), 0.0), 1.0) if bow > 0.0 else 0.0
-    return a + 2 * share * bend + 3 * share * share * bow < 0.0
+    slack = SLACK * min(a, b) if length <= WIDE else 0.0
+    return a + 2 * share * bend + 3 * share * share * bow < -slack
 
 
 @njit(**SUMS)
-def _dips(i, numbers):
+def _dips(i, share, numbers):
     """Whether the determinant may touch zero, or cross it twice, inside a step.
 
     By the parabola through its values at both ends and at the end of the step before.
@@ -280,7 +290,15 @@ def _dips(i, numbers):
     # the least value lies inside if the parabola falls at the start and rises at the end
     if not (slope < 0.0 and slope + 2.0 * bow * length > 0.0):
         return False
-    return here - slope * slope / (4.0 * bow) < DIP * min(here, there)
+    return here - slope * slope / (4.0 * bow) < share * min(here, there)
+
+
+@njit(**SUMS)
+def _lowest(i, numbers):
+    """Whether the determinant is much smaller here than one step before and at the end."""
+    before, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
+    sides = min(abs(before), abs(there))
+    return numbers[ARC, i] > 0.0 and before * there > 0.0 and abs(here) < NEAR * sides
 
 
 @njit(**{**BRIEF, "_nrt": True})

@@ -110,4 +110,6 @@ def lift(
         check_starts(state)
         return lift_many(state, to, tuple(within), options, progress)
     check_start(state, within)
-    return lift_one(state, to, tuple(within), replace(options, record=True), progress)
+    # what hides in the steps of one state is searched for afterwards, more thoroughly
+    options = replace(options, record=True, look_inside=False)
+    return lift_one(state, to, tuple(within), options, progress)

@@ -1,6 +1,6 @@
 """Lanes that march together along their curves: the engine under every lift."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -9,8 +9,18 @@ from equimorph.equilibria import kernels
 from equimorph.equilibria.cubics import least_inside
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.fronts import Bracket, Front, new_scalars
-from equimorph.equilibria.kernels import BRANCH, CONSTRAINT, CONVERGED, ENDED, REFUSED
+from equimorph.equilibria.happenings import Happenings
+from equimorph.equilibria.kernels import (
+    BRANCH,
+    CONSTRAINT,
+    CONVERGED,
+    ENDED,
+    ENDING,
+    HIDDEN,
+    REFUSED,
+)
 from equimorph.equilibria.location import locate_branch_point
+from equimorph.equilibria.probing import NARROW, inside_step
 from equimorph.equilibria.records import EventFile, PointFile
 from equimorph.equilibria.starts import ON_BOUND
 from equimorph.equilibria.stepping import kernels as stepping
@@ -73,6 +83,8 @@ class Block:
         self.capacity, self.active = capacity, 0
         size = curve.metric.size
         self.events = EventFile(size, events + capacity)
+        self.hidden: list[Happenings] = []
+        self._last: dict[int, float] = {}
         self.points = PointFile(size, capacity if options.record else 0)
         shapes = (2 * [(capacity, stepping.MEMORY, size)]) + (2 * [(capacity, size)])
         self._places = tuple(np.zeros(shape) for shape in shapes)
@@ -103,6 +115,8 @@ class Block:
         for k, constraint in enumerate(self.constraints):
             self._excess[2 * k, new] = np.nan
             self._excess[2 * k + 1, new] = constraint.excess(*here.states(z, none))
+        for lane in lanes if self._last else ():
+            self._last.pop(int(lane), None)
         stuck = stepping.seat(lanes, levels, self._knobs, z, start, *state)
         self.active += count
         lost = self._given_up() if stuck else []
@@ -123,7 +137,7 @@ class Block:
         ends = (move.dz, move.tangent_z, move.tangent_t, mass, self._places)
         kernels.correct_arrivals(*ends, *state)
         locates, plain = self.options.locates_branch_points, self.curve.folds_change_index
-        good, doubtful = kernels.judge(
+        good, doubtful, close = kernels.judge(
             move.index, move.determinant, *state, smallest, locates, plain
         )
         if good:
@@ -131,6 +145,8 @@ class Block:
                 self._refuse_jumps(move)
             if self.constraints:
                 self._constrain(move)
+            if close and locates:
+                self._look_inside(move)
             record = (self._places, self._scalars, active)
             self.events.add(move.tangent_z, self.options.stops, *record)
             if self.options.record:
@@ -202,16 +218,56 @@ class Block:
         found = locate_branch_point(self._here.take(at), self._bracket(at, move)).found
         counts[kernels.STAGE, at[~found]] = REFUSED
 
-    def _front(self, at: Some) -> Front:
-        """Where lanes are."""
+    def _look_inside(self, move: Advance) -> None:
+        """Search steps that come close to a singular state, lane by lane: they are rare and short.
+
+        A step whose start is the singular one is searched together with the step before.
+        """
+        counts = self._scalars[1]
+        stage, what = counts[kernels.STAGE, : self.active], counts[kernels.WHAT, : self.active]
+        for i in np.flatnonzero((stage == CONVERGED) & (what & HIDDEN != 0)):
+            at, found = np.array([i]), list[Happenings]()
+            if self.options.look_inside:
+                ends, lengths = self._around(at, move)
+                found = inside_step(self._here.take(at), ends, lengths, self.options)
+            events = self._new(int(counts[kernels.LANE, i]), found)
+            self.hidden += events
+            if not events:
+                what[i] &= ~HIDDEN
+            elif any((e.code & self.options.stops != 0).any() for e in events):
+                what[i] |= ENDING
+
+    def _new(self, lane: int, found: list[Happenings]) -> list[Happenings]:
+        """Events of a lane but for those that were found in the step before, too."""
+        events = Happenings.joined(found, self.curve.metric.size)
+        known = self._last.get(lane, -np.inf)
+        events = events.take(np.abs(events.travelled - known) > NARROW)
+        if len(events.t):
+            self._last[lane] = float(events.travelled[-1])
+        return [replace(events, lanes=np.full(len(events.t), lane))] if len(events.t) else []
+
+    def _around(self, at: Some, move: Advance) -> tuple[tuple[Front, Front], tuple[float, ...]]:
+        """Ends of a step and their lengths on the way; see `inside_step`."""
+        numbers, counts = (scalars[:, at[0]] for scalars in self._scalars)
+        bracket = self._bracket(at, move)
+        start, stop = numbers[kernels.TRAVELLED], numbers[kernels.TRAVELLED] + bracket.step[0]
+        low = abs(numbers[kernels.DET]) < kernels.NEAR * abs(numbers[kernels.NEW_DET])
+        if not (low and counts[kernels.KNOWN] > 0):
+            return (bracket.before, bracket.after), (start, stop)
+        turn = numbers[kernels.BEND] * numbers[kernels.ARC]
+        before = start - numbers[kernels.ARC] * np.sinc(turn / np.pi)
+        return (self._front(at, back=1), bracket.after), (before, stop, start)
+
+    def _front(self, at: Some, back: int = 0) -> Front:
+        """Where lanes are, or were one step before."""
         numbers, counts = self._scalars
-        (z, tangent), index = self._present(at), counts[kernels.INDEX, at]
-        t, slope = numbers[kernels.T, at], numbers[kernels.SLOPE, at]
+        (z, tangent), index = self._present(at, back), counts[kernels.INDEX, at]
+        t, slope = numbers[kernels.T + 2 * back, at], numbers[kernels.SLOPE + 2 * back, at]
         return Front(z, t, tangent, slope, index)
 
-    def _present(self, at: Some) -> tuple[Lanes, Lanes]:
-        """Present points and tangents, of the three that are remembered."""
-        head = self._scalars[1][kernels.HEAD, at]
+    def _present(self, at: Some, back: int = 0) -> tuple[Lanes, Lanes]:
+        """Present points and tangents, of the three that are remembered, or those before."""
+        head = (self._scalars[1][kernels.HEAD, at] - back) % stepping.MEMORY
         return self._places[0][at, head], self._places[1][at, head]
 
     def _bracket(self, at: Some, move: Advance) -> Bracket:

@@ -209,7 +209,9 @@ class _Job:
         """Locate everything that is pending; settle lanes that ended, retry where it failed."""
         block, ledger = self.block, self.ledger
         brackets = [block.events.drain()]
-        events = locate_all(block.curve, brackets, block.constraints, block.options)
+        shown = locate_all(block.curve, brackets, block.constraints, block.options)
+        events = Happenings.joined([shown, *block.hidden], block.curve.metric.size)
+        block.hidden = []
         bad = np.unique(events.lanes[~events.found])
         again = bad[ledger.retries[bad] < block.options.retries]
         if len(again):

@@ -21,6 +21,8 @@ Values = Float[np.ndarray, " points"]
 
 CLOSE = 0.1
 """Least value inside a step, as a share of those at its ends, that asks for more points."""
+AT_EVENT = 1e-6
+"""Value at one end of a step over that at the other below which the end is itself an event."""
 NARROW = 1.5e-4
 """Length in the metric on which the cubic is exact to round-off."""
 TOUCH = 1e-9
@@ -50,6 +52,26 @@ def probed(curve: Curve, front: Front, length: Values) -> Probe:
     at = Critical(curve.structure, front.z, p, b)
     slope = at.second(front.tangent_z, front.tangent_t[:, None] * curve.rate(front.t))
     return Probe(front, -at.g, slope, length)
+
+
+def inside_step(
+    curve: Curve, ends: tuple[Front, Front], lengths: tuple[float, ...], options: TraceOptions
+) -> list[Happenings]:
+    """Events between two points of one lane that neither the index nor the direction shows.
+
+    `lengths` on the way of the ends, and of a point between them at which F_z is nearly singular,
+    if one is known.
+    """
+    both = curve.take(np.zeros(2, int))
+    columns = zip(*(vars(front).values() for front in ends), strict=True)
+    front = Front(*(np.concatenate(column) for column in columns))
+    probe = probed(both, front, np.array(lengths[:2]))
+    smaller, larger = np.sort(np.abs(probe.value))
+    # a path may start or arrive right at an event: that is no hidden one
+    if smaller <= AT_EVENT * larger:
+        return []
+    pair, first = (probe.at(np.array([0])), probe.at(np.array([1]))), (*lengths[2:], None)[0]
+    return look_inside(curve, pair, first, options)
 
 
 def look_inside(

@@ -5,7 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.kernels import ARRIVAL, BRANCH, CONSTRAINT, CRITICAL, FOLD, RETURN
+from equimorph.equilibria.kernels import (
+    ARRIVAL,
+    BRANCH,
+    CONSTRAINT,
+    CRITICAL,
+    ENDING,
+    FOLD,
+    RETURN,
+)
 
 __all__ = [
     "ARRIVAL",
@@ -27,6 +35,8 @@ class TraceOptions:
     tangents that the step control aims at, radians. steps: limit per lane. locate_passed: whether
     folds and branch points that do not end a lane are located. retries: how often lanes whose
     events could not be located are traced again, each time with steps four times shorter.
+    look_inside: whether steps that come close to a singular state are searched for events that
+    their ends do not show.
     """
 
     through_folds: bool = False
@@ -39,11 +49,12 @@ class TraceOptions:
     record: bool = True
     locate_passed: bool = True
     retries: int = 2
+    look_inside: bool = True
 
     @property
     def stops(self) -> int:
         """Bits of the events that end a lane."""
-        stop = ARRIVAL | RETURN | CONSTRAINT
+        stop = ARRIVAL | RETURN | CONSTRAINT | ENDING
         stop |= 0 if self.through_folds else FOLD
         return stop | (0 if self.through_branch_points else BRANCH | CRITICAL)
 

@@ -36,6 +36,7 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
         first_step=0.05 * finer,
         largest_step=0.5 * finer,
         turning=0.25 * finer,
+        look_inside=False,
     )
     outcome = follow(line, pairing.points.z[rays.points], pairing.setting.constraints, options)
     good = np.isin(outcome.code, (ARRIVAL, RETURN, CONSTRAINT))
