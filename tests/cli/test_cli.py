@@ -88,11 +88,12 @@ def test_version_is_shown(shell: Shell):
     assert shell.out.startswith("equimorph 0.")
 
 
-@pytest.mark.parametrize("kind", ["arch", "spring"])
+@pytest.mark.parametrize("kind", ["arch", "column", "maps", "spring", "truss"])
 def test_a_new_study_passes_the_check(kind: str, shell: Shell):
     assert shell("new", "mine.toml", "--kind", kind) == 0
     assert shell("check", "mine.toml") == 0
-    assert "sound study with 1 point and 1 route" in shell.out
+    asked = "2 maps" if kind == "maps" else "1 point and 1 route"
+    assert f"sound study with {asked}" in shell.out
 
 
 def test_new_overwrites_nothing(shell: Shell):
@@ -291,7 +292,7 @@ USAGE = {
     "run x.toml --out": "Option '--out' requires an argument. See equimorph",
     "run x.toml y.toml": "extra argument",
     "rnu x.toml": "No such command 'rnu'. Did you mean 'run'?",
-    "new x.toml --kind beam": "'beam' is not one of 'arch', 'spring'",
+    "new x.toml --kind beam": "'beam' is not one of 'arch', 'column', 'maps', 'spring', 'truss'",
     "--sideways": "No such option: --sideways",
 }
 

@@ -91,6 +91,7 @@ def test_the_results_file_gives_maps_back(run):
         assert [curve.kind for curve in back.curves] == [curve.kind for curve in each.map.curves]
         for one, other in zip(back.curves, each.map.curves, strict=True):
             np.testing.assert_array_equal(one.points, other.points)
+            np.testing.assert_array_equal(one.errors, other.errors)
             np.testing.assert_array_equal(one.states.z, other.states.z)
     assert stored["limits"].at(x_l=0.8, k=1.0).kind == "fold"
 

@@ -32,7 +32,10 @@ class Kind(StrEnum):
     """Kinds of studies that can be begun."""
 
     arch = "arch"
+    column = "column"
+    maps = "maps"
     spring = "spring"
+    truss = "truss"
 
 
 def main() -> None:
@@ -85,7 +88,9 @@ def _options(
 @app.command()
 def new(
     file: Annotated[Path, typer.Argument(help="Study file to write, say my-arch.toml.")],
-    kind: Annotated[Kind, typer.Option(help="What to begin with.")] = Kind.arch,
+    kind: Annotated[
+        Kind, typer.Option(help="What to begin with: a rod (arch), an energy (column), ...")
+    ] = Kind.arch,
 ) -> None:
     """Begin a study: write an example file to change."""
     from equimorph.study.template import write_template

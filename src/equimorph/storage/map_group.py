@@ -32,6 +32,8 @@ def write(group: h5py.Group, amap: ActuatorMap) -> None:
     put(group, "curve_end", ends, ["curve"], "points before the end of each curve")
     put(group, "curve_point", _joined(curves, "points", 2), ["point", "coordinate"], "settings")
     put(group, "curve_value", _joined(curves, "values", 2), ["point", "side"], "lower and higher")
+    errors = np.concatenate([np.zeros(0), *(c.errors for c in curves)])
+    put(group, "curve_error", errors, ["point"], "bound of the error along the grid line")
     sizes = amap.states.z.shape[1], amap.states.p.shape[1]
     for name, size in zip("zp", sizes, strict=True):
         states = [getattr(c.states, name) for c in curves]
@@ -92,10 +94,10 @@ def _curves(group: h5py.Group, structure: Structure) -> tuple[MapCurve, ...]:
     kinds, ends = get(group, "curve_kind"), get(group, "curve_end")
     if not len(kinds):
         return ()
-    parts = [_split(group, name, ends) for name in ("z", "p", "point", "value")]
+    parts = [_split(group, name, ends) for name in ("z", "p", "point", "value", "error")]
     return tuple(
-        MapCurve(str(kind), States(structure, z, p), points, values)
-        for kind, z, p, points, values in zip(kinds, *parts, strict=True)
+        MapCurve(str(kind), States(structure, z, p), points, values, errors)
+        for kind, z, p, points, values, errors in zip(kinds, *parts, strict=True)
     )
 
 

@@ -20,7 +20,8 @@ def write_map(amap: ActuatorMap, path: str | Path) -> tuple[Path, Path]:
         The map.
     path
         Name of the table of the grid, ending in ``.csv``; that of the curves ends in
-        ``-curves.csv``. A value that does not exist is left empty.
+        ``-curves.csv``. A value that does not exist is left empty; "error"
+        bounds that of a place along its grid line.
 
     Raises
     ------
@@ -37,12 +38,16 @@ def write_map(amap: ActuatorMap, path: str | Path) -> tuple[Path, Path]:
     )
     write_text(table, _csv([*amap.grid.names, "value", "status"], rows))
     points = (
-        [str(k), curve.kind, repr(x), repr(y), _number(low), _number(high)]
+        [str(k), curve.kind, repr(x), repr(y), _number(low), _number(high), f"{error:.1e}"]
         for k, curve in enumerate(amap.curves)
-        for (x, y), (low, high) in zip(curve.points.tolist(), curve.values.tolist(), strict=True)
+        for (x, y), (low, high), error in zip(
+            curve.points.tolist(), curve.values.tolist(), curve.errors.tolist(), strict=True
+        )
     )
     curves = table.with_name(f"{table.stem}-curves.csv")
-    write_text(curves, _csv(["curve", "kind", *amap.grid.names, "lower", "higher"], points))
+    write_text(
+        curves, _csv(["curve", "kind", *amap.grid.names, "lower", "higher", "error"], points)
+    )
     return table, curves
 
 

@@ -22,6 +22,7 @@ from equimorph.study.names import (
 )
 from equimorph.study.outcome import MapOutcome, Outcome, RouteOutcome
 from equimorph.study.prepare import Problem
+from equimorph.tasks import ActuatorMap
 
 ROOM = 0.03
 """Empty border of a sketch, so that its line is not cut."""
@@ -110,9 +111,21 @@ def _map(each: MapOutcome, folder: Path) -> list[str]:
         f'<p class="lead">{escape(" · ".join(extent))}</p>',
         f"<p>{escape(what)} at {each.map.value.size} settings: {escape(', '.join(counts))}.</p>",
         f'<div class="figures">{_still(folder, files, caption)}</div>',
+        _accuracy(each.map),
         f'<p>Tables: <a href="{files}.csv">{files}.csv</a> (settings) and '
         f'<a href="{files}-curves.csv">{files}-curves.csv</a>.</p>',
     ]
+
+
+def _accuracy(amap: ActuatorMap) -> str:
+    """How well the places of curves are known, kind by kind."""
+    worst: dict[str, float] = {}
+    for curve in amap.curves:
+        worst[curve.kind] = max(worst.get(curve.kind, 0.0), float(curve.errors.max(initial=0.0)))
+    if not worst:
+        return ""
+    words = ", ".join(f"{kind} {error:.0e}" for kind, error in worst.items())
+    return f"<p>Curves, with the largest error of a place along a grid line: {escape(words)}.</p>"
 
 
 def _schedule_links(name: str) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from equimorph.errors import InputError
 
-KINDS = ("arch", "spring")
+KINDS = ("arch", "column", "maps", "spring", "truss")
 
 
 def template(kind: str) -> str:

@@ -89,6 +89,17 @@ def test_the_best_limit_load_under_the_left_half_load_is_where_the_paper_has_it(
 # --- curves ---------------------------------------------------------------------------------------
 
 
+def test_curves_say_how_well_they_are_known(uniform, half):
+    """1e-10 where there is a cause; else half of a bracket, 8⁻⁴ of an edge (8⁻¹⁵ at the rim)."""
+    for lmap in (uniform, half):
+        edge = max(axis[1] - axis[0] for axis in lmap.grid.axes())
+        for curve in lmap.curves:
+            assert curve.errors.shape == curve.points.shape[:1]
+            exact = curve.kind in ("cusp", "branch point", "grazing", "exchange")
+            bound = 1e-10 if exact or curve.kind == "edge" else 0.5 * edge * 8.0**-4
+            assert (curve.errors <= 1.01 * bound).all(), curve.kind
+
+
 def test_the_map_jumps_where_two_folds_merge(uniform):
     """PHYSICS §4.4 at Θ = 0.6: between Δ = 0.75 and 0.76, from 1.317 to 2.042 (2.0392).
 

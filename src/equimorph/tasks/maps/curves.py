@@ -31,6 +31,9 @@ BESIDE = 1.0 / PARTS**2
 """Distance from a place at which both sides are looked at, as a share of the pair."""
 SLACK = 1e-3
 """How far outside its bracket, in lengths of it, an exact place may lie."""
+EXACT = 1e-10
+"""Error of places that have a cause, in units of the parameters' scales: Newton's method ends with
+a correction of 1e-9, and is linear with a rate of 1e-6."""
 SAME = 1e-7
 """Places closer than this, in units of the parameters' scales, are one."""
 
@@ -51,20 +54,24 @@ class MapCurve:
     values
         Lower and higher value of the map on both sides, close to the curve; not numbers where there
         is none.
+    errors
+        Bound of the error of each point along its grid line, in the unit of the parameter.
     """
 
     kind: str
     states: States
     points: Float[np.ndarray, "points 2"]
     values: Float[np.ndarray, "points 2"]
+    errors: Float[np.ndarray, " points"]
 
 
 @dataclass(frozen=True)
 class Places:
-    """Places at which a map is not smooth, with their kinds, states and brackets."""
+    """Places at which a map is not smooth, with their kinds, errors, states and brackets."""
 
     brackets: Brackets
     kind: np.ndarray
+    error: Float[np.ndarray, " brackets"]
     setting: Float[np.ndarray, "brackets 2"]
     z: Float[np.ndarray, "brackets size"]
     p: Float[np.ndarray, "brackets parameters"]
@@ -81,7 +88,7 @@ class Places:
 
     @property
     def _columns(self) -> tuple[np.ndarray, ...]:
-        return self.kind, self.setting, self.z, self.p
+        return self.kind, self.error, self.setting, self.z, self.p
 
 
 def explained(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
@@ -109,7 +116,9 @@ def explained(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets
         good &= _within(pairs.take(at), new_p[:, paths.sheet.places])
         hit = at[good]
         found[hit], kind[hit], z[hit], p[hit] = True, cause.kind, new_z[good], new_p[good]
-    return _confirmed(paths, pairs, Places(pairs, kind, p[:, paths.sheet.places], z, p), found)
+    error = EXACT * structure.scales[paths.sheet.places[moving]]
+    place = p[:, paths.sheet.places]
+    return _confirmed(paths, pairs, Places(pairs, kind, error, place, z, p), found)
 
 
 def _confirmed(
@@ -204,7 +213,13 @@ def unexplained(paths: Paths, pairs: Brackets) -> Places:
     some = np.flatnonzero(kind != "")
     pairs = pairs.take(some)
     a, b = pairs.a, pairs.b
-    return Places(pairs, kind[some], 0.5 * (a.setting + b.setting), a.z, a.p)
+    middle = 0.5 * (a.setting + b.setting)
+    return Places(pairs, kind[some], half_length(pairs), middle, a.z, a.p)
+
+
+def half_length(pairs: Brackets) -> Float[np.ndarray, " brackets"]:
+    """How far the middle of a pair is at most from any place in it."""
+    return np.asarray(0.5 * np.abs(pairs.b.setting - pairs.a.setting).sum(axis=1))
 
 
 def curves_through(
@@ -223,5 +238,6 @@ def curves_through(
             ends = np.stack([some.brackets.a.value, some.brackets.b.value], axis=1)
             for line in chains(some.setting / scales, some.brackets.edge, shape):
                 states = States(structure, some.z[line], some.p[line])
-                curves.append(MapCurve(kind, states, some.setting[line], np.sort(ends[line])))
+                values, errors = np.sort(ends[line]), some.error[line]
+                curves.append(MapCurve(kind, states, some.setting[line], values, errors))
     return tuple(curves)

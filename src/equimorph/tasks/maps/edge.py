@@ -6,7 +6,7 @@ import numpy as np
 
 from equimorph.model import Constraint
 from equimorph.tasks.maps.brackets import Brackets, grid_edges, narrowed
-from equimorph.tasks.maps.curves import Places
+from equimorph.tasks.maps.curves import Places, half_length
 from equimorph.tasks.maps.natural import NaturalSheet
 from equimorph.tasks.maps.samples import Samples, Settings
 from equimorph.tasks.maps.unloaded import LOST, unloaded
@@ -33,4 +33,5 @@ def edge_of_definition(
     found = narrowed(sheet.structure, sampler, pairs, DIVISIONS)
     middle = 0.5 * (found.a.setting + found.b.setting)
     inside = found.a.where(found.a.kind == LOST, found.b)
-    return Places(found, np.full(len(found), "edge", dtype=object), middle, inside.z, inside.p)
+    kind = np.full(len(found), "edge", dtype=object)
+    return Places(found, kind, half_length(found), middle, inside.z, inside.p)
