@@ -60,7 +60,17 @@ _HOMES = {
         "limit_load",
         "snap_landing",
     ),
-    "equimorph.manifold": ("Audit", "EquilibriumSet", "SnapGraph", "equilibrium_set", "snap_graph"),
+    "equimorph.manifold": (
+        "Audit",
+        "EquilibriumSet",
+        "Location",
+        "SnapGraph",
+        "StabilityDistance",
+        "equilibrium_set",
+        "locate",
+        "snap_graph",
+        "stability_distance",
+    ),
     "equimorph.tasks": (
         "Calibration",
         "CurvatureMap",

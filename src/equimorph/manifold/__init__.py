@@ -8,9 +8,11 @@ from equimorph.manifold.equilibrium_set import (
     EquilibriumSet,
     Stratum,
 )
+from equimorph.manifold.locate import Location, Place, locate
 from equimorph.manifold.over import StatesOver, lift_to
 from equimorph.manifold.refinement import refine
 from equimorph.manifold.snap_graph import Snap, SnapGraph, snap_graph
+from equimorph.manifold.stability_distance import StabilityDistance, stability_distance
 
 __all__ = [
     "INTERVALS",
@@ -18,12 +20,17 @@ __all__ = [
     "Boundary",
     "Component",
     "EquilibriumSet",
+    "Location",
+    "Place",
     "Snap",
     "SnapGraph",
+    "StabilityDistance",
     "StatesOver",
     "Stratum",
     "equilibrium_set",
     "lift_to",
+    "locate",
     "refine",
     "snap_graph",
+    "stability_distance",
 ]

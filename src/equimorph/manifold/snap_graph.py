@@ -113,7 +113,7 @@ def snap_graph(
         raise InputError(f"`samples` must be a whole number >= 2; got {samples!r}.")
     progress = progress or Silent()
     stable = tuple(k for k, stratum in enumerate(eset.strata) if stratum.index == 0)
-    edges = [(k, piece) for k in stable for piece in _stability_boundary(eset, k)]
+    edges = [(k, piece) for k in stable for piece in _pieces(eset, k)]
     snaps = []
     for number, (source, piece) in enumerate(edges):
         progress.report("snaps", number, len(edges))
@@ -121,8 +121,8 @@ def snap_graph(
     return SnapGraph(eset, stable, tuple(snaps))
 
 
-def _stability_boundary(eset: EquilibriumSet, stratum: int) -> Iterator[Int[np.ndarray, " n"]]:
-    """Vertices of the pieces of the folds around a stable stratum, in order along curves."""
+def stability_boundary(eset: EquilibriumSet, stratum: int) -> Int[np.ndarray, "n d"]:
+    """Facets of the folds around a stratum, one a row."""
     whole = adjacency(eset.cells)
     d = len(eset.names)
     every = [_facets(piece, d) for piece in eset.folds]
@@ -130,8 +130,13 @@ def _stability_boundary(eset: EquilibriumSet, stratum: int) -> Iterator[Int[np.n
     a, b = whole.links.T
     side_a, side_b = eset.stratum[a] == stratum, eset.stratum[b] == stratum
     own = np.unique(whole.across[(side_a != side_b) & folded[whole.across]])
-    for piece in pieces(whole.facets[own]):
-        yield piece if d < 3 else np.unique(piece)
+    return np.asarray(whole.facets[own])
+
+
+def _pieces(eset: EquilibriumSet, stratum: int) -> Iterator[Int[np.ndarray, " n"]]:
+    """Vertices of the pieces of the folds around a stable stratum, in order along curves."""
+    for piece in pieces(stability_boundary(eset, stratum)):
+        yield piece if len(eset.names) < 3 else np.unique(piece)
 
 
 def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:

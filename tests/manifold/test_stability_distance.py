@@ -1,0 +1,145 @@
+"""Distances of the spring from its stability boundary x_l = cos³ δ, F/k = sin³ δ; the arch."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import minimize_scalar
+
+from equimorph.equilibria import lift
+from equimorph.errors import InputError
+from equimorph.manifold import equilibrium_set, stability_distance
+from equimorph.model import Box
+from equimorph.structures import Rod, Spring
+from typecheck import unchecked
+
+
+def upper(eset, **at):
+    here = eset.at(**at).stable
+    return here[int(here.z[:, 0].argmax())]
+
+
+def test_distances_over_one_parameter():
+    """x_l = 0.7: F at the fold; the arclength of the curve F(δ), by quadrature."""
+    with unchecked():
+        eset = equilibrium_set(
+            Spring(), Box(F=(-0.5, 0.5)), fixed={"x_l": 0.7}, intervals=(9,), checks=0
+        )
+    state = upper(eset, F=0.0)
+    fold = np.arccos(np.cbrt(0.7))
+    distance = stability_distance(eset, state)
+    assert distance.in_parameters == pytest.approx(np.sin(fold) ** 3, abs=1e-8)
+    length, _ = quad(lambda t: np.hypot(1, np.cos(t) - 0.7 / np.cos(t) ** 2), fold, state.z[0])
+    # chains of 8 and 16 links, extrapolated: of fourth order
+    assert distance.along_the_set == pytest.approx(length, rel=1e-4)
+    assert distance.way.z[-1, 0] == pytest.approx(fold, abs=1e-5)
+
+
+@pytest.mark.parametrize(("x", "force"), [(0.7, 0.0), (0.8, 0.05), (1.2, 0.1), (0.5, -0.2)])
+def test_distances_in_two_parameters(spring_set, x, force):
+    """Least distance from the astroid (cos³ δ, sin³ δ) for δ > 0: the upper branch ends there."""
+    with unchecked():
+        distance = stability_distance(spring_set, upper(spring_set, x_l=x, F=force))
+    t = np.linspace(0.0, 1.3, 200_001)
+    gap = np.hypot(np.cos(t) ** 3 - x, np.sin(t) ** 3 - force)
+    assert distance.in_parameters == pytest.approx(gap.min(), abs=1e-8)
+    nearest = distance.nearest
+    assert nearest["x_l"] == pytest.approx(np.cos(nearest.z[0]) ** 3, abs=1e-8)
+
+
+def geodesic_length(delta: float, x: float, bearing: float) -> float:
+    """Length from (δ, x_l) to x_l = cos³ δ along a geodesic of (δ, x_l, F(δ, x_l)), by its ODE.
+
+    With one graph coordinate F: q̈ = −F_ij q̇ⁱ q̇ʲ ∇F / (1 + |∇F|²).
+    """
+
+    def slopes(d, x):
+        return np.array([np.cos(d) - x / np.cos(d) ** 2, -np.tan(d)])
+
+    def rate(_, y):
+        d, x, v, w = y
+        gradient = slopes(d, x)
+        second = -np.sin(d) - 2 * x * np.sin(d) / np.cos(d) ** 3
+        bend = second * v * v - 2 * v * w / np.cos(d) ** 2
+        a = -bend * gradient / (1 + gradient @ gradient)
+        return [v, w, *a]
+
+    def folded(_, y):
+        return y[1] - np.cos(y[0]) ** 3
+
+    folded.terminal = True
+    v = np.array([np.cos(bearing), np.sin(bearing)])
+    v = v / np.sqrt(v @ v + (slopes(delta, x) @ v) ** 2)
+    end = solve_ivp(rate, (0, 3), [delta, x, *v], events=folded, rtol=1e-8, atol=1e-10)
+    return float(end.t_events[0][0]) if len(end.t_events[0]) else 3.0
+
+
+@pytest.mark.parametrize(
+    ("x", "force"),
+    [
+        (0.8, 0.05),
+        pytest.param(0.7, 0.0, marks=pytest.mark.slow),
+        pytest.param(0.5, -0.2, marks=pytest.mark.slow),
+    ],
+)
+def test_shortest_way_along_the_surface_of_the_spring(spring_set, x, force):
+    """Shooting geodesics in all directions. 1e-4: fourth order in 16 links."""
+    state = upper(spring_set, x_l=x, F=force)
+    bearings = np.linspace(0, 2 * np.pi, 25)
+    lengths = [geodesic_length(state.z[0], x, each) for each in bearings]
+    best = bearings[int(np.argmin(lengths))]
+    exact = minimize_scalar(
+        lambda t: geodesic_length(state.z[0], x, t), (best - 0.2, best, best + 0.2), tol=1e-6
+    ).fun
+    with unchecked():
+        distance = stability_distance(spring_set, state)
+    assert distance.along_the_set == pytest.approx(exact, rel=1e-4)
+    assert distance.along_the_set >= distance.in_parameters
+    assert distance.way.residual.max() < 1e-9
+
+
+@pytest.mark.slow
+def test_no_straight_move_of_the_arch_loses_stability_before():
+    """Lifts in 48 directions end no earlier; the one to the nearest fold ends there."""
+    arch = Rod()
+    with unchecked():
+        eset = equilibrium_set(
+            arch,
+            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
+            fixed={"q": 2.5},
+            within=[arch.max_curvature <= 20],
+            intervals=(24, 41),
+            checks=0,
+        )
+        for state in eset.at(Theta=1.0, Delta=0.0).stable:
+            distance = stability_distance(eset, state)
+            for bearing in np.linspace(0, 2 * np.pi, 48, endpoint=False):
+                move = 0.999 * distance.in_parameters * np.array([np.cos(bearing), np.sin(bearing)])
+                move *= arch.scales[[list(state.parameters).index(n) for n in eset.names]]
+                goal = {"Theta": 1.0 + move[0], "Delta": move[1]}
+                path = lift(state, to=goal)
+                assert path.end.kind == "arrived"
+                assert path.end.state.stable
+            nearest = {name: distance.nearest[name] for name in eset.names}
+            beyond = {
+                name: state[name] + 1.01 * (value - state[name]) for name, value in nearest.items()
+            }
+            path = lift(state, to=beyond)
+            assert path.end.kind == "fold"
+            assert path.end.at == pytest.approx(1 / 1.01, abs=1e-5)
+
+
+def test_a_stratum_without_folds_is_nowhere_unstable():
+    with unchecked():
+        eset = equilibrium_set(Spring(), Box(F=(-0.3, 0.3)), fixed={"x_l": 1.2}, intervals=(5,))
+    distance = stability_distance(eset, eset.at(F=0.1)[0])
+    assert (distance.in_parameters, distance.along_the_set) == (np.inf, np.inf)
+    assert distance.nearest is None
+
+
+def test_states_that_have_no_such_distance_are_refused(spring_set):
+    here = spring_set.at(x_l=0.8, F=0.0)
+    with pytest.raises(InputError, match="`state` must be stable; got one of index 1"):
+        stability_distance(spring_set, here[int(here.index.argmax())])
+    other = Spring().natural_state(x_l=0.8, k=2.0)
+    with pytest.raises(InputError, match="must have the fixed parameters of the set"):
+        stability_distance(spring_set, other)
