@@ -18,6 +18,7 @@ from equimorph.structures import (
     Frame,
     LineLoad,
     PointForce,
+    Pressure,
     Rod,
     Tendon,
     Truss,
@@ -118,13 +119,13 @@ def bench_newton_step(benchmark, make, size, lanes):
 
 
 def rod_with_every_option():
-    """Springs, varying stiffness and curvature, extensible, seven amplitudes."""
+    """Springs, varying stiffness and curvature, extensible, a tendon, seven amplitudes."""
     return Rod(
         ends=(End(angle=0.3, y=5.0), End(x=5.0)),
         stiffness=[[0, 1], [1, 2]],
         curvature=[[0, 0], [1, 1]],
         axial=50.0,
-        actuators={"k": Curvature(1.0, 0.0, 0.5)},
+        actuators={"k": Curvature(1.0, 0.0, 0.5), "T": Tendon(0.05)},
         loads={
             "q": LineLoad(direction=(0.3, -1.0)),
             "w": LineLoad("left-half"),
@@ -144,8 +145,16 @@ def rod_with_a_tendon():
     )
 
 
+def rod_under_pressure():
+    """An arch under outside pressure: a dense matrix, factored by pivoting."""
+    return Rod(ends=("clamped", "pinned"), curvature=-2.0, loads={"p": Pressure()}, span=0.82)
+
+
+RODS = {"all": rod_with_every_option, "arm": rod_with_a_tendon, "pressure": rod_under_pressure}
+
+
 @pytest.mark.parametrize("lanes", [100, 4096])
-@pytest.mark.parametrize("make", [rod_with_every_option, rod_with_a_tendon], ids=["all", "arm"])
+@pytest.mark.parametrize("make", RODS.values(), ids=RODS)
 def bench_newton_step_of_a_general_rod(benchmark, make, lanes):
     structure = make()
     generator = np.random.default_rng(0)

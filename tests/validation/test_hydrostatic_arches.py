@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 import equimorph as em
+from typecheck import unchecked
 
 CLAMPED_HALF_CIRCLE = 3.0  # k tan α cot kα = 1 at α = π/2: cot kα = 0 at k = 3
 
@@ -85,8 +86,9 @@ def test_inflating_a_slack_strip_makes_it_a_circle():
     crown = radius * (1 - np.cos(0.5 / radius))
     errors = []
     for pressure in (1e3, 1e4):
-        state = em.lift(state, {"p": pressure}).end.state
-        slack = em.lift(state, {"k": 0.0}).end.state
+        with unchecked():
+            state = em.lift(state, {"p": pressure}).end.state
+            slack = em.lift(state, {"k": 0.0}).end.state
         errors.append(rod.height(0.5)(slack) - crown)
     assert errors[1] < 1 / (1e4 * radius**2)
     assert errors[0] / errors[1] == pytest.approx(10.0, rel=0.3)

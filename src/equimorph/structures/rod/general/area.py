@@ -59,6 +59,13 @@ class EnclosedArea:
         out[:, at, at] = s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T)
         return np.asarray(out)
 
+    def turned(self, theta: Nodal, v: Nodal) -> Nodal:
+        """Derivative of the gradient along v."""
+        s, c = np.sin(theta), np.cos(theta)
+        own = s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T)
+        others = c * multiply(s * v, self.matrix.T) - s * multiply(c * v, self.matrix.T)
+        return np.asarray(own * v + others)
+
     def second(self, theta: Nodal, v: Nodal, w: Nodal) -> Nodal:
         """Second derivative of the gradient along v and w."""
         s, c = np.sin(theta), np.cos(theta)

@@ -8,8 +8,8 @@ from jaxtyping import Float
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout
 from equimorph.linalg.condensed import PIVOT_GUARD
-from equimorph.linalg.dense import solve_bordered
 from equimorph.linalg.lanes import over_lanes
+from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Advance, Border, Direction, Symmetry
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.general.area import EnclosedArea
@@ -27,6 +27,8 @@ Values = Float[np.ndarray, " lanes"]
 Scalars = Float[np.ndarray, "lanes scalars"]
 Points = Float[np.ndarray, "lanes points"]
 
+BLOCK = 64
+"""Full matrices put together at a time: they stay in the cache."""
 FORCES = 8.0
 """Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
 
@@ -215,7 +217,7 @@ class GeneralMechanics(Mechanics):
         theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
         moved, change = self._velocity(np.zeros_like(z), dp)
         force = area.gradient(theta)
-        turn = pull * np.einsum("lij,lj->li", area.hessian(theta), moved) + change * force
+        turn = pull * area.turned(theta, moved) + change * force
         residual, column = np.zeros((2, *z.shape))
         residual[:, : self.unknowns] = -(pull * force)[:, self.unknown_nodes]
         column[:, : self.unknowns] = -turn[:, self.unknown_nodes]
@@ -247,10 +249,9 @@ class GeneralMechanics(Mechanics):
         if self._area is not None:
             theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
             (v_theta, v_pull), (w_theta, w_pull) = self._velocity(*v), self._velocity(*w)
-            hessian = self._area.hessian(theta)
             total = pull * self._area.second(theta, v_theta, w_theta)
-            total += v_pull * np.einsum("lij,lj->li", hessian, w_theta)
-            total += w_pull * np.einsum("lij,lj->li", hessian, v_theta)
+            total += v_pull * self._area.turned(theta, w_theta)
+            total += w_pull * self._area.turned(theta, v_theta)
             out[:, : self.unknowns] -= total[:, self.unknown_nodes]
         return out
 
@@ -271,19 +272,30 @@ class GeneralMechanics(Mechanics):
             border = (nothing, nothing, np.zeros((len(z), 0, 0)))
         columns, rows, corner = border
         if self._area is not None:
-            matrix = self.layout.dense(diagonal, gradients, trailing)
-            self._add_pressed(self._area, z, p, matrix)
-            return solve_bordered(matrix, columns, rows, corner, rhs)
+            entries = self._pressed_entries(self._area, z, p, (diagonal, gradients, trailing))
+            return self._full_layout.solve(entries, border, rhs)
         parts = (diagonal, gradients, columns, rows, corner, rhs)
         return self.layout.solve(*parts, trailing=trailing)
 
-    def _add_pressed(
-        self, area: EnclosedArea, z: Lanes, p: Parameters, matrix: Float[np.ndarray, "lanes n n"]
-    ) -> None:
-        """Add the pressure's part to F_z: every angle works on every other one."""
-        inner, n = self.unknown_nodes, self.unknowns
-        pull = self._pressure(self.scalars(z, p))[:, None, None]
-        matrix[:, :n, :n] -= pull * area.hessian(self.nodal_angles(z, p))[:, inner, inner]
+    @cached_property
+    def _full_layout(self) -> SparseLayout:
+        """Pattern of F_z under pressure: every angle works on every other one."""
+        return SparseLayout(*np.tril_indices(self.size), self.size, self.constraints)
+
+    def _pressed_entries(
+        self, area: EnclosedArea, z: Lanes, p: Parameters, parts: tuple[np.ndarray, ...]
+    ) -> Float[np.ndarray, "lanes entries"]:
+        """Entries of F_z of a rod under pressure; parts: diagonal, border, trailing block."""
+        inner, n, layout = self.unknown_nodes, self.unknowns, self._full_layout
+        theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))
+        entries = np.empty((len(z), len(layout.rows)))
+        for start in range(0, len(z), BLOCK):
+            lanes = slice(start, start + BLOCK)
+            matrix = self.layout.dense(*(part[lanes] for part in parts))
+            pressed = area.hessian(theta[lanes])[:, inner, inner]
+            matrix[:, :n, :n] -= pull[lanes, None, None] * pressed
+            entries[lanes] = matrix[:, layout.rows, layout.columns]
+        return entries
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
