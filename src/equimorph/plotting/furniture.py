@@ -12,9 +12,10 @@ from matplotlib.patches import Circle, Polygon
 from matplotlib.quiver import Quiver
 
 from equimorph.plotting import style
-from equimorph.structures import Rod, Spring, States
+from equimorph.structures import Rod, Spring, States, Truss
 
 _HUB = 0.026  # radius of a rotary actuator, in lengths of the rod
+_JOINT = 0.02  # size of a truss's support, as a share of the picture
 _MOVED = 1e-3  # way of a support, in lengths of the rod, that is worth a rail
 _STATIONS = np.linspace(0.05, 0.95, 13)
 _LONGEST_ARROW = 0.1  # of a line load, as a share of the width of the picture
@@ -39,6 +40,8 @@ def draw_supports(ax: Axes, states: States) -> None:
         _draw_rod_supports(ax, states.structure, states)
     elif isinstance(states.structure, Spring):
         _draw_guides(ax, states)
+    elif isinstance(states.structure, Truss):
+        _draw_truss_supports(ax, states.structure, states)
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,9 @@ def moving_parts(ax: Axes, states: States) -> MovingParts:
         look |= {"linestyle": "none", "marker": "o", "markersize": 5, "markerfacecolor": "white"}
         lines = states.shape()[None]
         tails, heads = _tip_arrow(states)
+    elif isinstance(structure, Truss):
+        tails = structure.joint_places(states.z)
+        heads = _FORCE_ARROW * _longest_one(structure.nodal_forces(states.p))
     pointers = tuple(ax.plot([], [], **look)[0] for _ in lines)
     if not heads.any():
         return MovingParts(pointers, lines, None, tails, heads)
@@ -162,6 +168,18 @@ def _draw_support(ax: Axes, place: Float[np.ndarray, " 2"], radius: float, *, hi
     foot = place + radius * np.array([[0.0, 0.0], [-1.2, -2.0], [1.2, -2.0]])
     ax.add_patch(Polygon(foot, **look) if hinged else Circle((place[0], place[1]), radius, **look))
     ax.plot(*place, ".", color=style.INK, markersize=2.5, zorder=7)
+
+
+def _draw_truss_supports(ax: Axes, truss: Truss, states: States) -> None:
+    """Hinges at joints that are held, rollers at those that are held along some axes only."""
+    places, held = truss.joint_places(states.z[:1])[0], truss.network.held
+    low, high = np.ptp(states.shape().reshape(-1, 2), axis=0)
+    radius = _JOINT * float(max(low, high))
+    for place, axes in zip(places, held, strict=True):
+        if axes.all():
+            _draw_support(ax, place, radius, hinged=True)
+        elif axes.any():
+            _draw_support(ax, place, radius, hinged=False)
 
 
 def _draw_guides(ax: Axes, states: States) -> None:

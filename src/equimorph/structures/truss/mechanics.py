@@ -175,10 +175,25 @@ class TrussMechanics(DiscreteStructure):
         `s` runs from 0 to 1 along it, each bar as long as the others. A truss in space is seen
         obliquely: half of y recedes.
         """
+        corners = self.joint_places(z)[:, self.network.walk]
+        return corners if s is None else along_corners(corners, s)
+
+    def joint_places(self, z: Lanes) -> Float[np.ndarray, "lanes joints 2"]:
+        """Joints as they are drawn."""
         full = np.repeat(self.network.places[None], len(z), axis=0)
         full[:, ~self.network.held] += z
-        if self.network.space == 3:
-            recede = 0.5 * np.sqrt(0.5) * full[..., 1]
-            full = np.stack([full[..., 0] + recede, full[..., 2] + recede], axis=-1)
-        corners = full[:, self.network.walk]
-        return corners if s is None else along_corners(corners, s)
+        return self._seen(full)
+
+    def nodal_forces(self, p: Parameters) -> Float[np.ndarray, "lanes joints 2"]:
+        """Loads on the joints as they are drawn."""
+        full = np.zeros((len(p), *self.network.held.shape))
+        full[:, ~self.network.held] = multiply(p, self.pulls)
+        return self._seen(full)
+
+    def _seen(
+        self, vectors: Float[np.ndarray, "lanes joints space"]
+    ) -> Float[np.ndarray, "lanes joints 2"]:
+        if self.network.space == 2:
+            return vectors
+        recede = 0.5 * np.sqrt(0.5) * vectors[..., 1]
+        return np.stack([vectors[..., 0] + recede, vectors[..., 2] + recede], axis=-1)
