@@ -1,4 +1,4 @@
-"""Time against lanes, elements and degree: writes docs/growth.png and docs/performance.md.
+"""Time against lanes, grid, elements and degree: writes docs/growth.png and docs/performance.md.
 
 Run it on an idle machine: ``python benchmarks/growth.py``. Times are the least of several runs, all
 kernels compiled before.
@@ -17,13 +17,18 @@ from matplotlib.figure import Figure
 
 import equimorph as em
 from bench_lift import BOX, LARGEST, natural_states
+from bench_maps import over
+from bench_sets import lifted
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.plotting.style import DOUBLE_COLUMN, INDEX_COLOURS, INK, house_style
 from equimorph.structures import Rod
+from equimorph.tasks import limit_load_map
 
 DOCS = Path(__file__).parent.parent / "docs"
 LANES = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000)
 ELEMENTS, DEGREES = (2, 4, 6, 9, 12, 18), (4, 6, 9, 12)
+LOADS = ("uniform", "left-half")
+GRIDS = ((12, 20), (24, 40), (47, 80), (93, 160))
 BATCH = 4096
 
 
@@ -45,7 +50,7 @@ class Timing:
 def least(work: Callable[[], object], lanes: int) -> float:
     """Least wall-clock time; short work is repeated more often."""
     best = np.inf
-    for _ in range(3 if lanes > 3000 else 10):
+    for _ in range(10 if lanes <= 3000 else 5 if lanes <= 10_000 else 2):
         start = time.perf_counter()
         work()
         best = min(best, time.perf_counter() - start)
@@ -82,13 +87,34 @@ def short_lifts(lanes: int) -> Timing:
 
 
 def equilibria_along_paths() -> Timing:
-    """Equilibria on rays to q = 20, each with its index, recorded; `lanes` counts equilibria."""
+    """Equilibria on rays to q = 20, each with its index; `lanes` counts equilibria.
+
+    They are counted once and not kept while the time is taken.
+    """
     states = natural_states(10_000)
     velocity = np.tile([0.0, 0.0, 20.0, 0.0], (len(states), 1))
     line, z = ParameterLine(states.structure, states.p, velocity), states.z
     count = len(follow(line, z).points.t) + len(z)
-    seconds = least(lambda: follow(line, z, (), TraceOptions()), len(z))
+    few = TraceOptions(record=False)
+    seconds = least(lambda: follow(line, z, (), few), len(z))
     return Timing("equilibria along paths", count, seconds)
+
+
+def load_map(intervals: tuple[int, int], load: str) -> Timing:
+    """Limit loads over a grid, with the curves where they are not smooth."""
+    arch = Rod(load=load)
+
+    def run() -> object:
+        return limit_load_map(arch, over(intervals), "q", within=[arch.max_curvature <= LARGEST])
+
+    lanes = (intervals[0] + 1) * (intervals[1] + 1)
+    return Timing(f"map, {load}", lanes, least(run, lanes))
+
+
+def whole_set(intervals: tuple[int, int]) -> Timing:
+    """All equilibria over a grid at q = 2.5, without random checks; `lanes` counts settings."""
+    lanes = (intervals[0] + 1) * (intervals[1] + 1)
+    return Timing("equilibrium set", lanes, least(lambda: lifted(intervals), lanes))
 
 
 def natural(lanes: int) -> Timing:
@@ -110,7 +136,21 @@ def against_lanes(axes: Axes, rows: Sequence[Sequence[Timing]]) -> None:
             row[-1].name, (lanes[-1], each[-1]), (4, 0), textcoords="offset points",
             color=colour, va="center",
         )  # fmt: skip
-    axes.set(xlabel="lanes", ylabel="time per lane, µs", xlim=(0.7, 20 * rows[0][-1].lanes))
+    axes.set(xlabel="lanes", ylabel="time per lane, µs", xlim=(0.7, 1000 * rows[0][-1].lanes))
+    axes.grid(visible=True)
+
+
+def against_grid(axes: Axes, rows: Sequence[Sequence[Timing]]) -> None:
+    """Time of maps and sets against settings."""
+    styles = ((INDEX_COLOURS[0], "-"), (INDEX_COLOURS[0], "--"), (INK, "-"))
+    for row, (colour, line) in zip(rows, styles, strict=True):
+        settings, seconds = [t.lanes for t in row], [t.seconds for t in row]
+        axes.loglog(
+            settings, seconds, line, marker="o", color=colour, markersize=2.5, linewidth=1.0,
+            label=row[0].name,
+        )  # fmt: skip
+    axes.set(xlabel="settings of the grid", ylabel="time, s")
+    axes.legend(frameon=False, loc="upper left")
     axes.grid(visible=True)
 
 
@@ -124,18 +164,23 @@ def against_resolution(axes: Axes, grid: Sequence[Sequence[Timing]]) -> None:
             va="center",
         )  # fmt: skip
     axes.set(xlabel="elements", ylabel=f"Newton step, µs per lane ({BATCH} lanes)", ylim=(0, None))
-    axes.set_xlim(0, ELEMENTS[-1] * 1.3)
+    axes.set_xlim(0, ELEMENTS[-1] * 1.5)
     axes.set_xticks(ELEMENTS)
     axes.grid(visible=True)
 
 
-def figure(rows: Sequence[Sequence[Timing]], grid: Sequence[Sequence[Timing]]) -> Figure:
-    """Both diagrams side by side."""
+def figure(
+    rows: Sequence[Sequence[Timing]],
+    grids: Sequence[Sequence[Timing]],
+    steps: Sequence[Sequence[Timing]],
+) -> Figure:
+    """All three diagrams side by side."""
     with house_style():
-        drawing = Figure(figsize=(DOUBLE_COLUMN, 0.42 * DOUBLE_COLUMN), layout="constrained")
-        left, right = drawing.subplots(1, 2)
+        drawing = Figure(figsize=(DOUBLE_COLUMN, 0.36 * DOUBLE_COLUMN), layout="constrained")
+        left, middle, right = drawing.subplots(1, 3)
         against_lanes(left, rows)
-        against_resolution(right, grid)
+        against_grid(middle, grids)
+        against_resolution(right, steps)
         drawing.savefig(DOCS / "growth.png", dpi=200)
     return drawing
 
@@ -152,29 +197,39 @@ def machine() -> str:
 
 
 def table(
-    rows: Sequence[Sequence[Timing]], grid: Sequence[Sequence[Timing]], totals: Sequence[Timing]
+    rows: Sequence[Sequence[Timing]],
+    grids: Sequence[Sequence[Timing]],
+    steps: Sequence[Sequence[Timing]],
+    totals: Sequence[Timing],
 ) -> str:
     """Text of docs/performance.md."""
     lines = [
         "# Performance", "",
-        f"{machine()}; warm; least of several runs; the default rod (6 elements of degree 9)",
-        "unless said. Written by `benchmarks/growth.py`; `make bench` runs the benchmarks.",
+        f"{machine()}; warm; least of several runs;",
+        "the default rod (6 elements of degree 9) unless said. Written by",
+        "`benchmarks/growth.py`; `make bench` runs the benchmarks.",
         "", "| what | how many | time | per second |", "|---|---|---|---|",
     ]  # fmt: skip
     for timing in totals:
         rate = f"{timing.lanes / timing.seconds:,.0f}".replace(",", " ")
         count = f"{timing.lanes:,}".replace(",", " ")
         lines.append(f"| {timing.name} | {count} | {timing.seconds:.2f} s | {rate} |")
-    lines += ["", "![Time against lanes, elements and degree](growth.png)", ""]
+    lines += ["", "![Time against lanes, grid, elements and degree](growth.png)", ""]
     lines += ["Time per lane in µs:", "", "| lanes | " + " | ".join(r[0].name for r in rows) + " |"]
     lines.append("|---" * (len(rows) + 1) + "|")
     for column in zip(*rows, strict=True):
         cells = " | ".join(f"{t.each:.3g}" for t in column)
         lines.append(f"| {column[0].lanes:,} | {cells} |".replace(",", " "))
+    lines += ["", "Time in seconds of maps with their curves, and of the set at q = 2.5:", ""]
+    lines.append("| settings | " + " | ".join(row[0].name for row in grids) + " |")
+    lines.append("|---" * (len(grids) + 1) + "|")
+    for column in zip(*grids, strict=True):
+        cells = " | ".join(f"{t.seconds:.2f}" for t in column)
+        lines.append(f"| {column[0].lanes:,} | {cells} |".replace(",", " "))
     lines += ["", f"Newton step with tangent and inertia, µs per lane in a batch of {BATCH}:", ""]
     lines.append("| degree | " + " | ".join(f"{n} elements" for n in ELEMENTS) + " |")
     lines.append("|---" * (len(ELEMENTS) + 1) + "|")
-    for degree, row in zip(DEGREES, grid, strict=True):
+    for degree, row in zip(DEGREES, steps, strict=True):
         lines.append(f"| {degree} | " + " | ".join(f"{t.each:.2f}" for t in row) + " |")
     return "\n".join(lines) + "\n"
 
@@ -184,11 +239,16 @@ def main() -> None:
     natural_states(LANES[-1])
     for warm in (limit_loads, short_lifts, newton_step):
         warm(300)
+    for load in LOADS:
+        load_map((5, 8), load)
+    whole_set((5, 9))
     rows = [[work(n) for n in LANES] for work in (limit_loads, short_lifts, newton_step)]
-    grid = [[newton_step(BATCH, n, degree) for n in ELEMENTS] for degree in DEGREES]
+    grids = [[load_map(n, load) for n in GRIDS] for load in LOADS]
+    grids.append([whole_set((i, j + 1)) for i, j in GRIDS])
+    steps = [[newton_step(BATCH, n, degree) for n in ELEMENTS] for degree in DEGREES]
     totals = [equilibria_along_paths(), limit_loads(10_000), natural(10_000)]
-    figure(rows, grid)
-    (DOCS / "performance.md").write_text(table(rows, grid, totals), encoding="utf-8")
+    figure(rows, grids, steps)
+    (DOCS / "performance.md").write_text(table(rows, grids, steps, totals), encoding="utf-8")
 
 
 if __name__ == "__main__":

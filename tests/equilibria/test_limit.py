@@ -75,3 +75,14 @@ def test_unstable_start_is_refused():
 def test_unknown_load_is_refused(arch):
     with pytest.raises(InputError, match=r"`Q` must be a parameter \(Theta, Delta, q, nu\)"):
         em.limit_load(arch.natural_state(Theta=0.9), "Q")
+
+
+def test_rod_pulled_straight_is_lost_where_its_elements_are_too_long():
+    """Layers at the ends have the width 1/(2π √λ), with λ near 10⁶: 10⁻⁴, the elements 1/6."""
+    arch = em.Rod()
+    end = em.lift(arch.natural_state(Theta=0.9, Delta=0.0), {"nu": 0.9999}).end
+    assert end.kind == "lost"
+    assert end.detail.endswith("the discretisation does not resolve the state: refine it")
+    finer = em.Rod(elements=12)
+    path = em.lift(finer.natural_state(Theta=0.9, Delta=0.0), {"nu": 0.99})
+    assert path.arrived

@@ -43,6 +43,7 @@ WHY = {
     kernels.LONG: "no end in {most} steps",
     kernels.STUCK: "the start is singular: it lies on a fold or a branch point",
 }
+UNRESOLVED = "the discretisation does not resolve the state: refine it"
 
 
 @dataclass(frozen=True)
@@ -294,7 +295,11 @@ class Block:
         stage = counts[kernels.STAGE, : self.active]
         for i in np.flatnonzero(stage > ENDED):
             why = WHY[int(stage[i])].format(most=counts[kernels.MOST, i])
-            lost.append(Loss(int(counts[kernels.LANE, i]), why, self._front(np.array([i]))))
+            front = self._front(np.array([i]))
+            state = self.curve.take(counts[kernels.LANE, [i]]).states(front.z, front.t)
+            if not self.curve.structure.resolved(*state)[0]:
+                why = f"{why}, where {UNRESOLVED}"
+            lost.append(Loss(int(counts[kernels.LANE, i]), why, front))
         return lost
 
     def drop(self, lanes: Some) -> None:
