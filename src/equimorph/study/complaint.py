@@ -150,7 +150,7 @@ def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict
     elif "discriminator" in node:
         inner = {"$ref": node["discriminator"]["mapping"][part]}
     else:
-        inner = node["properties"][part]
+        inner = node.get("properties", {}).get(part) or node["additionalProperties"]
     for option in inner.get("anyOf", []):
         inner = option if "$ref" in option or "items" in option else inner
     if "$ref" in inner:

@@ -316,9 +316,10 @@ def test_descriptors_are_read_as_they_are_written():
     assert frame.descriptor("travel(P)") == portal(50.0).descriptor("travel(P)")
 
 
-def test_no_states_have_no_values():
-    frame = portal(50.0)
+@pytest.mark.parametrize("frame", [portal(50.0), portal(None)], ids=["extensible", "not"])
+def test_no_states_have_no_values(frame):
     nothing = frame.natural_state().batch[:0]
+    assert frame.travel("P")(nothing).shape == (0,)
     for text in ("displacement(B,y)", "moment(C-F,C)", "max_curvature", "reaction(E,x)", "energy"):
         assert frame.descriptor(text)(nothing).shape == (0,)
     assert nothing.shape().shape[0] == len(nothing.error_estimate) == 0

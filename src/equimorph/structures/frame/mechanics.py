@@ -149,7 +149,8 @@ class FrameMechanics(DiscreteStructure):
         total -= multiply(stretch * np.cos(psi), model.cosine[:, own])
         total -= multiply(pulls.tension, model.stretch[model.owner][:, own])
         held = model.place < 0
-        total += multiply(self.nodal_moments(z, p)[:, held], model.turned[held][:, own])
+        if held.any():
+            total += multiply(self.nodal_moments(z, p)[:, held], model.turned[held][:, own])
         return np.asarray(total)
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
