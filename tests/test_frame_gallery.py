@@ -1,0 +1,68 @@
+"""The gallery of networks: what its examples and study files compute."""
+
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import equimorph as em
+from equimorph.study.prepare import prepare
+from equimorph.study.problem import parse_study
+from typecheck import unchecked
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def structure(name):
+    """The structure of a study file."""
+    text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
+    return prepare(parse_study(text, name)).structure
+
+
+def example(name):
+    spec = spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_lees_frame_is_led_around_its_snap():
+    """Limits as printed, to half a unit of the last digit."""
+    module = example("lee")
+    with unchecked():
+        found = module.main((9, 9))
+        assert isinstance(module.figure(found), Figure)
+    assert found.limits == pytest.approx((18.5588, -9.4213), abs=6e-5)
+    assert found.eset.audit.clean
+    assert found.route.status == "arrived"
+    assert found.route.margin >= 0.2
+
+
+def test_the_bridge_keeps_its_middle_level_while_the_load_grows():
+    """1e-9: descriptors are held to that."""
+    module = example("bridge")
+    with unchecked():
+        found = module.main((7, 7))
+        assert isinstance(module.figure(found), Figure)
+    truss = module.bridge()
+    assert found.sag < -0.1
+    assert found.eset.audit.clean
+    assert found.level.end.kind == "arrived"
+    middle = truss.displacement("b3", "y")(found.level.states)
+    np.testing.assert_allclose(middle, 0.0, atol=1e-9)
+    assert (truss.max_utilisation(found.level.states) <= 1.0).all()
+
+
+def test_study_file_and_example_describe_the_same_bridge():
+    """Bars may be listed in another order: limit loads agree to round-off."""
+    safe = [
+        (made, [made.max_utilisation <= 1])
+        for made in (structure("bridge"), example("bridge").bridge())
+    ]
+    with unchecked():
+        one, two = (
+            em.limit_load(made.natural_state(), "F", within=cap).value for made, cap in safe
+        )
+    assert one == pytest.approx(two, rel=1e-9)
