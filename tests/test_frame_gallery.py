@@ -28,6 +28,7 @@ def example(name):
     return module
 
 
+@pytest.mark.slow
 def test_lees_frame_is_led_around_its_snap():
     """Limits as printed, to half a unit of the last digit."""
     module = example("lee")

@@ -32,7 +32,7 @@ def test_the_example_runs_from_file_to_page(drawn, tmp_path, monkeypatch):
         outcome = run_study(tmp_path / "lee.toml", tmp_path / "out")
         results = read_results(tmp_path / "out" / "results.h5")
     assert outcome.equilibrium_set.audit.clean
-    np.testing.assert_array_equal(np.sort(outcome.points[0].index), [0, 0, 1])
+    np.testing.assert_array_equal(np.sort(outcome.points[0].index), [0, 0, 1, 1, 2])
     assert outcome.routes[0].route.status == "arrived"
     stored = results.equilibrium_set.structure
     assert stored.identity() == outcome.problem.structure.identity()
