@@ -14,7 +14,7 @@ from equimorph.structures import Rod, Spring
 
 @pytest.mark.parametrize(
     ("name", "printed"),
-    [("Theta", "Θ"), ("nu", "ν"), ("x_l", "$x_l$"), ("tip_load", "tip load")],
+    [("Theta", "Θ"), ("theta_A", "$θ_A$"), ("nu", "ν"), ("x_l", "$x_l$"), ("tip_load", "tip load")],
 )
 def test_names_become_symbols_or_plain_words(name, printed):
     assert symbol(name) == printed

@@ -8,6 +8,8 @@ from equimorph.structures import Structure
 _SYMBOLS = {
     "Theta": "Θ",
     "Delta": "Δ",
+    "theta_A": "$θ_A$",
+    "theta_B": "$θ_B$",
     "nu": "ν",
     "q": "$q$",
     "x_l": "$x_l$",

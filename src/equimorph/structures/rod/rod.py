@@ -96,8 +96,8 @@ class Rod(Described):
     axial
         Axial stiffness EA(s), in units of 4π²B/L² (of force). None: inextensible.
     loads
-        More parameters of the role "load" by name, 0 by default: a `LineLoad`, `PointForce` or
-        `Couple`, or several of a kind that share the amplitude.
+        More parameters of the role "load" by name, 0 by default: a `LineLoad`, `PointForce`,
+        `Couple` or `Pressure`, or several of a kind that share the amplitude.
     actuators
         The same for the role "actuator"; `Curvature` patterns and `Tendon`s, above all.
     coordinates
