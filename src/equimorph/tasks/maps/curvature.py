@@ -123,7 +123,7 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     sink.report("paths", 0, 2)
     vertices = paths(settings)
     sink.report("paths", 1, 2)
-    places = places_on(replace(paths, options=options.finer()), vertices, shape)
+    places = places_on(paths, vertices, shape)
     edge = edge_of_definition(sheet, constraints, settings, shape)
     curves = curves_through(sheet, (*places, edge), shape)
     sink.report("paths", 2, 2)
