@@ -19,7 +19,7 @@ from equimorph.structures import States, Structure
 OVERHANG = 0.3
 """How far beyond a cell, in barycentric coordinates, a point may lie to be tried from it."""
 ITERATIONS = 12
-ROUND_OFF = 1e-12
+ROUND_OFF = 1e-14
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
 SAME = 1e-6
 """Distance in the metric below which two states over one point are the same."""
