@@ -55,13 +55,13 @@ def main(intervals: tuple[int, int] = (15, 15)) -> Result:
 
 def figure(result: Result) -> Figure:
     """The actuator over the load, and the utilisation of the bars."""
-    drawing = Figure(figsize=(6.0, 3.0), layout="constrained")
+    drawing = Figure(figsize=(7.0, 3.0), layout="constrained")
     left, right = drawing.subplots(1, 2)
     states = result.level.states
     left.plot(states["F"], states["a"])
-    left.set(xlabel="F", ylabel="a", title="mid-span kept level")
+    left.set(xlabel="F", ylabel="a", title="mid-span kept level", xticks=[0, 0.5, 1, 1.5])
     right.plot(states["F"], bridge().max_utilisation(states))
-    right.set(xlabel="F", ylabel="max U", title="compression over Euler load")
+    right.set(xlabel="F", ylabel="max U", title="share of Euler's load", xticks=[0, 0.5, 1, 1.5])
     return drawing
 
 

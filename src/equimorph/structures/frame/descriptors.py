@@ -21,6 +21,16 @@ WRITTEN = (
     *("max_curvature(member)", "max_curvature", "reaction(joint,axis)"),
     *("travel(load)", "effort(actuator)", "energy"),
 )
+CONJUGATE = {
+    "force": "length",
+    "force/length": "length²",
+    "force·length": "rad",
+    "1/length": "force·length²",
+    "length": "force",
+    "rad": "force·length",
+    "1": "force·length",
+}
+"""Units of efforts and travels by the unit of their parameter."""
 _CALL = re.compile(r"(\w+)(?:\(([\w-]+)(?:,([\w-]+))?\))?")
 
 
@@ -139,13 +149,13 @@ def effort(frame: FrameFields, parameter: str, sign: float = 1.0) -> Descriptor:
     """∂E/∂p of a parameter, or minus that."""
     at = position(frame.parameters, parameter)
     unit = frame.model.bending / frame.model.length
-    label = frame.parameters[at].unit
+    label = CONJUGATE[frame.parameters[at].unit]
     name = f"{'effort' if sign > 0.0 else 'travel'}({parameter})"
 
     def value(z: Lanes, p: Parameters) -> Values:
         return np.asarray(sign * unit * frame.effort(z, p)[:, at])
 
-    return _made(frame, name, f"force·length/({label})", value)
+    return _made(frame, name, label, value)
 
 
 def travel(frame: FrameFields, load: str) -> Descriptor:
