@@ -67,3 +67,26 @@ def test_study_file_and_example_describe_the_same_bridge():
             em.limit_load(made.natural_state(), "F", within=cap).value for made, cap in safe
         )
     assert one == pytest.approx(two, rel=1e-9)
+
+
+def test_the_network_stays_where_it_is_put():
+    """Two stable states without load; the study file has the same limit load. 1e-9: round-off."""
+    made = structure("network")
+    with unchecked():
+        found = em.find_equilibria(made, {"t": 0.0, "P": 0.0}, within=[made.max_curvature <= 2])
+        here = em.limit_load(made.natural_state(), "P").value
+        there = em.limit_load(example("network").network().natural_state(), "P").value
+    np.testing.assert_array_equal(found.index, [0, 0])
+    assert here == pytest.approx(there, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_the_network_is_pressed_over_and_pulled_back():
+    """The loads that its study file names, to four digits."""
+    module = example("network")
+    with unchecked():
+        found = module.main()
+        assert isinstance(module.figure(found), Figure)
+    assert found.loads == pytest.approx((14.2530, -14.0613), abs=6e-5)
+    assert found.inverted.stable
+    assert found.eset.audit.clean
