@@ -10,7 +10,9 @@ from typecheck import unchecked
 ARCH_BOX = Box(Theta=(0.2, 2.5), Delta=(-2, 2))
 
 
-def lifted_arch(intervals: tuple[int, int], checks: int = 2) -> EquilibriumSet:
+def lifted_arch(
+    intervals: tuple[int, int], checks: int = 2, accuracy: float | None = None
+) -> EquilibriumSet:
     arch = Rod()
     with unchecked():  # shapes are checked on small surfaces
         return equilibrium_set(
@@ -20,6 +22,7 @@ def lifted_arch(intervals: tuple[int, int], checks: int = 2) -> EquilibriumSet:
             within=[arch.max_curvature <= 20],
             intervals=intervals,
             checks=checks,
+            accuracy=accuracy,
         )
 
 
@@ -37,6 +40,16 @@ def lifted_arch(intervals: tuple[int, int], checks: int = 2) -> EquilibriumSet:
 )
 def arch_set(request) -> EquilibriumSet:
     return lifted_arch(request.param)
+
+
+@pytest.fixture(scope="session")
+def refined_arch():
+    """Refined sets of the arch by intervals and accuracy."""
+
+    def refined(intervals: tuple[int, int], accuracy: float) -> EquilibriumSet:
+        return lifted_arch(intervals, checks=0, accuracy=accuracy)
+
+    return refined
 
 
 @pytest.fixture(scope="session")

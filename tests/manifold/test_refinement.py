@@ -13,7 +13,7 @@ from equimorph.manifold.pairing import Setting
 from equimorph.manifold.surgery import collapse, flip, smallest_angle
 from equimorph.manifold.topology import euler_characteristic
 from equimorph.model import Box, Descriptor
-from oracles.complexes import assert_faithful, assert_folds_are_singular
+from oracles.complexes import assert_faithful, assert_folds_are_singular, farthest
 from oracles.polynomial import bead_on_a_circle, fold_form
 from oracles.surfaces import cusp, sphere, torus
 from typecheck import unchecked
@@ -123,6 +123,39 @@ def test_parabola_over_one_parameter_is_refined():
     x, a = inside_cells(eset).T
     assert np.abs(a - x**2).max() < 2.5e-3  # the distance is less by the slope, √5 at most
     assert eset.audit.smallest_angle == 0.0
+
+
+@pytest.fixture(scope="module")
+def fine_arch(refined_arch):
+    return refined_arch((47, 81), 0.01)
+
+
+@pytest.mark.parametrize(
+    "intervals",
+    [
+        pytest.param((6, 11), marks=pytest.mark.slow),
+        pytest.param((12, 21), marks=pytest.mark.slow),
+        pytest.param((24, 41), marks=pytest.mark.slow),
+    ],
+    ids="{0[0]}x{0[1]}".format,
+)
+def test_refined_arch_does_not_depend_on_the_grid(intervals, refined_arch, fine_arch):
+    """Surfaces within 0.01 of the set: twice that from each other, with the same pieces."""
+    eset = refined_arch(intervals, 0.01)
+    assert_faithful(eset)
+    assert_folds_are_singular(eset, 1e-8)
+    assert topology(eset) == topology(fine_arch)
+    assert max(farthest(eset, fine_arch), farthest(fine_arch, eset)) <= 0.02
+
+
+def test_refined_arch_is_faithful(refined_arch):
+    eset = refined_arch((12, 21), 0.02)
+    assert_faithful(eset)
+    assert_folds_are_singular(eset, 1e-8)
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (2, 0)
+    assert len(eset.boundaries) == 4
+    assert eset.audit.deviation <= 0.02
+    assert eset.audit.smallest_angle > 10.0
 
 
 def test_refinement_is_deterministic():

@@ -1,11 +1,12 @@
 """What must hold on every equilibrium set, whatever the structure."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.topology import adjacency, flags_of, orientation, projected_volume
 
-REGULAR = (0, 3)
+REGULAR = (0, 3, 5, 6)
 FOLDED = (1, 4)
 CAPPED = (2, 4)
 
@@ -42,6 +43,8 @@ def assert_folds_are_singular(eset: EquilibriumSet, tolerance: float) -> None:
     below = eset.structure.solve(z, p, nothing, shift=-shift).negative
     # exactly one eigenvalue lies between −tolerance and +tolerance
     assert (above - below == 1).all()
+    # and it is the one that tells both sides apart
+    assert np.array_equal(below - eset.structure.constraints, eset.index[folded])
 
 
 def assert_index_of_cells(eset: EquilibriumSet) -> None:
@@ -115,3 +118,42 @@ def assert_closed(piece: np.ndarray, d: int) -> None:
         assert len(np.unique(piece)) == len(piece) - 1
     if d == 3:
         assert (adjacency(piece).counts == 2).all()
+
+
+def places(eset: EquilibriumSet) -> np.ndarray:
+    """Vertices in the embedding: configuration in the metric and scaled free parameters."""
+    structure = eset.structure
+    names = [parameter.name for parameter in structure.parameters]
+    scales = structure.scales[[names.index(name) for name in eset.names]]
+    u = eset.points.z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    return np.concatenate([u, eset.coordinates / scales], axis=1)
+
+
+def farthest(eset: EquilibriumSet, other: EquilibriumSet) -> float:
+    """Largest distance of a vertex of one surface from the triangles of another.
+
+    Of the other's triangles those with the nearest middles are looked at.
+    """
+    place, corners = places(eset), places(other)[other.cells]
+    near = cKDTree(corners.mean(axis=1)).query(place, k=min(40, len(corners)))[1]
+    gap = np.full(len(place), np.inf)
+    for column in near.T:
+        gap = np.minimum(gap, _to_triangles(place, corners[column]))
+    return float(gap.max())
+
+
+def _to_triangles(place: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Distance of points from triangles, one each."""
+    base, sides = corners[:, 0], corners[:, 1:] - corners[:, :1]
+    gram = sides @ np.swapaxes(sides, 1, 2)
+    right = np.einsum("nkd,nd->nk", sides, place - base)
+    share = np.linalg.solve(gram, right[:, :, None])[:, :, 0]
+    inside = (share.min(axis=1) >= 0.0) & (share.sum(axis=1) <= 1.0)
+    foot = base + np.einsum("nk,nkd->nd", share, sides)
+    gap = np.where(inside, np.linalg.norm(place - foot, axis=1), np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        a, along = corners[:, i], corners[:, j] - corners[:, i]
+        t = np.einsum("nd,nd->n", place - a, along) / np.einsum("nd,nd->n", along, along)
+        foot = a + np.clip(t, 0.0, 1.0)[:, None] * along
+        gap = np.minimum(gap, np.linalg.norm(place - foot, axis=1))
+    return gap

@@ -17,7 +17,7 @@ from equimorph.manifold.cutting import (
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.normals import existence_normals
 from equimorph.manifold.pairing import Pairing
-from equimorph.manifold.pins import pin
+from equimorph.manifold.pins import lower_index, pin
 from equimorph.manifold.points import CAP, CORNER, FOLD
 from equimorph.manifold.polygons import Loops, Polygon
 from equimorph.manifold.simplices import plane_bases
@@ -229,9 +229,13 @@ def _pinned(pairing: Pairing, wanted: list[tuple[_Plan, Chord, int]]) -> list[in
         pairs = [wanted[k][1] for k in own]
         planes = _planes(pairing, [wanted[k][0].polygon.triangle for k in own])
         pinned = pin(pairing.setting, pairing.points, pairs, kind, planes)
-        inside = pairing.mesh.covers(pinned.p[:, pairing.setting.free])
-        for lane in np.flatnonzero(pinned.found & inside):
-            low = int(pairing.points.index[list(pairs[lane])].min())
+        good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
+        lows = pairing.points.index[np.array(pairs)].min(axis=1)
+        if kind in {FOLD, CORNER}:
+            # where two eigenvalues nearly vanish, the other fold may be met
+            own_low = lower_index(pairing.setting, pinned.z[good], pinned.p[good])
+            good[good] = own_low == lows[good]
+        for lane, low in zip(np.flatnonzero(good).tolist(), lows[good].tolist(), strict=True):
             out[own[lane]] = pairing.points.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out
 

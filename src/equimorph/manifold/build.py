@@ -30,6 +30,8 @@ from equimorph.structures import Structure
 COARSE = 12
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
 BISECTIONS = 12
+GRIDS = 3
+"""Grids that are tried, each with twice the intervals, until refinement succeeds everywhere."""
 SEARCHES = 4
 """Rounds of independent checks; what one round finds missing is lifted before the next."""
 HOPELESS = 50
@@ -76,7 +78,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
         other points are checked, until nothing is missing or four rounds are over.
     accuracy
         Largest distance of the straight cells from the set, in the metric, to which the set is
-        refined (see `refine`); it is left as it was lifted if not given.
+        refined (see `refine`); it is left as it was lifted if not given. If some edges cannot be
+        bisected the grid is too coarse: one of twice the intervals is lifted, at most twice.
     progress
         Sink for progress reports.
 
@@ -95,6 +98,30 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
         check_accuracy(accuracy)
     intervals = _intervals(box, intervals)
     setting = _setting(structure, box, fixed or {}, tuple(within))
+    for number in range(GRIDS):
+        eset = _of_grid(setting, (box, dict(fixed or {}), intervals), (seed, checks), progress)
+        if accuracy is None:
+            break
+        eset = refine(eset, accuracy, progress)
+        if eset.audit.unrefined == 0 or number == GRIDS - 1:
+            break
+        # odd numbers stay odd, which keeps lines of symmetry off the grid
+        intervals = tuple(2 * n + n % 2 for n in intervals)
+    return eset
+
+
+def _of_grid(
+    setting: Setting,
+    given: tuple[Box, Mapping[str, float], tuple[int, ...]],
+    effort: tuple[int, int],
+    progress: Progress,
+) -> EquilibriumSet:
+    """Set over a grid, with checks.
+
+    `given` are box, fixed values and intervals; `effort` the random seed and the number of checks.
+    """
+    box, _, intervals = given
+    seed, checks = effort
     lines = grid_lines(box, intervals, _mirrored(setting))
     progress.report("seeds", 0, 1)
     pairing = start_pairing(setting, grid_mesh(lines))
@@ -104,15 +131,14 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     for number in range(SEARCHES):
         pairing.fit()
         cells, bisected = _lifted(pairing, progress)
-        eset = account(pairing, cells, (box, dict(fixed or {}), intervals), bisected)
+        eset = account(pairing, cells, given, bisected)
         found = check(eset, generator, checks, progress)
         if found.lacking == 0 or number == SEARCHES - 1:
             break
         recovered += found.lacking
         pairing.points.over_vertices(*seeds_from(setting, pairing.mesh, found.missing))
     audit = replace(eset.audit, checked=found.found, missing=found.lacking, recovered=recovered)
-    eset = replace(eset, audit=audit)
-    return eset if accuracy is None else refine(eset, accuracy, progress)
+    return replace(eset, audit=audit)
 
 
 def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:

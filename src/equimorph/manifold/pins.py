@@ -18,6 +18,8 @@ Values = Float[np.ndarray, " lanes"]
 
 NEWTON_STEPS = 15
 DIFFERENCE = 1e-6
+VANISHING = 1e-6
+"""Size below which an eigenvalue at a fold is the one that vanishes."""
 REACH = 3.0
 """How far a point may lie from the middle, relative to the farthest one around it."""
 
@@ -122,6 +124,13 @@ def corrected(aim: Aim, z: Lanes, p: Parameters, around: Values) -> Pinned:
     for constraint in setting.constraints:
         found[found] &= constraint.excess(z[found], p[found]) < 1e-9
     return Pinned(z, p, found)
+
+
+def lower_index(setting: Setting, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+    """Index on the lower side of folds: eigenvalues below the one that vanishes."""
+    structure = setting.structure
+    nothing, shift = np.zeros((len(z), 0, structure.size)), np.full(len(z), -VANISHING)
+    return np.asarray(structure.solve(z, p, nothing, shift=shift).negative - structure.constraints)
 
 
 def _middles(

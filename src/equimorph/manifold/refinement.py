@@ -26,10 +26,10 @@ from equimorph.manifold.fabric import (
     vertices_of,
 )
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.pins import Aim, corrected
+from equimorph.manifold.pins import Aim, corrected, lower_index
 from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
 from equimorph.manifold.surgery import collapse, flip, smallest_angle
-from equimorph.manifold.tangents import hermite, split_step
+from equimorph.manifold.tangents import Cubics, split_step
 from equimorph.manifold.topology import keys_of
 from equimorph.model import Progress, Silent
 
@@ -41,8 +41,16 @@ SHARE = {1: 1.0, 2: 0.75, 3: 2.0 / 3.0}
 of the largest."""
 PREFERENCE = 1.6
 """How much longer an edge must be than those that deviate to be bisected before them."""
-REACH = 0.5
+PLACES = (0.5, 0.3, 0.7)
+"""Where along an edge a vertex is tried, one place after the other."""
+REACH = 0.3
 """How far from its prediction a new vertex may be corrected, relative to its edge."""
+PART = 0.85
+"""Longest that both parts of an edge may be, relative to the whole."""
+ALONG = 0.5
+"""Least cosine of the angle between an edge and the set at its new vertex."""
+HOPELESS = 60
+"""Failed bisections, and a fiftieth of all edges, beyond which refinement ends."""
 MOST = 2_000_000
 """Vertices beyond which refinement ends."""
 
@@ -127,6 +135,7 @@ class _Memory:
     keys: Int[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, int))
     error: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
     stuck: set[tuple[int, int]] = field(default_factory=set)
+    failures: int = 0
 
 
 def _refined(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progress) -> Fabric:
@@ -135,7 +144,8 @@ def _refined(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progre
     for _ in range(ROUNDS):
         edges = _known(fabric, memory)
         wanted = (edges.error > tolerance) & ~edges.stuck
-        if len(fabric.vertices) > MOST:
+        hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
+        if hopeless or len(fabric.vertices) > MOST:
             break
         if not wanted.any():
             if tidied == TIDIED:
@@ -192,7 +202,7 @@ def _deviations(
         own = np.flatnonzero(marks == mark)
         for some in np.array_split(own, len(own) // 8192 + 1):
             first, second = (fabric.end(ends[some, side], mark) for side in range(2))
-            out[some] = hermite(first, second)[0]
+            out[some] = Cubics(first, second).error
     return out
 
 
@@ -229,10 +239,15 @@ def _bisect(
         np.minimum.at(lowest, side, fabric.cell_index)
     for mark in np.unique(edges.marks[chosen]).tolist():
         own = chosen[edges.marks[chosen] == mark]
-        found, vertices = _middles(fabric, ends[own], mark, lowest[own])
-        parts.append(vertices)
-        done.append(own[found])
-        memory.stuck.update(map(tuple, ends[own[~found]].tolist()))
+        for t in PLACES:
+            found, vertices = _on_edges(fabric, ends[own], mark, lowest[own], t)
+            parts.append(vertices)
+            done.append(own[found])
+            own = own[~found]
+            if len(own) == 0:
+                break
+        memory.stuck.update(map(tuple, ends[own].tolist()))
+        memory.failures += len(own)
     if not done:
         return fabric
     more = parts[0]
@@ -244,15 +259,21 @@ def _bisect(
     return fabric.bisected(ends[at], more) if len(at) else fabric
 
 
-def _middles(
-    fabric: Fabric, ends: Int[np.ndarray, "n 2"], mark: int, lowest: Int[np.ndarray, " n"]
+def _on_edges(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    mark: int,
+    lowest: Int[np.ndarray, " n"],
+    t: float,
 ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
-    """Exact vertices amid edges with a mark, and for which edges they were found."""
+    """Exact vertices at a place along edges with a mark, and for which edges they were found."""
     setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
     first, second = (fabric.end(ends[:, side], mark) for side in range(2))
-    dz, dp = split_step(setting, hermite(first, second)[1])
-    z = 0.5 * (store.z[ends[:, 0]] + store.z[ends[:, 1]]) + dz
-    p = 0.5 * (store.p[ends[:, 0]] + store.p[ends[:, 1]]) + dp
+    z, p = store.z[ends], store.p[ends]
+    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
+    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
+    dz, dp = split_step(setting, t * chord + Cubics(first, second).step(chord, t))
+    z, p = z[:, 0] + dz, p[:, 0] + dp
     keep = held(mark, d)
     for k in keep:
         p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
@@ -265,20 +286,33 @@ def _middles(
     place = _embedded(fabric, z, p)
     fold, cap = bool(mark & ON_FOLD), bool(mark & ON_CAP)
     aim = Aim(setting, fold, cap, np.tile(aim_span, (len(z), 1, 1)), place, rows)
-    chord = np.linalg.norm(second.place - first.place, axis=1)
-    pinned = corrected(aim, z, p, chord)
-    gap = np.linalg.norm(_embedded(fabric, pinned.z, pinned.p) - place, axis=1)
-    found = pinned.found & (gap <= REACH * chord)
+    length = np.linalg.norm(second.place - first.place, axis=1)
+    pinned = corrected(aim, z, p, length)
+    here = _embedded(fabric, pinned.z, pinned.p)
+    found = pinned.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
+    for end in (first, second):
+        found &= np.linalg.norm(here - end.place, axis=1) <= PART * length
     free = pinned.p[:, setting.free]
     found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
-    if not fold:
-        found[found] &= setting.structure.index(pinned.z[found], pinned.p[found]) == lowest[found]
+    count = lower_index if fold else _index
+    found[found] = count(setting, pinned.z[found], pinned.p[found]) == lowest[found]
     kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
-    count = int(found.sum())
-    kinds = np.full(count, kind[fold, cap])
-    others = (lowest[found], np.full(count, -1))
+    others = (lowest[found], np.full(found.sum(), -1))
+    kinds = np.full(found.sum(), kind[fold, cap])
     states = (pinned.z[found], pinned.p[found])
-    return found, vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
+    vertices = vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
+    # a point on another fold nearby sees the edge at a large angle
+    middle = replace(fabric, vertices=vertices).end(np.arange(len(vertices)), mark)
+    flat = middle.nearest((second.place - first.place)[found])
+    good = np.linalg.norm(flat, axis=1) >= ALONG * length[found]
+    found[found] = good
+    return found, vertices.take(np.flatnonzero(good))
+
+
+def _index(
+    setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Int[np.ndarray, " n"]:
+    return setting.structure.index(z, p)
 
 
 def _embedded(

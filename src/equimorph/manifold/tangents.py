@@ -1,6 +1,7 @@
 """Tangent spaces of the set at its vertices, and how far straight edges are from it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -104,14 +105,21 @@ class Ends:
 
         As long as the chord.
         """
-        flat = np.einsum("edc,ec->ed", self.rows, chord)
-        if self.slopes.shape[1]:
-            basis = self.allowed
-            flat = np.einsum("edk,ek->ed", basis, np.einsum("edk,ed->ek", basis, flat))
+        flat = self.nearest(chord)
         length = np.linalg.norm(flat, axis=1)
         share = np.linalg.norm(chord, axis=1) / np.maximum(length, 1e-300)
         # where chord and tangent space are far apart, the vector stays short
         return np.asarray(flat * np.minimum(share, 2.0)[:, None])
+
+    def nearest(
+        self, chord: Float[np.ndarray, "edges coordinates"]
+    ) -> Float[np.ndarray, "edges d"]:
+        """Orthogonal projections of chords, in the frame."""
+        flat = np.einsum("edc,ec->ed", self.rows, chord)
+        if self.slopes.shape[1]:
+            basis = self.allowed
+            flat = np.einsum("edk,ek->ed", basis, np.einsum("edk,ed->ek", basis, flat))
+        return np.asarray(flat)
 
     @property
     def allowed(self) -> Float[np.ndarray, "edges d k"]:
@@ -121,20 +129,40 @@ class Ends:
         return np.asarray(np.linalg.qr(columns, mode="complete")[0][:, :, m:])
 
 
-def hermite(first: Ends, second: Ends) -> tuple[Float[np.ndarray, " edges"], np.ndarray]:
-    """How far the set is from the middle part of edges, and the step from their middles to it.
+@dataclass(frozen=True)
+class Cubics:
+    """Curves over edges that touch the tangent spaces at both ends.
 
-    The cubic that touches the tangent spaces at both ends leaves the chord c by
-    ``t(1 − t)² n₀ − t²(1 − t) n₁`` with nᵢ = tᵢ − c: in the middle by (n₀ − n₁)/8.
+    They leave the chord c by ``t(1 − t)² n₀ − t²(1 − t) n₁`` with nᵢ = tᵢ − c: in the middle by
+    (n₀ − n₁)/8.
     """
-    chord = second.place - first.place
-    a, b = first.along(chord), second.along(chord)
-    off_a = np.einsum("ed,edc->ec", a, first.rows) - chord
-    off_b = np.einsum("ed,edc->ec", b, second.rows) - chord
-    middle = np.linalg.norm(off_a - off_b, axis=1) / 8.0
-    slope = np.maximum(np.linalg.norm(off_a, axis=1), np.linalg.norm(off_b, axis=1))
-    step = np.einsum("ed,edf->ef", a, first.frame) - np.einsum("ed,edf->ef", b, second.frame)
-    return np.maximum(middle, S_SHAPE * slope), step / 8.0
+
+    first: Ends
+    second: Ends
+
+    @cached_property
+    def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        chord = self.second.place - self.first.place
+        return chord, self.first.along(chord), self.second.along(chord)
+
+    @property
+    def error(self) -> Float[np.ndarray, " edges"]:
+        """How far the curves are from their chords."""
+        chord, a, b = self._along
+        off_a = np.einsum("ed,edc->ec", a, self.first.rows) - chord
+        off_b = np.einsum("ed,edc->ec", b, self.second.rows) - chord
+        middle = np.linalg.norm(off_a - off_b, axis=1) / 8.0
+        slope = np.maximum(np.linalg.norm(off_a, axis=1), np.linalg.norm(off_b, axis=1))
+        return np.asarray(np.maximum(middle, S_SHAPE * slope))
+
+    def step(
+        self, chord: Float[np.ndarray, "edges full"], t: float
+    ) -> Float[np.ndarray, "edges full"]:
+        """Step from the chords, changes of z and of the scaled parameters, to the curves at t."""
+        _, a, b = self._along
+        off_a = np.einsum("ed,edf->ef", a, self.first.frame) - chord
+        off_b = np.einsum("ed,edf->ef", b, self.second.frame) - chord
+        return np.asarray(t * (1 - t) ** 2 * off_a - t**2 * (1 - t) * off_b)
 
 
 def best_corners(
