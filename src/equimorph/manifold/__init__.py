@@ -2,12 +2,14 @@
 
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.build import INTERVALS, equilibrium_set
+from equimorph.manifold.cusps import Cusps, cusps
 from equimorph.manifold.equilibrium_set import (
     Boundary,
     Component,
     EquilibriumSet,
     Stratum,
 )
+from equimorph.manifold.levels import Level, cell_sizes, level_set, part, restricted, singular_set
 from equimorph.manifold.locate import Location, Place, locate
 from equimorph.manifold.over import StatesOver, lift_to
 from equimorph.manifold.refinement import refine
@@ -19,7 +21,9 @@ __all__ = [
     "Audit",
     "Boundary",
     "Component",
+    "Cusps",
     "EquilibriumSet",
+    "Level",
     "Location",
     "Place",
     "Snap",
@@ -27,10 +31,16 @@ __all__ = [
     "StabilityDistance",
     "StatesOver",
     "Stratum",
+    "cell_sizes",
+    "cusps",
     "equilibrium_set",
+    "level_set",
     "lift_to",
     "locate",
+    "part",
     "refine",
+    "restricted",
+    "singular_set",
     "snap_graph",
     "stability_distance",
 ]

@@ -113,7 +113,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
     folds, caps = (flags_of(whole.facets, each) for each in (given.folds, given.caps))
     component = labels(len(corners), whole.links)
     stratum = labels(len(corners), whole.links[whole.manifold & ~folds[whole.across]])
-    boundaries = _boundaries(whole, caps)
+    boundaries = _boundaries(whole, caps, folds)
     strata = tuple(
         Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
@@ -148,16 +148,22 @@ def _kept(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:
     return facets[(facets >= 0).all(axis=1)]
 
 
-def _boundaries(whole: Adjacency, caps: Bool[np.ndarray, " F"]) -> tuple[Boundary, ...]:
+def _boundaries(
+    whole: Adjacency, caps: Bool[np.ndarray, " F"], folds: Bool[np.ndarray, " F"]
+) -> tuple[Boundary, ...]:
     once = whole.counts == 1
     base = int(whole.facets.max(initial=0)) + 1
-    capped = set(keys_of(whole.facets[once & caps], base).tolist())
+    marked = {
+        kind: keys_of(whole.facets[once & flags], base)
+        for kind, flags in (("cap", caps), ("fold", folds & ~caps))
+    }
     out = []
     for piece in pieces(whole.facets[once]):
-        facets = _facets_of(piece, whole.facets.shape[1])
-        on_cap = sum(key in capped for key in keys_of(facets, base).tolist())
-        kind = "cap" if on_cap == len(facets) else ("box" if on_cap == 0 else "mixed")
-        out.append(Boundary(piece, kind))
+        keys = keys_of(_facets_of(piece, whole.facets.shape[1]), base)
+        amounts = {kind: int(np.isin(keys, own).sum()) for kind, own in marked.items()}
+        amounts["box"] = len(keys) - sum(amounts.values())
+        kinds = [kind for kind, amount in amounts.items() if amount]
+        out.append(Boundary(piece, kinds[0] if len(kinds) == 1 else "mixed"))
     return tuple(out)
 
 

@@ -36,7 +36,9 @@ class Stratum:
 
 @dataclass(frozen=True)
 class Boundary:
-    """A connected piece of the boundary on the box ("box"), a constraint ("cap") or both ("mixed").
+    """A connected piece of the boundary: on the box ("box") or a constraint ("cap").
+
+    Of parts of sets also on a "fold"; "mixed" if on several of these.
 
     vertices: one point (d = 1), a loop with the first vertex repeated (d = 2), or triangles, one a
     row (d = 3).

@@ -23,7 +23,7 @@ from equimorph.manifold.tangents import (
     placed_frames,
     tangent_frames,
 )
-from equimorph.manifold.topology import adjacency, flags_of, keys_of, rows_of
+from equimorph.manifold.topology import adjacency, flags_of, keys_of, orientation, rows_of
 from equimorph.structures import States
 
 ON_FOLD, ON_CAP, SIDES = 1, 2, 4
@@ -202,10 +202,10 @@ def vertices_of(
 def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
     """Return a set as a fabric."""
     z, p = eset.points.z, eset.points.p
-    rows = best_corners(setting, z, p, eset.cells)
+    whole = adjacency(eset.cells)
+    rows = best_corners(setting, z, p, eset.cells, orientation(eset.cells, whole)[0])
     others = (eset.index, eset.grid_vertex)
     vertices = vertices_of(setting, (z, p), eset.kinds, others, rows)
-    whole = adjacency(eset.cells)
     d = len(eset.names)
     folds = [np.zeros((0, d), int), *(_facets(piece, d) for piece in eset.folds)]
     folded = flags_of(whole.facets, np.concatenate(folds))

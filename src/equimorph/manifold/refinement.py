@@ -19,17 +19,13 @@ from equimorph.manifold.fabric import (
     ON_CAP,
     ON_FOLD,
     Fabric,
-    Vertices,
     edges_of,
     fabric_of,
-    held,
-    vertices_of,
 )
+from equimorph.manifold.on_edges import on_edges
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.pins import Aim, corrected, lower_index
-from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
 from equimorph.manifold.surgery import collapse, flip, smallest_angle
-from equimorph.manifold.tangents import Cubics, split_step
+from equimorph.manifold.tangents import Cubics
 from equimorph.manifold.topology import keys_of
 from equimorph.model import Progress, Silent
 
@@ -43,12 +39,6 @@ PREFERENCE = 1.6
 """How much longer an edge must be than those that deviate to be bisected before them."""
 PLACES = (0.5, 0.3, 0.7)
 """Where along an edge a vertex is tried, one place after the other."""
-REACH = 0.3
-"""How far from its prediction a new vertex may be corrected, relative to its edge."""
-PART = 0.85
-"""Longest that both parts of an edge may be, relative to the whole."""
-ALONG = 0.5
-"""Least cosine of the angle between an edge and the set at its new vertex."""
 HOPELESS = 60
 """Failed bisections, and a fiftieth of all edges, beyond which refinement ends."""
 MOST = 2_000_000
@@ -240,7 +230,8 @@ def _bisect(
     for mark in np.unique(edges.marks[chosen]).tolist():
         own = chosen[edges.marks[chosen] == mark]
         for t in PLACES:
-            found, vertices = _on_edges(fabric, ends[own], mark, lowest[own], t)
+            places = np.full(len(own), t)
+            found, vertices = on_edges(fabric, ends[own], mark, lowest[own], places)
             parts.append(vertices)
             done.append(own[found])
             own = own[~found]
@@ -257,67 +248,3 @@ def _bisect(
     if np.isin(edges.marks[at], (ON_FOLD, ON_CAP)).any():
         memory.stuck.clear()  # beside a fold that is better known they may succeed
     return fabric.bisected(ends[at], more) if len(at) else fabric
-
-
-def _on_edges(
-    fabric: Fabric,
-    ends: Int[np.ndarray, "n 2"],
-    mark: int,
-    lowest: Int[np.ndarray, " n"],
-    t: float,
-) -> tuple[Bool[np.ndarray, " n"], Vertices]:
-    """Exact vertices at a place along edges with a mark, and for which edges they were found."""
-    setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
-    first, second = (fabric.end(ends[:, side], mark) for side in range(2))
-    z, p = store.z[ends], store.p[ends]
-    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
-    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
-    dz, dp = split_step(setting, t * chord + Cubics(first, second).step(chord, t))
-    z, p = z[:, 0] + dz, p[:, 0] + dp
-    keep = held(mark, d)
-    for k in keep:
-        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
-    # the second space seen from the first, so that both bases point the same way
-    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
-    plane = first.rows + turned @ second.rows
-    inside = replace(first, rows=plane).allowed
-    rows = np.swapaxes(inside, 1, 2) @ plane
-    aim_span = np.delete(np.eye(d), keep, axis=0)
-    place = _embedded(fabric, z, p)
-    fold, cap = bool(mark & ON_FOLD), bool(mark & ON_CAP)
-    aim = Aim(setting, fold, cap, np.tile(aim_span, (len(z), 1, 1)), place, rows)
-    length = np.linalg.norm(second.place - first.place, axis=1)
-    pinned = corrected(aim, z, p, length)
-    here = _embedded(fabric, pinned.z, pinned.p)
-    found = pinned.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
-    for end in (first, second):
-        found &= np.linalg.norm(here - end.place, axis=1) <= PART * length
-    free = pinned.p[:, setting.free]
-    found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
-    count = lower_index if fold else _index
-    found[found] = count(setting, pinned.z[found], pinned.p[found]) == lowest[found]
-    kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
-    others = (lowest[found], np.full(found.sum(), -1))
-    kinds = np.full(found.sum(), kind[fold, cap])
-    states = (pinned.z[found], pinned.p[found])
-    vertices = vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
-    # a point on another fold nearby sees the edge at a large angle
-    middle = replace(fabric, vertices=vertices).end(np.arange(len(vertices)), mark)
-    flat = middle.nearest((second.place - first.place)[found])
-    good = np.linalg.norm(flat, axis=1) >= ALONG * length[found]
-    found[found] = good
-    return found, vertices.take(np.flatnonzero(good))
-
-
-def _index(
-    setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
-) -> Int[np.ndarray, " n"]:
-    return setting.structure.index(z, p)
-
-
-def _embedded(
-    fabric: Fabric, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
-) -> Float[np.ndarray, "n coordinates"]:
-    setting = fabric.setting
-    u = z[:, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
-    return np.concatenate([u, p[:, setting.free] / setting.scales], axis=1)

@@ -26,7 +26,8 @@ S_SHAPE = 0.1
 def tangent_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
     """Orthonormal bases of the tangent spaces at points of the set, regular at folds, too.
 
-    ``[F_z F_p; R] t_i = (0, e_i)`` with rows R of the embedding that span nearby spaces.
+    ``[F_z F_p; R] t_i = (0, e_i)`` with rows R of the embedding that span nearby spaces, whose
+    orientation the bases take over.
     """
     out = np.empty((len(z), rows.shape[1], z.shape[1] + rows.shape[1]))
     for at in range(0, len(z), CHUNK):
@@ -156,19 +157,27 @@ class Cubics:
         return np.asarray(np.maximum(middle, S_SHAPE * slope))
 
     def step(
-        self, chord: Float[np.ndarray, "edges full"], t: float
+        self, chord: Float[np.ndarray, "edges full"], t: Float[np.ndarray, " edges"]
     ) -> Float[np.ndarray, "edges full"]:
         """Step from the chords, changes of z and of the scaled parameters, to the curves at t."""
         _, a, b = self._along
         off_a = np.einsum("ed,edf->ef", a, self.first.frame) - chord
         off_b = np.einsum("ed,edf->ef", b, self.second.frame) - chord
-        return np.asarray(t * (1 - t) ** 2 * off_a - t**2 * (1 - t) * off_b)
+        share = t[:, None]
+        return np.asarray(share * (1 - share) ** 2 * off_a - share**2 * (1 - share) * off_b)
 
 
 def best_corners(
-    setting: Setting, z: Lanes, p: Parameters, cells: Int[np.ndarray, "C corners"]
+    setting: Setting,
+    z: Lanes,
+    p: Parameters,
+    cells: Int[np.ndarray, "C corners"],
+    signs: Int[np.ndarray, " C"],
 ) -> Rows:
-    """Orthonormal bases of the planes of the cell around each vertex that is the least slender."""
+    """Orthonormal bases of the planes of the cell around each vertex that is the least slender.
+
+    Oriented as the cells are with the given signs.
+    """
     place = embed(setting, z, p)
     corners = cells.shape[1]
     owner = cells.T.ravel()
@@ -179,4 +188,8 @@ def best_corners(
     breadth = np.linalg.det(sides @ np.swapaxes(sides, 1, 2))
     order = np.lexsort((-breadth, owner))
     first = order[np.diff(owner[order], prepend=-1) > 0]
-    return np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(sides[first], 1, 2))[0], 1, 2))
+    basis, share = np.linalg.qr(np.swapaxes(sides[first], 1, 2))
+    corner, cell = np.divmod(first, len(cells))
+    turned = np.linalg.det(share) * signs[cell] * (-1) ** corner < 0
+    basis[turned, :, 0] *= -1.0
+    return np.ascontiguousarray(np.swapaxes(basis, 1, 2))

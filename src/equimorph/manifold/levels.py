@@ -1,0 +1,287 @@
+"""Level sets: exact vertices where a function on the set vanishes, and complexes cut along them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.errors import InputError
+from equimorph.manifold.accounting import Frame, Lifting, described
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.equilibrium_set import EquilibriumSet
+from equimorph.manifold.fabric import HOLE, ON_CAP, Fabric, Vertices, edges_of, fabric_of
+from equimorph.manifold.on_edges import on_edges
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.points import CAP, CORNER, FOLD
+from equimorph.manifold.tangents import split_step
+from equimorph.manifold.topology import adjacency, pieces
+from equimorph.model import Constraint, Descriptor
+from equimorph.structures import States
+
+TRIALS = 60
+ROUND_OFF = 1e-12
+"""Part of the range of a function below which its values count as zero."""
+DIFFERENCE = 1e-5
+
+Values = Float[np.ndarray, " V"]
+Function = Callable[[Vertices], Values]
+
+
+@dataclass(frozen=True)
+class Level:
+    """Where a function on the set vanishes: exact states, and how they hang together.
+
+    pieces: points (d = 1), polylines, closed ones with the first point repeated (d = 2), or
+    triangles, one a row (d = 3), as numbers of states. lost: edges on which no state was found; the
+    level is interrupted there.
+    """
+
+    states: States
+    pieces: tuple[Int[np.ndarray, "..."], ...]
+    lost: int
+
+
+def level_set(eset: EquilibriumSet, descriptor: Descriptor, value: float) -> Level:
+    """States of a set at which a descriptor has a value, polished to round-off.
+
+    Raises
+    ------
+    InputError
+        If `value` is not finite.
+    """
+    if not np.isfinite(value):
+        raise InputError(f"`value` must be finite; got {value!r}.")
+    return _level(eset, lambda v: descriptor.function(v.z, v.p) - value)
+
+
+def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Level:
+    """States at which as many descriptors as there are free parameters do not steer the set.
+
+    ``det J_S = 0``, with derivatives of the descriptors along the set; so it is smooth at folds. It
+    needs a set that can be oriented.
+
+    Raises
+    ------
+    InputError
+        For another number of descriptors.
+    """
+    d = len(eset.names)
+    if len(descriptors) != d:
+        raise InputError(
+            f"`descriptors` must be {d}, one per free parameter of the set; got {len(descriptors)}."
+        )
+    return _level(eset, lambda v: jacobian(fabric_setting(eset), v, descriptors))
+
+
+def jacobian(setting: Setting, at: Vertices, descriptors: Sequence[Descriptor]) -> Values:
+    """det of the derivatives of descriptors along orthonormal, coherently oriented tangents."""
+    rows = []
+    for k in range(at.frame.shape[1]):
+        dz, dp = split_step(setting, DIFFERENCE * at.frame[:, k])
+        ahead, behind = (at.z + dz, at.p + dp), (at.z - dz, at.p - dp)
+        rows.append(
+            np.stack([each.function(*ahead) - each.function(*behind) for each in descriptors])
+        )
+    return np.asarray(np.linalg.det(np.moveaxis(np.stack(rows), 2, 0) / (2.0 * DIFFERENCE)))
+
+
+def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
+    """Part of a set that obeys a further constraint, cut exactly along it.
+
+    The audit counts edges that could not be cut as `unrefined`; there whole cells are left out.
+    """
+    fabric = _fabric(eset)
+    cut = _cut(fabric, lambda v: constraint.excess(v.z, v.p))
+    inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
+    constraints = (*eset.constraints, constraint)
+    setting = replace(fabric.setting, constraints=constraints)
+    return _part(eset, replace(cut.fabric, setting=setting), inside, (cut.on_level, cut.lost))
+
+
+def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
+    """Lengths, areas or volumes of the cells in the metric of the embedding."""
+    setting = fabric_setting(eset)
+    corners = embed(setting, eset.points.z, eset.points.p)[eset.cells]
+    sides = corners[:, 1:] - corners[:, :1]
+    gram = sides @ np.swapaxes(sides, 1, 2)
+    share = {1: 1.0, 2: 0.5, 3: 1.0 / 6.0}[len(eset.names)]
+    return np.asarray(share * np.sqrt(np.maximum(np.linalg.det(gram), 0.0)))
+
+
+def part(eset: EquilibriumSet, cells: Bool[np.ndarray, " C"]) -> EquilibriumSet:
+    """Some of the cells as a set of its own, like the stable ones: ``eset.cell_index == 0``."""
+    fabric = _fabric(eset)
+    nothing = np.zeros(len(fabric.vertices), bool)
+    return _part(eset, fabric, cells, (nothing, 0))
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A fabric cut along a level, values at its vertices, and how many edges could not be cut."""
+
+    fabric: Fabric
+    values: Values
+    lost: int
+
+    @property
+    def on_level(self) -> Bool[np.ndarray, " V"]:
+        """Vertices on the level."""
+        return np.asarray(self.values == 0.0)
+
+
+def fabric_setting(eset: EquilibriumSet) -> Setting:
+    """Return the structure and the free parameters of a set."""
+    names = [parameter.name for parameter in eset.structure.parameters]
+    free = np.array([names.index(name) for name in eset.names])
+    base = eset.points.p[0].copy() if len(eset.points) else np.zeros(len(names))
+    return Setting(eset.structure, base, free, eset.constraints)
+
+
+def _fabric(eset: EquilibriumSet) -> Fabric:
+    return fabric_of(fabric_setting(eset), eset)
+
+
+def _level(eset: EquilibriumSet, function: Function) -> Level:
+    cut = _cut(_fabric(eset), function)
+    store, whole = cut.fabric.vertices, adjacency(cut.fabric.cells)
+    facets = whole.facets[cut.on_level[whole.facets].all(axis=1)]
+    used, inverse = np.unique(facets, return_inverse=True)
+    states = States(eset.structure, store.z[used], store.p[used])
+    return Level(states, tuple(pieces(inverse.reshape(facets.shape))), cut.lost)
+
+
+def _cut(fabric: Fabric, function: Function) -> _Cut:
+    """Put vertices where a function vanishes on edges, until no edge crosses its level."""
+    values = function(fabric.vertices)
+    values = np.where(np.abs(values) <= ROUND_OFF * np.abs(values).max(initial=0.0), 0.0, values)
+    lost: set[tuple[int, int]] = set()
+    while True:
+        ends, of_cells = edges_of(fabric.cells, len(fabric.vertices))
+        crossed = values[ends[:, 0]] * values[ends[:, 1]] < 0.0
+        if lost:
+            crossed &= [tuple(pair) not in lost for pair in ends.tolist()]
+        chosen = _one_per_cell(crossed, of_cells)
+        if len(chosen) == 0:
+            return _Cut(fabric, values, len(lost))
+        marks = fabric.edge_marks(ends)
+        lowest = np.full(len(ends), np.iinfo(int).max)
+        for side in of_cells.T:
+            np.minimum.at(lowest, side, fabric.cell_index)
+        for mark in np.unique(marks[chosen]).tolist():
+            own = chosen[marks[chosen] == mark]
+            known = values[ends[own]]
+            done, more = roots(
+                fabric, ends[own], (mark, lowest[own]), known, lambda at, _: function(at)
+            )
+            lost.update(map(tuple, ends[own[~done]].tolist()))
+            if done.any():
+                fabric = fabric.bisected(ends[own[done]], more)
+                values = np.concatenate([values, np.zeros(len(more))])
+
+
+def _one_per_cell(
+    crossed: Bool[np.ndarray, " E"], of_cells: Int[np.ndarray, "C sides"]
+) -> Int[np.ndarray, " n"]:
+    """Crossed edges, no two of one cell; as many as agree on an order that looks random."""
+    rank = np.where(crossed, (np.arange(len(crossed)) * 2654435761) % 4294967296 + 1, 0)
+    best = rank[of_cells].max(axis=1)
+    beaten = np.zeros(len(crossed), bool)
+    for side in of_cells.T:
+        beaten[side[rank[side] < best]] = True
+    return np.flatnonzero(crossed & ~beaten)
+
+
+def roots(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    about: tuple[int, Int[np.ndarray, " n"]],
+    known: Float[np.ndarray, "n 2"],
+    value_of: Callable[[Vertices, Int[np.ndarray, " some"]], Float[np.ndarray, " some"]],
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Vertices where a function vanishes on edges, by regula falsi (Illinois).
+
+    Parameters
+    ----------
+    about
+        The mark of the edges, and the index of each.
+    known
+        Values at both ends, of different signs.
+    value_of
+        Values at vertices on the edges whose numbers are the second argument.
+
+    Returns
+    -------
+    Edges on which a root was found, and the roots in the order of these edges.
+    """
+    low, high = np.zeros(len(ends)), np.ones(len(ends))
+    at_low, at_high = known.T.copy()
+    small = ROUND_OFF * np.maximum(np.abs(at_low), np.abs(at_high))
+    todo, done = np.arange(len(ends)), np.zeros(len(ends), bool)
+    lanes, found = [], []
+    for _ in range(TRIALS):
+        t = low[todo] - at_low[todo] * (high - low)[todo] / (at_high - at_low)[todo]
+        good, at = on_edges(fabric, ends[todo], about[0], about[1][todo], t)
+        todo, t = todo[good], t[good]
+        value = value_of(at, todo)
+        ended = (np.abs(value) <= small[todo]) | ((high - low)[todo] < 1e-14)
+        found.append(at.take(np.flatnonzero(ended)))
+        lanes.append(todo[ended])
+        done[todo[ended]] = True
+        todo, t, value = todo[~ended], t[~ended], value[~ended]
+        if len(todo) == 0:
+            break
+        left = value * at_low[todo] > 0.0
+        # the end that stays counts half, so that it does not stay for ever
+        low[todo], high[todo] = np.where(left, t, low[todo]), np.where(left, high[todo], t)
+        at_low[todo] = np.where(left, value, 0.5 * at_low[todo])
+        at_high[todo] = np.where(left, 0.5 * at_high[todo], value)
+    whole = found[0]
+    for more in found[1:]:
+        whole = whole.joined(more)
+    return done, whole.take(np.argsort(np.concatenate(lanes)))
+
+
+def _part(
+    eset: EquilibriumSet,
+    fabric: Fabric,
+    cells: Bool[np.ndarray, " C"],
+    level: tuple[Bool[np.ndarray, " V"], int],
+) -> EquilibriumSet:
+    """Some cells of a fabric as a set; facets on the level lie on a constraint."""
+    on_level, lost = level
+    whole = adjacency(fabric.cells[cells]) if cells.any() else None
+    facets, marks = fabric.facets, fabric.marks
+    if whole is not None:
+        outer = whole.facets[whole.counts == 1]
+        capped = outer[on_level[outer].all(axis=1)]
+        facets = np.concatenate([facets, capped])
+        marks = np.concatenate([marks, np.full(len(capped), ON_CAP)])
+    kinds = fabric.vertices.kinds.copy()
+    kinds[on_level] = np.where(np.isin(kinds[on_level], (FOLD, CORNER)), CORNER, CAP)
+    fabric = replace(
+        fabric,
+        vertices=replace(fabric.vertices, kinds=kinds),
+        cells=fabric.cells[cells],
+        cell_index=fabric.cell_index[cells],
+        squared=fabric.squared[cells],
+        facets=facets[(marks & HOLE) == 0],
+        marks=marks[(marks & HOLE) == 0],
+    )
+    audit = eset.audit
+    lifting = Lifting(
+        audit.unpaired, audit.conflicts, audit.retraced,
+        audit.parity_violations, audit.undecided, audit.bisected,
+    )  # fmt: skip
+    frame = Frame(fabric.setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
+    out = described(frame, fabric.complex(), lifting)
+    kept = replace(
+        out.audit,
+        checked=audit.checked,
+        missing=audit.missing,
+        recovered=audit.recovered,
+        accuracy=audit.accuracy,
+        deviation=audit.deviation,
+        unrefined=audit.unrefined + lost,
+    )
+    return replace(out, audit=kept)

@@ -1,0 +1,84 @@
+"""Exact vertices on the edges of a complex."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.fabric import ON_CAP, ON_FOLD, Fabric, Vertices, held, vertices_of
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.pins import Aim, corrected, lower_index
+from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
+from equimorph.manifold.tangents import Cubics, split_step
+
+REACH = 0.3
+"""How far from its prediction a new vertex may be corrected, relative to its edge."""
+EXCESS = 0.35
+"""How much longer the parts of an edge may be than they would be on a straight one, relative to
+it."""
+ALONG = 0.5
+"""Least cosine of the angle between an edge and the set at its new vertex."""
+
+
+def on_edges(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    mark: int,
+    lowest: Int[np.ndarray, " n"],
+    t: Float[np.ndarray, " n"],
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Exact vertices at places t along edges with a mark, and for which edges they were found."""
+    setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
+    first, second = (fabric.end(ends[:, side], mark) for side in range(2))
+    z, p = store.z[ends], store.p[ends]
+    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
+    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
+    dz, dp = split_step(setting, t[:, None] * chord + Cubics(first, second).step(chord, t))
+    z, p = z[:, 0] + dz, p[:, 0] + dp
+    keep = held(mark, d)
+    for k in keep:
+        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
+    # the second space seen from the first, so that both bases point the same way
+    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
+    plane = first.rows + turned @ second.rows
+    inside = replace(first, rows=plane).allowed
+    rows = np.swapaxes(inside, 1, 2) @ plane
+    aim_span = np.delete(np.eye(d), keep, axis=0)
+    place = _embedded(fabric, z, p)
+    fold, cap = bool(mark & ON_FOLD), bool(mark & ON_CAP)
+    aim = Aim(setting, fold, cap, np.tile(aim_span, (len(z), 1, 1)), place, rows)
+    length = np.linalg.norm(second.place - first.place, axis=1)
+    pinned = corrected(aim, z, p, length)
+    here = _embedded(fabric, pinned.z, pinned.p)
+    found = pinned.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
+    for end, part in ((first, t), (second, 1.0 - t)):
+        found &= np.linalg.norm(here - end.place, axis=1) <= (part + EXCESS) * length
+    free = pinned.p[:, setting.free]
+    found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
+    count = lower_index if fold else _index
+    found[found] = count(setting, pinned.z[found], pinned.p[found]) == lowest[found]
+    kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
+    others = (lowest[found], np.full(found.sum(), -1))
+    kinds = np.full(found.sum(), kind[fold, cap])
+    states = (pinned.z[found], pinned.p[found])
+    vertices = vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
+    # a point on another fold nearby sees the edge at a large angle
+    middle = replace(fabric, vertices=vertices).end(np.arange(len(vertices)), mark)
+    flat = middle.nearest((second.place - first.place)[found])
+    good = np.linalg.norm(flat, axis=1) >= ALONG * length[found]
+    found[found] = good
+    return found, vertices.take(np.flatnonzero(good))
+
+
+def _index(
+    setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Int[np.ndarray, " n"]:
+    return setting.structure.index(z, p)
+
+
+def _embedded(
+    fabric: Fabric, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Float[np.ndarray, "n coordinates"]:
+    setting = fabric.setting
+    u = z[:, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
+    return np.concatenate([u, p[:, setting.free] / setting.scales], axis=1)
