@@ -2,7 +2,7 @@
 
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.build import INTERVALS, equilibrium_set
-from equimorph.manifold.cusps import Cusps, cusps
+from equimorph.manifold.cusp_points import Cusps, cusps
 from equimorph.manifold.equilibrium_set import (
     Boundary,
     Component,

@@ -14,10 +14,14 @@ from equimorph.structures import States
 
 @dataclass(frozen=True)
 class Cusps:
-    """Cusps as states, and the index on the lower side of each; 0 on the boundary of stability."""
+    """Cusps as states, and the index on the lower side of each; 0 on the boundary of stability.
+
+    lost: edges of folds that turn back at a cusp which was not found; refine the set there.
+    """
 
     states: States
     index: Int[np.ndarray, " n"]
+    lost: int
 
 
 def cusps(eset: EquilibriumSet) -> Cusps:
@@ -49,9 +53,10 @@ def cusps(eset: EquilibriumSet) -> Cusps:
         return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
 
     if len(turning) == 0:
-        return Cusps(States(eset.structure, store.z[:0], store.p[:0]), store.index[:0])
-    _, found = roots(fabric, ends[turning], (ON_FOLD, lowest), known[turning], value)
-    return Cusps(States(eset.structure, found.z, found.p), found.index)
+        return Cusps(States(eset.structure, store.z[:0], store.p[:0]), store.index[:0], 0)
+    done, found = roots(fabric, ends[turning], (ON_FOLD, lowest), known[turning], value)
+    lost = int((~done).sum())
+    return Cusps(States(eset.structure, found.z, found.p), found.index, lost)
 
 
 def sides_of_existence(at: Vertices) -> Float[np.ndarray, "n 2"]:
