@@ -172,11 +172,11 @@ def best_corners(
     z: Lanes,
     p: Parameters,
     cells: Int[np.ndarray, "C corners"],
-    signs: Int[np.ndarray, " C"],
+    signs: Int[np.ndarray, " C"] | None = None,
 ) -> Rows:
     """Orthonormal bases of the planes of the cell around each vertex that is the least slender.
 
-    Oriented as the cells are with the given signs.
+    Oriented as the cells are with the given signs, if these matter.
     """
     place = embed(setting, z, p)
     corners = cells.shape[1]
@@ -189,6 +189,8 @@ def best_corners(
     order = np.lexsort((-breadth, owner))
     first = order[np.diff(owner[order], prepend=-1) > 0]
     basis, share = np.linalg.qr(np.swapaxes(sides[first], 1, 2))
+    if signs is None:
+        return np.ascontiguousarray(np.swapaxes(basis, 1, 2))
     corner, cell = np.divmod(first, len(cells))
     turned = np.linalg.det(share) * signs[cell] * (-1) ** corner < 0
     basis[turned, :, 0] *= -1.0
