@@ -52,4 +52,4 @@ if __name__ == "__main__":
     found = main()
     print(found.eset.audit)
     print(found.route)
-    em.plotting.save(figure(found), "beam.png")
+    em.plotting.save(figure(found), ".", "beam")

@@ -54,4 +54,4 @@ if __name__ == "__main__":
     print(f"limit load {found.limit.value:.5f} ({found.limit.kind})")
     print(found.eset.audit)
     print(found.route)
-    em.plotting.save(figure(found), "deep_arch.png")
+    em.plotting.save(figure(found), ".", "deep_arch")

@@ -46,4 +46,4 @@ if __name__ == "__main__":
     turned = -2 * found.snap.end.state["Theta"]
     print(f"one end alone: {found.snap.end.kind} at {turned:.4f} rad")
     print(found.route)
-    em.plotting.save(figure(found), "strip.png")
+    em.plotting.save(figure(found), ".", "strip")
