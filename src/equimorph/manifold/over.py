@@ -193,13 +193,13 @@ class Sheets:
             z += weights[:, k : k + 1] * self.points.z[corners[:, k]]
         return np.asarray(z)
 
-    @cached_property
-    def _size(self) -> Float[np.ndarray, " C"]:
+    def _size(self, cell: Int[np.ndarray, " hits"]) -> Float[np.ndarray, " hits"]:
         """Longest side of each cell from its first corner, in the metric."""
         n, mass = self.structure.unknowns, self.structure.mass
-        u = self.points.z[:, :n]
-        sides = [u[corner] - u[self.cells[:, 0]] for corner in self.cells.T[1:]]
-        return np.asarray(np.sqrt(np.max([side**2 @ mass for side in sides], axis=0)))
+        some, back = np.unique(cell, return_inverse=True)
+        u, corners = self.points.z[:, :n], self.cells[some]
+        sides = [u[corner] - u[corners[:, 0]] for corner in corners.T[1:]]
+        return np.asarray(np.sqrt(np.max([side**2 @ mass for side in sides], axis=0))[back])
 
     def _polished(
         self, guess: Lanes, p: Points, hits: Hits
@@ -209,7 +209,7 @@ class Sheets:
         z, good, index = _newton(structure, guess, p[hits.point])
         good &= index == self.cell_index[hits.cell]
         moved = np.sqrt((z - guess)[:, : structure.unknowns] ** 2 @ structure.mass)
-        good &= moved <= 2.0 * self._size[hits.cell] + SAME
+        good &= moved <= 2.0 * self._size(hits.cell) + SAME
         good[good] = structure.resolved(z[good], p[hits.point[good]])
         return z, good
 
