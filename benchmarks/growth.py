@@ -136,7 +136,7 @@ def against_lanes(axes: Axes, rows: Sequence[Sequence[Timing]]) -> None:
             row[-1].name, (lanes[-1], each[-1]), (4, 0), textcoords="offset points",
             color=colour, va="center",
         )  # fmt: skip
-    axes.set(xlabel="lanes", ylabel="time per lane, µs", xlim=(0.7, 1000 * rows[0][-1].lanes))
+    axes.set(xlabel="lanes", ylabel="time per lane, µs", xlim=(0.7, 10_000 * rows[0][-1].lanes))
     axes.grid(visible=True)
 
 
@@ -149,7 +149,11 @@ def against_grid(axes: Axes, rows: Sequence[Sequence[Timing]]) -> None:
             settings, seconds, line, marker="o", color=colour, markersize=2.5, linewidth=1.0,
             label=row[0].name,
         )  # fmt: skip
+    every = [t.seconds for row in rows for t in row]
+    ticks = 2.0 ** np.arange(np.floor(np.log2(min(every))), np.ceil(np.log2(max(every))) + 1)
     axes.set(xlabel="settings of the grid", ylabel="time, s")
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
     axes.legend(frameon=False, loc="upper left")
     axes.grid(visible=True)
 
