@@ -11,6 +11,8 @@ MOST_BINS = 4
 """Bins per cell, at most."""
 NUDGE = 1e-9
 """Shift, in ranges of the parameters, that puts points between cells into one of them."""
+TRIANGLE = 3
+"""Number of corners."""
 
 
 @dataclass(frozen=True)
@@ -120,12 +122,17 @@ def _inward(unit: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
 def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "corners C corners"]:
     """Inverse of the matrix of each cell's corners over ones, row by row."""
     ones = np.ones((*unit.shape[:2], 1))
-    matrix = np.swapaxes(np.concatenate([unit, ones], axis=2), 1, 2).copy()
+    homogeneous = np.concatenate([unit, ones], axis=2)
     flat = volumes(unit) == 0.0
-    matrix[flat] = np.eye(matrix.shape[1])
-    maps = np.linalg.inv(matrix)
-    maps[flat] = np.nan
-    return np.ascontiguousarray(np.swapaxes(maps, 0, 1))
+    homogeneous[flat] = np.eye(homogeneous.shape[1])
+    if unit.shape[1] == TRIANGLE:  # the products of two corners are all minors
+        first, second, third = np.swapaxes(homogeneous, 0, 1)
+        maps = np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)])
+        maps /= np.einsum("ci,ci->c", first, maps[0])[:, None]
+    else:
+        maps = np.swapaxes(np.linalg.inv(np.swapaxes(homogeneous, 1, 2)), 0, 1)
+    maps[:, flat] = np.nan
+    return np.ascontiguousarray(maps)
 
 
 def _listed(
