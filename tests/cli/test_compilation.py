@@ -14,6 +14,17 @@ def test_every_structure_can_be_compiled_before_a_run(path: Path):
     evaluate(problem)
 
 
+def test_a_study_around_settings_without_natural_states_can_be_compiled(tmp_path: Path):
+    """At Θ = 0 the arch has none; what is compiled must not decide what can be computed."""
+    text = (EXAMPLES[0].parent / "arch.toml").read_text()
+    path = tmp_path / "around.toml"
+    path.write_text(text.replace("Theta = [0.2, 2.5]", "Theta = [-2.5, 2.5]"))
+    _, _, problem = read_problem(path)
+    assert problem.equilibrium_set is not None
+    assert problem.equilibrium_set.box.lower[0] == -2.5
+    evaluate(problem)
+
+
 def test_marching_is_compiled_on_a_spring():
     march()
     assert are_compiled()

@@ -60,7 +60,8 @@ def evaluate(problem: Problem) -> None:
     values |= dict(zip(box.names, (box.lower + box.upper) / 2, strict=True))
     values |= fixed | dict(structure.unloaded())
     p = np.array([[values[each.name] for each in structure.parameters]])
-    z, _ = structure.natural(p)
+    structure.natural(p)
+    z = structure.sample(p, np.random.default_rng(0))  # natural states need not exist here
     zero, one = np.zeros(1), np.ones_like(p)
     structure.advance(z, p, one, z, zero, zero)
     structure.second_derivative(z, p, (z, one), (z, one))

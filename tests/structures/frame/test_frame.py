@@ -365,12 +365,9 @@ def test_the_error_estimate_bounds_the_error(degree):
 # --- against a rod --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("axial", [None, 40.0])
-@pytest.mark.parametrize("end", ["free", "pinned"])
+@pytest.mark.parametrize(("end", "axial"), [("free", None), ("free", 40.0), ("pinned", 40.0)])
 def test_two_members_joined_rigidly_are_one_rod(axial, end):
     """The same mechanics through two formulations. 1e-9: what elements of degree 9 and 11 leave."""
-    if axial is None and end == "pinned":
-        pytest.skip("an inextensible beam cannot be held at both ends")
     stiffness, length, joint = 3.0, 2.0, 0.8
     rod = em.Rod(
         span=length if end == "pinned" else None,

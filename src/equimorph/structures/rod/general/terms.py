@@ -1,5 +1,6 @@
 """What acts on a rod: loads, couples, intrinsic curvature and tendons, each with an amplitude."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
@@ -64,7 +65,7 @@ class Effects:
     tension: ElementNodes | float = 0.0
 
 
-class Term:
+class Term(ABC):
     """Something that acts on a rod in proportion to a parameter."""
 
     word: ClassVar[str]
@@ -72,13 +73,13 @@ class Term:
     """What the amplitude is: a key of `structures.units.LABELS`."""
 
     @property
+    @abstractmethod
     def breaks(self) -> tuple[float, ...]:
         """Arclengths inside the rod where it is not smooth."""
-        raise NotImplementedError
 
+    @abstractmethod
     def effects(self, mesh: Mesh) -> Effects:
         """Effects on the nodes of a mesh whose element ends meet the breaks."""
-        raise NotImplementedError
 
     def data(self) -> dict[str, Any]:
         """The term as plain data; `InputError` for a callable."""
