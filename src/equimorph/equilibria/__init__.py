@@ -18,6 +18,7 @@ from equimorph.equilibria.limit import LimitLoad, LimitLoads, limit_load
 from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.pools import distinct
+from equimorph.equilibria.ranges import held_over
 from equimorph.equilibria.search import FoundStates, find_equilibria, search_points
 from equimorph.equilibria.snap import Landing, snap_landing
 from equimorph.equilibria.switching import Branch, branches
@@ -51,6 +52,7 @@ __all__ = [
     "fold_curve",
     "follow",
     "grazing_curve",
+    "held_over",
     "lift",
     "limit_load",
     "newton",

@@ -2,6 +2,7 @@
 
 from equimorph.model.box import Box, Grid
 from equimorph.model.descriptor import Constraint, Descriptor
+from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.parameter import (
     Parameter,
     Role,
@@ -10,6 +11,7 @@ from equimorph.model.parameter import (
     position,
 )
 from equimorph.model.progress import Progress, Silent
+from equimorph.model.rates import Rates
 from equimorph.model.schedule import Schedule
 from equimorph.model.spline import Spline
 
@@ -17,9 +19,13 @@ __all__ = [
     "Box",
     "Constraint",
     "Descriptor",
+    "Disc",
     "Grid",
+    "HalfPlane",
+    "Obstacle",
     "Parameter",
     "Progress",
+    "Rates",
     "Role",
     "Schedule",
     "Silent",

@@ -7,6 +7,13 @@ from equimorph.errors import InputError
 from equimorph.structures.contract import Advance, Structure, Symmetry, bordered_advance
 from equimorph.structures.energy import EnergyStructure, Unknown
 from equimorph.structures.frame import Frame, Member
+from equimorph.structures.quantities import (
+    distance_to,
+    effort_of,
+    margin_of,
+    outside,
+    value_of,
+)
 from equimorph.structures.rod import (
     Couple,
     Curvature,
@@ -52,7 +59,12 @@ __all__ = [
     "Truss",
     "Unknown",
     "bordered_advance",
+    "distance_to",
+    "effort_of",
     "from_identity",
+    "margin_of",
+    "outside",
+    "value_of",
 ]
 
 

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.model import Descriptor, Parameter, names_of
+from equimorph.structures.approach import straight_arcs
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -156,6 +157,10 @@ class Structure(ABC):
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points 2"]:
         """Coordinates to draw."""
+
+    def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 2"]:
+        """Shape as cubic arcs: both ends, and the derivatives there; straight lines by default."""
+        return straight_arcs(self.shape(z, p))
 
     @abstractmethod
     def descriptor(self, text: str) -> Descriptor:

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.linalg import BorderedSolution
+from equimorph.structures.approach import smooth_arcs
 from equimorph.structures.contract import Advance, Border, Direction, Structure, Symmetry
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.interface import Mechanics
@@ -12,6 +13,9 @@ from equimorph.structures.units import Units
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
+
+ARCS = 128
+"""Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""
 
 
 class Measured(Structure):
@@ -101,3 +105,8 @@ class Measured(Structure):
         """Positions (x, y) at arclengths `s` (default: 101 equidistant ones)."""
         at = np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
         return self.fields(z, p, at)[:, :, 2:]
+
+    def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 2"]:
+        """Shape as cubic arcs with the rod's positions and angles at their ends."""
+        fields = self.fields(z, p, np.linspace(0.0, 1.0, ARCS + 1))
+        return smooth_arcs(fields[:, :, 2:], fields[:, :, 0], self.units.value("length") / ARCS)

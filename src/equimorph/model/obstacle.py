@@ -1,0 +1,109 @@
+"""Obstacles for the shape of a structure: half-planes and discs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+
+Pair = tuple[float, float]
+Places = Float[np.ndarray, "*points 2"]
+Values = Float[np.ndarray, "*points"]
+
+
+def _pair(name: str, value: Sequence[float]) -> Pair:
+    try:
+        x, y = (float(entry) for entry in value)
+    except (TypeError, ValueError):
+        x = y = np.nan
+    if not np.isfinite((x, y)).all():
+        raise InputError(f"`{name}` must be two finite numbers (x, y); got {value!r}.")
+    return x, y
+
+
+@dataclass(frozen=True)
+class HalfPlane:
+    """Forbidden side of a line: places behind `point`, seen along `normal`.
+
+    Parameters
+    ----------
+    point
+        A point on the line, in the structure's unit of length.
+    normal
+        Direction into the allowed side, of any length.
+    """
+
+    point: Pair
+    normal: Pair
+
+    def __post_init__(self) -> None:
+        """Check both, and give the normal unit length."""
+        x, y = _pair("normal", self.normal)
+        size = float(np.hypot(x, y))
+        if size == 0.0:
+            raise InputError("`normal` must not be zero; got (0, 0).")
+        object.__setattr__(self, "point", _pair("point", self.point))
+        object.__setattr__(self, "normal", (x / size, y / size))
+
+    def __str__(self) -> str:
+        """Return it as it is written."""
+        (x, y), (a, b) = self.point, self.normal
+        return f"half_plane({x:.9g}, {y:.9g}, {a:.9g}, {b:.9g})"
+
+    def distance(self, places: Places) -> Values:
+        """Signed distance of places: negative behind the line."""
+        return np.asarray((places - np.array(self.point)) @ np.array(self.normal))
+
+    def derivatives(self, place: Places, rate: Places, bend: Places) -> tuple[Values, Values]:
+        """First and second derivative of a growing function of the distance along curves."""
+        normal = np.array(self.normal)
+        return np.asarray(rate @ normal), np.asarray(bend @ normal)
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A forbidden disc, or with `inside` a round room that must not be left.
+
+    Parameters
+    ----------
+    centre, radius
+        In the structure's unit of length.
+    inside
+        Whether the inside is allowed and the outside is not.
+    """
+
+    centre: Pair
+    radius: float
+    inside: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the centre and the radius."""
+        object.__setattr__(self, "centre", _pair("centre", self.centre))
+        if not (np.isfinite(self.radius) and self.radius >= 0.0):
+            raise InputError(f"`radius` must be a finite number >= 0; got {self.radius!r}.")
+
+    def __str__(self) -> str:
+        """Return it as it is written."""
+        name = "room" if self.inside else "disc"
+        return f"{name}({self.centre[0]:.9g}, {self.centre[1]:.9g}, {self.radius:.9g})"
+
+    @property
+    def _sign(self) -> float:
+        return -1.0 if self.inside else 1.0
+
+    def distance(self, places: Places) -> Values:
+        """Signed distance of places from the circle: negative where it is forbidden."""
+        gap = np.linalg.norm(places - np.array(self.centre), axis=-1)
+        return np.asarray(self._sign * (gap - self.radius))
+
+    def derivatives(self, place: Places, rate: Places, bend: Places) -> tuple[Values, Values]:
+        """First and second derivative of a growing function of the distance along curves."""
+        gap = place - np.array(self.centre)
+        first = (gap * rate).sum(axis=-1)
+        second = (rate * rate).sum(axis=-1) + (gap * bend).sum(axis=-1)
+        return self._sign * first, self._sign * second
+
+
+Obstacle = HalfPlane | Disc

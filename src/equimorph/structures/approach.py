@@ -1,0 +1,90 @@
+"""How near a structure comes to an obstacle, and where."""
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.model.obstacle import Obstacle
+
+STEPS = 8
+"""Newton steps towards the nearest point of an arc."""
+STARTS = np.array([0.0, 1.0])
+
+Arcs = Float[np.ndarray, "lanes arcs 4 2"]
+"""Cubic arcs: both ends, and the derivatives there with respect to the share of the arc."""
+Values = Float[np.ndarray, " lanes"]
+
+
+def straight_arcs(corners: Float[np.ndarray, "lanes points 2"]) -> Arcs:
+    """Arcs of a polygon."""
+    side = np.diff(corners, axis=1)
+    return np.stack([corners[:, :-1], corners[:, 1:], side, side], axis=2)
+
+
+def smooth_arcs(
+    places: Float[np.ndarray, "lanes points 2"], angles: Float[np.ndarray, "lanes points"],
+    spacing: float,
+) -> Arcs:  # fmt: skip
+    """Arcs through equidistant points of curves whose tangents are known: of fourth order."""
+    rate = spacing * np.stack([np.cos(angles), np.sin(angles)], axis=2)
+    return np.stack([places[:, :-1], places[:, 1:], rate[:, :-1], rate[:, 1:]], axis=2)
+
+
+def nearest(arcs: Arcs, obstacle: Obstacle) -> tuple[Values, Values]:
+    """Smallest signed distance of arcs from an obstacle, and the share of the way where it is.
+
+    All arcs are tried at a few points; on the best of them and its neighbours Newton's method
+    finds the extremum.
+    """
+    count = arcs.shape[1]
+    shares = _tried(arcs, obstacle)
+    distance = obstacle.distance(_points(arcs[:, :, None], shares)[0])
+    best = distance.min(axis=2).argmin(axis=1)
+    lanes = np.arange(len(arcs))
+    least, where = np.full((2, len(arcs)), np.inf)
+    for beside in (0, -1, 1):
+        arc = np.clip(best + beside, 0, count - 1)
+        start = shares[lanes, arc, distance[lanes, arc].argmin(axis=1)]
+        value, share = _polished(arcs[lanes, arc], obstacle, start)
+        better = value < least - 1e-15
+        least = np.where(better, value, least)
+        where = np.where(better, (arc + share) / count, where)
+    return least, where
+
+
+def _tried(arcs: Arcs, obstacle: Obstacle) -> Float[np.ndarray, "lanes arcs starts"]:
+    """Both ends, and the extremum on the chord."""
+    chord = arcs[:, :, 1] - arcs[:, :, 0]
+    zero = np.zeros_like(chord)
+    first, second = obstacle.derivatives(arcs[:, :, 0], chord, zero)
+    inner = np.clip(-first / np.where(second > 0.0, second, np.inf), 0.0, 1.0)
+    fixed = np.broadcast_to(STARTS, (*inner.shape, len(STARTS)))
+    return np.concatenate([fixed, inner[:, :, None]], axis=2)
+
+
+def _points(
+    arcs: Float[np.ndarray, "*some 4 2"], share: Float[np.ndarray, "*shares"]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places on cubic arcs, with first and second derivatives."""
+    t = share[..., None]
+    a, b, da, db = (arcs[..., k, :] for k in range(4))
+    c2, c3 = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
+    place = a + t * (da + t * (c2 + t * c3))
+    return place, da + t * (2.0 * c2 + 3.0 * t * c3), 2.0 * c2 + 6.0 * t * c3
+
+
+def _polished(
+    arcs: Float[np.ndarray, "lanes 4 2"], obstacle: Obstacle, start: Values
+) -> tuple[Values, Values]:
+    """Least distance on one arc a lane, and where."""
+    share, best = start, start
+    value = obstacle.distance(_points(arcs, start)[0])
+    for _ in range(STEPS):
+        first, second = obstacle.derivatives(*_points(arcs, share))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = np.nan_to_num(first / second)
+        step = np.where(second > 0.0, newton, np.sign(first))
+        share = np.clip(share - step, 0.0, 1.0)
+        now = obstacle.distance(_points(arcs, share)[0])
+        best = np.where(now < value, share, best)
+        value = np.minimum(now, value)
+    return value, best

@@ -1,0 +1,116 @@
+"""Descriptors that every structure has: what constraints of all tasks are made of.
+
+Compared with a number, each is a `Constraint` for any task: ``effort_of(arch, "Theta") <= 0.2``.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.errors import InputError
+from equimorph.model import Box, Descriptor, position
+from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
+from equimorph.structures.approach import nearest
+from equimorph.structures.contract import Structure
+from equimorph.structures.margin import stability_margin
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+
+
+def value_of(structure: Structure, name: str) -> Descriptor:
+    """Value of a parameter, to bound an actuator: ``value_of(arch, "Theta") <= 2``.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    at = position(structure.parameters, name)
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return p[:, at].copy()
+
+    return Descriptor(name, structure.parameters[at].unit, value, name, structure.signature)
+
+
+def effort_of(structure: Structure, name: str) -> Descriptor:
+    """Effort ∂L/∂p of a parameter: the couple or force of an actuator, the way of a load.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    at, unit = position(structure.parameters, name), structure.energy_scale
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return np.asarray(unit * structure.effort(z, p)[:, at])
+
+    label = f"energy/({structure.parameters[at].unit})"
+    return Descriptor(f"effort({name})", label, value, f"∂L/∂{name}", structure.signature)
+
+
+def margin_of(structure: Structure) -> Descriptor:
+    """Stability margin: smallest eigenvalue of the constrained Hessian in the metric."""
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return stability_margin(structure, z, p)
+
+    return Descriptor("stability_margin", "1", value, "margin", structure.signature)
+
+
+def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
+    """Signed distance of the shape from an obstacle: negative where it enters what is forbidden.
+
+    Its `place` is the share of the shape's way where it comes nearest. Rods are followed along
+    their exact positions and angles, other structures along what `shape` draws.
+
+    Raises
+    ------
+    InputError
+        If `obstacle` is neither a `HalfPlane` nor a `Disc`.
+
+    Examples
+    --------
+    >>> from equimorph import Disc, Spring, distance_to
+    >>> spring = Spring()
+    >>> away = distance_to(spring, Disc((0.5, 0.2), 0.1))
+    >>> round(away(spring.natural_state(x_l=1.2)), 6)
+    0.1
+    """
+    if not isinstance(obstacle, HalfPlane | Disc):
+        raise InputError(f"`obstacle` must be a HalfPlane or a Disc; got {obstacle!r}.")
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return nearest(structure.arcs(z, p), obstacle)[0]
+
+    def place(z: Lanes, p: Parameters) -> Values:
+        return nearest(structure.arcs(z, p), obstacle)[1]
+
+    name = f"distance({obstacle})"
+    return Descriptor(name, structure.length_unit, value, "distance", structure.signature, place)
+
+
+def outside(structure: Structure, box: Box) -> Descriptor:
+    """How far parameters are outside a box, in their scales; negative inside.
+
+    The largest distance along one parameter, so that ``outside(arch, Box(...)) >= 0`` keeps
+    actuators out of a region.
+
+    Raises
+    ------
+    InputError
+        For names that the structure does not have.
+    """
+    at = np.array([position(structure.parameters, name) for name in box.names])
+    scales = structure.scales[at]
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        here = p[:, at]
+        gaps = np.maximum(box.lower - here, here - box.upper) / scales
+        return np.asarray(gaps.max(axis=1))
+
+    bounds = zip(box.names, box.lower.tolist(), box.upper.tolist(), strict=True)
+    written = ", ".join(f"{name} {low:.9g} to {high:.9g}" for name, low, high in bounds)
+    return Descriptor(f"outside({written})", "scales", value, "outside", structure.signature)
