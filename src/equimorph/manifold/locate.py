@@ -113,20 +113,20 @@ def locate(
     """
     if len(eset.cells) == 0:
         raise InputError("`eset` must have states to compare with; got an empty set.")
-    fit = _Shape.of(eset, measured, s) if isinstance(measured, np.ndarray) else _Values.of(
+    fit = _Shape.of(eset, measured, s) if isinstance(measured, np.ndarray) else ValueFit.of(
         eset, measured, errors or {}
     )  # fmt: skip
     misfit = np.linalg.norm(fit.residuals(eset.points.z, eset.points.p), axis=1)
     starts = local_minima(faces_of(eset.cells, 2), misfit)[:CANDIDATES]
     ground = Ground(setting_of(eset), eset)
     found, value, inside = ground.nearest(spots(eset, starts), fit.residuals)
-    chosen = _different(eset.structure, found, value)[:2]
+    chosen = different(eset.structure, found, value)[:2]
     places = _places(eset, found.take(chosen), value[chosen], inside[chosen])
     return Location(places[0], places[1] if len(places) > 1 else None)
 
 
 @dataclass(frozen=True)
-class _Values:
+class ValueFit:
     """Descriptors and parameters, in units of their errors."""
 
     eset: EquilibriumSet
@@ -139,7 +139,8 @@ class _Values:
         eset: EquilibriumSet,
         measured: Mapping[Descriptor | str, float],
         errors: Mapping[Descriptor | str, float],
-    ) -> "_Values":
+    ) -> "ValueFit":
+        """Values in units of their errors, or of their ranges over the set."""
         _check_values(eset, measured)
         known = cls(eset, measured, dict.fromkeys(measured, 1.0))
         spread = np.ptp(known.residuals(eset.points.z, eset.points.p), axis=0)
@@ -214,7 +215,7 @@ def _name(what: Descriptor | str) -> str:
     return what if isinstance(what, str) else what.name
 
 
-def _different(
+def different(
     structure: Structure, found: Spot, value: Float[np.ndarray, " lanes"]
 ) -> Int[np.ndarray, " kept"]:
     """Different states, the best first."""

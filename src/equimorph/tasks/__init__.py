@@ -6,6 +6,7 @@ from equimorph.tasks.calibration import (
     MeasuredValues,
     calibrate,
 )
+from equimorph.tasks.estimation import Resolving, StateEstimate, estimate_state
 from equimorph.tasks.maps import (
     ActuatorMap,
     CurvatureMap,
@@ -29,11 +30,14 @@ __all__ = [
     "MapCurve",
     "MeasuredShape",
     "MeasuredValues",
+    "Resolving",
     "Route",
     "Shapes",
+    "StateEstimate",
     "Tracking",
     "calibrate",
     "curvature_map",
+    "estimate_state",
     "limit_load_map",
     "natural_states_over",
     "plan",

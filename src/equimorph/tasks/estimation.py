@@ -1,0 +1,341 @@
+"""`estimate_state`: on which branch and under which load a measured structure is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.stats import chi2 as chi_squared
+
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.locate import ValueFit, different, pieces_of
+from equimorph.manifold.nearest import (
+    DIFFERENCE,
+    Ground,
+    Residuals,
+    Spot,
+    local_minima,
+    setting_of,
+    spots,
+)
+from equimorph.manifold.tangents import fold_slopes, split_step
+from equimorph.manifold.topology import faces_of
+from equimorph.model import Descriptor
+from equimorph.structures import State, States
+
+STARTS = 16
+"""Local minima over the vertices from which the best fits are searched."""
+UNLIKELY = 1e-3
+"""Chance of a χ² as large as that of the best fit below which nothing on the set explains it."""
+NEGLIGIBLE = 1e-6
+"""Weight, relative to the best, below which a fit is no candidate."""
+INWARD = 1e-4
+"""Distance from the edge of stability at which the fit is compared."""
+PLACES = np.linspace(0.0, 1.0, 26)
+"""Where shapes are compared if no other measurement is named."""
+
+Measured = Mapping[Descriptor | str, float]
+
+
+@dataclass(frozen=True)
+class Resolving:
+    """The measurement that tells the best candidate from the others most clearly.
+
+    Parameters
+    ----------
+    descriptor
+        What to measure.
+    values
+        What each candidate would show.
+    separation
+        Least difference between the best candidate and another one, in standard errors of the
+        measurement; in units of the descriptor where no error was given.
+    """
+
+    descriptor: Descriptor
+    values: Float[np.ndarray, " lanes"]
+    separation: float
+
+
+@dataclass(frozen=True)
+class StateEstimate:
+    """Answer to "on which branch is the structure, and under which load".
+
+    Parameters
+    ----------
+    status
+        "known", "ambiguous" if several candidates explain what was measured, or "refused" if none
+        does, with the reason in `why`.
+    states
+        Candidates: the best fit of each branch that stands a chance, best first.
+    chi2
+        Sum of the squares of what is left of each value, in its standard errors.
+    weight
+        Chance of each, if all were as likely before: ``exp(−χ²/2)``, normalised.
+    margin
+        Stability margin of each.
+    stratum
+        Piece of the set that each lies on, −1 if not known.
+    inside
+        Whether each is a minimum; else it lies on a fold or a side of the box, and the fit would
+        become better beyond.
+    standard_errors
+        Of each free parameter of the set, by name, for each candidate.
+    next_measurement
+        What to measure in order to resolve an ambiguity; None if there is none.
+    """
+
+    status: Literal["known", "ambiguous", "refused"]
+    why: str
+    states: States
+    chi2: Float[np.ndarray, " lanes"]
+    weight: Float[np.ndarray, " lanes"]
+    margin: Float[np.ndarray, " lanes"]
+    stratum: Int[np.ndarray, " lanes"]
+    inside: Bool[np.ndarray, " lanes"]
+    standard_errors: Mapping[str, Float[np.ndarray, " lanes"]]
+    next_measurement: Resolving | None = None
+
+    def __repr__(self) -> str:
+        """The best candidate with its weight, or why there is none."""
+        if self.status == "refused":
+            return f"StateEstimate(refused: {self.why})"
+        return f"StateEstimate({self.status}: {self.state}, weight {self.weight[0]:.3g})"
+
+    @property
+    def known(self) -> bool:
+        """Whether one candidate stands out."""
+        return self.status == "known"
+
+    @property
+    def state(self) -> State:
+        """The best candidate."""
+        return self.states[0]
+
+
+def estimate_state(
+    eset: EquilibriumSet,
+    measured: Measured,
+    errors: Measured,
+    *,
+    could_measure: Mapping[Descriptor, float] | None = None,
+    confidence: float = 0.95,
+    unstable: bool = False,
+) -> StateEstimate:
+    """Tell from measured values with errors where on a set a structure is, and how surely.
+
+    Weighted least squares on the set from every vertex that fits better than its neighbours; on
+    the stability boundary where a fit would cross it. Free parameters of the set are what is to be
+    found out (the load, say); what is known of them counts as a measured value.
+
+    Parameters
+    ----------
+    eset
+        Set over all parameters that are not known exactly.
+    measured
+        Values of descriptors and, by name, of parameters; at least one for each free parameter.
+    errors
+        Standard error of each value.
+    could_measure
+        Descriptors that might be measured next, with their standard errors; coordinates of the
+        shape if None.
+    confidence
+        Weight from which on the best candidate counts as known.
+    unstable
+        Whether unstable equilibria are candidates, too.
+
+    Returns
+    -------
+    Candidates with χ² and weights. No fit, and no unique one, are answers.
+
+    Raises
+    ------
+    InputError
+        For too few values, values or errors that are no numbers, missing errors, a confidence that
+        is none, or a set without cells.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> spring = em.Spring()
+    >>> eset = em.equilibrium_set(spring, em.Box(F=(-0.4, 0.4)), fixed={"x_l": 0.8}, intervals=(9,))
+    >>> found = em.estimate_state(eset, {spring.angle: 0.62}, {spring.angle: 0.01})
+    >>> found.status, round(found.state["F"], 6)
+    ('known', 0.009908)
+    """
+    fit = _fit(eset, measured, errors)
+    if not 0.5 < confidence < 1.0:
+        raise InputError(f"`confidence` must lie between 0.5 and 1; got {confidence!r}.")
+    if not unstable and not (eset.cell_index == 0).any():
+        raise InputError("`eset` must have stable cells; got none.")
+    found, misfit, inside = _settled(eset, fit.residuals, unstable)
+    order = different(eset.structure, found, misfit)
+    order = order[_weights(misfit[order] ** 2) > NEGLIGIBLE]
+    found, chi2 = found.take(order), misfit[order] ** 2
+    states = States(eset.structure, found.z, found.p)
+    weight = _weights(chi2)
+    freedom = max(len(measured) - len(eset.names), 1)
+    status, why = _judged(states, chi2, weight, freedom, confidence)
+    rivals = np.flatnonzero(weight > 1.0 - confidence)
+    resolving = _resolving(states, rivals, could_measure) if status == "ambiguous" else None
+    return StateEstimate(
+        status,
+        why if resolving is None else f"{why}; {resolving.descriptor.name} would tell them apart",
+        states,
+        chi2,
+        weight,
+        states.margin,
+        np.array([pieces_of(eset, state)[0] for state in states], int),
+        inside[order],
+        _standard_errors(eset, found, fit.residuals),
+        resolving,
+    )
+
+
+def _fit(eset: EquilibriumSet, measured: Measured, errors: Measured) -> ValueFit:
+    if len(eset.cells) == 0:
+        raise InputError("`eset` must have states to compare with; got an empty set.")
+    for what in measured:
+        if what not in errors:
+            name = what if isinstance(what, str) else what.name
+            raise InputError(f"`errors` must give one for every value; got none for {name}.")
+    return ValueFit.of(eset, measured, errors)
+
+
+def _settled(
+    eset: EquilibriumSet, residuals: Residuals, unstable: bool
+) -> tuple[Spot, Float[np.ndarray, " lanes"], Bool[np.ndarray, " lanes"]]:
+    """Best fits, their misfits, and whether they are minima; those on folds are none."""
+    ground = Ground(setting_of(eset), eset)
+    value = np.linalg.norm(residuals(eset.points.z, eset.points.p), axis=1)
+    cells = eset.cells if unstable else eset.cells[eset.cell_index == 0]
+    starts = local_minima(faces_of(cells, 2), value)[:STARTS]
+    found, misfit, inside = ground.nearest(spots(eset, starts), residuals)
+    if unstable:
+        return found, misfit, inside
+    stable = eset.structure.index(found.z, found.p) == 0
+    kept, (edge, value) = (found.take(stable), misfit[stable]), _at_edge(ground, residuals, value)
+    pairs = zip(vars(kept[0]).values(), vars(edge).values(), strict=True)
+    whole = Spot(*(np.concatenate(pair) for pair in pairs))
+    flags = np.concatenate([inside[stable], np.zeros(len(value), bool)])
+    return whole, np.concatenate([kept[1], value]), flags
+
+
+def _at_edge(
+    ground: Ground, residuals: Residuals, value: Float[np.ndarray, " V"]
+) -> tuple[Spot, Float[np.ndarray, " lanes"]]:
+    """States at the edge of stability beyond which alone the fit would become better."""
+    eset = ground.eset
+    every = [_facets(piece, len(eset.names)) for piece in eset.folds]
+    facets = np.concatenate([np.zeros((0, len(eset.names)), int), *every])
+    facets = facets[(eset.index[facets] == 0).all(axis=1)]
+    single = facets.shape[1] == 1
+    starts = facets[:, 0] if single else local_minima(faces_of(facets, 2), value)[:STARTS]
+    begin = spots(eset, starts)
+    if len(starts) == 0:
+        return begin, np.zeros(0)
+    edge, misfit, _ = Ground(ground.setting, eset, fold=True).nearest(begin, residuals)
+    frames, rows = ground.frames(edge)
+    across = fold_slopes(ground.setting, edge.z, edge.p, frames)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    here = Spot(edge.z, edge.p, rows)
+    inner, there = ground.moved(here, frames, INWARD * across)
+    outer, back = ground.moved(here, frames, -INWARD * across)
+    stable = [eset.structure.index(side.z, side.p) == 0 for side in (inner, outer)]
+    nearer = [np.linalg.norm(residuals(side.z, side.p), axis=1) < misfit for side in (inner, outer)]
+    parts = there & back & (stable[0] != stable[1])
+    closed = parts & ~np.where(stable[0], nearer[0], nearer[1])
+    return edge.take(closed), misfit[closed]
+
+
+def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+    """Facets of a piece of a fold: a point, a polyline or triangles."""
+    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+
+
+def _weights(chi2: Float[np.ndarray, " lanes"]) -> Float[np.ndarray, " lanes"]:
+    likely = np.exp(-0.5 * (chi2 - chi2.min(initial=np.inf)))
+    return np.asarray(likely / likely.sum())
+
+
+def _judged(
+    states: States,
+    chi2: Float[np.ndarray, " lanes"],
+    weight: Float[np.ndarray, " lanes"],
+    freedom: int,
+    confidence: float,
+) -> tuple[Literal["known", "ambiguous", "refused"], str]:
+    if len(states) == 0:
+        return "refused", "no state of the set comes near to what was measured"
+    chance = float(chi_squared.sf(chi2[0], freedom))
+    if chance < UNLIKELY:
+        return "refused", (
+            f"the best fit has χ² = {chi2[0]:.4g} ({freedom} degrees of freedom, chance "
+            f"{chance:.1g}): no state of the set explains what was measured"
+        )
+    if weight[0] >= confidence:
+        return "known", ""
+    rivals = weight[weight > 1.0 - confidence]
+    chances = ", ".join(f"{each:.3g}" for each in rivals)
+    return "ambiguous", f"{len(rivals)} states explain what was measured, with weights {chances}"
+
+
+def _resolving(
+    states: States,
+    rivals: Int[np.ndarray, " some"],
+    could_measure: Mapping[Descriptor, float] | None,
+) -> Resolving | None:
+    """Measurement in which the best candidate differs most from the nearest rival."""
+    options = _coordinates(states) if could_measure is None else dict(could_measure)
+    best: Resolving | None = None
+    for descriptor, error in options.items():
+        if not float(error) > 0.0:
+            raise InputError(
+                f"`could_measure` must give positive errors; got {descriptor.name}: {error!r}."
+            )
+        values = descriptor(states)
+        apart = float(np.abs(values[rivals[1:]] - values[0]).min() / error)
+        if best is None or apart > best.separation:
+            best = Resolving(descriptor, values, apart)
+    return best
+
+
+def _coordinates(states: States) -> dict[Descriptor, float]:
+    """Coordinates of the drawn shape at some places, each with error one."""
+    structure, unit = states.structure, states.structure.length_unit
+    dims = states[:1].shape(PLACES[:1]).shape[2]
+
+    def value(
+        s: float, axis: int, z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes P"]
+    ) -> Float[np.ndarray, " lanes"]:
+        return structure.shape(z, p, np.array([s]))[:, 0, axis]
+
+    return {
+        Descriptor(f"{'xyz'[axis]} of the shape at s = {s:g}", unit, partial(value, s, axis)): 1.0
+        for s in PLACES.tolist()
+        for axis in range(dims)
+    }
+
+
+def _standard_errors(
+    eset: EquilibriumSet, spot: Spot, residuals: Residuals
+) -> dict[str, Float[np.ndarray, " lanes"]]:
+    """Linearised: covariance (JᵀJ)⁻¹ of tangent coordinates, carried over to the parameters."""
+    setting, d = setting_of(eset), len(eset.names)
+    frames, _ = Ground(setting, eset).frames(spot)
+    columns = []
+    for k in range(frames.shape[1]):
+        dz, dp = split_step(setting, DIFFERENCE * frames[:, k])
+        ahead, behind = (residuals(spot.z + s * dz, spot.p + s * dp) for s in (1.0, -1.0))
+        columns.append((ahead - behind) / (2.0 * DIFFERENCE))
+    slope = np.stack(columns, axis=2)
+    values, vectors = np.linalg.eigh(np.swapaxes(slope, 1, 2) @ slope)
+    moves = frames[:, :, frames.shape[2] - d :] * setting.scales
+    spread = np.einsum("lki,lkp->lip", vectors, moves) ** 2
+    # directions that change nothing measured and no parameter do not count
+    least = np.maximum(1e-14 * values.max(axis=1, keepdims=True), 1e-300)
+    variance = (spread / np.maximum(values, least)[:, :, None]).sum(axis=1)
+    return dict(zip(eset.names, np.sqrt(variance).T, strict=True))
