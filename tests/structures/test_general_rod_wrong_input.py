@@ -28,7 +28,7 @@ WRONG = {
         r"`stiffness` must be positive everywhere; got -0\.1 at s = 0\.5",
     ),
     "no axial stiffness": ({"axial": -3.0}, "`axial` must be positive"),
-    "curvature by name": ({"curvature": "big"}, "`curvature` must be a number, a table"),
+    "curvature by name": ({"curvature": "big"}, "`curvature` must be a number, with"),
     "curvature not finite": ({"curvature": np.inf}, "`curvature` must be finite; got inf"),
     "kink outside": (
         {"curvature": lambda s: s, "kinks": [1.2]},

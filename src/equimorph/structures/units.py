@@ -1,22 +1,26 @@
-"""Units of bending structures: numbers of the user to and from the non-dimensional ones inside."""
+"""Units of rods: numbers of the user to and from the non-dimensional ones inside."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from equimorph.errors import InputError
+from equimorph.structures.unit_system import UnitSystem
 
 FOUR_PI_SQUARED = 4.0 * np.pi**2
+SI = UnitSystem("N", "m")
 LABELS = {
-    "length": ("L", "m"),
-    "force": ("4π²B/L²", "N"),
-    "line": ("4π²B/L²", "N/m"),
-    "tension": ("4π²B/L²", "N"),
-    "couple": ("4π²B/L", "N m"),
-    "curvature": ("1/L", "1/m"),
+    "length": ("L", "length"),
+    "force": ("4π²B/L²", "force"),
+    "line": ("4π²B/L²", "force/length"),
+    "tension": ("4π²B/L²", "force"),
+    "couple": ("4π²B/L", "force·length"),
+    "curvature": ("1/L", "1/length"),
     "angle": ("rad", "rad"),
-    "spring": ("4π²B/L³", "N/m"),
+    "spring": ("4π²B/L³", "force/length"),
 }
+"""Labels without units, and quantities as `UnitSystem` writes them."""
 
 
 @dataclass(frozen=True)
@@ -24,19 +28,22 @@ class Units:
     """Non-dimensional numbers times `value(quantity)` are the user's.
 
     Inside, lengths are measured by L, forces by 4π²B/L², moments and energies by 4π²B/L. Without
-    bending stiffness and length the user's numbers are those; with them they are in any consistent
-    units, labelled as SI.
+    bending stiffness and length the user's numbers are those; with them they are in the units of
+    `system`.
 
     Parameters
     ----------
     bending_stiffness
-        B = EI in N m².
+        B = EI.
     length
-        L in m.
+        L.
+    system
+        Units of the user's numbers; SI if none are named.
     """
 
     bending_stiffness: float | None = None
     length: float | None = None
+    system: UnitSystem = field(default_factory=UnitSystem)
 
     def __post_init__(self) -> None:
         """Check that both or none are given, and positive."""
@@ -77,9 +84,46 @@ class Units:
 
     def label(self, quantity: str) -> str:
         """Its unit."""
-        return LABELS[quantity][0 if self.plain else 1]
+        plain, words = LABELS[quantity]
+        return plain if self.plain else self._labelled.label(words)
+
+    def number(self, given: Any, quantity: str, what: str) -> Any:
+        """Number of a quantity that may be a text with units; see `UnitSystem.number`."""
+        system = self.system if self.plain else self._labelled
+        return system.number(given, quantity, what)
+
+    @property
+    def _labelled(self) -> UnitSystem:
+        return SI if self.system.plain else self.system
 
     @property
     def energy_label(self) -> str:
         """Unit of energy."""
-        return "4π²B/L" if self.plain else "J"
+        if self.plain:
+            return LABELS["couple"][0]
+        return "J" if self._labelled == SI else self._labelled.label("force·length")
+
+    def data(self) -> dict[str, Any]:
+        """What a rod is given of it; empty if plain."""
+        if self.plain:
+            return {}
+        given = {"EI": self.bending_stiffness, "length": self.length}
+        return given if self.system.plain else {**given, "units": self.system.data()}
+
+
+def rod_units(EI: Any, length: Any, system: UnitSystem) -> Units:
+    """Units of a rod from its bending stiffness and length, which may be texts with units.
+
+    Raises
+    ------
+    InputError
+        If one of them is missing or not positive, or units are named without them.
+    """
+    if EI is None and length is None and not system.plain:
+        raise InputError(
+            f"`units` must come with EI and length; got {system.data()} alone. Without these two a "
+            "rod is non-dimensional."
+        )
+    own = SI if system.plain else system
+    stiff, long = own.number(EI, "force·length²", "EI"), own.number(length, "length", "length")
+    return Units(stiff, long, system)

@@ -87,8 +87,10 @@ def _load(shape: Any) -> Any:
 
 
 def _profile(shape: Any) -> Any:
-    if not (_is_number(shape) or _is_table(shape)):
-        raise _requirement(f"be a number or a table [[s, f], ...] of numbers up to {LARGEST:g}")
+    if not (_is_number(shape) or _is_table(shape) or isinstance(shape, str)):
+        raise _requirement(
+            f"be a number up to {LARGEST:g}, a table [[s, f], ...] of such, or a text with its unit"
+        )
     return shape
 
 
@@ -125,7 +127,23 @@ def _formula(given: Any) -> Any:
     return given
 
 
+def _quantity(given: Any) -> Any:
+    """Check its form; whether a unit fits is known to the structure."""
+    if not (_is_number(given) or isinstance(given, str)):
+        raise _requirement(f'be a number up to {LARGEST:g}, or a text with its unit like "2 N m^2"')
+    return given
+
+
+def _stiff(given: Any) -> Any:
+    if _is_number(given) and not given > 0:
+        raise _requirement("be greater than 0")
+    return _quantity(given)
+
+
 Formula = Annotated[Any, AfterValidator(_formula)]
+Quantity = Annotated[Any, AfterValidator(_quantity)]
+Stiffness = Annotated[Any, AfterValidator(_stiff)]
+UnitSystem = Annotated[dict[str, str], Field(min_length=2, max_length=2)]
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Interval = Annotated[list[Number], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
 Point = dict[str, Number]
@@ -155,18 +173,20 @@ class RodSection(_Section):
     loads: dict[str, Term] | None = None
     actuators: dict[str, Term] | None = None
     coordinates: dict[str, dict[str, Number]] | None = None
-    rise: Number | None = None
-    EI: Number | None = None
-    length: Number | None = None
-    span: float | None = Field(default=None, gt=0, le=LARGEST)
+    rise: Quantity | None = None
+    EI: Quantity | None = None
+    length: Quantity | None = None
+    units: UnitSystem | None = None
+    span: Stiffness | None = None
     elements: int | None = Field(default=None, ge=2, le=1000)
     degree: int | None = Field(default=None, ge=3, le=16)
 
     @field_validator("span")
     @classmethod
-    def _within_reach(cls, span: float | None, info: Any) -> float | None:
+    def _within_reach(cls, span: Any, info: Any) -> Any:
         longest = info.data.get("length") or 1.0
-        if span is not None and info.data.get("axial") is None and not span < longest:
+        texts = isinstance(span, str) or isinstance(longest, str)
+        if span is not None and not texts and info.data.get("axial") is None and not span < longest:
             raise _requirement(f"be less than {longest:g}")
         return span
 
@@ -221,29 +241,31 @@ class BarSection(_Section):
     """A bar of a truss; see `equimorph.Bar`."""
 
     ends: list[str] = Field(min_length=2, max_length=2)
-    EA: float = Field(default=1.0, gt=0, le=LARGEST)
-    EI: float | None = Field(default=None, gt=0, le=LARGEST)
-    rest: float | None = Field(default=None, gt=0, le=LARGEST)
+    EA: Stiffness = 1.0
+    EI: Stiffness | None = None
+    rest: Stiffness | None = None
 
 
 Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
+Place = Annotated[list[Quantity], Field(min_length=2, max_length=3)]
 
 
 class TrussSection(_Section):
     """Bars between joints; see `equimorph.Truss`."""
 
     kind: Literal["truss"]
-    joints: dict[str, Vector] = Field(min_length=2)
+    joints: dict[str, Place] = Field(min_length=2)
     bars: list[BarSection] = Field(min_length=1)
     supports: dict[str, str]
     loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
     actuators: dict[str, dict[str, Number]] = Field(default_factory=dict)
     strain: Literal["engineering", "green"] = "engineering"
+    units: UnitSystem | None = None
 
 
 def _support(given: Any) -> Any:
     table = given if isinstance(given, dict) else {}
-    fine = table and all(value == "held" or type(value) in (int, float) for value in table.values())
+    fine = table and all(isinstance(value, str) or _is_number(value) for value in table.values())
     if not (isinstance(given, str) or fine):
         raise _requirement(
             'be "fixed", "pinned", axes to hold like "y", or a table like '
@@ -256,11 +278,11 @@ class MemberSection(_Section):
     """A member of a frame; see `equimorph.Member`."""
 
     ends: list[str] = Field(min_length=2, max_length=2)
-    EI: float = Field(default=1.0, gt=0, le=LARGEST)
-    EA: float | None = Field(default=None, gt=0, le=LARGEST)
-    curvature: Number = 0.0
+    EI: Stiffness = 1.0
+    EA: Stiffness | None = None
+    curvature: Quantity = 0.0
     hinges: list[str] = Field(default_factory=list)
-    weight: float | None = Field(default=None, gt=0, le=LARGEST)
+    weight: Stiffness | None = None
 
 
 Plane = Annotated[list[Number], Field(min_length=2, max_length=2)]
@@ -279,13 +301,16 @@ class FrameSection(_Section):
     """Rods between joints; see `equimorph.Frame`."""
 
     kind: Literal["frame"]
-    joints: dict[str, Plane] = Field(min_length=2)
+    joints: dict[str, Annotated[list[Quantity], Field(min_length=2, max_length=2)]] = Field(
+        min_length=2
+    )
     members: list[MemberSection] = Field(min_length=1)
     supports: dict[str, Annotated[Any, AfterValidator(_support)]]
     loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
     actuators: dict[str, EffectSection] = Field(default_factory=dict)
     elements: int = Field(default=2, ge=1, le=1000)
     degree: int = Field(default=8, ge=3, le=16)
+    units: UnitSystem | None = None
 
 
 class SetSection(_Section):

@@ -313,8 +313,8 @@ def test_descriptors_are_read_as_they_are_written():
         assert frame.descriptor(text).name == text
     assert frame.descriptor("moment( B - A, A )")(state) == frame.moment("A-B", "A")(state)
     assert frame.elevation == frame.travel("P")
-    assert [each.unit for each in frame.parameters] == ["1", "length", "1", "force/length"]
-    assert frame.descriptor("travel(q)").unit == "length²"
+    assert [each.unit for each in frame.parameters] == ["1", "length", "1", "1"]
+    assert frame.descriptor("travel(q)").unit == "force·length"
     assert frame.descriptor("travel(P)") == portal(50.0).descriptor("travel(P)")
 
 

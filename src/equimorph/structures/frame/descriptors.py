@@ -37,7 +37,7 @@ _CALL = re.compile(r"(\w+)(?:\(([\w-]+)(?:,([\w-]+))?\))?")
 def _made(
     frame: FrameFields, name: str, unit: str, value: Callable[[Lanes, Parameters], Values]
 ) -> Descriptor:
-    return Descriptor(name, unit, value, name, frame.signature)
+    return Descriptor(name, frame.model.system.label(unit), value, name, frame.signature)
 
 
 def displacement(frame: FrameFields, joint: str, axis: str) -> Descriptor:
@@ -51,7 +51,8 @@ def displacement(frame: FrameFields, joint: str, axis: str) -> Descriptor:
         return np.asarray(unit * frame.displacements(z, p)[:, at, along])
 
     name = f"displacement({joint},{axis})"
-    return Descriptor(name, "length", value, f"u_{axis}({joint})", frame.signature)
+    label = frame.model.system.label("length")
+    return Descriptor(name, label, value, f"u_{axis}({joint})", frame.signature)
 
 
 def rotation(frame: FrameFields, where: str, joint: str | None = None) -> Descriptor:
@@ -126,9 +127,9 @@ def max_curvature(frame: FrameFields, member: str | None = None) -> Descriptor:
         largest = frame.largest_curvatures(z, p)[:, members]
         return np.asarray(largest.max(axis=1) / frame.model.length)
 
-    return Descriptor(
-        name, "1/length", value, "max |κ|" if member is None else name, frame.signature
-    )
+    symbol = "max |κ|" if member is None else name
+    label = frame.model.system.label("1/length")
+    return Descriptor(name, label, value, symbol, frame.signature)
 
 
 def reaction(frame: FrameFields, joint: str, axis: str) -> Descriptor:
@@ -149,7 +150,7 @@ def effort(frame: FrameFields, parameter: str, sign: float = 1.0) -> Descriptor:
     """∂E/∂p of a parameter, or minus that."""
     at = position(frame.parameters, parameter)
     unit = frame.model.bending / frame.model.length
-    label = CONJUGATE[frame.parameters[at].unit]
+    label = CONJUGATE[frame.model.patterns.unit(at)]
     name = f"{'effort' if sign > 0.0 else 'travel'}({parameter})"
 
     def value(z: Lanes, p: Parameters) -> Values:
@@ -172,7 +173,8 @@ def total_energy(frame: FrameFields) -> Descriptor:
     def value(z: Lanes, p: Parameters) -> Values:
         return np.asarray(unit * frame.energy(z, p))
 
-    return Descriptor("energy", "force·length", value, "E", frame.signature)
+    label = frame.model.system.label("force·length")
+    return Descriptor("energy", label, value, "E", frame.signature)
 
 
 def elevation(frame: FrameFields) -> Descriptor:

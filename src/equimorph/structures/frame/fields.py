@@ -87,7 +87,7 @@ class FrameFields(FrameMechanics):
         It counts per length as the member is drawn, which an elastic or actuated strain leaves out.
         """
         model, y = self.model, self.scalars(z, p)
-        bends = np.array([member.curvature for member in model.network.members]) * model.length
+        bends = np.array([float(each.curvature) for each in model.network.members]) * model.length
         actuated = multiply(y, model.natural.T) + bends
         elastic = self._moments(z, p) / model.rigidity[:, None, None]
         return np.asarray(elastic + actuated[:, :, None, None])

@@ -19,6 +19,7 @@ from equimorph.structures.frame.network import Network, network
 from equimorph.structures.frame.patterns import Given, Patterns, patterns
 from equimorph.structures.frame.support import support_data
 from equimorph.structures.rod.discretisation import Mesh, reference_element
+from equimorph.structures.unit_system import Quantity, unit_system
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -33,8 +34,7 @@ class Frame(FrameFields):
     Members are unshearable, geometrically exact rods, straight or circular arcs as drawn, which is
     free of stress. Without EA they are inextensible; with it they have the energy ½ EA ε² per
     length besides ½ EI (κ − κ₀)². They meet at rigid or hinged joints. Dead loads act on joints or
-    along members. x points right, y up; angles and couples count counterclockwise. All numbers are
-    in one system of units of the user's choice.
+    along members. x points right, y up; angles and couples count counterclockwise.
 
     Unknowns are the turns of Gauss–Lobatto nodes along the members; the multipliers are forces that
     balance without loads, one for each independent cycle of members and supports in x and in y.
@@ -58,6 +58,9 @@ class Frame(FrameFields):
         (x, y) and "turn" their angles.
     elements, degree
         Elements of each member and their polynomial degree.
+    units
+        Units of force and length of all numbers, like ``{"force": "kN", "length": "mm"}``; places,
+        stiffnesses and weights may then be texts with units of their own. None: any one system.
 
     Raises
     ------
@@ -78,11 +81,9 @@ class Frame(FrameFields):
     0.49346
     """
 
-    length_unit = "length"
-
     def __init__(  # noqa: PLR0913  # a network has that many parts
         self,
-        joints: Mapping[str, Sequence[float]],
+        joints: Mapping[str, Sequence[Quantity]],
         members: Iterable[Any],
         supports: Mapping[str, Any],
         loads: Given | None = None,
@@ -90,19 +91,23 @@ class Frame(FrameFields):
         *,
         elements: int = 2,
         degree: int = 8,
+        units: Mapping[str, Any] | None = None,
     ) -> None:
         if not (isinstance(elements, int) and elements >= 1):
             raise InputError(f"`elements` must be a whole number >= 1; got {elements!r}.")
         if not (isinstance(degree, int) and 3 <= degree <= 16):
             raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
-        made = network(joints, members, supports)
+        system = unit_system(units)
+        made = network(joints, members, supports, system)
         self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
         found = patterns(made, self._actuators, self._loads)
         self._check_drift(made)
         length = float(made.lengths.mean())
-        bending = float(np.mean([member.EI for member in made.members]))
+        bending = float(np.mean([float(member.EI) for member in made.members]))
         mesh = Mesh(np.linspace(0.0, 1.0, elements + 1), reference_element(degree))
-        super().__init__(FrameModel(made, found.scaled(length, bending), mesh, length, bending))
+        scaled = found.scaled(length, bending)
+        super().__init__(FrameModel(made, scaled, mesh, length, bending, system))
+        self.length_unit, self.energy_scale = system.label("length"), bending / length
         self.parameters = tuple(
             self._parameter(k, name, found)
             for k, name in enumerate([*self._actuators, *self._loads])
@@ -119,13 +124,14 @@ class Frame(FrameFields):
                 )
 
     def _parameter(self, k: int, name: str, found: Patterns) -> Parameter:
+        unit = self.model.system.label(found.unit(k))
         if k >= len(self._actuators):
-            return Parameter(name, found.unit(k), 1.0, "load", 0.0)
+            return Parameter(name, unit, 1.0, "load", 0.0)
         rates, rests = found.length[k], self.model.network.lengths
         limits = -rests[rates != 0.0] / rates[rates != 0.0]
         lower = float(limits[limits < 0.0].max(initial=-np.inf))
         upper = float(limits[limits > 0.0].min(initial=np.inf))
-        return Parameter(name, found.unit(k), 1.0, "actuator", 0.0, lower, upper)
+        return Parameter(name, unit, 1.0, "actuator", 0.0, lower, upper)
 
     def _set_scales(self) -> None:
         """Measure parameters by what turns a node by one radian, or bends a member by as much."""
@@ -153,6 +159,7 @@ class Frame(FrameFields):
             "actuators": _plain(self._actuators),
             "elements": mesh.elements,
             "degree": mesh.degree,
+            **({} if self.model.system.plain else {"units": self.model.system.data()}),
         }
 
     def natural_guess(self, p: Parameters) -> Lanes:

@@ -7,7 +7,15 @@ from typing import Any
 import numpy as np
 
 from equimorph.errors import InputError
+from equimorph.structures.unit_system import Quantity, UnitSystem, check_positive
 
+QUANTITIES = {
+    "EI": "force·length²",
+    "EA": "force",
+    "curvature": "1/length",
+    "weight": "force/length",
+}
+"""What each number of a member measures."""
 SLENDER = 0.5
 """Largest radius of gyration √(EI/EA) of a member, relative to its length."""
 
@@ -15,6 +23,8 @@ SLENDER = 0.5
 @dataclass(frozen=True)
 class Member:
     """An elastic rod between two joints, straight or a circular arc where it is free of stress.
+
+    Numbers are in the units of the frame; texts like "0.3 N m^2" are converted to these.
 
     Parameters
     ----------
@@ -30,15 +40,15 @@ class Member:
     hinges
         Names of those of its ends that transmit no moment.
     weight
-        Weight per length, for loads on "weight"; None: without.
+        Weight per length, for loads on "weight", or a text like "0.1 kg/m"; None: without.
     """
 
     ends: Sequence[str]
-    EI: float = 1.0
-    EA: float | None = None
-    curvature: float = 0.0
+    EI: Quantity = 1.0
+    EA: Quantity | None = None
+    curvature: Quantity = 0.0
     hinges: Sequence[str] = ()
-    weight: float | None = None
+    weight: Quantity | None = None
 
     def __post_init__(self) -> None:
         """Check ends and numbers."""
@@ -49,12 +59,11 @@ class Member:
             )
         if self.ends[0] == self.ends[1]:
             raise InputError(f"`ends` of a member must differ; got {self.ends[0]} twice.")
-        for name, value in (("EI", self.EI), ("EA", self.EA), ("weight", self.weight)):
-            if value is None and name != "EI":
-                continue
-            if not (isinstance(value, int | float) and 0.0 < value < np.inf):
-                raise InputError(f"`{name}` of member {self.name} must be positive; got {value!r}.")
-        if not (isinstance(self.curvature, int | float) and np.isfinite(self.curvature)):
+        for name in ("EI", "EA", "weight"):
+            value = getattr(self, name)
+            if value is not None or name == "EI":
+                check_positive(value, name, f" of member {self.name}")
+        if not (isinstance(self.curvature, str) or _finite(self.curvature)):
             raise InputError(
                 f"`curvature` of member {self.name} must be finite; got {self.curvature!r}."
             )
@@ -70,16 +79,20 @@ class Member:
         """Its joints, joined: A-B."""
         return "-".join(self.ends)
 
+    def measured(self, system: UnitSystem) -> "Member":
+        """The same member with its numbers in a system of units."""
+        return system.measured(self, QUANTITIES, f"member {self.name}")
+
     def length(self, chord: float) -> float:
         """Length of the arc over a chord; InputError if there is none, or none slender enough."""
-        half = 0.5 * abs(self.curvature) * chord
+        half = 0.5 * abs(float(self.curvature)) * chord
         if half >= 1.0:
             raise InputError(
                 f"`curvature` of member {self.name} must be less than 2 over the distance of its "
                 f"joints, {2.0 / chord:.6g}, a half circle; got {self.curvature!r}."
             )
         length = chord if half == 0.0 else chord * float(np.arcsin(half)) / half
-        gyration = 0.0 if self.EA is None else float(np.sqrt(self.EI / self.EA))
+        gyration = 0.0 if self.EA is None else float(np.sqrt(float(self.EI) / float(self.EA)))
         if gyration > SLENDER * length:
             raise InputError(
                 f"`EI` and `EA` of member {self.name} must be those of a slender rod in one system "
@@ -92,6 +105,10 @@ class Member:
         """Return what it is made from."""
         given = {key: value for key, value in asdict(self).items() if value is not None}
         return {**given, "ends": list(self.ends), "hinges": list(self.hinges)}
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, int | float) and bool(np.isfinite(value))
 
 
 def member_of(given: Any) -> Member:

@@ -11,6 +11,7 @@ from equimorph.structures.frame.network import Network
 from equimorph.structures.frame.patterns import Patterns
 from equimorph.structures.frame.statics import Graph
 from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.unit_system import UnitSystem
 
 Scalars = Float[np.ndarray, "scalars scalars"]
 
@@ -48,7 +49,7 @@ class FrameModel:
     mesh
         Elements of a member of length 1.
     length, bending
-        Units of length and of bending stiffness.
+        Units of length and of bending stiffness, in those of the user's `system`.
     """
 
     network: Network
@@ -56,6 +57,7 @@ class FrameModel:
     mesh: Mesh
     length: float
     bending: float
+    system: UnitSystem
 
     # --- numbering ------------------------------------------------------------------------------
 
@@ -189,7 +191,7 @@ class FrameModel:
     def directions(self) -> Float[np.ndarray, " points"]:
         """Tangent angles as drawn."""
         chords = np.arctan2(*self.network.chords.T[::-1])
-        bends = np.array([member.curvature for member in self.network.members]) * self.length
+        bends = np.array([float(each.curvature) for each in self.network.members]) * self.length
         middle = self.arclengths - 0.5 * self.lengths[self.owner]
         return np.asarray(chords[self.owner] + bends[self.owner] * middle)
 
@@ -222,7 +224,7 @@ class FrameModel:
     def softness(self) -> Float[np.ndarray, " points"]:
         """γ: axial compliance over the quadrature weight."""
         unit = self.bending / self.length**2
-        given = [0.0 if each.EA is None else unit / each.EA for each in self.network.members]
+        given = [0.0 if each.EA is None else unit / float(each.EA) for each in self.network.members]
         return np.asarray(np.array(given)[self.owner] / self.weights)
 
     # --- members and joints ---------------------------------------------------------------------
@@ -230,7 +232,7 @@ class FrameModel:
     @cached_property
     def rigidity(self) -> Float[np.ndarray, " members"]:
         """Bending stiffness of the members."""
-        return np.array([member.EI for member in self.network.members]) / self.bending
+        return np.array([float(member.EI) for member in self.network.members]) / self.bending
 
     @cached_property
     def supports(self) -> Float[np.ndarray, "joints 3"]:

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.errors import InputError, suggestion
 from equimorph.structures.frame.member import Member, member_of
 from equimorph.structures.frame.support import AXES, stiffnesses
+from equimorph.structures.unit_system import UnitSystem
 from equimorph.structures.walk import walk_along
 
 WEIGHT = "weight"
@@ -101,7 +102,7 @@ class Network:
         return at
 
 
-def network(joints: Any, members: Iterable[Any], supports: Any) -> Network:
+def network(joints: Any, members: Iterable[Any], supports: Any, system: UnitSystem) -> Network:
     """Network from what a user gives, checked.
 
     Raises
@@ -110,8 +111,8 @@ def network(joints: Any, members: Iterable[Any], supports: Any) -> Network:
         For joints without place or members, members between unknown or equal joints, arcs that do
         not reach, unknown supports, or joints apart from the others.
     """
-    names, places = _places(joints)
-    made = tuple(member_of(each) for each in members)
+    names, places = _places(joints, system)
+    made = tuple(member_of(each).measured(system) for each in members)
     ends = np.empty((len(made), 2), dtype=int)
     for k, member in enumerate(made):
         for i, end in enumerate(member.ends):
@@ -125,7 +126,7 @@ def network(joints: Any, members: Iterable[Any], supports: Any) -> Network:
     for joint, given in items(supports, "supports", "joint"):
         if joint not in names:
             raise InputError(f"`supports` must be at joints ({', '.join(names)}); got {joint}.")
-        held[names.index(joint)] = stiffnesses(joint, given)
+        held[names.index(joint)] = stiffnesses(joint, given, system)
     result = Network(names, places, made, ends, held)
     _check_members(result)
     _check_connection(result)
@@ -152,7 +153,9 @@ def numbers(given: Any, counts: Sequence[int], what: str) -> list[float]:
     return found
 
 
-def _places(joints: Any) -> tuple[tuple[str, ...], Float[np.ndarray, "joints 2"]]:
+def _places(
+    joints: Any, system: UnitSystem
+) -> tuple[tuple[str, ...], Float[np.ndarray, "joints 2"]]:
     given = dict(items(joints, "joints", "name"))
     if len(given) < 2:
         raise InputError(f"`joints` must be at least two; got {len(given)}.")
@@ -162,9 +165,11 @@ def _places(joints: Any) -> tuple[tuple[str, ...], Float[np.ndarray, "joints 2"]
                 "`joints` must have names of letters, digits and underscores, other than "
                 f"{WEIGHT}; got {name!r}."
             )
-    return tuple(given), np.array(
-        [numbers(at, [2], f"joints.{name}") for name, at in given.items()]
-    )
+    places = []
+    for name, at in given.items():
+        what = f"joints.{name}"
+        places.append(numbers(system.numbers(at, "length", what), [2], what))
+    return tuple(given), np.array(places)
 
 
 def _check_members(made: Network) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from equimorph.errors import InputError
 from equimorph.structures.frame.network import WEIGHT, Network, items, numbers
@@ -16,7 +16,10 @@ KINDS = ("curvature", "length", "move", "turn")
 
 @dataclass(frozen=True, eq=False)
 class Patterns:
-    """Forces, couples, line loads, curvatures, elongations, moves and turns by parameter."""
+    """Forces, couples, line loads, curvatures, elongations, moves and turns by parameter.
+
+    factors: parameters that multiply weights, and are numbers without unit.
+    """
 
     forces: Float[np.ndarray, "parameters joints 2"]
     couples: Float[np.ndarray, "parameters joints"]
@@ -25,6 +28,7 @@ class Patterns:
     length: Float[np.ndarray, "parameters members"]
     moves: Float[np.ndarray, "parameters joints 2"]
     turns: Float[np.ndarray, "parameters joints"]
+    factors: Bool[np.ndarray, " parameters"]
 
     @property
     def count(self) -> int:
@@ -42,6 +46,7 @@ class Patterns:
             self.length / length,
             self.moves / length,
             self.turns,
+            self.factors,
         )
 
     def unit(self, k: int) -> str:
@@ -55,7 +60,7 @@ class Patterns:
             "rad": self.turns,
         }
         found = [unit for unit, array in given.items() if array[k].any()]
-        return found[0] if len(found) == 1 else "1"
+        return found[0] if len(found) == 1 and not self.factors[k] else "1"
 
     def typical(self, k: int) -> float:
         """Value of a non-dimensional parameter that bends a member of length 1 by about 1."""
@@ -87,6 +92,7 @@ def patterns(made: Network, actuators: Given, loads: Given) -> Patterns:
     found = Patterns(
         np.zeros(both), np.zeros(single), np.zeros((count, members, 2)),
         np.zeros((count, members)), np.zeros((count, members)), np.zeros(both), np.zeros(single),
+        np.zeros(count, bool),
     )  # fmt: skip
     for k, (name, given) in enumerate(actuators.items()):
         _fill_actuator(made, found, k, f"actuators.{name}", given)
@@ -150,9 +156,10 @@ def _fill_load(made: Network, into: Patterns, k: int, what: str, given: Any) -> 
     for name, value in entries:
         here = f"{what}.{name}"
         if name == WEIGHT:
-            weights = np.array([member.weight or 0.0 for member in made.members])
+            weights = np.array([float(member.weight or 0.0) for member in made.members])
             if not weights.any():
                 raise InputError(f"`{here}` must act on members with a weight; got none that has.")
+            into.factors[k] = True
             into.lines[k] += weights[:, None] * np.array(numbers(value, [2], here))
         elif name in made.joints:
             vector = numbers(value, [2, 3], here)

@@ -7,13 +7,16 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.errors import InputError
+from equimorph.structures.unit_system import UnitSystem
 
 AXES = ("x", "y", "angle")
 WORDS = {"fixed": AXES, "pinned": ("x", "y")}
 HELD = "held"
+SPRINGS = {"x": "force/length", "y": "force/length", "angle": "force·length"}
+"""What the stiffnesses of springs measure."""
 
 
-def stiffnesses(joint: str, given: Any) -> Float[np.ndarray, "3"]:
+def stiffnesses(joint: str, given: Any, system: UnitSystem) -> Float[np.ndarray, "3"]:
     """Stiffness of a support against moves in x, in y and against turning; ∞ where it holds.
 
     Parameters
@@ -23,6 +26,8 @@ def stiffnesses(joint: str, given: Any) -> Float[np.ndarray, "3"]:
     given
         "fixed", "pinned", the axes that a roller holds ("x", "y", "xy"), or a table from axes
         ("x", "y", "angle") to "held" or a spring's stiffness.
+    system
+        Units of the stiffnesses.
     """
     table = given
     if isinstance(given, str):
@@ -37,12 +42,12 @@ def stiffnesses(joint: str, given: Any) -> Float[np.ndarray, "3"]:
         )
     values = np.zeros(3)
     for axis, value in table.items():
-        spring = isinstance(value, int | float) and 0.0 < value < np.inf
+        what = f"supports.{joint}.{axis}"
+        stiff = np.inf if value == HELD else system.number(value, SPRINGS[axis], what)
+        spring = isinstance(stiff, int | float) and 0.0 < stiff < np.inf
         if value != HELD and not spring:
-            raise InputError(
-                f"`supports.{joint}.{axis}` must be held or a positive stiffness; got {value!r}."
-            )
-        values[AXES.index(axis)] = float(value) if spring else np.inf
+            raise InputError(f"`{what}` must be held or a positive stiffness; got {value!r}.")
+        values[AXES.index(axis)] = stiff
     return values
 
 

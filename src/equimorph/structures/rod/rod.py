@@ -22,7 +22,8 @@ from equimorph.structures.rod.loads import LoadShape, LoadSpec, load_shape
 from equimorph.structures.rod.mechanics import ClampedMechanics
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch
 from equimorph.structures.states import State, States
-from equimorph.structures.units import Units
+from equimorph.structures.unit_system import Quantity, unit_system
+from equimorph.structures.units import rod_units
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -107,7 +108,10 @@ class Rod(Described):
     rise
         Default of the parameter rise, of end B above A where both are supported.
     EI, length
-        Bending stiffness and length in a consistent system of units; labels are those of SI.
+        Bending stiffness and length; numbers are then dimensional.
+    units
+        Units of force and length of all numbers, like ``{"force": "mN", "length": "mm"}``; SI by
+        default. EI, length, axial, curvature, span and rise may then be texts with their own units.
 
     Raises
     ------
@@ -136,7 +140,7 @@ class Rod(Described):
     def __init__(  # noqa: PLR0913  # a default for everything
         self,
         load: LoadSpec | None = None,
-        span: float | None = None,
+        span: Quantity | None = None,
         *,
         kinks: Sequence[float] = (),
         elements: int = 6,
@@ -148,15 +152,19 @@ class Rod(Described):
         loads: Mapping[str, Any] | None = None,
         actuators: Mapping[str, Any] | None = None,
         coordinates: Mapping[str, Mapping[str, float]] | None = None,
-        rise: float = 0.0,
-        EI: float | None = None,
-        length: float | None = None,
+        rise: Quantity = 0.0,
+        EI: Quantity | None = None,
+        length: Quantity | None = None,
+        units: Mapping[str, Any] | None = None,
     ) -> None:
         if not (isinstance(elements, int) and elements >= 2):
             raise InputError(f"`elements` must be a whole number >= 2; got {elements!r}.")
         if not (isinstance(degree, int) and 3 <= degree <= 16):
             raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
-        self.units = Units(EI, length)
+        self.units = rod_units(EI, length, unit_system(units))
+        number = self.units.number
+        axial = number(axial, "force", "axial")
+        curvature = number(curvature, "1/length", "curvature")
         self._resolution = (elements, degree)
         shape = "uniform" if load is None and loads is None else load
         self._load = None if shape is None else load_shape(shape, kinks)
@@ -164,13 +172,16 @@ class Rod(Described):
         options = (axial is not None, loads is not None, actuators, coordinates is not None, rise)
         arch = self._load is not None and tuple(ends) == CLAMPED and self.units.plain
         if self._load is not None and arch and _all_default(stiffness, curvature, *options):
-            self._become_arch(self._load, DEFAULT_SPAN if span is None else span)
+            self._become_arch(
+                self._load, DEFAULT_SPAN if span is None else number(span, "length", "span")
+            )
         else:
             own = {} if shape is None else {"q": LineLoad(shape, kinks=kinks)}
             span = DEFAULT_SPAN * self.units.value("length") if span is None else span
             self._general = Description(
                 ends, stiffness, curvature, axial, {**own, **(loads or {})}, actuators or {},
-                coordinates, span, rise, kinks, self.units,
+                coordinates, number(span, "length", "span"), number(rise, "length", "rise"),
+                kinks, self.units,
             )  # fmt: skip
             self._become_general(self._general)
         self.unknowns, self.constraints = self.mechanics.unknowns, self.mechanics.constraints

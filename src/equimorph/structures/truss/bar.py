@@ -4,14 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from equimorph.errors import InputError
+from equimorph.structures.unit_system import Quantity, UnitSystem, check_positive
+
+QUANTITIES = {"EA": "force", "EI": "force·length²", "rest": "length"}
+"""What each number of a bar measures."""
 
 
 @dataclass(frozen=True)
 class Bar:
     """A straight bar between two joints, which it does not bend.
+
+    Numbers are in the units of the truss; texts like "12 kN" are converted to these.
 
     Parameters
     ----------
@@ -26,9 +30,9 @@ class Bar:
     """
 
     ends: Sequence[str]
-    EA: float = 1.0
-    EI: float | None = None
-    rest: float | None = None
+    EA: Quantity = 1.0
+    EI: Quantity | None = None
+    rest: Quantity | None = None
 
     def __post_init__(self) -> None:
         """Check ends and numbers."""
@@ -37,16 +41,19 @@ class Bar:
             raise InputError(f"`ends` of a bar must be the names of two joints; got {self.ends!r}.")
         if self.ends[0] == self.ends[1]:
             raise InputError(f"`ends` of a bar must differ; got {self.ends[0]} twice.")
-        for name, value in (("EA", self.EA), ("EI", self.EI), ("rest", self.rest)):
-            if value is None and name != "EA":
-                continue
-            if not (isinstance(value, int | float) and 0.0 < value < np.inf):
-                raise InputError(f"`{name}` of bar {self.name} must be positive; got {value!r}.")
+        for name in QUANTITIES:
+            value = getattr(self, name)
+            if value is not None or name == "EA":
+                check_positive(value, name, f" of bar {self.name}")
 
     @property
     def name(self) -> str:
         """Its joints, joined: A-B."""
         return "-".join(self.ends)
+
+    def measured(self, system: UnitSystem) -> "Bar":
+        """The same bar with its numbers in a system of units."""
+        return system.measured(self, QUANTITIES, f"bar {self.name}")
 
     def data(self) -> dict[str, Any]:
         """Return what it is made from."""

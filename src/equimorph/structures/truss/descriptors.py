@@ -29,7 +29,9 @@ def force(truss: TrussMechanics, bar: str) -> Descriptor:
         return truss.energies.force(*truss.lengths(z, p))[:, at].copy()
 
     name = truss.network.bars[at].name
-    return Descriptor(f"force({name})", "force", value, f"N({name})", truss.signature)
+    return Descriptor(
+        f"force({name})", truss.system.label("force"), value, f"N({name})", truss.signature
+    )
 
 
 def _utilisations(truss: TrussMechanics, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes b"]:
@@ -69,13 +71,14 @@ def displacement(truss: TrussMechanics, joint: str, axis: str) -> Descriptor:
     at = truss.network.move(joint, axis)
     name = f"displacement({joint},{axis})"
     symbol = f"u_{axis}({joint})"
-    return Descriptor(name, "length", lambda z, p: z[:, at].copy(), symbol, truss.signature)
+    unit = truss.length_unit
+    return Descriptor(name, unit, lambda z, p: z[:, at].copy(), symbol, truss.signature)
 
 
 def effort(truss: TrussMechanics, parameter: str, sign: float = 1.0) -> Descriptor:
     """∂E/∂p of a parameter."""
     at = position(truss.parameters, parameter)
-    unit = "length" if truss.parameters[at].role == "load" else "force"
+    unit = truss.system.label("length" if truss.parameters[at].role == "load" else "force")
 
     def value(z: Lanes, p: Parameters) -> Values:
         return sign * truss.effort(z, p)[:, at]
@@ -105,7 +108,8 @@ def named(truss: TrussMechanics, text: str) -> Descriptor:
     name, *given = found.groups() if found else ("", None, None)
     arguments = [each for each in given if each is not None]
     if name == "energy" and not arguments:
-        return Descriptor("energy", "force·length", truss.energy, "E", truss.signature)
+        label = truss.system.label("force·length")
+        return Descriptor("energy", label, truss.energy, "E", truss.signature)
     makers: dict[tuple[str, int], Callable[..., Descriptor]] = {
         ("force", 1): force,
         ("utilisation", 1): utilisation,

@@ -14,6 +14,7 @@ from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.truss.kernels import linearise_lanes
 from equimorph.structures.truss.network import Network
 from equimorph.structures.truss.strain import Energies
+from equimorph.structures.unit_system import UnitSystem
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -38,6 +39,8 @@ class TrussMechanics(DiscreteStructure):
         Changes of the rest lengths by the parameters.
     pulls
         Forces on the unknowns by the parameters.
+    system
+        Units of all numbers.
     """
 
     kind: ClassVar[str] = "truss"
@@ -49,8 +52,10 @@ class TrussMechanics(DiscreteStructure):
         energies: Energies,
         rates: Float[np.ndarray, "bars parameters"],
         pulls: Float[np.ndarray, "parameters unknowns"],
+        system: UnitSystem,
     ) -> None:
         self.network, self.energies, self.rates, self.pulls = network, energies, rates, pulls
+        self.system, self.length_unit = system, system.label("length")
         self.unknowns = len(network.moves)
         self.mass = np.ones(self.unknowns)
 

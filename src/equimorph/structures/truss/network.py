@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.structures.truss.bar import Bar, bar_of
+from equimorph.structures.unit_system import UnitSystem
 from equimorph.structures.walk import walk_along
 
 AXES = "xyz"
@@ -105,7 +106,7 @@ class Network:
         return np.asarray(free)
 
 
-def network(joints: Any, bars: Iterable[Any], supports: Any) -> Network:
+def network(joints: Any, bars: Iterable[Any], supports: Any, system: UnitSystem) -> Network:
     """Network from what a user gives, checked.
 
     Raises
@@ -114,8 +115,8 @@ def network(joints: Any, bars: Iterable[Any], supports: Any) -> Network:
         For joints without place or bars, bars between unknown, equal or held joints, unknown
         supports, or if nothing can move.
     """
-    names, places = _places(joints)
-    made = tuple(bar_of(each) for each in bars)
+    names, places = _places(joints, system)
+    made = tuple(bar_of(each).measured(system) for each in bars)
     ends = np.empty((len(made), 2), dtype=int)
     for k, bar in enumerate(made):
         for i, end in enumerate(bar.ends):
@@ -156,7 +157,9 @@ def _numbers(given: Any, count: int, what: str) -> Float[np.ndarray, " count"]:
     return numbers
 
 
-def _places(joints: Any) -> tuple[tuple[str, ...], Float[np.ndarray, "joints space"]]:
+def _places(
+    joints: Any, system: UnitSystem
+) -> tuple[tuple[str, ...], Float[np.ndarray, "joints space"]]:
     given = dict(_items(joints, "joints"))
     if len(given) < 2:
         raise InputError(f"`joints` must be at least two; got {len(given)}.")
@@ -167,7 +170,10 @@ def _places(joints: Any) -> tuple[tuple[str, ...], Float[np.ndarray, "joints spa
             )
     first = next(iter(given.values()))
     space = len(first) if isinstance(first, Sequence) and len(first) in (2, 3) else 2
-    places = [_numbers(place, space, f"joints.{name}") for name, place in given.items()]
+    places = []
+    for name, place in given.items():
+        what = f"joints.{name}"
+        places.append(_numbers(system.numbers(place, "length", what), space, what))
     return tuple(given), np.array(places)
 
 

@@ -14,6 +14,7 @@ from equimorph.structures.truss import descriptors
 from equimorph.structures.truss.mechanics import TrussMechanics
 from equimorph.structures.truss.network import AXES, Network, network
 from equimorph.structures.truss.strain import Energies, Strain
+from equimorph.structures.unit_system import Quantity, unit_system
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -52,6 +53,9 @@ class Truss(TrussMechanics):
         parameter: ``{"a": {"A-B": 1.0}}``.
     strain
         "engineering" or "green".
+    units
+        Units of force and length of all numbers, like ``{"force": "kN", "length": "mm"}``; places,
+        lengths and stiffnesses may then be texts with units of their own. None: any one system.
 
     Raises
     ------
@@ -73,20 +77,21 @@ class Truss(TrussMechanics):
     State(truss: F=0; index 0)
     """
 
-    length_unit = "length"
-
-    def __init__(  # three have defaults
+    def __init__(  # noqa: PLR0913  # four have defaults
         self,
-        joints: Mapping[str, Sequence[float]],
+        joints: Mapping[str, Sequence[Quantity]],
         bars: Iterable[Any],
         supports: Mapping[str, str],
         loads: Patterns | None = None,
         actuators: Patterns | None = None,
         strain: Strain = "engineering",
+        *,
+        units: Mapping[str, Any] | None = None,
     ) -> None:
         if strain not in get_args(Strain):
             raise InputError(f"`strain` must be engineering or green; got {strain!r}.")
-        made = network(joints, bars, supports)
+        system = unit_system(units)
+        made = network(joints, bars, supports, system)
         self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
         self._check_names()
         stiffness = np.array([float(bar.EA) for bar in made.bars])
@@ -98,13 +103,14 @@ class Truss(TrussMechanics):
             energies,
             np.pad(rates, ((0, 0), (0, len(forces)))),
             np.array([*np.zeros((len(self._actuators), len(made.moves))), *forces]),
+            system,
         )
         self.parameters = (
             *(
-                _actuator(name, made, rate)
+                _actuator(name, made, rate, system.label("length"))
                 for name, rate in zip(self._actuators, rates.T, strict=True)
             ),
-            *(Parameter(name, "force", 1.0, "load", 0.0) for name in self._loads),
+            *(Parameter(name, system.label("force"), 1.0, "load", 0.0) for name in self._loads),
         )
         self._start = self._equilibrium()
         self._set_scales()
@@ -198,6 +204,7 @@ class Truss(TrussMechanics):
                 for name, rates in self._actuators.items()
             },
             "strain": "green" if self.energies.green else "engineering",
+            **({} if self.system.plain else {"units": self.system.data()}),
         }
 
     def natural_guess(self, p: Parameters) -> Lanes:
@@ -250,10 +257,10 @@ def _rates(made: Network, actuators: Patterns) -> Float[np.ndarray, "bars actuat
     return rates
 
 
-def _actuator(name: str, made: Network, rates: Float[np.ndarray, " bars"]) -> Parameter:
+def _actuator(name: str, made: Network, rates: Float[np.ndarray, " bars"], unit: str) -> Parameter:
     """Actuator that may not take a rest length to zero."""
     moved = np.flatnonzero(rates)
     limits = -made.rests[moved] / rates[moved]
     lower = float(limits[rates[moved] > 0.0].max(initial=-np.inf))
     upper = float(limits[rates[moved] < 0.0].min(initial=np.inf))
-    return Parameter(name, "length", 1.0, "actuator", 0.0, lower, upper)
+    return Parameter(name, unit, 1.0, "actuator", 0.0, lower, upper)

@@ -282,9 +282,7 @@ class Description:
             data["span"] = float(self.span)
         if self.rise != 0.0:
             data["rise"] = float(self.rise)
-        if not self.units.plain:
-            data |= {"EI": self.units.bending_stiffness, "length": self.units.length}
-        return data
+        return data | self.units.data()
 
 
 def _scaled(shape: LoadShape, unit: float) -> LoadShape:

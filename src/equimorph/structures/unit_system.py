@@ -1,0 +1,219 @@
+"""Quantities with their units: what a user writes as "12 kN m^2" as numbers in one system."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+
+from equimorph.errors import InputError, suggestion
+
+Dimension = tuple[int, int, int]
+"""Powers of kilogram, metre and second."""
+Unit = tuple[float, Dimension]
+Quantity = float | str
+"""A number in the units at hand, or a text with its own, like "12 kN"."""
+
+STANDARD_GRAVITY = 9.80665
+"""m/s², by definition [BIPM2019]_: what turns a mass per length into a weight per length."""
+POUND, INCH = 0.45359237, 0.0254
+LENGTH, FORCE, MASS = (0, 1, 0), (1, 1, -2), (1, 0, 0)
+UNITS: dict[str, Unit] = {
+    **{name: (value, LENGTH) for name, value in {
+        "m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "um": 1e-6, "in": INCH, "ft": 12.0 * INCH,
+    }.items()},
+    **{name: (value, FORCE) for name, value in {
+        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "MN": 1e6, "lbf": POUND * STANDARD_GRAVITY,
+        "kip": 1e3 * POUND * STANDARD_GRAVITY, "kgf": STANDARD_GRAVITY,
+    }.items()},
+    **{name: (value, MASS) for name, value in {
+        "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": POUND,
+    }.items()},
+    **{name: (value, (1, -1, -2)) for name, value in {
+        "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": POUND * STANDARD_GRAVITY / INCH**2,
+    }.items()},
+    "J": (1.0, (1, 2, -2)),
+    "1": (1.0, (0, 0, 0)),
+}  # fmt: skip
+"""Values in SI."""
+_FACTOR = re.compile(r"\s*([·*/]?)\s*([A-Za-z]+|1)(?:\^?(-?\d+))?\s*")
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
+_POWERS = str.maketrans({"²": "2", "³": "3", "⁴": "4"})
+Part = TypeVar("Part")
+
+
+def read_unit(text: str, known: Mapping[str, Unit], what: str) -> Unit:
+    """Value and dimension of a product of powers of units, like ``kN m^2`` or ``N/mm``.
+
+    Parameters
+    ----------
+    text
+        Units with an optional power, joined by ``/``, ``·``, ``*`` or a space.
+    known
+        Units by name.
+    what
+        What the text is the unit of, for messages.
+
+    Raises
+    ------
+    InputError
+        For a unit that is not known, or a text that is no product.
+
+    Examples
+    --------
+    >>> read_unit("kN mm^2", UNITS, "EI")
+    (0.001, (1, 3, -2))
+    """
+    rest, value, powers = text.translate(_POWERS), 1.0, np.zeros(3, int)
+    while rest:
+        found = _FACTOR.match(rest)
+        name = found.group(2) if found else rest
+        if found is None or name not in known:
+            units = [each for each in known if each != "1"]
+            raise InputError(
+                f"`{what}` must be in units such as kN or N mm^2, of {', '.join(units)}; got "
+                f"{text!r}.{suggestion(name, units)}"
+            )
+        power = int(found.group(3) or 1) * (-1 if found.group(1) == "/" else 1)
+        one, dimension = known[name]
+        value, powers = value * one**power, powers + power * np.array(dimension)
+        rest = rest[found.end() :]
+    mass, length, time = powers.tolist()
+    return value, (mass, length, time)
+
+
+@dataclass(frozen=True)
+class UnitSystem:
+    """The units of force and of length in which a structure's numbers are given and returned.
+
+    Parameters
+    ----------
+    force, length
+        Names in `UNITS`; None: numbers are in any one system, and texts are refused.
+    """
+
+    force: str | None = None
+    length: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check that both or none are given, and that they are what they should be."""
+        if self.plain:
+            return
+        for name, dimension in (("force", FORCE), ("length", LENGTH)):
+            given = getattr(self, name)
+            fitting = [unit for unit, (_, of) in UNITS.items() if of == dimension]
+            if given not in fitting:
+                raise InputError(
+                    f"`units.{name}` must be one of {', '.join(fitting)}; got {given!r}."
+                )
+
+    @property
+    def plain(self) -> bool:
+        """Whether no units are named."""
+        return self.force is None and self.length is None
+
+    @cached_property
+    def _own(self) -> dict[str, Unit]:
+        """The words force and length as units."""
+        return {
+            "force": UNITS[self.force or "N"],
+            "length": UNITS[self.length or "m"],
+            "1": UNITS["1"],
+        }
+
+    def label(self, quantity: str) -> str:
+        """Label of a quantity written in the words force and length: "force·length" is N m."""
+        if self.plain:
+            return quantity
+        words = quantity.replace("·", " ")
+        return words.replace("force", str(self.force)).replace("length", str(self.length))
+
+    def number(self, given: Any, quantity: str, what: str) -> Any:
+        """Number of a quantity in these units; what is no text is returned as it is.
+
+        Parameters
+        ----------
+        given
+            A number in these units, or a text with units of its own.
+        quantity
+            What it measures, in the words force and length, like ``force·length²``. A force per
+            length may be given as a mass per length, which standard gravity makes heavy.
+        what
+            Its name, for messages.
+
+        Raises
+        ------
+        InputError
+            For a text without number, with unknown units, or with those of another quantity.
+
+        Examples
+        --------
+        >>> UnitSystem("N", "mm").number("0.2 kN m^2", "force·length²", "EI")
+        200000000.0
+        """
+        if not isinstance(given, str):
+            return given
+        found = _NUMBER.fullmatch(given)
+        if found is None or not found.group(2).strip():
+            raise InputError(f"`{what}` must be a number, with or without its unit; got {given!r}.")
+        value, dimension = read_unit(found.group(2).strip(), UNITS, what)
+        if self.plain:
+            raise InputError(
+                f"`units` must be given where a quantity has a unit; got {what} = {given!r}. "
+                'Add units={"force": "N", "length": "m"}, say: plain numbers are in these.'
+            )
+        unit, wanted = read_unit(quantity, self._own, what)
+        if wanted == read_unit("force/length", self._own, what)[1] and dimension == (1, -1, 0):
+            value, dimension = STANDARD_GRAVITY * value, wanted
+        if dimension != wanted:
+            raise InputError(
+                f"`{what}` must be in units of {quantity}, like {self.label(quantity)}; got "
+                f"{given!r}."
+            )
+        return float(found.group(1)) * value / unit
+
+    def numbers(self, given: Any, quantity: str, what: str) -> Any:
+        """The same for every entry of a list of numbers or texts."""
+        if not isinstance(given, list | tuple) or not any(isinstance(each, str) for each in given):
+            return given
+        return [self.number(each, quantity, what) for each in given]
+
+    def measured(self, part: Part, quantities: Mapping[str, str], what: str) -> Part:
+        """A dataclass with its quantities as numbers, by field and what it measures."""
+        values = {
+            name: self.number(getattr(part, name), quantity, f"{name} of {what}")
+            for name, quantity in quantities.items()
+        }
+        return replace(part, **values)  # type: ignore[type-var]
+
+    def data(self) -> dict[str, str]:
+        """Return what it is made from; empty if plain."""
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {} if self.plain else given
+
+
+def unit_system(given: Any) -> UnitSystem:
+    """System of units from a table, or none.
+
+    Raises
+    ------
+    InputError
+        For anything but ``{"force": ..., "length": ...}``.
+    """
+    if given is None or isinstance(given, UnitSystem):
+        return given or UnitSystem()
+    if not isinstance(given, Mapping) or set(given) != {"force", "length"}:
+        raise InputError(
+            f'`units` must be a table like {{"force": "N", "length": "mm"}}; got {given!r}.'
+        )
+    return UnitSystem(**given)
+
+
+def check_positive(value: Any, what: str, of: str = "") -> None:
+    """Refuse what is neither a positive number nor a text that begins with one."""
+    found = _NUMBER.fullmatch(value) if isinstance(value, str) else None
+    number = float(found.group(1)) if found else value
+    if not (isinstance(number, int | float) and 0.0 < number < np.inf):
+        raise InputError(f"`{what}`{of} must be positive; got {value!r}.")
