@@ -87,10 +87,12 @@ _HOMES = {
         "MapCurve",
         "MeasuredShape",
         "MeasuredValues",
+        "Proof",
         "Route",
         "Shapes",
         "StateEstimate",
         "Tracking",
+        "Verification",
         "calibrate",
         "curvature_map",
         "estimate_state",
@@ -98,6 +100,7 @@ _HOMES = {
         "plan",
         "solve_shape",
         "track",
+        "verify",
     ),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

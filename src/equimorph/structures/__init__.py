@@ -4,7 +4,14 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from equimorph.errors import InputError
-from equimorph.structures.contract import Advance, Structure, Symmetry, bordered_advance
+from equimorph.structures.contract import (
+    Advance,
+    Direction,
+    Majorant,
+    Structure,
+    Symmetry,
+    bordered_advance,
+)
 from equimorph.structures.energy import EnergyStructure, Unknown
 from equimorph.structures.frame import Frame, Member
 from equimorph.structures.quantities import (
@@ -42,10 +49,12 @@ __all__ = [
     "Bar",
     "Couple",
     "Curvature",
+    "Direction",
     "End",
     "EnergyStructure",
     "Frame",
     "LineLoad",
+    "Majorant",
     "Member",
     "PointForce",
     "Pressure",

@@ -23,6 +23,7 @@ Border = tuple[
     Float[np.ndarray, "lanes k size"],
     Float[np.ndarray, "lanes k k"],
 ]
+Majorant = Callable[[Direction, Direction], Lanes]
 Closing = tuple[Lanes, Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]
 
 
@@ -114,6 +115,15 @@ class Structure(ABC):
     @abstractmethod
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w], second derivative of F along two directions (dz, dp)."""
+
+    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
+        """Bound of D²F over boxes around (z, p) that reach so far in each entry; None if unknown.
+
+        The bound is a function of two directions v, w with entries ≥ 0: entry i is at least
+        |D²F[v', w']ᵢ| for all states in the box and all |v'| ≤ v, |w'| ≤ w, entry by entry.
+        """
+        del z, p, reach
+        return None
 
     @abstractmethod
     def effort(self, z: Lanes, p: Parameters) -> Parameters:

@@ -11,12 +11,38 @@ from jaxtyping import Bool, Float
 from equimorph.errors import InputError, suggestion
 from equimorph.linalg import BorderedSolution, solve_bordered
 from equimorph.model import Descriptor, Parameter, parameter_vector
-from equimorph.structures.contract import Direction, Structure, Symmetry
+from equimorph.structures.contract import Direction, Majorant, Structure, Symmetry
 from equimorph.structures.states import State
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
+
+
+Term = tuple[float, dict[str, int]]
+"""Factor and exponents of x, F, k, sec δ and tan δ."""
+
+TERMS: tuple[Term, ...] = (
+    (1.0, {"F": 1, "x": 1, "S": 2}),
+    (-1.0, {"k": 1, "x": 1, "S": 1, "T": 1}),
+    (1.0, {"k": 1, "x": 2, "S": 2, "T": 1}),
+)
+"""∂E/∂δ as a sum of products."""
+
+
+def _slopes(term: Term, names: str = "") -> list[tuple[str, Term]]:
+    """Derivatives of a product by δ (d), x, F and k, with the names joined: S′ = ST, T′ = S²."""
+    factor, powers = term
+    changes = [(n, n, {n: -1}) for n in "xFk"]
+    changes += [("d", "S", {"T": 1}), ("d", "T", {"S": 2, "T": -1})]
+    out = []
+    for by, name, change in changes:
+        count = powers.get(name, 0)
+        if count:
+            keys = {*powers, *change}
+            exponents = {key: powers.get(key, 0) + change.get(key, 0) for key in keys}
+            out.append((names + by, (factor * count, exponents)))
+    return out
 
 
 class Spring(Structure):
@@ -117,6 +143,28 @@ class Spring(Structure):
         f_vw = f_vw + x * (2 * secant2**2 + 4 * tangent**2 * secant2) * vd * wd
         balance = force - k * stretch * sine
         return np.asarray(b_vw * x * secant2 + b_v * f_w + b_w * f_v + balance * f_vw)[:, None]
+
+    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant:
+        """Bound of |D²F| for F = F x S² − k x S T + k x² S² T with S = sec δ, T = tan δ.
+
+        Each of the products is bounded by itself. Scale: as F.
+        """
+        x, force, k = (np.abs(p) + reach[1]).T
+        angle = np.minimum(np.abs(z[:, 0]) + reach[0][:, 0], 0.5 * np.pi)
+        powers = {"x": x, "F": force, "k": k, "S": 1.0 / np.cos(angle), "T": np.tan(angle)}
+
+        def bound(v: Direction, w: Direction) -> Lanes:
+            along = [dict(zip("dxFk", (each[0][:, 0], *each[1].T), strict=True)) for each in (v, w)]
+            twice = [
+                term for one in TERMS for once in _slopes(one) for term in _slopes(once[1], once[0])
+            ]
+            total = np.zeros(len(z))
+            for names, (factor, exponents) in twice:
+                size = np.prod([powers[n] ** e for n, e in exponents.items()], axis=0)
+                total += abs(factor) * size * along[0][names[0]] * along[1][names[1]]
+            return total[:, None]
+
+        return bound
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂E/∂(x_l, F, k)."""

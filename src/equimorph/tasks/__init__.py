@@ -21,6 +21,7 @@ from equimorph.tasks.plan import plan
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes import Shapes, solve_shape
 from equimorph.tasks.tracking import Tracking, track
+from equimorph.tasks.verification import Proof, Verification, verify
 
 __all__ = [
     "ActuatorMap",
@@ -30,11 +31,13 @@ __all__ = [
     "MapCurve",
     "MeasuredShape",
     "MeasuredValues",
+    "Proof",
     "Resolving",
     "Route",
     "Shapes",
     "StateEstimate",
     "Tracking",
+    "Verification",
     "calibrate",
     "curvature_map",
     "estimate_state",
@@ -44,4 +47,5 @@ __all__ = [
     "solve_shape",
     "track",
     "unloaded_base",
+    "verify",
 ]

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.equilibria import Path, TraceOptions, lift
+from equimorph.equilibria import Event, Path, TraceOptions, lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, Structure
@@ -92,14 +92,18 @@ def _moved(way_points: Corners) -> list[str]:
 
 
 def _reason(path: Path, names: Sequence[str], segments: int) -> str:
-    end = path.end
+    segment = min(int(path.end.at) + 1, segments)
+    return f"segment {segment} of {segments} meets {obstacle(path.end, names)}"
+
+
+def obstacle(end: Event, names: Sequence[str]) -> str:
+    """What ended a lift, and where, in words."""
     what = {
         "fold": "a fold: stability is lost and the structure would snap",
         "branch point": f"a {end.criticality} branch point: stability is lost",
         "constraint": f"the constraint {end.detail}",
     }.get(end.kind, f"a numerical failure ({end.detail})")
-    segment = min(int(end.at) + 1, segments)
-    return f"segment {segment} of {segments} meets {what}, at {place(end.state, names)}"
+    return f"{what}, at {place(end.state, names)}"
 
 
 def distance(a: State, b: State) -> float:

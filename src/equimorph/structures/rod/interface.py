@@ -11,6 +11,7 @@ from equimorph.structures.contract import (
     Advance,
     Border,
     Direction,
+    Majorant,
     Symmetry,
     solved_advance,
 )
@@ -74,6 +75,11 @@ class Mechanics(ABC):
     @abstractmethod
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
+
+    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
+        """Bound of D²F over boxes; unknown unless the mechanics say so."""
+        del z, p, reach
+        return None
 
     @abstractmethod
     def effort(self, z: Lanes, p: Parameters) -> Parameters:

@@ -5,7 +5,14 @@ from jaxtyping import Bool, Float
 
 from equimorph.linalg import BorderedSolution
 from equimorph.structures.approach import smooth_arcs
-from equimorph.structures.contract import Advance, Border, Direction, Structure, Symmetry
+from equimorph.structures.contract import (
+    Advance,
+    Border,
+    Direction,
+    Majorant,
+    Structure,
+    Symmetry,
+)
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.units import Units
@@ -65,6 +72,10 @@ class Measured(Structure):
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
         return self.mechanics.second_derivative(z, p, v, w)
+
+    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
+        """Bound of D²F over boxes, where the mechanics know one."""
+        return self.mechanics.second_derivative_bound(z, p, reach)
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p: couples of actuators, displacements of loads."""

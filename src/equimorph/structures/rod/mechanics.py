@@ -10,7 +10,8 @@ from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.contract import Advance, Direction, Symmetry
+from equimorph.structures.contract import Advance, Direction, Majorant, Symmetry
+from equimorph.structures.rod.bounds import clamped_bound
 from equimorph.structures.rod.derivatives.kernels import (
     matrix_lanes,
     parameter_lanes,
@@ -152,6 +153,12 @@ class ClampedMechanics(Mechanics):
         out = np.empty_like(arrays[0])
         over_lanes(second_lanes, self._matrices[1:], arrays, [out])
         return out
+
+    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant:
+        """Bound of |D²F| over boxes; see `ClampedBound`."""
+        weights, theta = self.mesh.weights, self.nodal_angles(z, p)
+        forces = z[:, -1:] * weights - p[:, 2:3] * self.loads, z[:, -2:-1] * weights
+        return clamped_bound(theta, forces, reach, weights, self.loads)
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""

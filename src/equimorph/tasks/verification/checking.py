@@ -1,0 +1,257 @@
+"""`verify`: margins along any schedule, or its first violation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria import Event, Path, TraceOptions, check_start, newton, way_points
+from equimorph.errors import InputError
+from equimorph.model import Constraint, Descriptor, Schedule, names_of
+from equimorph.structures import State, States, Structure, from_identity
+from equimorph.tasks.route import FINE, obstacle, place, scheduled
+from equimorph.tasks.verification.marching import March, march
+from equimorph.tasks.verification.proof import Proof, prove
+
+NEAR = 0.05
+"""Distance in the metric up to which a start that was written with few digits is corrected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """Whether a schedule can be executed without a snap.
+
+    Parameters
+    ----------
+    status
+        "verified", or "refused" with the first violation in `why`.
+    states
+        Equilibria along the schedule, as far as it can be followed.
+    at
+        Number of the step + share of it, per state.
+    margin
+        Smallest stability margin on the way.
+    schedule
+        The schedule with the margins and descriptors found; only if it was verified.
+    violation
+        What ended the way, and where.
+    proof
+        In proof mode: what is proved between the states, too.
+    """
+
+    status: Literal["verified", "refused"]
+    why: str
+    states: States
+    at: Float[np.ndarray, " points"]
+    margins: Float[np.ndarray, " points"]
+    schedule: Schedule | None = None
+    violation: Event | None = None
+    proof: Proof | None = None
+
+    def __repr__(self) -> str:
+        """Margin and proof, or the violation."""
+        if not self.verified:
+            return f"Verification(refused at {self.at[-1]:.6g}: {self.why})"
+        proof = "" if self.proof is None else f", {self.proof.status}"
+        return f"Verification(verified: {len(self.states)} states, margin {self.margin:.4g}{proof})"
+
+    @property
+    def verified(self) -> bool:
+        """Whether nothing stands in the way."""
+        return self.status == "verified"
+
+    @property
+    def margin(self) -> float:
+        """Smallest stability margin at the states."""
+        return float(self.margins.min())
+
+
+def verify(  # noqa: PLR0913  # all but two by keyword
+    schedule: Schedule | Sequence[Mapping[str, float]],
+    start: State | None = None,
+    *,
+    structure: Structure | None = None,
+    within: Sequence[Constraint] = (),
+    margin: float = 0.0,
+    monitor: Sequence[Descriptor] = (),
+    proof: bool = False,
+    options: TraceOptions | None = None,
+) -> Verification:
+    """Check a schedule, from wherever it comes: every step is lifted finely, margins are recorded.
+
+    Between its steps parameters change at constant rates. A way-point {name: value} keeps the
+    parameters that it does not name.
+
+    Parameters
+    ----------
+    schedule
+        A `Schedule`, of a route or read from files; or way-points, which need a `start`.
+    start
+        State in which the structure is. None: that of the schedule, corrected if it was written
+        with few digits.
+    structure
+        Needed only if neither a start nor the schedule carries one.
+    within
+        Constraints to obey on the way.
+    margin
+        Smallest stability margin allowed, in the structure's metric.
+    monitor
+        Further descriptors for the schedule of the result.
+    proof
+        Prove, too, that between the states the curve exists, is the only one nearby and keeps its
+        index; see `Proof`. A schedule that is safe, but cannot be proved so, stays verified.
+    options
+        Step control of the lifts; by default that of the final check of routes.
+
+    Returns
+    -------
+    The verified schedule, or the first violation.
+
+    Raises
+    ------
+    InputError
+        If there is no start or structure, names are not those of the structure, the start is no
+        equilibrium, nothing moves, or `margin` is negative.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> rest = em.Spring().natural_state(x_l=1.5)
+    >>> em.verify([{"F": 0.2}, {"x_l": 1.2}], rest, proof=True).proof.status
+    'proved'
+    """
+    if not margin >= 0.0:
+        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
+    begin, rows = _legs(schedule, start, structure)
+    constraints = tuple(within)
+    why = _wrong_start(begin, constraints, margin)
+    if why:
+        return Verification("refused", why, begin.batch, np.zeros(1), np.array([begin.margin]))
+    done = march(begin, rows, constraints, options or FINE)
+    margins = done.states.margin
+    why, last = _violation(done, margins, margin, len(rows))
+    if why:
+        kept = slice(0, last + 1)
+        event = done.end if done.end.kind != "arrived" else None
+        return Verification(
+            "refused", why, done.states[kept], done.at[kept], margins[kept], None, event
+        )
+    proved = prove(done.states, margin) if proof else None
+    table = _table(done, margins, (*(c.descriptor for c in constraints), *monitor))
+    return Verification("verified", "", done.states, done.at, margins, table, None, proved)
+
+
+def _legs(
+    schedule: Schedule | Sequence[Mapping[str, float]],
+    start: State | None,
+    structure: Structure | None,
+) -> tuple[State, Float[np.ndarray, "rows parameters"]]:
+    """Start, and all parameters at the corners after it."""
+    if not isinstance(schedule, Schedule):
+        if start is None:
+            raise InputError("`start` must be given with way-points; got none.")
+        check_start(start)
+        return start, _moving(np.array(way_points(start.structure, start.p, schedule)))
+    begin = start or _first_state(schedule, structure)
+    names = names_of(begin.structure.parameters)
+    if schedule.names != names:
+        raise InputError(
+            f"`schedule` must give the parameters {', '.join(names)}; "
+            f"got {', '.join(schedule.names)}."
+        )
+    if not np.isfinite(schedule.values).all():
+        raise InputError("`schedule` must have finite values; got some that are not.")
+    check_start(begin)
+    if not np.allclose(schedule.values[0], begin.p, rtol=0, atol=1e-9):
+        raise InputError(
+            f"`start` must have the first parameters of the schedule; got {begin.parameters}."
+        )
+    return begin, _moving(np.concatenate([begin.p[None], schedule.values[1:]]))
+
+
+def _moving(rows: Float[np.ndarray, "rows parameters"]) -> Float[np.ndarray, "moves parameters"]:
+    """Corners after the first, without pauses."""
+    moves = np.abs(np.diff(rows, axis=0)).max(axis=1, initial=0.0) > 0.0
+    if not moves.any():
+        raise InputError("`schedule` must change at least one parameter; got one that rests.")
+    return np.asarray(rows[1:][moves])
+
+
+def _first_state(schedule: Schedule, structure: Structure | None) -> State:
+    """State in which a schedule begins."""
+    owner, unknowns = structure, schedule.start.get("unknowns")
+    if owner is None:
+        if schedule.start.get("structure") is None:
+            raise InputError(
+                "`structure` must be given for a schedule that carries none; got none."
+            )
+        owner = from_identity(schedule.start["structure"])
+    z = np.asarray(unknowns, dtype=float)
+    if z.shape != (owner.size,):
+        raise InputError(
+            f"`schedule` must start with {owner.size} unknowns of its structure; "
+            f"got {z.size if unknowns is not None else 'none'}."
+        )
+    state = State(owner, z, schedule.values[0].copy())
+    if state.residual < 1e-10:
+        return state
+    near, found = newton(owner, z[None], state.p[None])
+    gap = float(np.sqrt((near[0] - z)[: owner.unknowns] ** 2 @ owner.mass))
+    if not (found[0] and gap <= NEAR):
+        raise InputError(
+            f"`schedule` must start at an equilibrium; got a residual of {state.residual:.2g}."
+        )
+    return State(owner, near[0], state.p)
+
+
+def _wrong_start(start: State, within: tuple[Constraint, ...], margin: float) -> str:
+    for constraint in within:
+        if not constraint.holds(start.batch)[0]:
+            value = constraint.descriptor(start)
+            return f"the start violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
+    if not start.stable:
+        return f"the start is unstable (index {start.index})"
+    if start.margin < margin:
+        return f"the start has a stability margin of {start.margin:.4g}, below {margin:g}"
+    return ""
+
+
+def _violation(
+    done: March, margins: Float[np.ndarray, " points"], margin: float, legs: int
+) -> tuple[str, int]:
+    """First violation in words, and the number of the state; nothing for none."""
+    low = np.flatnonzero(margins < margin) if margin > 0.0 else np.flatnonzero(margins <= 0.0)
+    # the end at a fold has no margin, but the fold is what is to be told
+    low = low[low < len(margins) - (done.end.kind != "arrived")]
+    names = _moved(done.states)
+    if len(low):
+        k = int(low[0])
+        where = place(done.states[k], names)
+        return f"the stability margin falls to {margins[k]:.4g}, below {margin:g}, at {where}", k
+    if done.end.kind == "arrived":
+        return "", len(margins) - 1
+    leg = min(int(done.end.at) + 1, legs)
+    return f"step {leg} of {legs} meets {obstacle(done.end, names)}", len(margins) - 1
+
+
+def _moved(states: States) -> list[str]:
+    names = names_of(states.structure.parameters)
+    moves = np.ptp(states.p, axis=0) > 0.0
+    return [name for name, moving in zip(names, moves, strict=True) if moving]
+
+
+def _table(
+    done: March, margins: Float[np.ndarray, " points"], descriptors: Sequence[Descriptor]
+) -> Schedule:
+    """Schedule of all states."""
+    states = done.states
+    structure = states.structure
+    dz = np.diff(states.z[:, : structure.unknowns], axis=0)
+    dp = np.diff(states.p, axis=0) / structure.scales
+    length = np.concatenate([[0.0], np.cumsum(np.sqrt(dz**2 @ structure.mass + (dp**2).sum(1)))])
+    at = done.at.copy()
+    at[done.corners] = np.arange(len(done.corners))
+    path = Path(states, at, length, np.zeros(len(at), int), (done.end,))
+    return scheduled(path, margins, tuple(dict.fromkeys(descriptors)))

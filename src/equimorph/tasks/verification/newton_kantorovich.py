@@ -1,0 +1,207 @@
+"""Newton–Kantorovich bounds on straight segments in parameter space.
+
+On a segment p(t) the chord z̄(t) between two equilibria is compared with Newton's operator
+T(z) = z − A⁻¹F(z; p(t)), A = F_z at the middle. With ‖T(z̄) − z̄‖ ≤ Y and ‖DT‖ ≤ Z₁ + Z₂ r within
+distance r of the chord, ``Y + (Z₁ + Z₂ r) r ≤ r`` proves one equilibrium within r for every t; as
+‖I − A⁻¹F_z‖ < 1 there, F_z stays regular and keeps the inertia of A [DayLessardMischaikow2007]_.
+All bounds are componentwise, in the maximum norm with weights s, so that they hold in z as it is.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.structures import Direction, Majorant, States, Structure
+from equimorph.tasks.verification.sampled import sampled_bound
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+Matrices = Float[np.ndarray, "lanes size size"]
+
+DIFFERENCE = 1e-4
+"""Step of the central differences that give F_z independently of the solver."""
+SWEEPS = 5
+"""Power iterations towards the best weights."""
+LEAST_WEIGHT = 1e-3
+ROOM = 4.0
+"""Reach of the boxes beside the chord, in units of the defect."""
+ROUNDING = 1e-13
+"""Relative error assumed for every entry of F, and more than it ever is."""
+SHARES = (0.95, 0.9, 0.8, 0.6, 0.4, 0.2)
+"""Parts of the margin at the ends of a segment that are tried as bounds on it."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What is known of segments.
+
+    Parameters
+    ----------
+    proved
+        Whether one equilibrium exists and is unique beside every point of the chord.
+    error
+        Largest distance r of the equilibria from the chord, in multiples of the weights.
+    unique
+        Distance within which they are the only ones.
+    at_ends
+        Distance of the equilibria from the given states at both ends.
+    index
+        Negative eigenvalues of the constrained Hessian all along.
+    weights
+        s: entry by entry, z lies within r s of the chord.
+    margin
+        Stability margin that is kept all along, 0 if none was proved.
+    """
+
+    proved: Bool[np.ndarray, " lanes"]
+    error: Values
+    unique: Values
+    at_ends: Float[np.ndarray, "lanes 2"]
+    index: Int[np.ndarray, " lanes"]
+    weights: Lanes
+    margin: Values
+
+    def take(self, at: Int[np.ndarray, " some"]) -> "Bounds":
+        """Return some of the segments."""
+        return Bounds(*(column[at] for column in vars(self).values()))
+
+    @classmethod
+    def joined(cls, parts: list["Bounds"]) -> "Bounds":
+        """All segments of some parts."""
+        return cls(
+            *(np.concatenate(c) for c in zip(*(vars(b).values() for b in parts), strict=True))
+        )
+
+
+def segment_bounds(first: States, last: States) -> Bounds:
+    """Bounds on the segments between pairs of equilibria."""
+    structure = first.structure
+    middle = States(structure, 0.5 * (first.z + last.z), 0.5 * (first.p + last.p))
+    half = 0.5 * np.abs(last.z - first.z), 0.5 * np.abs(last.p - first.p)
+    matrix = _matrix(structure, middle)
+    inverse, index = _inverse(structure, middle, np.zeros(len(first)))
+    near = _majorant(structure, middle, (half[0] + 1e-6, half[1]))
+    weights = _weights(inverse, near, half)
+    defects, bend = _defect(structure, (first, last), (inverse, matrix), near, half)
+    defect = _norm(defects.max(axis=1) + bend, weights)
+    reach = ROOM * defect + 1e-9
+    bound = _majorant(structure, middle, (half[0] + reach[:, None] * weights, half[1]))
+    still = np.zeros_like(half[1])
+    off = _norm(np.abs(_unity_gap(inverse, matrix)) @ weights[:, :, None], weights)
+    turn = off + _norm(_applied(inverse, bound(half, (weights, still))), weights)
+    grow = _norm(_applied(inverse, bound((weights, still), (weights, still))), weights)
+    room = (1.0 - turn) ** 2 - 4.0 * defect * grow
+    root = np.sqrt(np.maximum(room, 0.0))
+    error = 2.0 * defect / np.maximum(1.0 - turn + root, 1e-300)
+    with np.errstate(divide="ignore"):
+        unique = np.minimum(reach, np.maximum(1.0 - turn, 0.0) / np.maximum(grow, 1e-300))
+    proved = (turn < 1.0) & (room > 0.0) & (error <= reach) & np.isfinite(error)
+    ends = np.stack([_norm(each, weights) for each in np.moveaxis(defects, 1, 0)], axis=1)
+    at_ends = 2.0 * ends / np.maximum(1.0 - turn, 1e-300)[:, None]
+    tube = half[0] + np.where(proved, error, 0.0)[:, None] * weights, half[1]
+    margin = _margins(structure, (first, last), middle, matrix, (bound, tube))
+    return Bounds(proved, error, unique, at_ends, index, weights, np.where(proved, margin, 0.0))
+
+
+def _majorant(structure: Structure, middle: States, reach: Direction) -> Majorant:
+    own = structure.second_derivative_bound(middle.z, middle.p, reach)
+    return own or sampled_bound(structure, middle.z, middle.p, reach)
+
+
+def _matrix(structure: Structure, middle: States) -> Matrices:
+    """F_z by central differences of F."""
+    lanes, size = middle.z.shape
+    steps = DIFFERENCE * np.eye(size)
+    p = np.repeat(middle.p, size, axis=0)
+    ahead, behind = (
+        structure.residual((middle.z[:, None] + sign * steps).reshape(-1, size), p)
+        for sign in (1.0, -1.0)
+    )
+    rows = ((ahead - behind) / (2.0 * DIFFERENCE)).reshape(lanes, size, size)
+    return np.ascontiguousarray(rows.transpose(0, 2, 1))
+
+
+def _inverse(
+    structure: Structure, middle: States, shift: Values
+) -> tuple[Matrices, Int[np.ndarray, " lanes"]]:
+    """Approximate inverse of F_z − shift·mass, and the index by its inertia."""
+    units = np.tile(np.eye(structure.size), (len(middle), 1, 1))
+    solved = structure.solve(middle.z, middle.p, units, shift=shift)
+    columns = np.ascontiguousarray(solved.x.transpose(0, 2, 1))
+    return columns, np.asarray(solved.negative - structure.constraints)
+
+
+def _unity_gap(inverse: Matrices, matrix: Matrices) -> Matrices:
+    return np.asarray(np.eye(matrix.shape[1]) - inverse @ matrix)
+
+
+def _applied(inverse: Matrices, rows: Lanes) -> Lanes:
+    """|A⁻¹| times rows ≥ 0."""
+    return np.asarray((np.abs(inverse) @ rows[:, :, None])[:, :, 0])
+
+
+def _norm(rows: Float[np.ndarray, "lanes size *one"], weights: Lanes) -> Values:
+    return np.asarray((rows.reshape(weights.shape) / weights).max(axis=1, initial=0.0))
+
+
+def _weights(inverse: Matrices, bound: Majorant, half: Direction) -> Lanes:
+    """Weights in which the change of F_z along the chord counts least: its Perron vector."""
+    weights = np.ones_like(half[0])
+    still = np.zeros_like(half[1])
+    for _ in range(SWEEPS):
+        new = _applied(inverse, bound(half, (weights, still)))
+        size = new.max(axis=1, keepdims=True)
+        weights = np.where(size > 0.0, new / np.maximum(size, 1e-300), 1.0)
+        weights = np.maximum(weights, LEAST_WEIGHT)
+    return np.asarray(weights)
+
+
+def _defect(
+    structure: Structure,
+    ends: tuple[States, States],
+    linear: tuple[Matrices, Matrices],
+    bound: Majorant,
+    half: Direction,
+) -> tuple[Float[np.ndarray, "lanes 2 size"], Lanes]:
+    """|A⁻¹F| at both ends with an allowance for rounding, and how much more it is between."""
+    inverse, matrix = linear
+    rows = []
+    for end in ends:
+        residual = structure.residual(end.z, end.p)
+        rounding = ROUNDING * (np.abs(matrix) @ np.abs(end.z)[:, :, None])[:, :, 0]
+        moved = (inverse @ residual[:, :, None])[:, :, 0]
+        rows.append(np.abs(moved) + _applied(inverse, rounding))
+    # a function with second derivative f″ leaves its chord by max|f″|/8; the whole step is 2 half
+    bend = 0.5 * _applied(inverse, bound(half, half))
+    return np.stack(rows, axis=1), bend
+
+
+def _margins(
+    structure: Structure,
+    ends: tuple[States, States],
+    middle: States,
+    matrix: Matrices,
+    around: tuple[Majorant, Direction],
+) -> Values:
+    """Largest tried σ for which F_z − σ·mass keeps index 0 in the tubes."""
+    bound, tube = around
+    least = np.minimum(ends[0].margin, ends[1].margin)
+    kept, still = np.zeros(len(middle)), np.zeros_like(tube[1])
+    mass = np.zeros(structure.size)
+    mass[: structure.unknowns] = structure.mass
+    for share in SHARES:
+        shift = np.where(least > 0.0, share * least, 0.0)
+        inverse, index = _inverse(structure, middle, shift)
+        weights = _weights(inverse, bound, tube)
+        moved = matrix - np.eye(structure.size) * mass * shift[:, None, None]
+        off = np.abs(_unity_gap(inverse, moved)) @ weights[:, :, None]
+        turn = _norm(off, weights) + _norm(
+            _applied(inverse, bound(tube, (weights, still))), weights
+        )
+        good = (turn < 1.0) & (index == 0) & (kept == 0.0)
+        kept = np.where(good, shift, kept)
+        if (kept > 0.0).all():
+            break
+    return kept

@@ -1,0 +1,183 @@
+"""Proof mode: between the states of a schedule, too, the lifted curve exists and is unique."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria import newton
+from equimorph.structures import States, Structure
+from equimorph.tasks.verification.newton_kantorovich import Bounds, segment_bounds
+from equimorph.tasks.verification.sampled import can_be_sampled
+
+MOST_BISECTIONS = 12
+LARGEST_SAGITTA = 0.25
+ENTRIES_AT_ONCE = 400_000
+"""Entries of the inverse matrices that are held at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """What was proved of a polyline in parameter space between known equilibria.
+
+    Parameters
+    ----------
+    status
+        "proved" or "unproved" with the reason in `why`.
+    states
+        Equilibria between which a bound holds, those added by bisection included.
+    error
+        For each segment, largest distance of the true curve from the chord between its ends: of
+        any unknown or multiplier.
+    margin
+        Stability margin that the curve is proved to keep everywhere.
+    bounds
+        "structural": of the second derivatives over whole boxes; "sampled": estimated from samples,
+        in which case nothing is proved in the strict sense.
+    failed
+        First segment for which the bound fails, by its ends.
+    """
+
+    status: Literal["proved", "unproved"]
+    why: str
+    states: States
+    error: Float[np.ndarray, " segments"]
+    margin: float
+    bounds: Literal["structural", "sampled"]
+    failed: States | None = None
+
+    def __repr__(self) -> str:
+        """Number of segments and the margin, or why there is no proof."""
+        if self.status == "unproved":
+            return f"Proof(unproved: {self.why})"
+        count = len(self.error)
+        return f"Proof({self.bounds} bounds on {count} segments; margin >= {self.margin:.4g})"
+
+
+def prove(states: States, margin: float = 0.0) -> Proof:
+    """Prove that one curve of stable equilibria joins consecutive states.
+
+    Newton–Kantorovich bound on every segment; where it fails the segment is bisected. It proves,
+    for all parameters on the straight segments between those of the states, that an equilibrium
+    exists near the chord, that it is the only one there and continuous, and that its index is 0
+    with at least `margin`. Assumed: round-off is covered by stated allowances instead of being
+    enclosed by interval arithmetic; F is taken as the structure computes it.
+    """
+    structure = states.structure
+    kind = _kind(states)
+    if kind == "unknown":
+        why = (
+            f"a {structure.kind} with {structure.size} unknowns knows no bound of its second "
+            "derivatives and has too many to sample"
+        )
+        return Proof("unproved", why, states, np.zeros(0), 0.0, "sampled")
+    states = _without_repeats(states)
+    bounds = _all_bounds(states[:-1], states[1:])
+    for _ in range(MOST_BISECTIONS):
+        bad = np.flatnonzero(_wrong(bounds, margin))
+        if len(bad) == 0:
+            return _concluded(states, bounds, kind)
+        divided = _bisected(states, bad)
+        if divided is None:
+            break
+        states, new = divided
+        bounds = _renewed(bounds, states, bad, new)
+    bad = np.flatnonzero(_wrong(bounds, margin))
+    if len(bad) == 0:
+        return _concluded(states, bounds, kind)
+    k = int(bad[0])
+    why = _why(bounds, k, margin)
+    return Proof("unproved", why, states, _errors(bounds), 0.0, kind, states[k : k + 2])
+
+
+def _kind(states: States) -> Literal["structural", "sampled", "unknown"]:
+    structure = states.structure
+    z, p = states.z[:1], states.p[:1]
+    if structure.second_derivative_bound(z, p, (np.zeros_like(z), np.zeros_like(p))) is not None:
+        return "structural"
+    return "sampled" if can_be_sampled(structure) else "unknown"
+
+
+def _without_repeats(states: States) -> States:
+    moved = np.abs(np.diff(states.p, axis=0)).max(axis=1, initial=0.0) > 0.0
+    return states[np.flatnonzero(np.concatenate([[True], moved]))]
+
+
+def _all_bounds(first: States, last: States) -> Bounds:
+    structure = first.structure
+    entries = structure.size**2
+    if _kind(first) == "sampled":
+        entries *= structure.size
+    count = max(1, ENTRIES_AT_ONCE // entries)
+    parts = [
+        segment_bounds(first[k : k + count], last[k : k + count])
+        for k in range(0, len(first), count)
+    ]
+    return Bounds.joined(parts)
+
+
+def _wrong(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
+    """Segments without a bound, of another index, or whose curve need not go on in the next."""
+    wrong = ~bounds.proved | (bounds.margin <= margin) | (bounds.index != 0)
+    # the equilibrium at a shared end must lie where the next segment has only one
+    reach = bounds.at_ends.max(axis=1)[:, None] * bounds.weights
+    alone = bounds.unique[:, None] * bounds.weights
+    for one, other in ((reach[:-1], alone[1:]), (reach[1:], alone[:-1])):
+        apart = (one > other).any(axis=1)
+        wrong[:-1] |= apart
+    return np.asarray(wrong)
+
+
+def _bisected(
+    states: States, bad: Int[np.ndarray, " bad"]
+) -> tuple[States, Int[np.ndarray, " bad"]] | None:
+    """States with exact ones amid the bad segments, and their places; None if there are none.
+
+    A curve that leaves its chord by a quarter of its length, or an unstable state, cannot be meant.
+    """
+    structure: Structure = states.structure
+    middle = 0.5 * (states.z[bad] + states.z[bad + 1])
+    p = 0.5 * (states.p[bad] + states.p[bad + 1])
+    z, found = newton(structure, middle, p)
+    n, mass = structure.unknowns, structure.mass
+    away = np.sqrt((z - middle)[:, :n] ** 2 @ mass)
+    chord = np.sqrt((states.z[bad + 1] - states.z[bad])[:, :n] ** 2 @ mass)
+    if not (found & (away <= LARGEST_SAGITTA * chord + 1e-12)).all():
+        return None
+    if (structure.index(z, p) != 0).any():
+        return None
+    joined = States(
+        structure, np.insert(states.z, bad + 1, z, axis=0), np.insert(states.p, bad + 1, p, axis=0)
+    )
+    return joined, bad + 1 + np.arange(len(bad))
+
+
+def _renewed(
+    bounds: Bounds, states: States, bad: Int[np.ndarray, " bad"], new: Int[np.ndarray, " bad"]
+) -> Bounds:
+    """Bounds of all segments: those of the halves are computed."""
+    halves = np.sort(np.concatenate([new - 1, new]))
+    fresh = _all_bounds(states[halves], states[halves + 1])
+    kept = np.setdiff1d(np.arange(len(bounds.proved)), bad)
+    place = np.setdiff1d(np.arange(len(states) - 1), halves)
+    order = np.argsort(np.concatenate([place, halves]))
+    return Bounds.joined([bounds.take(kept), fresh]).take(order)
+
+
+def _errors(bounds: Bounds) -> Float[np.ndarray, " segments"]:
+    return np.asarray(bounds.error * bounds.weights.max(axis=1))
+
+
+def _concluded(states: States, bounds: Bounds, kind: Literal["structural", "sampled"]) -> Proof:
+    return Proof("proved", "", states, _errors(bounds), float(bounds.margin.min()), kind)
+
+
+def _why(bounds: Bounds, k: int, margin: float) -> str:
+    if not bounds.proved[k]:
+        return f"the bound fails on a segment after {MOST_BISECTIONS} bisections"
+    if bounds.index[k] != 0:
+        return f"the index is {bounds.index[k]} on a segment"
+    if bounds.margin[k] <= margin:
+        return f"a margin of {max(margin, 0.0):g} could not be proved on a segment"
+    return "neighbouring segments could not be joined"

@@ -1,0 +1,144 @@
+"""Bounds on segments: true where the curve is known, and none where there is no such curve."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.equilibria import newton
+from equimorph.structures import Rod, Spring, States
+from equimorph.tasks import plan, verify
+from equimorph.tasks.verification import prove
+from equimorph.tasks.verification.newton_kantorovich import segment_bounds
+from oracles.polynomial import bead_on_a_circle, fold_form
+from typecheck import unchecked
+
+VIA = [{"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0}]
+
+
+@pytest.fixture(scope="module")
+def proved(ends):
+    return verify(VIA, ends[0], proof=True)
+
+
+def _signs(generator, rows):
+    return tuple(each * generator.choice([-1.0, 1.0], each.shape) for each in rows)
+
+
+@pytest.mark.parametrize("structure", [Rod(), Rod(load="left-half"), Spring()], ids=str)
+def test_second_derivatives_in_a_box_stay_below_their_bound(structure):
+    """Random states in random boxes; the bound must not be much larger than what occurs."""
+    generator = np.random.default_rng(1)
+    lanes, count = 12, len(structure.parameters)
+    p = np.tile([1.0, 0.3, 2.0, 0.84] if count == 4 else [0.8, 0.01, 1.0], (lanes, 1))
+    z = structure.sample(p, generator)
+    z *= 0.7
+    reach = np.full_like(z, 0.03), np.full_like(p, 0.02)
+    bound = structure.second_derivative_bound(z, p, reach)
+    v, w = ((generator.random(z.shape), generator.random(p.shape)) for _ in range(2))
+    most = bound(v, w)
+    share = 0.0
+    for _ in range(200):
+        inside = (
+            x + r * generator.uniform(-1, 1, x.shape) for x, r in zip((z, p), reach, strict=True)
+        )
+        value = structure.second_derivative(*inside, _signs(generator, v), _signs(generator, w))
+        share = max(share, float((np.abs(value) / most).max()))
+    assert 0.2 < share <= 1.0
+
+
+def test_spring_s_curve_lies_within_the_proved_distance():
+    """δ over F at x_l = 0.8 by F/k = (1 − x_l/cos δ) sin δ."""
+    delta = np.linspace(0.62, 0.9, 9)
+    force = (1 - 0.8 / np.cos(delta)) * np.sin(delta)
+    p = np.stack([np.full(9, 0.8), force, np.ones(9)], axis=1)
+    proof = prove(States(Spring(), delta[:, None], p))
+    assert proof.status == "proved"
+    states, error = proof.states, proof.error
+    exact = np.linspace(0.62, 0.9, 2001)
+    load = (1 - 0.8 / np.cos(exact)) * np.sin(exact)
+    segment = np.clip(np.searchsorted(-states.p[:, 1], -load) - 1, 0, len(error) - 1)
+    chord = np.interp(-load, -states.p[:, 1], states.z[:, 0])
+    assert (np.abs(chord - exact) <= error[segment] + 1e-12).all()
+    # margin: E'' = k x (x − cos³ δ)/cos⁴ δ
+    stiffness = 0.8 * (0.8 - np.cos(exact) ** 3) / np.cos(exact) ** 4
+    assert 0.0 < proof.margin <= stiffness.min()
+
+
+def test_arch_is_proved_all_the_way_with_most_of_its_margin(proved):
+    assert proved.verified
+    assert proved.proof.status == "proved"
+    assert proved.proof.bounds == "structural"
+    assert 0.75 * proved.margin < proved.proof.margin <= proved.margin
+    assert proved.proof.error.max() < 1e-2
+
+
+def test_equilibria_between_the_states_lie_within_the_proved_distance(proved):
+    states = proved.proof.states[::7]
+    bounds = segment_bounds(states[:-1], states[1:])
+    for share in (0.15, 0.5, 0.8):
+        z, p = ((1 - share) * column[:-1] + share * column[1:] for column in (states.z, states.p))
+        exact, found = newton(states.structure, z, p)
+        assert found.all()
+        distance = np.abs(exact - z).max(axis=1)
+        far = bounds.error * bounds.weights.max(axis=1)
+        assert (distance[bounds.proved] <= far[bounds.proved]).all()
+        assert (States(states.structure, exact, p).margin >= bounds.margin)[bounds.proved].all()
+
+
+def test_demanded_margin_is_proved_or_the_reason_given(ends):
+    kept = verify(VIA, ends[0], margin=0.4, proof=True)
+    assert kept.proof.status == "proved"
+    assert kept.proof.margin > 0.4
+
+
+def test_states_of_two_branches_are_not_joined(arch_set, ends):
+    """Upright and inverted over the same point, then over neighbouring ones."""
+    down = em.lift(ends[1], {"Theta": 1.0001}).end.state
+    both = States(arch_set.structure, np.stack([ends[0].z, down.z]), np.stack([ends[0].p, down.p]))
+    proof = prove(both)
+    assert proof.status == "unproved"
+    assert proof.failed is not None
+
+
+def test_nothing_is_proved_across_a_fold():
+    """x² = a: from (a, x) = (0.04, 0.2) to (0.04, −0.2) the branches meet at the fold only."""
+    structure = fold_form()
+    x, a = np.array([[0.2], [-0.2]]), np.array([[0.04], [0.0401]])
+    x[1] = -np.sqrt(0.0401)
+    assert prove(States(structure, x, a)).status == "unproved"
+
+
+def test_sampled_bounds_are_named():
+    structure = bead_on_a_circle()
+    start = em.lift(structure.state(0.0, 1.0, 1.0, g=1.0), {"h": 0.2}).end.state
+    found = verify([{"h": -0.2}], start, proof=True)
+    assert found.proof.status == "proved"
+    assert found.proof.bounds == "sampled"
+
+
+def test_structures_with_too_many_unknowns_have_no_proof(monkeypatch):
+    monkeypatch.setattr("equimorph.tasks.verification.sampled.MOST_ENTRIES", 2)
+    structure = bead_on_a_circle()
+    start = structure.state(0.0, 1.0, 1.0, g=1.0)
+    found = verify([{"h": 0.2}], start, proof=True)
+    assert found.verified
+    assert "knows no bound" in found.proof.why
+
+
+@pytest.mark.slow
+def test_fifty_routes_of_the_arch_are_proved(arch_set):
+    """Random stable states over the box, joined by routes of margin 0.05."""
+    generator = np.random.default_rng(3)
+    stable = arch_set.points[np.flatnonzero((arch_set.index == 0) & (arch_set.kinds == 0))]
+    stable = stable[stable.margin > 0.1]
+    proved = 0
+    with unchecked():
+        while proved < 50:
+            start, goal = (stable[int(k)] for k in generator.integers(len(stable), size=2))
+            route = plan(arch_set, start, goal, margin=0.05)
+            if not route.arrived:
+                continue
+            found = verify(route.schedule, start, margin=0.05, proof=True)
+            assert found.verified
+            assert found.proof.status == "proved", found.proof.why
+            proved += 1
