@@ -80,6 +80,14 @@ _HOMES = {
         "snap_graph",
         "stability_distance",
     ),
+    "equimorph.charts": (
+        "Chart",
+        "Charted",
+        "DescriptorChart",
+        "Domain",
+        "Overlap",
+        "Projection",
+    ),
     "equimorph.tasks": (
         "Calibration",
         "CurvatureMap",
@@ -104,8 +112,8 @@ _HOMES = {
     ),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
-_LAYERS = ("errors", "linalg", "model", "structures", "equilibria", "manifold", "tasks",
-           "plotting", "storage", "study", "cli")  # fmt: skip
+_LAYERS = ("errors", "linalg", "model", "structures", "equilibria", "manifold", "charts",
+           "tasks", "plotting", "storage", "study", "cli")  # fmt: skip
 
 __all__ = [  # noqa: PLE0604  # names are listed with their homes above
     "__version__",

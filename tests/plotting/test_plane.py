@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from scipy.integrate import quad
 
 from equimorph import plotting
+from equimorph.charts.regions import count_regions
 from equimorph.errors import InputError
-from equimorph.plotting.regions import count_regions
 from equimorph.tasks import Route
 
 

@@ -11,6 +11,8 @@ MOST_BINS = 4
 """Bins per cell, at most."""
 NUDGE = 1e-9
 """Shift, in ranges of the parameters, that puts points between cells into one of them."""
+FLAT = 1e-15
+"""Volume, in the unit cube, below which a cell has no barycentric coordinates."""
 TRIANGLE = 3
 """Number of corners."""
 
@@ -123,7 +125,7 @@ def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "corners 
     """Inverse of the matrix of each cell's corners over ones, row by row."""
     ones = np.ones((*unit.shape[:2], 1))
     homogeneous = np.concatenate([unit, ones], axis=2)
-    flat = volumes(unit) == 0.0
+    flat = np.abs(volumes(unit)) < FLAT
     homogeneous[flat] = np.eye(homogeneous.shape[1])
     if unit.shape[1] == TRIANGLE:  # the products of two corners are all minors
         first, second, third = np.swapaxes(homogeneous, 0, 1)

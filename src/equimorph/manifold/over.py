@@ -187,7 +187,7 @@ class Sheets:
         corners = self.cells[hits.cell]
         folded = self.folded[corners]
         some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
-        weights[some] = _rooted(weights[some], folded[some])
+        weights[some] = rooted(weights[some], folded[some])
         z = weights[:, :1] * self.points.z[corners[:, 0]]
         for k in range(1, corners.shape[1]):
             z += weights[:, k : k + 1] * self.points.z[corners[:, k]]
@@ -206,7 +206,7 @@ class Sheets:
     ) -> tuple[Lanes, Bool[np.ndarray, " hits"]]:
         """Exact states of the cells' own index near the guesses, where there are any."""
         structure = self.structure
-        z, good, index = _newton(structure, guess, p[hits.point])
+        z, good, index = exact_states(structure, guess, p[hits.point])
         good &= index == self.cell_index[hits.cell]
         moved = np.sqrt((z - guess)[:, : structure.unknowns] ** 2 @ structure.mass)
         good &= moved <= 2.0 * self._size(hits.cell) + SAME
@@ -247,7 +247,7 @@ class Sheets:
         target = p[number]
         guess = self._guess(mine)
         starts = np.concatenate([guess, self.points.z[corners]])
-        solved, good, _ = _newton(self.structure, starts, np.tile(target, (len(starts), 1)))
+        solved, good, _ = exact_states(self.structure, starts, np.tile(target, (len(starts), 1)))
         solved = solved[good]
         everywhere = np.tile(target, (len(solved), 1))
         good = self.structure.resolved(solved, everywhere) & self._allowed(solved, everywhere)
@@ -271,7 +271,7 @@ class Sheets:
         return np.where(near, mine.cell[best], -1)
 
 
-def _rooted(
+def rooted(
     weights: Float[np.ndarray, "n corners"], folded: Bool[np.ndarray, "n corners"]
 ) -> Float[np.ndarray, "n corners"]:
     """Weights of corners with the root of the share of those off the fold as their share."""
@@ -299,7 +299,7 @@ def lift_to(
     return np.concatenate([states.z[still], outcome.z[arrived]])
 
 
-def _newton(
+def exact_states(
     structure: Structure, z: Lanes, p: Points
 ) -> tuple[Lanes, Bool[np.ndarray, " lanes"], Int[np.ndarray, " lanes"]]:
     """Newton at fixed parameters until the next correction would be round-off; and the index.

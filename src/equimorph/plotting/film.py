@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image
 
+from equimorph.charts.regions import count_regions
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -21,7 +22,6 @@ from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along, track
 from equimorph.plotting.furniture import MovingParts, draw_supports, frame_shapes, moving_parts
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane, shade_regions
-from equimorph.plotting.regions import count_regions
 from equimorph.plotting.symbols import symbol
 from equimorph.structures import States
 from equimorph.tasks import Route

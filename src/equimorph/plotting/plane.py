@@ -15,13 +15,13 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 from scipy import ndimage
 
+from equimorph.charts.regions import Regions, count_regions
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.plotting import style
 from equimorph.plotting.badges import number_way_points
 from equimorph.plotting.curves import boundary_pieces, fold_pieces, intended, track, way_points
-from equimorph.plotting.regions import Regions, count_regions
 from equimorph.plotting.symbols import constraint_label, parameter_label
 from equimorph.tasks import Route
 
@@ -56,7 +56,7 @@ def parameter_plane(
 ) -> Axes:
     """Number of equilibria over the parameters, with fold curves and a route.
 
-    Regions are exact for the cells of the set, see `equimorph.plotting.regions`.
+    Regions are exact for the cells of the set, see `equimorph.charts.regions`.
 
     Parameters
     ----------

@@ -10,12 +10,16 @@ the contributions of neighbours cancel; what remains are the edges e on which th
 of constant N, with no raster in between.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.plotting.arrangement import arrange, cross, outline, sides, winding, winding_raster
+from equimorph.charts.arrangement import arrange, cross, outline, sides, winding, winding_raster
+
+Counts = Int[np.ndarray, " edges"]
+Flags = Bool[np.ndarray, " edges"]
 
 # Spacing of the grid to which the cuts are rounded, relative to the extent of the set. The
 # coarser ones are for edges so crowded (cells squeezed flat at a cusp) that rounding tangles them.
@@ -31,14 +35,22 @@ class Regions:
     levels
         For k = 1, 2, …: closed loops, counter-clockwise around and clockwise inside the set of
         parameters with at least k equilibria; fill them with the non-zero rule.
-    ends, jump
-        Directed edges across which the count jumps, and the count on their left less that on
-        their right.
+    places, edges
+        Where edges end, and which of the places are the ends of each.
+    jump, left
+        Count on the left of each edge less that on its right, and the count on its left.
     """
 
     levels: tuple[tuple[Float[np.ndarray, "_ 2"], ...], ...]
-    ends: Float[np.ndarray, "edges 2 2"]
+    places: Float[np.ndarray, "places 2"]
+    edges: Int[np.ndarray, "edges 2"]
     jump: Int[np.ndarray, " edges"]
+    left: Int[np.ndarray, " edges"]
+
+    @property
+    def ends(self) -> Float[np.ndarray, "edges 2 2"]:
+        """Both ends of each edge."""
+        return np.asarray(self.places[self.edges])
 
     @property
     def largest(self) -> int:
@@ -54,6 +66,11 @@ class Regions:
     ) -> Int[np.ndarray, "rows columns"]:
         """`count` on a grid with columns at rising x and rows at y."""
         return winding_raster(x, y, self.ends, self.jump)
+
+    def loops(self, wanted: Callable[[Counts], Flags]) -> tuple[Float[np.ndarray, "_ 2"], ...]:
+        """Outlines of the region where the count is one of those wanted, which is on their left."""
+        inside = [wanted(count) for count in (self.left, self.left - self.jump)]
+        return tuple(self.places[loop] for loop in _loops(self.edges, *inside))
 
     def areas(self) -> dict[int, float]:
         """Area of the parameters with exactly k equilibria, for every k ≥ 1."""
@@ -79,9 +96,26 @@ def count_regions(
     -------
     Nested regions; none at all if there is no cell.
     """
-    edges, jump = outline(coordinates, cells)
+    return regions_within(coordinates, *outline(coordinates, cells))
+
+
+def regions_within(
+    coordinates: Float[np.ndarray, "vertices 2"],
+    edges: Int[np.ndarray, "given 2"],
+    jump: Int[np.ndarray, " given"],
+) -> Regions:
+    """Exact regions of the plane between closed curves, by how often these wind around them.
+
+    Parameters
+    ----------
+    coordinates
+        Places of the ends of edges.
+    edges, jump
+        Directed edges, and by how much the count on their left exceeds that on their right.
+    """
     if not len(edges):
-        return Regions((), np.empty((0, 2, 2)), np.empty(0, int))
+        none = np.empty(0, int)
+        return Regions((), np.empty((0, 2)), np.empty((0, 2), int), none, none)
     origin, extent = coordinates.min(axis=0), np.ptp(coordinates, axis=0)
     for spacing in _SPACINGS:
         places, pieces, jumps = arrange((coordinates - origin) / (extent * spacing), edges, jump)
@@ -93,7 +127,7 @@ def count_regions(
         tuple(places[loop] for loop in _loops(pieces, left >= k, right >= k))
         for k in range(1, int(max(left.max(), right.max())) + 1)
     )
-    return Regions(levels, places[pieces], jumps)
+    return Regions(levels, places, pieces, jumps, left)
 
 
 def _balanced(

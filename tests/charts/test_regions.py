@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equimorph.plotting.arrangement import outline
-from equimorph.plotting.regions import count_regions
+from equimorph.charts.arrangement import outline
+from equimorph.charts.regions import count_regions
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])

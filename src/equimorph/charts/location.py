@@ -1,0 +1,320 @@
+"""The states of some cells of a set that have given coordinates."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.charts.coordinates import Coordinates
+from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria.outcome import follow
+from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.cell_index import CellIndex, Hits
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.over import rooted
+from equimorph.manifold.points import CORNER, FOLD
+from equimorph.manifold.simplices import volumes
+from equimorph.manifold.topology import Adjacency, adjacency, flags_of, orientation
+from equimorph.structures import States
+
+Lanes = Float[np.ndarray, "lanes size"]
+Points = Float[np.ndarray, "points d"]
+Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
+
+OVERHANG = 0.3
+"""How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried."""
+SAME = 1e-6
+"""Distance, in the metric and scaled parameters, below which two states are the same."""
+CHUNK = 4096
+SLACK = 1e-9
+"""By how much a state may exceed the box or a constraint."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """States that have the coordinates of points, sorted by point, and cells that they lie on.
+
+    inside: whether that cell contains the point.
+    """
+
+    states: States
+    point: Int[np.ndarray, " found"]
+    cell: Int[np.ndarray, " found"]
+    inside: Bool[np.ndarray, " found"]
+
+    def take(self, some: Bool[np.ndarray, " found"] | Int[np.ndarray, " some"]) -> "Found":
+        """Some of the states."""
+        return Found(self.states[some], self.point[some], self.cell[some], self.inside[some])
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Some cells of a set in the space of coordinates.
+
+    Parameters
+    ----------
+    eset
+        The set.
+    coordinates
+        The coordinates.
+    numbers
+        Which of its cells.
+    """
+
+    eset: EquilibriumSet
+    coordinates: Coordinates
+    numbers: Int[np.ndarray, " own"]
+
+    @cached_property
+    def values(self) -> Float[np.ndarray, "V d"]:
+        """Coordinates of all vertices of the set."""
+        return self.coordinates(self.eset.points.z, self.eset.points.p)
+
+    @cached_property
+    def corners(self) -> Int[np.ndarray, "own corners"]:
+        """Vertices of the cells."""
+        return np.asarray(self.eset.cells[self.numbers])
+
+    @cached_property
+    def whole(self) -> Adjacency:
+        """How the cells hang together."""
+        return adjacency(self.corners)
+
+    @cached_property
+    def turn(self) -> Float[np.ndarray, " own"]:
+        """Volumes in the space of coordinates; their signs change where the coordinates fold."""
+        signs, _ = orientation(self.corners, self.whole)
+        return np.asarray(volumes(self.values[self.corners]) * signs)
+
+    @cached_property
+    def turning(self) -> Bool[np.ndarray, " F"]:
+        """Facets of `whole` between cells whose volumes have different signs."""
+        flags = np.zeros(len(self.whole.facets), bool)
+        a, b = self.whole.links.T
+        flags[self.whole.across[self.turn[a] * self.turn[b] < 0.0]] = True
+        return flags
+
+    @cached_property
+    def _edge(self) -> Bool[np.ndarray, " own"]:
+        """Cells at the boundary or at a fold of the coordinates: straight, they miss the curves."""
+        at = np.zeros(len(self.eset.points), bool)
+        at[self.whole.facets[(self.whole.counts == 1) | self.turning]] = True
+        return np.asarray(at[self.corners].any(axis=1))
+
+    @cached_property
+    def _index(self) -> CellIndex:
+        overhang = np.where(self._edge, OVERHANG, 0.0)
+        return CellIndex.of(self.values[self.corners], overhang)
+
+    @cached_property
+    def _indices(self) -> tuple[Int[np.ndarray, " own"], Int[np.ndarray, " own"]]:
+        """Least and largest index that a state found from each cell may have.
+
+        Next to a fold inside the chart that of the cells beyond it, too.
+        """
+        own = self.eset.cell_index[self.numbers]
+        if self.coordinates.projecting:
+            return own, own
+        around = np.tile([[np.iinfo(int).max], [np.iinfo(int).min]], len(self.eset.points))
+        for corner in self.corners.T:
+            np.minimum.at(around[0], corner, own)
+            np.maximum.at(around[1], corner, own)
+        return around[0][self.corners].min(axis=1), around[1][self.corners].max(axis=1)
+
+    @cached_property
+    def _at_fold(self) -> Bool[np.ndarray, " own"]:
+        return np.asarray(np.isin(self.eset.kinds, (FOLD, CORNER))[self.corners].any(axis=1))
+
+    @cached_property
+    def _folded(self) -> Bool[np.ndarray, " V"]:
+        """Vertices from which states move like the root of the way."""
+        return np.isin(self.eset.kinds, (FOLD, CORNER)) & self.coordinates.projecting
+
+    def find(self, points: Points) -> Found:
+        """States of the cells that have the coordinates of points."""
+        parts = [self._some(points[at : at + CHUNK], at) for at in range(0, len(points), CHUNK)]
+        if not parts:
+            nothing = np.zeros(0, int)
+            return Found(self.eset.points[nothing], nothing, nothing, nothing > 0)
+        z, p, point, cell, inside = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return Found(States(self.eset.structure, z, p), point, cell, inside)
+
+    def _some(self, points: Points, first: int) -> tuple[np.ndarray, ...]:
+        hits = self._index.near(points)
+        hits = hits.take(hits.inside | self._edge[hits.cell])
+        z, p, good = self._polished(self._guess(hits), hits, points[hits.point])
+        again = self._doubtful(hits, good, len(points))
+        z, p, good = self._again(hits, (z, p, good), again, points)
+        kept = np.flatnonzero(good)
+        kept = kept[self._one_of_each(z[kept], p[kept], hits.take(kept))]
+        hits = hits.take(kept)
+        return z[kept], p[kept], first + hits.point, self.numbers[hits.cell], hits.inside
+
+    def _guess(self, hits: Hits) -> Guess:
+        """Interpolation between the corners, at the nearest point of the cell."""
+        weights = np.maximum(hits.weights, 0.0)
+        weights /= weights.sum(axis=1, keepdims=True)
+        corners = self.corners[hits.cell]
+        folded = self._folded[corners]
+        some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
+        weights[some] = rooted(weights[some], folded[some])
+        z, p = (
+            np.einsum("hk,hki->hi", weights, column[corners])
+            for column in (self.eset.points.z, self.eset.points.p)
+        )
+        return z, p
+
+    def _polished(
+        self, guess: Guess, hits: Hits, wanted: Float[np.ndarray, "hits d"]
+    ) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"], Bool[np.ndarray, " lanes"]]:
+        """Exact states near guesses, where there are any that the cells may have."""
+        folded = self._at_fold[hits.cell]
+        z, p, good, index = self.coordinates.solved(
+            guess, wanted, lambda lanes: self._planes(hits.cell[lanes]), folded
+        )
+        setting = self.coordinates.setting
+        some = np.flatnonzero(good)
+        moved = np.linalg.norm(
+            embed(setting, z[some], p[some]) - embed(setting, guess[0][some], guess[1][some]),
+            axis=1,
+        )
+        good[some] = moved <= 2.0 * self._sizes[hits.cell[some]] + SAME
+        return z, p, self._allowed(z, p, good, index, hits.cell)
+
+    def _allowed(
+        self,
+        z: Lanes,
+        p: Float[np.ndarray, "lanes parameters"],
+        good: Bool[np.ndarray, " lanes"],
+        index: Int[np.ndarray, " lanes"],
+        cell: Int[np.ndarray, " lanes"],
+    ) -> Bool[np.ndarray, " lanes"]:
+        low, high = self._indices
+        good = good & (index >= low[cell]) & (index <= high[cell])
+        good &= self.eset.box.contains(p[:, self.coordinates.setting.free], slack=SLACK)
+        good[good] = self.eset.structure.resolved(z[good], p[good])
+        for constraint in self.eset.constraints:
+            some = np.flatnonzero(good)
+            good[some] = constraint.excess(z[some], p[some]) <= SLACK
+        return good
+
+    @cached_property
+    def _frames(self) -> Float[np.ndarray, "own d coordinates"]:
+        """Sides of the cells from their first corners, in the metric."""
+        setting = self.coordinates.setting
+        place = embed(setting, self.eset.points.z, self.eset.points.p)
+        return np.asarray(place[self.corners[:, 1:]] - place[self.corners[:, :1]])
+
+    @cached_property
+    def _sizes(self) -> Float[np.ndarray, " own"]:
+        return np.asarray(np.linalg.norm(self._frames, axis=2).max(axis=1))
+
+    def _planes(self, cell: Int[np.ndarray, " hits"]) -> Float[np.ndarray, "hits d coordinates"]:
+        """Orthonormal bases of the planes of cells."""
+        some, back = np.unique(cell, return_inverse=True)
+        basis = np.linalg.qr(np.swapaxes(self._frames[some], 1, 2))[0]
+        return np.ascontiguousarray(np.swapaxes(basis, 1, 2)[back])
+
+    def _doubtful(
+        self, hits: Hits, good: Bool[np.ndarray, " hits"], count: int
+    ) -> Int[np.ndarray, " n"]:
+        """Failed hits of cells that contain the point, or of points without a state."""
+        states = np.bincount(hits.point[good], minlength=count)
+        wanted = np.bincount(hits.point[hits.inside], minlength=count)
+        return np.flatnonzero(~good & (states < np.maximum(wanted, 1))[hits.point])
+
+    def _again(
+        self,
+        hits: Hits,
+        known: tuple[Lanes, Float[np.ndarray, "lanes parameters"], Bool[np.ndarray, " lanes"]],
+        again: Int[np.ndarray, " n"],
+        points: Points,
+    ) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"], Bool[np.ndarray, " lanes"]]:
+        """Try doubtful hits from regular corners of their cells, by lifts or by Newton.
+
+        From the nearest one; if the cell contains the point, from all.
+        """
+        z, p, good = known
+        far = np.isin(self.eset.kinds, (FOLD, CORNER))[self.corners[hits.cell[again]]]
+        nearest = np.argsort(1e9 * far - hits.weights[again], axis=1)
+        for k, place in enumerate(nearest.T):
+            open_ = ~good[again] & ~far[np.arange(len(again)), place]
+            if k > 0:
+                open_ &= hits.inside[again]
+            lanes = again[open_]
+            if len(lanes) == 0:
+                continue
+            corner = self.corners[hits.cell[lanes], place[open_]]
+            found = self._from_corners(corner, points[hits.point[lanes]], hits.take(lanes))
+            z[lanes], p[lanes], good[lanes] = found
+        return z, p, good
+
+    def _from_corners(
+        self,
+        corner: Int[np.ndarray, " lanes"],
+        wanted: Float[np.ndarray, "lanes d"],
+        hits: Hits,
+    ) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"], Bool[np.ndarray, " lanes"]]:
+        start = self.eset.points[corner]
+        if not self.coordinates.projecting:
+            return self._polished((start.z, start.p), hits, wanted)
+        velocity = np.zeros_like(start.p)
+        velocity[:, self.coordinates.places] = wanted - start.p[:, self.coordinates.places]
+        line = ParameterLine(self.eset.structure, start.p.copy(), velocity)
+        ended = follow(line, start.z.copy(), (), TraceOptions(record=False))
+        arrived = ended.code == ARRIVAL
+        p = start.p + velocity
+        index = np.where(arrived, ended.index, -1)
+        return ended.z, p, self._allowed(ended.z, p, arrived, index, hits.cell)
+
+    def _one_of_each(
+        self, z: Lanes, p: Float[np.ndarray, "lanes parameters"], hits: Hits
+    ) -> Int[np.ndarray, " kept"]:
+        """One of the equal states over each point, rather from a cell that contains the point.
+
+        Equal states have equal products with any vector, so that they are neighbours in its order.
+        """
+        place = embed(self.coordinates.setting, z, p)
+        product = place @ np.cos(1.0 + np.arange(place.shape[1]))
+        order = np.lexsort((product, hits.point))
+        new = np.ones(len(z), bool)
+        new[1:] = np.linalg.norm(np.diff(place[order], axis=0), axis=1) > SAME
+        new[1:] |= np.diff(hits.point[order]) > 0
+        group = np.empty(len(z), int)
+        group[order] = np.cumsum(new)
+        order = np.lexsort((hits.cell, ~hits.inside, group))
+        first = np.ones(len(z), bool)
+        first[1:] = np.diff(group[order]) > 0
+        return np.sort(order[first])
+
+
+def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
+    """Facets where the cells end or the coordinates fold, and what they lie on.
+
+    "fold" of the set, "cap" (a constraint), "box", "cut" (other cells of the set follow), or
+    "singular" where the coordinates turn back without a fold.
+    """
+    eset, whole = cells.eset, cells.whole
+    d = whole.facets.shape[1]
+    some = np.flatnonzero((whole.counts == 1) | cells.turning)
+    facets = whole.facets[some]
+    folds = [np.zeros((0, d), int)]
+    folds += [np.stack([f[:-1], f[1:]], axis=1) if d == 2 else f.reshape(-1, d) for f in eset.folds]
+    all_of_them = adjacency(eset.cells)
+    outer = flags_of(facets, all_of_them.facets[all_of_them.counts == 1])
+    lines = eset.coordinates[facets]
+    size = eset.box.upper - eset.box.lower
+    on_box = np.zeros(len(facets), bool)
+    for bound in (eset.box.lower, eset.box.upper):
+        on_box |= (np.abs(lines - bound) <= SLACK * size).all(axis=1).any(axis=1)
+    capped = np.isin(eset.kinds, (2, CORNER))[facets].all(axis=1)
+    ended = whole.counts[some] == 1
+    kinds = np.select(
+        [flags_of(facets, np.concatenate(folds)), ended & on_box & outer, ended & capped & outer,
+         ended],
+        ["fold", "box", "cap", "cut"],
+        "singular",
+    )  # fmt: skip
+    return facets, kinds
