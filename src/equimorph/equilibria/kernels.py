@@ -41,8 +41,9 @@ lane finished; given up: step too short, too many steps, or a singular start."""
 
 ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT, CRITICAL = 1, 2, 4, 8, 16, 32
 """Bits of what can happen in a step."""
-HIDDEN, ENDING = 64, 128
-"""Bits of steps with events that their ends do not show, and of those that such an event ends."""
+HIDDEN, ENDING, EARLY = 64, 128, 256
+"""Bits of steps with events that their ends do not show, of those that such an event ends, and of
+second steps after a first one that may hide some."""
 
 LEVEL_SLOPE = 1e-6
 """Slope dt/ds of a start that counts as zero: it lies on a fold, and leads nowhere in t."""
@@ -70,8 +71,13 @@ BACK = 0.4
 DIP, NEAR, WIDE = 0.3, 0.1, 1e-3
 """Least determinant inside a step, as a share of those at its ends, below which the step may hide
 two events; below which it is searched for them; length from which on it is refused first."""
+EARLY_NEAR, EARLY_DIP = 0.3, 0.5
+"""Determinant at a start, and least one inside a first step, as shares of those at its ends, below
+which the step is searched: what came before it is not known."""
 SLACK = 0.01
 """Slope of t that is no turn inside such a short step, as a share of those at its ends."""
+ROUND_OFF = 1e-14
+"""Change of t back inside such a step that is none: t lies between 0 and 1."""
 
 
 BROAD = 0.05
@@ -250,6 +256,9 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
         if changed == 0 and plain and (_dips(i, NEAR, numbers) or _lowest(i, numbers)):
             counts[WHAT, i] |= HIDDEN
             close += 1
+        if plain and numbers[TRAVELLED, i] <= numbers[ARC, i] and _hides_early(i, numbers):
+            close += (counts[WHAT, i] & HIDDEN) == 0
+            counts[WHAT, i] |= EARLY
     return good, doubtful, close
 
 
@@ -268,7 +277,7 @@ def _turns_twice(old, new, gain, length):
     # slope at share s: a + 2 s (3 rise - 2 a - b) + 3 s² (a + b - 2 rise)
     bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
     share = min(max(-bend / (3 * bow), 0.0), 1.0) if bow > 0.0 else 0.0
-    slack = SLACK * min(a, b) if length <= WIDE else 0.0
+    slack = max(SLACK * min(a, b), ROUND_OFF / length) if length <= WIDE else 0.0
     return a + 2 * share * bend + 3 * share * share * bow < -slack
 
 
@@ -299,6 +308,27 @@ def _lowest(i, numbers):
     before, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
     sides = min(abs(before), abs(there))
     return numbers[ARC, i] > 0.0 and before * there > 0.0 and abs(here) < NEAR * sides
+
+
+@njit(**SUMS)
+def _hides_early(i, numbers):
+    """Whether the determinant may touch zero, or cross it twice, in the first step of a lane.
+
+    By the parabola through its values at the start and after the first and the second step.
+    """
+    before, length = numbers[ARC, i], numbers[LENGTH, i]
+    start, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
+    if not (before > 0.0 and start * here > 0.0):
+        return False
+    start, here, there = abs(start), abs(here), np.sign(here) * there
+    if start < EARLY_NEAR * here:
+        return True
+    rise, next_rise = (here - start) / before, (there - here) / length
+    bow = (next_rise - rise) / (before + length)
+    slope = rise - bow * before
+    if not (slope < 0.0 and slope + 2.0 * bow * before > 0.0):
+        return False
+    return start - slope * slope / (4.0 * bow) < EARLY_DIP * min(start, here)
 
 
 @njit(**{**BRIEF, "_nrt": True})

@@ -14,6 +14,7 @@ from equimorph.equilibria.kernels import (
     BRANCH,
     CONSTRAINT,
     CONVERGED,
+    EARLY,
     ENDED,
     ENDING,
     HIDDEN,
@@ -31,6 +32,8 @@ from equimorph.structures import Advance
 Lanes = Float[np.ndarray, "lanes size"]
 Names = Int[np.ndarray, " lanes"]
 Some = Int[np.ndarray, " some"]
+Span = tuple[tuple[Front, Front], tuple[float, ...]]
+"""Ends of a step and their lengths on the way; see `inside_step`."""
 
 DIFFERENCE = 1e-5
 """Step of differences along a curve, in the metric."""
@@ -226,17 +229,27 @@ class Block:
         """
         counts = self._scalars[1]
         stage, what = counts[kernels.STAGE, : self.active], counts[kernels.WHAT, : self.active]
-        for i in np.flatnonzero((stage == CONVERGED) & (what & HIDDEN != 0)):
+        for i in np.flatnonzero((stage == CONVERGED) & (what & (HIDDEN | EARLY) != 0)):
             at, found = np.array([i]), list[Happenings]()
-            if self.options.look_inside:
-                ends, lengths = self._around(at, move)
-                found = inside_step(self._here.take(at), ends, lengths, self.options)
+            for ends, lengths in self._doubtful(at, move) if self.options.look_inside else ():
+                found += inside_step(self._here.take(at), ends, lengths, self.options)
             events = self._new(int(counts[kernels.LANE, i]), found)
             self.hidden += events
             if not events:
-                what[i] &= ~HIDDEN
+                what[i] &= ~(HIDDEN | EARLY)
             elif any((e.code & self.options.stops != 0).any() for e in events):
                 what[i] |= ENDING
+
+    def _doubtful(self, at: Some, move: Advance) -> list[Span]:
+        """Steps of a lane that may hide events: the one before if it is the first, the present."""
+        numbers, counts = self._scalars
+        what, spans = counts[kernels.WHAT, at[0]], list[Span]()
+        if what & EARLY:
+            ends = self._front(at, back=1), self._front(at)
+            spans.append((ends, (0.0, numbers[kernels.TRAVELLED, at[0]])))
+        if what & HIDDEN:
+            spans.append(self._around(at, move))
+        return spans
 
     def _new(self, lane: int, found: list[Happenings]) -> list[Happenings]:
         """Events of a lane but for those that were found in the step before, too."""
@@ -247,7 +260,7 @@ class Block:
             self._last[lane] = float(events.travelled[-1])
         return [replace(events, lanes=np.full(len(events.t), lane))] if len(events.t) else []
 
-    def _around(self, at: Some, move: Advance) -> tuple[tuple[Front, Front], tuple[float, ...]]:
+    def _around(self, at: Some, move: Advance) -> Span:
         """Ends of a step and their lengths on the way; see `inside_step`."""
         numbers, counts = (scalars[:, at[0]] for scalars in self._scalars)
         bracket = self._bracket(at, move)

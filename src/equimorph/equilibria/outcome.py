@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.happenings import Happenings, locate_all
 from equimorph.equilibria.march import Block, Loss
+from equimorph.equilibria.probing import inside_only_steps
 from equimorph.equilibria.tracing import (
     ARRIVAL,
     BRANCH,
@@ -208,9 +209,10 @@ class _Job:
     def _locate(self) -> None:
         """Locate everything that is pending; settle lanes that ended, retry where it failed."""
         block, ledger = self.block, self.ledger
-        brackets = [block.events.drain()]
-        shown = locate_all(block.curve, brackets, block.constraints, block.options)
-        events = Happenings.joined([shown, *block.hidden], block.curve.metric.size)
+        curve, bracket, options = block.curve, block.events.drain(), block.options
+        shown = locate_all(curve, [bracket], block.constraints, options)
+        only = inside_only_steps(curve, bracket, options)
+        events = Happenings.joined([shown, *block.hidden, *only], curve.metric.size)
         block.hidden = []
         bad = np.unique(events.lanes[~events.found])
         again = bad[ledger.retries[bad] < block.options.retries]
@@ -286,6 +288,9 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Outcome:
         part if (last := _last(ledger, part, tries)).all() else part.take(last)
         for part, tries in parts
     ]
+    joined = Points.joined(points, size)
+    # an event that the first step hid is known after the second
+    beyond = (joined.travelled > ledger.travelled[joined.lanes]) & (ledger.code[joined.lanes] > 0)
     return Outcome(
         ledger.code,
         ledger.z,
@@ -294,7 +299,7 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Outcome:
         ledger.travelled,
         ledger.why,
         Happenings.joined(passed, size),
-        Points.joined(points, size),
+        joined.take(~beyond) if beyond.any() else joined,
     )
 
 

@@ -7,13 +7,14 @@ v). Points are added until it is known that it does not reach zero, or where.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.cubics import least_inside
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.fronts import Bracket, Front, step_along
 from equimorph.equilibria.happenings import Happenings, locate_all
+from equimorph.equilibria.kernels import EARLY_DIP, EARLY_NEAR
 from equimorph.equilibria.location import hermite
 from equimorph.equilibria.tracing import BRANCH, FOLD, TraceOptions
 
@@ -27,6 +28,9 @@ NARROW = 1.5e-4
 """Length in the metric on which the cubic is exact to round-off."""
 TOUCH = 1e-9
 """Least value over those at the ends of a step that counts as zero."""
+SHARP = 1e-6
+"""Distance between two zeros of an eigenvalue, in the metric, below which they count as one that
+touches zero: round-off, relative to the largest eigenvalues, hides what lies between."""
 TRIALS = 30
 
 
@@ -74,6 +78,45 @@ def inside_step(
     return look_inside(curve, pair, first, options)
 
 
+def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> list[Happenings]:
+    """Events inside steps that are the only one of their lane, which nothing before them tells.
+
+    The determinant at the middle of the step tells where to look.
+    """
+    ends = bracket.before.index == bracket.after.index
+    ends &= (bracket.travelled == 0.0) & (bracket.what & options.stops != 0)
+    if not (curve.folds_change_index and options.look_inside and ends.any()):
+        return []
+    step = bracket.take(np.flatnonzero(ends))
+    here, old, new = curve.take(step.lanes), step.before, step.after
+    middle = hermite(step, np.full(len(step.lanes), 0.5))
+    places = ((old.z, old.t), middle, (new.z, new.t))
+    found = list[Happenings]()
+    for i in np.flatnonzero(_may_vanish(np.stack([_determinant(here, *at) for at in places]))):
+        one, lengths = step.take(np.array([i])), (0.0, float(step.step[i]))
+        lane = curve.take(one.lanes)
+        inside = inside_step(lane, (one.before, one.after), lengths, options)
+        found += [replace(each, lanes=np.full(len(each.t), one.lanes[0])) for each in inside]
+    return found
+
+
+def _determinant(curve: Curve, z: Float[np.ndarray, "lanes size"], t: Values) -> Values:
+    """Determinant of F_z."""
+    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
+    return curve.advance(np.ascontiguousarray(z), t, still, one, none).determinant
+
+
+def _may_vanish(values: Float[np.ndarray, "3 steps"]) -> Bool[np.ndarray, " steps"]:
+    """Whether what has such values at start, middle and end may touch zero or cross it twice."""
+    start, middle, end = np.sign(values[0]) * values
+    bow, slope = start + end - 2.0 * middle, end - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        least = middle - slope**2 / (8.0 * bow)
+    dips = (np.abs(slope) < 2.0 * bow) & (least < EARLY_DIP * np.minimum(start, end))
+    low = np.minimum(start, end) < EARLY_NEAR * middle
+    return np.asarray(dips | low | (middle < EARLY_NEAR * np.minimum(start, end)))
+
+
 def look_inside(
     curve: Curve,
     ends: tuple[Probe, Probe],
@@ -84,7 +127,7 @@ def look_inside(
 
     `first` is a length at which it is known to be small.
     """
-    zero = TOUCH * float(min(np.abs(ends[0].value[0]), np.abs(ends[1].value[0])))
+    zero = _zero(ends)
     sign = float(np.sign(ends[0].value[0]))
     low, high = (_upright(end, sign, zero) for end in ends)
     doubt = 0.0
@@ -109,6 +152,14 @@ def look_inside(
         else:
             high = middle
     return [_event(BRANCH, low.front.z, low.front.t, low, found=False)]
+
+
+def _zero(ends: tuple[Probe, Probe]) -> float:
+    """Size of an eigenvalue that counts as zero between two points."""
+    low, high = ends
+    bow = np.abs(np.sign(high.value) * high.slope - np.sign(low.value) * low.slope)
+    bow = 0.125 * bow * SHARP**2 / (high.length - low.length)
+    return float(np.maximum(TOUCH * np.minimum(np.abs(low.value), np.abs(high.value)), bow)[0])
 
 
 def _upright(probe: Probe, sign: float, zero: float) -> Probe:
@@ -168,7 +219,7 @@ def _at_the_least(
     """Decide on a narrow piece: nothing, one event that touches, or two."""
     low, high = near
     share, least, _ = _least(curve, low, high)
-    zero = TOUCH * float(min(np.abs(ends[0].value[0]), np.abs(ends[1].value[0])))
+    zero = _zero(ends)
     if least > zero:
         return []
     piece = replace(step_between(near, 0), step=_chord(curve, low, high))
