@@ -80,6 +80,19 @@ def test_the_network_stays_where_it_is_put():
     assert here == pytest.approx(there, rel=1e-9)
 
 
+def test_the_network_snaps_over_at_its_fold():
+    """One way it comes to rest inverted, the other way is held: the second softest mode is slow."""
+    rest = structure("network").natural_state()
+    with unchecked():
+        fold = em.lift(rest, {"P": 30.0}).end
+        landings = {each.status: each for each in em.snap_landing(fold.state)}
+    assert fold.kind == "fold"
+    assert set(landings) == {"landed", "held"}
+    height = rest.structure.displacement("M2", "y")
+    assert height(landings["landed"].state) < -0.6
+    assert landings["landed"].released > 1.0
+
+
 @pytest.mark.slow
 def test_the_network_is_pressed_over_and_pulled_back():
     """The loads that its study file names, to four digits."""

@@ -19,8 +19,8 @@ from equimorph.structures import State, States
 class LimitLoad:
     """The largest load met up to the first critical point.
 
-    kind: "fold", "branch point", "constraint", "none below the bound", "undefined unloaded" (a
-    constraint fails at the start) or "lost"; `state`: where the path ended.
+    kind: "fold", "branch point", "multiple point", "constraint", "none below the bound", "undefined
+    unloaded" (a constraint fails at the start) or "lost"; `state`: where the path ended.
     """
 
     value: float

@@ -51,11 +51,12 @@ UNRESOLVED = "the discretisation does not resolve the state: refine it"
 
 @dataclass(frozen=True)
 class Loss:
-    """A lane that cannot go on: its number, why, and the last point."""
+    """A lane that cannot go on: its number, why, the last point, and the length of its way."""
 
     lane: int
     why: str
     front: Front
+    travelled: float
 
 
 class Block:
@@ -304,7 +305,7 @@ class Block:
 
     def _given_up(self) -> list[Loss]:
         """Lanes that cannot go on."""
-        counts, lost = self._scalars[1], []
+        (numbers, counts), lost = self._scalars, list[Loss]()
         stage = counts[kernels.STAGE, : self.active]
         for i in np.flatnonzero(stage > ENDED):
             why = WHY[int(stage[i])].format(most=counts[kernels.MOST, i])
@@ -312,7 +313,8 @@ class Block:
             state = self.curve.take(counts[kernels.LANE, [i]]).states(front.z, front.t)
             if not self.curve.structure.resolved(*state)[0]:
                 why = f"{why}, where {UNRESOLVED}"
-            lost.append(Loss(int(counts[kernels.LANE, i]), why, front))
+            length = float(numbers[kernels.TRAVELLED, i])
+            lost.append(Loss(int(counts[kernels.LANE, i]), why, front, length))
         return lost
 
     def drop(self, lanes: Some) -> None:

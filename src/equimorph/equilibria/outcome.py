@@ -32,7 +32,7 @@ Values = Float[np.ndarray, " lanes"]
 Names = Int[np.ndarray, " lanes"]
 Some = Int[np.ndarray, " some"]
 
-LOST, CANCELLED = 0, -1
+LOST, CANCELLED, MULTIPLE = 0, -1, -3
 KINDS = {
     ARRIVAL: "arrived",
     RETURN: "returned",
@@ -41,6 +41,7 @@ KINDS = {
     CONSTRAINT: "constraint",
     CRITICAL: "critical",
     LOST: "lost",
+    MULTIPLE: "multiple point",
     CANCELLED: "cancelled",
 }
 LANES_PER_THREAD = 128
@@ -204,6 +205,7 @@ class _Job:
             lane, front = loss.lane, loss.front
             ledger.z[lane], ledger.t[lane] = front.z[0], front.t[0]
             ledger.index[lane], ledger.why[lane] = front.index[0], loss.why
+            ledger.travelled[lane] = loss.travelled
         self.queue.finish(len(lost))
 
     def _locate(self) -> None:

@@ -20,6 +20,8 @@ CRITICAL = 1e-6
 """Stability margin up to which a state without negative eigenvalues may be left."""
 NUDGES = (1e-2, 1e-3, 1e-4)
 """Distances from the start along its eigenvector, in the metric, from which the flow is tried."""
+SHORTER = (1.0, 0.1, 0.01, 0.001)
+"""Lengths of steps there, relative to the longest."""
 RELAXATIONS = 4
 """Steps in which stiff modes come to rest before it is asked whether a nudge grows."""
 INVERSE_ITERATIONS = 4
@@ -116,8 +118,8 @@ def snap_landing(state: State, *, at: Mapping[str, float] | None = None) -> tupl
         )
     soft = _Softest.of(state)
     starts = {direction: _start(state, soft, direction) for direction in (1, -1)}
-    leaving = {direction: z for direction, z in starts.items() if z is not None}
-    landings = {direction: _held(state, direction) for direction in starts}
+    leaving = {direction: z for direction, (z, _) in starts.items() if z is not None}
+    landings = {way: _still(state, way, told=told) for way, (_, told) in starts.items()}
     if leaving:
         p = np.tile(state.p, (len(leaving), 1))
         rate = np.full(len(leaving), soft.rate)
@@ -177,31 +179,49 @@ def _unit(structure: Structure, vector: Mode) -> Mode:
     return np.asarray(vector / metric_length(structure, vector[None])[0])
 
 
-def _start(state: State, soft: _Softest, direction: int) -> Lanes | None:
-    """Configuration from which the flow leaves along, or against, the softest mode, if it does."""
-    tries = (_nudged(state, soft, direction * size) for size in NUDGES)
-    return next((z for z in tries if z is not None), None)
+def _start(state: State, soft: _Softest, direction: int) -> tuple[Lanes | None, bool]:
+    """Configuration from which the flow leaves along, or against, the softest mode, if it does.
 
-
-def _held(state: State, direction: int) -> Landing:
-    detail = "the energy rises in this direction"
-    return Landing("held", direction, state, 0.0, state.batch, np.zeros(1), detail)
-
-
-def _nudged(state: State, soft: _Softest, size: float) -> Lanes | None:
-    """Configuration beside the state on the constraints, if the flow leads away from it there."""
-    structure, n, p = state.structure, state.structure.unknowns, state.p[None]
+    Also whether a flow beside the state could be followed at all. Steps that cannot be solved,
+    because the energy bends down within them, are tried again shorter.
+    """
     # stiff modes relax, the soft one is not amplified much
-    h = np.array([min(10.0 / soft.rate, 0.3 / max(abs(soft.eigenvalue), 1e-300))])
+    longest = min(10.0 / soft.rate, 0.3 / max(abs(soft.eigenvalue), 1e-300))
+    told = False
+    for size in NUDGES:
+        moved = (_nudged(state, soft, direction * size, longest * each) for each in SHORTER)
+        z, away = next((found for found in moved if found is not None), (None, 0.0))
+        if away > 0.0:
+            return z, True
+        told = told or z is not None
+    return None, told
+
+
+def _still(state: State, direction: int, *, told: bool) -> Landing:
+    """Nothing moves, as far as can be told."""
+    status, detail = (
+        ("held", "the energy rises in this direction")
+        if told
+        else ("lost", "no step beside the state, however short, could be solved")
+    )
+    return Landing(status, direction, state, 0.0, state.batch, np.zeros(1), detail)
+
+
+def _nudged(state: State, soft: _Softest, size: float, h: float) -> tuple[Lanes, float] | None:
+    """Configuration beside the state on the constraints, and how fast the flow leads away there.
+
+    None if a step of length h cannot be solved.
+    """
+    structure, n, p = state.structure, state.structure.unknowns, state.p[None]
     z = state.z[None].copy()
     z[0, :n] += size * soft.mode
     for _ in range(RELAXATIONS):
         before = z
-        z, solved = implicit_step(structure, z, p, h)
+        z, solved = implicit_step(structure, z, p, np.array([h]))
         if not solved[0]:
             return None
     away = (z - before)[0, :n] @ (structure.mass * soft.mode)
-    return z if away * size > 0.0 else None
+    return z, float(np.sign(size) * away)
 
 
 def _after_change(state: State, p: Float[np.ndarray, " parameters"]) -> Landing:

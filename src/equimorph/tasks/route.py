@@ -101,6 +101,7 @@ def obstacle(end: Event, names: Sequence[str]) -> str:
     what = {
         "fold": "a fold: stability is lost and the structure would snap",
         "branch point": f"a {end.criticality} branch point: stability is lost",
+        "multiple point": f"a multiple point ({end.detail})",
         "constraint": f"the constraint {end.detail}",
     }.get(end.kind, f"a numerical failure ({end.detail})")
     return f"{what}, at {place(end.state, names)}"

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.lifting.legs import Leg, listed, of_some, prepared
 from equimorph.equilibria.lifting.paths import Event
+from equimorph.equilibria.multiple import with_multiple_points
 from equimorph.equilibria.normal_form import criticality
 from equimorph.equilibria.outcome import CANCELLED, KINDS, Outcome, follow
 from equimorph.equilibria.starts import violated
@@ -135,6 +136,7 @@ def lift_many(
             begun = replace(begun, curve=begun.curve.take(far), z=begun.z[far])
         if len(far):
             outcome = follow(begun.curve, begun.z, within, options, progress=progress)
+            outcome = with_multiple_points(begun.curve, begun.z, outcome)
             ledger.enter(going[far], begun.curve, outcome, number)
         ledger.at[ledger.code == ARRIVAL] = number + 1.0
         if (ledger.code == CANCELLED).any():

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.hidden import with_hidden_events
 from equimorph.equilibria.lifting.legs import Leg, listed, prepared
+from equimorph.equilibria.multiple import with_multiple_points
 from equimorph.equilibria.normal_form import criticality
 from equimorph.equilibria.outcome import KINDS, LOST, Outcome, follow
 from equimorph.equilibria.tracing import BRANCH, CONSTRAINT, FOLD, TraceOptions
@@ -23,7 +24,9 @@ class Event:
 
     kind: "arrived", "fold", "branch point", "constraint", "returned" (a path that turned at a fold
     came back to the parameters of its start), "critical" (stability changes where a path with
-    unknown parameters goes on) or "lost"; `at`: number of the leg + share of it;
+    unknown parameters goes on), "multiple point" (several eigenvalues vanish at once, so that the
+    path has no direction; it ends within round-off of it) or "lost"; `at`: number of the leg +
+    share of it;
     `criticality` of branch points; `detail`: one line.
     """
 
@@ -92,6 +95,7 @@ def lift_one(
         outcome = follow(begun.curve, begun.z, within, options, progress=progress)
         if begun.curve.folds_change_index:
             outcome = with_hidden_events(begun.curve, begun.z, outcome, options)
+        outcome = with_multiple_points(begun.curve, begun.z, outcome)
         pieces.append(_segment(begun.curve, outcome, number, within))
         if pieces[-1].events[-1].kind != "arrived":
             break
