@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.equilibria.natural_sheet import natural_sheet
 from equimorph.model import parameter_vector
-from equimorph.tasks.maps.natural import natural_sheet
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Grid, parameter_vector, position
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.maps.curves import MapCurve
-from equimorph.tasks.maps.natural import NaturalSheet, natural_sheet
 
 
 @dataclass(frozen=True, eq=False)

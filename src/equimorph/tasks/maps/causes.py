@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.equilibria.locus import Test
+from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.tasks.maps.brackets import Brackets, Edges
-from equimorph.tasks.maps.natural import NaturalSheet
 from equimorph.tasks.maps.samples import Samples, Settings
 
 

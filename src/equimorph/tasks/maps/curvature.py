@@ -8,13 +8,13 @@ import numpy as np
 from jaxtyping import Bool
 
 from equimorph.equilibria import TraceOptions
+from equimorph.equilibria.natural_sheet import natural_sheet
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Grid, Progress, Silent, position
 from equimorph.structures import States, Structure
 from equimorph.tasks.maps.actuator_map import ActuatorMap, settings_of, unloaded_base
 from equimorph.tasks.maps.curves import curves_through, places_on
 from equimorph.tasks.maps.edge import edge_of_definition
-from equimorph.tasks.maps.natural import natural_sheet
 from equimorph.tasks.maps.passages import KINDS, Passages
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.structures import States
 from equimorph.tasks.maps.brackets import (
     PARTS,
@@ -19,7 +20,6 @@ from equimorph.tasks.maps.brackets import (
 )
 from equimorph.tasks.maps.causes import Paths
 from equimorph.tasks.maps.chains import chains
-from equimorph.tasks.maps.natural import NaturalSheet
 from equimorph.tasks.maps.polish import polished
 from equimorph.tasks.maps.samples import Samples, difference
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from equimorph.equilibria import LimitLoad, TraceOptions, limit_load
+from equimorph.equilibria.natural_sheet import natural_sheet
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Grid, Progress, Silent, position
 from equimorph.structures import States, Structure
 from equimorph.tasks.maps.actuator_map import ActuatorMap, settings_of, unloaded_base
 from equimorph.tasks.maps.curves import curves_through, places_on
 from equimorph.tasks.maps.edge import edge_of_definition
-from equimorph.tasks.maps.natural import natural_sheet
 from equimorph.tasks.maps.rays import KINDS, Rays
 
 

@@ -8,11 +8,11 @@ from jaxtyping import Bool, Float
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD
 from equimorph.model import Constraint
 from equimorph.tasks.maps.brackets import Brackets, Edges
 from equimorph.tasks.maps.causes import Cause
-from equimorph.tasks.maps.natural import NaturalSheet
 from equimorph.tasks.maps.samples import Samples, Settings
 from equimorph.tasks.maps.unloaded import LOST, START_KINDS, unloaded
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.model import Constraint
-from equimorph.tasks.maps.natural import NaturalSheet
 from equimorph.tasks.maps.samples import Samples, Settings
 
 START_KINDS = ("undefined unloaded", "no natural state", "lost")

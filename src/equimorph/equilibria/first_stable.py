@@ -1,0 +1,121 @@
+"""Paths in a load, through unstable parts too, to the first stable state at a given load."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria.curves import ParameterLine
+from equimorph.equilibria.normal_form import criticality
+from equimorph.equilibria.outcome import Outcome, follow
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, RETURN, TraceOptions
+from equimorph.model import Constraint
+from equimorph.structures import Structure
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+
+WAYS = ("lost", "stable", "snaps", "branches off", "constraint", "none")
+"""What a real loading does, or why there is no state, in the order of their numbers."""
+LOST, STABLE, SNAPS, OFF, BOUND, NONE = range(len(WAYS))
+FOLLOWED = ("supercritical", "transcritical")
+"""Branch points at which a real structure goes over to another branch without a snap."""
+PASSAGES = 20
+"""How often a path may pass the given load, or none, before it is given up."""
+
+
+@dataclass(frozen=True)
+class _Walk:
+    """Paths on their way: lane, state, what happened, the level where they are, and direction."""
+
+    lane: Int[np.ndarray, " lanes"]
+    z: Lanes
+    p: Parameters
+    at: Float[np.ndarray, " lanes"]
+    way: Int[np.ndarray, " lanes"]
+    high: Bool[np.ndarray, " lanes"]
+    up: Bool[np.ndarray, " lanes"]
+
+    def take(self, some: Bool[np.ndarray, " lanes"]) -> "_Walk":
+        """Return some of the lanes."""
+        return _Walk(*(column[some] for column in vars(self).values()))
+
+
+@dataclass(frozen=True)
+class FirstStable:
+    """The first stable state at a given load on paths from unloaded states.
+
+    Attributes
+    ----------
+    structure
+        The structure.
+    load, low
+        Place of the parameter along which paths run, and its value where they start.
+    bound
+        Largest load, of either sign, up to which paths are followed.
+    within
+        Constraints that end paths.
+    options
+        Step control; paths must go through folds and branch points.
+    """
+
+    structure: Structure
+    load: int
+    low: float
+    bound: float
+    within: tuple[Constraint, ...]
+    options: TraceOptions
+
+    def __call__(
+        self, z: Lanes, p: Parameters, at: Float[np.ndarray, " lanes"]
+    ) -> tuple[Lanes, Parameters, Int[np.ndarray, " lanes"]]:
+        """States at loads `at` (other than the unloaded one), and numbers in `WAYS`."""
+        z, p, way = z.copy(), p.copy(), np.full(len(z), LOST)
+        still = np.zeros(len(z), bool)
+        stable = np.full(len(z), STABLE)
+        walk = _Walk(np.arange(len(z)), z.copy(), p.copy(), at, stable, still, ~still)
+        for _ in range(PASSAGES):
+            if not len(walk.lane):
+                break
+            here, end = self._passed(walk)
+            z[here.lane], p[here.lane], way[here.lane] = here.z, here.p, end
+            walk = here.take(end == LOST).take(np.isfinite(here.z[end == LOST, 0]))
+        way[walk.lane] = NONE
+        return z, p, way
+
+    def _passed(self, walk: _Walk) -> tuple[_Walk, Int[np.ndarray, " lanes"]]:
+        """Paths at the next level that they meet, and how they end there: `LOST` if they go on.
+
+        The levels are the unloaded structure and the given load. Lost paths have no state.
+        """
+        far = np.where(walk.up == (walk.at > self.low), self.bound, -self.bound)
+        goal = np.where(walk.up == walk.high, far, np.where(walk.high, self.low, walk.at))
+        velocity = np.zeros_like(walk.p)
+        velocity[:, self.load] = goal - walk.p[:, self.load]
+        line = ParameterLine(self.structure, walk.p.copy(), velocity)
+        ended = follow(line, walk.z.copy(), self.within, self.options)
+        arrived, returned = ended.code == ARRIVAL, ended.code == RETURN
+        outside = arrived & (walk.up == walk.high)
+        inside = (arrived & ~outside) | returned
+        high, up = walk.high ^ (arrived & ~outside), walk.up ^ returned
+        p = line.parameters(ended.t)
+        p[inside, self.load] = np.where(high, walk.at, self.low)[inside]
+        z = np.where((inside | outside | (ended.code == CONSTRAINT))[:, None], ended.z, np.nan)
+        way = np.where(walk.way == STABLE, _first_loss(line, ended), walk.way)
+        met = inside & high & (ended.index == 0)
+        kind = np.select([met, outside, ended.code == CONSTRAINT], [way, NONE, BOUND], LOST)
+        return _Walk(walk.lane, z, p, walk.at, way, high, up), kind
+
+
+def _first_loss(line: ParameterLine, ended: Outcome) -> Int[np.ndarray, " lanes"]:
+    """What the first loss of stability on the way means for a real loading."""
+    way = np.full(len(ended.code), STABLE)
+    losses = ended.passed.take(ended.passed.index[:, 1] > 0)
+    lanes, first = np.unique(losses.lanes, return_index=True)
+    way[lanes] = SNAPS
+    branch = np.flatnonzero(losses.code[first] == BRANCH)
+    if len(branch):
+        at, which = lanes[branch], first[branch]
+        kinds = criticality(line.take(at), losses.z[which], losses.t[which])
+        way[at[np.isin(kinds, FOLLOWED)]] = OFF
+    return way
