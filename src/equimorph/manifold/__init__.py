@@ -9,7 +9,16 @@ from equimorph.manifold.equilibrium_set import (
     EquilibriumSet,
     Stratum,
 )
-from equimorph.manifold.levels import Level, cell_sizes, level_set, part, restricted, singular_set
+from equimorph.manifold.levels import (
+    Division,
+    Level,
+    cell_sizes,
+    divided,
+    level_set,
+    part,
+    restricted,
+    singular_set,
+)
 from equimorph.manifold.locate import Location, Place, locate
 from equimorph.manifold.over import StatesOver, lift_to
 from equimorph.manifold.refinement import refine
@@ -22,6 +31,7 @@ __all__ = [
     "Boundary",
     "Component",
     "Cusps",
+    "Division",
     "EquilibriumSet",
     "Level",
     "Location",
@@ -33,6 +43,7 @@ __all__ = [
     "Stratum",
     "cell_sizes",
     "cusps",
+    "divided",
     "equilibrium_set",
     "level_set",
     "lift_to",

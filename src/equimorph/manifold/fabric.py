@@ -211,7 +211,9 @@ def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
     folded = flags_of(whole.facets, np.concatenate(folds))
     outer = whole.counts == 1
     marks = np.where(folded, ON_FOLD, 0)
-    marks[outer] |= _outer_marks(eset, whole.facets[outer])
+    outer_marks = _outer_marks(eset, whole.facets[outer])
+    # of parts of sets folds are boundaries, too
+    marks[outer] |= np.where(folded[outer], outer_marks & ~HOLE, outer_marks)
     marked = marks > 0
     box = np.stack([eset.box.lower, eset.box.upper])
     squared = squared_sides(vertices.place, eset.cells)

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.nearest import Ground, Spot, local_minima, setting_of, spots
+from equimorph.manifold.over import StatesOver
 from equimorph.manifold.topology import faces_of
 from equimorph.model import Descriptor, position
 from equimorph.structures import State, States, Structure
@@ -246,6 +247,22 @@ def _places(
 
 def pieces_of(eset: EquilibriumSet, state: State) -> tuple[int, int]:
     """Stratum and component that a state of the set lies on, −1 if it lies on none."""
+    here = _place_over(eset, state)
+    return (
+        (-1, -1)
+        if here is None
+        else (int(here[0].stratum[here[1]]), int(here[0].component[here[1]]))
+    )
+
+
+def cell_of(eset: EquilibriumSet, state: State) -> int:
+    """Cell that a state of the set lies in, −1 if it lies in none."""
+    here = _place_over(eset, state)
+    return -1 if here is None else int(here[0].cell[here[1]])
+
+
+def _place_over(eset: EquilibriumSet, state: State) -> tuple[StatesOver, int] | None:
+    """Equilibria of the set over a state's parameters, and which of them it is."""
     sides = zip(eset.names, eset.box.lower, eset.box.upper, strict=True)
     # round-off may have put it a little beyond a side of the box
     at = {name: np.array([np.clip(state[name], low, high)]) for name, low, high in sides}
@@ -254,7 +271,4 @@ def pieces_of(eset: EquilibriumSet, state: State) -> tuple[int, int]:
     gap = np.sqrt((here.states.z - state.z)[:, :n] ** 2 @ mass)
     # next to a fold a state over rounded parameters moves by the root of round-off
     near = np.flatnonzero(gap < 10.0 * SAME)
-    if len(near) == 0:
-        return -1, -1
-    best = near[gap[near].argmin()]
-    return int(here.stratum[best]), int(here.component[best])
+    return (here, int(near[gap[near].argmin()])) if len(near) else None

@@ -18,6 +18,7 @@ from equimorph.tasks.maps import (
     unloaded_base,
 )
 from equimorph.tasks.plan import plan
+from equimorph.tasks.reach import Reach, attainable, reachable
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes import Shapes, solve_shape
 from equimorph.tasks.tracking import Tracking, track
@@ -32,18 +33,21 @@ __all__ = [
     "MeasuredShape",
     "MeasuredValues",
     "Proof",
+    "Reach",
     "Resolving",
     "Route",
     "Shapes",
     "StateEstimate",
     "Tracking",
     "Verification",
+    "attainable",
     "calibrate",
     "curvature_map",
     "estimate_state",
     "limit_load_map",
     "natural_states_over",
     "plan",
+    "reachable",
     "solve_shape",
     "track",
     "unloaded_base",

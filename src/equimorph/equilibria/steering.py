@@ -1,0 +1,63 @@
+"""How descriptors of regular states answer their parameters."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.model import Descriptor
+from equimorph.structures import Structure
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+
+DIFFERENCE = 1e-3
+"""Step of central differences of fourth order, relative to the scales of the parameters and to the
+metric: their error and that of round-off are about 1e-12."""
+
+
+def answers(
+    structure: Structure, z: Lanes, p: Parameters, free: Int[np.ndarray, " k"]
+) -> tuple[Float[np.ndarray, "lanes k size"], Float[np.ndarray, "lanes k parameters"]]:
+    """Changes of z and p for each free parameter, one scale of it: ``z' = −F_z⁻¹ F_p``."""
+    lanes, k = len(z), len(free)
+    dp = np.zeros((lanes, k, p.shape[1]))
+    dp[:, np.arange(k), free] = structure.scales[free]
+    columns = np.stack(
+        [structure.parameter_derivative(z, p, np.ascontiguousarray(dp[:, i])) for i in range(k)], 1
+    )
+    return structure.solve(z, p, -columns).x, dp
+
+
+def slopes_along(
+    structure: Structure,
+    here: tuple[Lanes, Parameters],
+    along: tuple[Float[np.ndarray, "lanes k size"], Float[np.ndarray, "lanes k parameters"]],
+    descriptors: Sequence[Descriptor],
+) -> Float[np.ndarray, "lanes m k"]:
+    """Derivatives of descriptors along directions (dz, dp) from states."""
+    (z, p), (dz, dp) = here, along
+    n, (lanes, k, _) = structure.unknowns, dz.shape
+    # the softer the direction, the shorter the step, so that differences stay small in the metric
+    size = np.sqrt(dz[:, :, :n] ** 2 @ structure.mass + ((dp / structure.scales) ** 2).sum(axis=2))
+    h = (DIFFERENCE / np.maximum(size, 1e-300))[:, :, None]
+    shifts = np.array([-2.0, -1.0, 1.0, 2.0])
+    trial_z = (z[:, None, None] + shifts[:, None] * (h * dz)[:, :, None]).reshape(-1, z.shape[1])
+    trial_p = (p[:, None, None] + shifts[:, None] * (h * dp)[:, :, None]).reshape(-1, p.shape[1])
+    weights = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
+    out = [
+        each.function(trial_z, trial_p).reshape(lanes, k, 4) @ weights / h[:, :, 0]
+        for each in descriptors
+    ]
+    return np.stack(out, axis=1)
+
+
+def steering(
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    free: Int[np.ndarray, " k"],
+    descriptors: Sequence[Descriptor],
+) -> Float[np.ndarray, "lanes m k"]:
+    """Jacobian of descriptors by free parameters along the set, per scale of these."""
+    return slopes_along(structure, (z, p), answers(structure, z, p, free), descriptors)
