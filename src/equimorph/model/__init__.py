@@ -1,7 +1,7 @@
 """Plain data: parameters, boxes, descriptors, constraints, schedules, progress sinks."""
 
 from equimorph.model.box import Box, Grid
-from equimorph.model.descriptor import Constraint, Descriptor
+from equimorph.model.descriptor import Constraint, Descriptor, combined, largest_of
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.parameter import (
     Parameter,
@@ -30,6 +30,8 @@ __all__ = [
     "Schedule",
     "Silent",
     "Spline",
+    "combined",
+    "largest_of",
     "names_of",
     "parameter_vector",
     "position",

@@ -14,6 +14,11 @@ Evaluate = Callable[
     Float[np.ndarray, " lanes"],
 ]
 
+Branches = Callable[
+    [Float[np.ndarray, "lanes size"], Float[np.ndarray, "lanes parameters"]],
+    tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]],
+]
+
 
 @runtime_checkable
 class OneState(Protocol):
@@ -62,6 +67,9 @@ class Descriptor:
         equal, whenever they were made; without an origin, those with the same function.
     place
         For extrema along the structure: the arclength where they are.
+    branches
+        For the largest of several smooth functions: all of them (−∞ where there are fewer) and
+        their places, by which they are told apart.
     """
 
     name: str
@@ -70,6 +78,7 @@ class Descriptor:
     symbol: str = ""
     origin: Hashable = None
     place: Evaluate | None = None
+    branches: Branches | None = None
 
     # one and many states differ by the number of axes only, which static types do not see
     @overload
@@ -139,3 +148,58 @@ class Constraint:
     def holds(self, states: ManyStates) -> Bool[np.ndarray, " lanes"]:
         """Whether states obey the constraint."""
         return self.excess(states.z, states.p) <= 0.0
+
+
+def combined(
+    name: str, function: Callable[..., Any], *descriptors: Descriptor, unit: str = "1"
+) -> Descriptor:
+    """Descriptor that is a function of others: ``combined("gap", lambda a, b: a - b, one, other)``.
+
+    Parameters
+    ----------
+    name
+        Its name; by this it is told apart from other descriptors of the structure.
+    function
+        Of as many arrays (lanes) as descriptors, entry by entry.
+    descriptors
+        At least one, of one structure.
+    unit
+        Its unit.
+
+    Raises
+    ------
+    InputError
+        Without descriptors, or for those of different structures.
+    """
+    if len({each.origin for each in descriptors}) != 1:
+        raise InputError(
+            "`descriptors` must be one or more of one structure; got "
+            f"{', '.join(each.name for each in descriptors) or 'none'}."
+        )
+
+    def value(
+        z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
+    ) -> Float[np.ndarray, " lanes"]:
+        return np.asarray(function(*(each.function(z, p) for each in descriptors)), dtype=float)
+
+    return Descriptor(name, unit, value, name)
+
+
+def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
+    """Largest of several smooth descriptors; its minima, kinks among them, can be found exactly.
+
+    Raises
+    ------
+    InputError
+        As for `combined`.
+    """
+    whole = combined(name, lambda *values: np.max(values, axis=0), *descriptors)
+    unit = descriptors[0].unit
+
+    def branches(
+        z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
+    ) -> tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]]:
+        values = np.stack([each.function(z, p) for each in descriptors], axis=1)
+        return values, np.tile(np.arange(float(len(descriptors))), (len(z), 1))
+
+    return Descriptor(name, unit, whole.function, name, branches=branches)

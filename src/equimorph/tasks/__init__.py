@@ -17,6 +17,7 @@ from equimorph.tasks.maps import (
     natural_states_over,
     unloaded_base,
 )
+from equimorph.tasks.optimising import Certificate, Optima, Optimum, optimise
 from equimorph.tasks.plan import plan
 from equimorph.tasks.reach import Reach, attainable, reachable
 from equimorph.tasks.route import Route
@@ -27,11 +28,14 @@ from equimorph.tasks.verification import Proof, Verification, verify
 __all__ = [
     "ActuatorMap",
     "Calibration",
+    "Certificate",
     "CurvatureMap",
     "LimitLoadMap",
     "MapCurve",
     "MeasuredShape",
     "MeasuredValues",
+    "Optima",
+    "Optimum",
     "Proof",
     "Reach",
     "Resolving",
@@ -46,6 +50,7 @@ __all__ = [
     "estimate_state",
     "limit_load_map",
     "natural_states_over",
+    "optimise",
     "plan",
     "reachable",
     "solve_shape",

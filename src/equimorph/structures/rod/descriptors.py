@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
+from equimorph.structures.peaks import peaks, stations
 from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.validity import clearance
@@ -15,6 +16,7 @@ from equimorph.structures.rod.validity import clearance
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
+Extrema = Float[np.ndarray, "lanes extrema"]
 
 WRITTEN = (
     *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy", "clearance(s)"),
@@ -94,8 +96,17 @@ def max_curvature(rod: Measured) -> Descriptor:
     def place(z: Lanes, p: Parameters) -> Values:
         return rod.mechanics.largest_curvature(z, p)[1]
 
+    def branches(z: Lanes, p: Parameters) -> tuple[Extrema, Extrema]:
+        at = stations(rod.mesh.breaks)
+        found, places = peaks(np.abs(rod.mechanics.fields(z, p, at)[:, :, 1]), at)
+        exact, where = rod.mechanics.largest_curvature(z, p)
+        gap = np.where(np.isfinite(found), np.abs(places - where[:, None]), np.inf)
+        largest = gap.argmin(axis=1)
+        found[np.arange(len(z)), largest] = exact
+        return unit * found, places
+
     label = rod.units.label("curvature")
-    return Descriptor("max_curvature", label, value, "max |κ|", rod.signature, place)
+    return Descriptor("max_curvature", label, value, "max |κ|", rod.signature, place, branches)
 
 
 def support_force(rod: Measured, component: str) -> Descriptor:

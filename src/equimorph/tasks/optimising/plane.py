@@ -1,0 +1,73 @@
+"""Moving on an equilibrium set in coordinates of its tangent spaces."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.nearest import setting_of, spots
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.pins import Aim, corrected
+from equimorph.manifold.tangents import placed_frames, split_step, tangent_frames
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Frames = Float[np.ndarray, "lanes d full"]
+Rows = Float[np.ndarray, "lanes d coordinates"]
+Steps = Float[np.ndarray, "lanes d"]
+
+ANYWHERE = 1e3
+"""Distance from its guess within which a corrected point will do."""
+
+
+@dataclass(frozen=True)
+class Spots:
+    """Points of a set with orthonormal bases of spaces near their tangent spaces."""
+
+    z: Lanes
+    p: Parameters
+    rows: Rows
+
+    def __len__(self) -> int:
+        """Number of points."""
+        return len(self.z)
+
+    def take(self, some: Int[np.ndarray, " n"] | Bool[np.ndarray, " lanes"]) -> "Spots":
+        """Some of the points."""
+        return Spots(self.z[some], self.p[some], self.rows[some])
+
+
+def spots_of(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> Spots:
+    """Vertices of a set, with the planes of cells around them."""
+    found = spots(eset, vertices)
+    return Spots(found.z, found.p, found.rows)
+
+
+def plane_of(eset: EquilibriumSet) -> Setting:
+    """Structure and free parameters of a set, without its constraints: steps may cross these."""
+    return replace(setting_of(eset), constraints=())
+
+
+def frames_of(setting: Setting, at: Spots) -> tuple[Frames, Spots]:
+    """Orthonormal tangents at points, and the points with these as their planes."""
+    frames = tangent_frames(setting, at.z, at.p, at.rows)
+    return frames, Spots(at.z, at.p, placed_frames(setting, frames))
+
+
+def stepped(setting: Setting, at: Spots, frames: Frames, steps: Steps) -> tuple[Lanes, Parameters]:
+    """Points of the tangent spaces, off the set by the square of the step."""
+    dz, dp = split_step(setting, np.einsum("ld,ldf->lf", steps, frames))
+    return at.z + dz, at.p + dp
+
+
+def settled(
+    setting: Setting, z: Lanes, p: Parameters, rows: Rows
+) -> tuple[Spots, Bool[np.ndarray, " lanes"]]:
+    """Points of the set orthogonally above points, in planes, and where there are any."""
+    d = len(setting.free)
+    span = np.tile(np.eye(d), (len(z), 1, 1))
+    aim = Aim(setting, False, False, span, embed(setting, z, p), rows)
+    pinned = corrected(aim, z, p, np.full(len(z), ANYWHERE))
+    return Spots(pinned.z, pinned.p, rows), pinned.found
