@@ -11,6 +11,7 @@ from PIL import Image
 from equimorph import plotting
 from equimorph.study import Outcome, run_study
 from equimorph.study.folder import PRIVATE
+from equimorph.tasks import Route
 from typecheck import unchecked
 
 SPRING = """\
@@ -68,6 +69,13 @@ def finished_run(base: Path) -> tuple[Outcome, Path]:
     with pytest.MonkeyPatch.context() as patch, unchecked():  # the layers below check themselves
         patch.setattr(plotting, "film", partial(plotting.film, frames=12))
         return run_study(base / "spring.toml", base / "out"), base / "out"
+
+
+def only_route(outcome: Outcome) -> Route:
+    """Route of a study that asks for one."""
+    (journey,) = outcome.of("route").values()
+    route: Route = journey.route
+    return route
 
 
 def with_answers_of(finished: Path, out: Path) -> Path:

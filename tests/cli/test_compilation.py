@@ -20,8 +20,8 @@ def test_a_study_around_settings_without_natural_states_can_be_compiled(tmp_path
     path = tmp_path / "around.toml"
     path.write_text(text.replace("Theta = [0.2, 2.5]", "Theta = [-2.5, 2.5]"))
     _, _, problem = read_problem(path)
-    assert problem.equilibrium_set is not None
-    assert problem.equilibrium_set.box.lower[0] == -2.5
+    assert problem.ground.extent is not None
+    assert problem.ground.extent.box.lower[0] == -2.5
     evaluate(problem)
 
 

@@ -12,7 +12,7 @@ from equimorph.storage import read_results
 from equimorph.study import run_study
 from equimorph.study.prepare import prepare
 from equimorph.study.problem import parse_study
-from studies import draw_dots
+from studies import draw_dots, only_route
 from typecheck import unchecked
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "column.toml"
@@ -33,7 +33,7 @@ def test_the_example_runs_from_file_to_page(drawn, tmp_path, monkeypatch):
     assert outcome.equilibrium_set.audit.clean
     lean = outcome.problem.structure.descriptor("lean")(outcome.points[0])
     np.testing.assert_allclose(np.sort(lean), [-lean.max(), 0.0, lean.max()], atol=1e-12)
-    route = outcome.routes[0].route
+    route = only_route(outcome)
     assert route.status == "arrived"
     assert route.path.states["P"].min() < (3.0 - np.sqrt(5.0)) / 2.0
     stored = results.equilibrium_set.structure

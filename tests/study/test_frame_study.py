@@ -12,7 +12,7 @@ from equimorph.storage import read_results
 from equimorph.study import run_study
 from equimorph.study.prepare import prepare
 from equimorph.study.problem import parse_study
-from studies import draw_dots
+from studies import draw_dots, only_route
 from typecheck import unchecked
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "lee.toml"
@@ -33,7 +33,7 @@ def test_the_example_runs_from_file_to_page(drawn, tmp_path, monkeypatch):
         results = read_results(tmp_path / "out" / "results.h5")
     assert outcome.equilibrium_set.audit.clean
     np.testing.assert_array_equal(np.sort(outcome.points[0].index), [0, 0, 1, 1, 2])
-    assert outcome.routes[0].route.status == "arrived"
+    assert only_route(outcome).status == "arrived"
     stored = results.equilibrium_set.structure
     assert stored.identity() == outcome.problem.structure.identity()
     assert (tmp_path / "out" / "index.html").is_file()

@@ -52,7 +52,7 @@ def run(tmp_path_factory):
 
 def test_a_study_has_the_maps_that_it_asks_for(run):
     """PHYSICS §2: F = k (1 − x_l^⅔)^{3/2} where x_l < 1."""
-    limits, angles = (each.map for each in run[0].maps)
+    limits, angles = run[0].of("map").values()
     x_l, k = np.meshgrid(*limits.grid.axes(), indexing="ij")
     folds = k * np.maximum(1.0 - x_l ** (2 / 3), 0.0) ** 1.5
     np.testing.assert_allclose(limits.value[x_l < 1], folds[x_l < 1], rtol=1e-9)
@@ -70,7 +70,7 @@ def test_the_folder_holds_figures_and_tables_of_maps(run):
 
 
 def test_the_table_of_a_map_gives_every_number_back(run):
-    limits = run[0].maps[0].map
+    limits = run[0].of("map")["limits"]
     with (run[2] / "limits-map.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == limits.value.size
@@ -83,13 +83,13 @@ def test_the_results_file_gives_maps_back(run):
     """Bit for bit, except natural states, which are computed again."""
     stored = read_results(run[2] / "results.h5").maps
     assert list(stored) == ["angles", "limits"]
-    for each in run[0].maps:
-        back = stored[each.name]
-        np.testing.assert_array_equal(back.value, each.map.value)
-        np.testing.assert_array_equal(back.status, each.map.status)
-        np.testing.assert_array_equal(back.states.z, each.map.states.z)
-        assert [curve.kind for curve in back.curves] == [curve.kind for curve in each.map.curves]
-        for one, other in zip(back.curves, each.map.curves, strict=True):
+    for name, amap in run[0].of("map").items():
+        back = stored[name]
+        np.testing.assert_array_equal(back.value, amap.value)
+        np.testing.assert_array_equal(back.status, amap.status)
+        np.testing.assert_array_equal(back.states.z, amap.states.z)
+        assert [curve.kind for curve in back.curves] == [curve.kind for curve in amap.curves]
+        for one, other in zip(back.curves, amap.curves, strict=True):
             np.testing.assert_array_equal(one.points, other.points)
             np.testing.assert_array_equal(one.errors, other.errors)
             np.testing.assert_array_equal(one.states.z, other.states.z)
@@ -97,7 +97,7 @@ def test_the_results_file_gives_maps_back(run):
 
 
 def test_xarray_opens_a_map_with_its_grid_lines(run):
-    limits = run[0].maps[0].map
+    limits = run[0].of("map")["limits"]
     with xr.open_dataset(run[2] / "results.h5", engine="h5netcdf", group="maps/limits") as data:
         assert data["value"].dims == ("x_l", "k")
         np.testing.assert_array_equal(data["k"], limits.grid.axes()[1])
@@ -107,17 +107,17 @@ def test_a_second_run_takes_maps_from_the_folder(run, monkeypatch):
     def fail(*_, **__):
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("equimorph.study.maps.limit_load_map", fail)
-    monkeypatch.setattr("equimorph.study.maps.curvature_map", fail)
+    monkeypatch.setattr("equimorph.study.kinds.map.limit_load_map", fail)
+    monkeypatch.setattr("equimorph.study.kinds.map.curvature_map", fail)
     again = run_study(run[1], run[2])
-    np.testing.assert_array_equal(again.maps[0].map.value, run[0].maps[0].map.value)
+    np.testing.assert_array_equal(again.of("map")["limits"].value, run[0].of("map")["limits"].value)
 
 
 def test_the_example_asks_for_maps_alone():
     path = Path(__file__).parents[2] / "examples" / "maps.toml"
     problem = prepare(parse_study(path.read_text(encoding="utf-8"), path.name))
-    assert [task.section.kind for task in problem.maps] == ["limit_load_map", "curvature_map"]
-    assert problem.equilibrium_set is None
+    assert [task.section.kind for task in problem.tasks] == ["limit_load_map", "curvature_map"]
+    assert problem.ground.extent is None
 
 
 @pytest.fixture(scope="module")
@@ -137,14 +137,16 @@ def test_maps_need_no_set(maps_alone, run):
     ends = (".png", ".svg", ".csv", "-curves.csv")
     ours = {"study.toml", "results.h5", "index.html", "equimorph.json", ".equimorph"}
     assert names == ours | {f"limits-map{end}" for end in ends}
-    np.testing.assert_array_equal(outcome.maps[0].map.value, run[0].maps[0].map.value)
+    np.testing.assert_array_equal(
+        outcome.of("map")["limits"].value, run[0].of("map")["limits"].value
+    )
 
 
 def test_a_results_file_without_a_set_gives_its_maps_back(maps_alone):
     outcome, out = maps_alone
     stored = read_results(out / "results.h5")
     assert stored.equilibrium_set is None
-    np.testing.assert_array_equal(stored.maps["limits"].value, outcome.maps[0].map.value)
+    np.testing.assert_array_equal(stored.maps["limits"].value, outcome.of("map")["limits"].value)
 
 
 def test_the_page_without_a_set_says_what_was_asked(maps_alone):

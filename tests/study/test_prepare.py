@@ -12,11 +12,11 @@ def _prepare(text: str) -> Problem:
 
 def test_a_study_becomes_objects(arch_text: str):
     problem = _prepare(arch_text)
-    assert problem.equilibrium_set.box.names == ("Theta", "Delta")
-    assert [str(constraint) for constraint in problem.equilibrium_set.constraints] == [
+    assert problem.ground.extent.box.names == ("Theta", "Delta")
+    assert [str(constraint) for constraint in problem.ground.extent.constraints] == [
         "max_curvature <= 20"
     ]
-    assert problem.tasks[0].constraints[0].bound == 20.0
+    assert problem.tasks[0].task.constraints[0].bound == 20.0
 
 
 def test_what_is_left_out_takes_the_structures_default(arch_text: str):
@@ -34,7 +34,7 @@ def test_a_load_table_reaches_the_rod(arch_text: str):
 
 def test_a_study_without_intervals_takes_those_of_the_library(arch_text: str):
     assert (
-        _prepare(arch_text.replace("intervals = [5, 9]", "")).equilibrium_set.intervals
+        _prepare(arch_text.replace("intervals = [5, 9]", "")).ground.extent.intervals
         == INTERVALS[2]
     )
 

@@ -13,6 +13,7 @@ from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, run_study
+from studies import only_route
 from typecheck import unchecked
 
 FIGURES = ["surface", "stable-plane", "over-plane", "over-shapes"]
@@ -48,7 +49,7 @@ def test_equilibria_of_the_spring_are_found(finished: tuple[Outcome, Path]):
 
 def test_the_route_leads_around_the_snap(finished: tuple[Outcome, Path]):
     """A stable way between both sides must pass x_l > 1, PHYSICS section 2."""
-    route = finished[0].routes[0].route
+    route = only_route(finished[0])
     assert route.status == "arrived"
     assert route.path.states["x_l"].max() > 1.0
     assert (route.path.index == 0).all()
@@ -74,7 +75,7 @@ def test_stored_results_are_those_of_the_run(finished: tuple[Outcome, Path]):
     stored = read_results(out / "results.h5")
     np.testing.assert_array_equal(stored.equilibrium_set.points.z, outcome.equilibrium_set.points.z)
     schedule = read_schedule(out / "over-schedule.csv")
-    np.testing.assert_array_equal(schedule.values, outcome.routes[0].route.schedule.values)
+    np.testing.assert_array_equal(schedule.values, only_route(outcome).schedule.values)
 
 
 def test_figures_are_pictures_and_the_film_moves(finished: tuple[Outcome, Path]):
@@ -103,7 +104,7 @@ def test_the_page_says_the_answers(finished: tuple[Outcome, Path]):
     assert "3 found, 2 of them stable" in page
     assert "0.6435" in page
     assert "Audit: clean" in page
-    assert f"smallest margin {outcome.routes[0].route.margin:.4g}" in page
+    assert f"smallest margin {only_route(outcome).margin:.4g}" in page
 
 
 @pytest.mark.usefixtures("plain_figures")
@@ -219,7 +220,7 @@ def test_a_start_that_is_no_equilibrium_stops_the_run_until_it_is_corrected(
 def test_a_refused_route_is_an_answer(spring_text: str, out: Path, tmp_path: Path):
     (tmp_path / "tight.toml").write_text(spring_text + "margin = 50.0\n")
     outcome = run_study(tmp_path / "tight.toml", out)
-    assert outcome.routes[0].route.status == "refused"
+    assert only_route(outcome).status == "refused"
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "Refused." in page
     assert not (out / "over-schedule.csv").exists()

@@ -12,7 +12,7 @@ from equimorph.storage import read_results
 from equimorph.study import run_study
 from equimorph.study.prepare import prepare
 from equimorph.study.problem import parse_study
-from studies import draw_dots
+from studies import draw_dots, only_route
 from typecheck import unchecked
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "truss.toml"
@@ -32,7 +32,7 @@ def test_the_example_runs_from_file_to_page(drawn, tmp_path, monkeypatch):
         results = read_results(tmp_path / "out" / "results.h5")
     assert outcome.equilibrium_set.audit.clean
     np.testing.assert_array_equal(np.sort(outcome.points[0].index), [0, 0, 1])
-    route = outcome.routes[0].route
+    route = only_route(outcome)
     assert route.status == "arrived"
     assert route.path.states["a"].min() < 1.0 - np.hypot(1.0, 0.3)
     stored = results.equilibrium_set.structure

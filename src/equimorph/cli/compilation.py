@@ -50,15 +50,11 @@ def march() -> None:
 
 def evaluate(problem: Problem) -> None:
     """Evaluate everything that the structure of a study knows of one state."""
-    structure, wanted = problem.structure, problem.equilibrium_set
-    if wanted is not None:
-        box, fixed, constraints = wanted.box, wanted.fixed, wanted.constraints
-    else:
-        task = problem.maps[0]
-        box, fixed, constraints = task.grid.box, task.section.fixed, task.constraints
+    structure, extent = problem.structure, next(iter(problem.extents.values()))
+    box, fixed, constraints = extent.box, extent.fixed, extent.constraints
     values = {each.name: each.default for each in structure.parameters}
     values |= dict(zip(box.names, (box.lower + box.upper) / 2, strict=True))
-    values |= fixed | dict(structure.unloaded())
+    values |= dict(fixed) | dict(structure.unloaded())
     p = np.array([[values[each.name] for each in structure.parameters]])
     structure.natural(p)
     z = structure.sample(p, np.random.default_rng(0))  # natural states need not exist here
@@ -70,5 +66,5 @@ def evaluate(problem: Problem) -> None:
     structure.resolved(z, p)
     structure.error_estimate(z, p)
     structure.shape(z, p)
-    for each in (problem.height, *(limit.descriptor for limit in constraints)):
+    for each in (problem.ground.height, *(limit.descriptor for limit in constraints)):
         each.function(z, p)

@@ -9,10 +9,12 @@ from rich.table import Table
 from equimorph.cli.compilation import are_compiled, compile_kernels
 from equimorph.cli.progress import ScreenProgress
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Box, Descriptor, names_of
+from equimorph.model import Descriptor, names_of
 from equimorph.structures import States, Structure
-from equimorph.study import Outcome, Problem, RouteOutcome, read_problem, run_study
-from equimorph.study.memory import amount, estimated_memory, intervals_of
+from equimorph.study import Outcome, Problem, read_problem, run_study
+from equimorph.study.kinds.map import MapTask
+from equimorph.study.lookup import Extent
+from equimorph.study.memory import amount, estimated_memory
 from equimorph.tasks import unloaded_base
 
 
@@ -26,7 +28,8 @@ def check_and_show(file: Path) -> None:
     """
     screen = Console(highlight=False)
     _, study, problem = read_problem(file)
-    counts = {"point": len(study.equilibria), "route": len(study.routes), "map": len(study.maps)}
+    counts = {"point": len(study.equilibria)}
+    counts |= {table: len(sections) for table, sections in study.tasks.items()}
     asked = [_count(number, word) for word, number in counts.items() if number]
     what = " and ".join(asked) or "an equilibrium set"
     screen.print(f"{escape(str(file))} is a sound study with {what}.", soft_wrap=True)
@@ -59,7 +62,7 @@ def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
 
 def _extents(problem: Problem) -> list[str]:
     """Every parameter of the set and of each map with its values, also those at defaults."""
-    wanted, structure = problem.equilibrium_set, problem.structure
+    wanted, structure = problem.ground.extent, problem.structure
     lines = []
     if wanted is not None:
         values = {
@@ -68,22 +71,29 @@ def _extents(problem: Problem) -> list[str]:
         fixed = [
             f"{name} = {value:g}" for name, value in values.items() if name not in wanted.box.names
         ]
-        lines.append(_extent(structure, wanted.box, wanted.intervals, fixed))
-    for task in problem.maps:
-        grid, load = task.grid, task.section.load
-        base = unloaded_base(structure, grid, load, task.section.fixed).tolist()
-        start = dict(zip(names_of(structure.parameters), base, strict=True))
-        load_range = f"{load} from {start.pop(load):g} on"
-        fixed = [f"{name} = {value:g}" for name, value in start.items() if name not in grid.names]
-        words = _extent(structure, grid.box, intervals_of(task), [load_range, *fixed])
-        lines.append(f"Map {task.section.name}: {words}")
+        lines.append(_extent(structure, wanted, fixed))
+    for asked in problem.tasks:
+        if isinstance(asked.task, MapTask):
+            own = _extent(structure, problem.extents[asked.key], _values_of_map(asked.task))
+            lines.append(f"Map {asked.name}: {own}")
     return lines
 
 
-def _extent(structure: Structure, box: Box, intervals: tuple[int, int], others: list[str]) -> str:
-    limits = zip(box.names, box.lower, box.upper, intervals, strict=True)
+def _values_of_map(task: MapTask) -> list[str]:
+    """Where its load begins, and the parameters that keep their values."""
+    structure, grid, load = task.structure, task.grid, task.section.load
+    base = unloaded_base(structure, grid, load, task.section.fixed).tolist()
+    start = dict(zip(names_of(structure.parameters), base, strict=True))
+    load_range = f"{load} from {start.pop(load):g} on"
+    others = (f"{name} = {value:g}" for name, value in start.items() if name not in grid.names)
+    return [load_range, *others]
+
+
+def _extent(structure: Structure, extent: Extent, others: list[str]) -> str:
+    box = extent.box
+    limits = zip(box.names, box.lower, box.upper, extent.intervals, strict=True)
     free = [f"{name} from {low:g} to {up:g} in {n} intervals" for name, low, up, n in limits]
-    memory = amount(estimated_memory(structure.size, intervals))
+    memory = amount(estimated_memory(structure.size, extent.intervals))
     return f"{', '.join(free)}; {', '.join(others)}. Memory: about {memory}."
 
 
@@ -92,18 +102,15 @@ def _count(number: int, word: str) -> str:
 
 
 def _show(outcome: Outcome, screen: Console) -> None:
-    heights = outcome.problem.height
+    heights = outcome.problem.ground.height
     if outcome.equilibrium_set is not None:
         screen.print(_set_line(outcome.equilibrium_set, reused=outcome.reused), soft_wrap=True)
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):
         where = ", ".join(f"{name} = {value:g}" for name, value in point.items())
         screen.print(f"Equilibria at {where}:", soft_wrap=True)
         screen.print(_table(heights, states))
-    for each in outcome.routes:
-        screen.print(_verdict(each), soft_wrap=True)
-    for amap in outcome.maps:
-        counts = ", ".join(f"{count} {kind}" for kind, count in amap.map.counts.items() if count)
-        screen.print(f"Map {amap.name}: {counts}.", soft_wrap=True)
+    for each in outcome.answers:
+        screen.print(each.asked.kind.verdict(each.asked.task, each.answer), soft_wrap=True)
 
 
 def _set_line(eset: EquilibriumSet, *, reused: bool) -> str:
@@ -121,12 +128,3 @@ def _table(heights: Descriptor, states: States) -> Table:
     for height, index, margin, energy in values:
         table.add_row(f"{height:.5f}", str(index), f"{margin:.4f}", f"{energy:.5f}")
     return table
-
-
-def _verdict(each: RouteOutcome) -> str:
-    if not each.arrived:
-        return f"Route {each.name}: [bold red]refused[/]. {escape(each.route.why)}"
-    return (
-        f"Route {each.name}: [bold green]arrived[/] without a snap, smallest margin "
-        f"{each.route.margin:.3f}, length {each.route.length:.3f}."
-    )

@@ -19,8 +19,15 @@ VERSION = 1
 START, GOAL, ROUTE = "start", "goal", "route"
 
 Answer = TypeVar("Answer")
-Journey = tuple[State, State, Route]
-"""Start, goal, and the route between them or its refusal."""
+
+
+@dataclass(frozen=True)
+class Journey:
+    """Start, goal, and the route between them or its refusal."""
+
+    start: State
+    goal: State
+    route: Route
 
 
 @dataclass(frozen=True)
@@ -69,15 +76,14 @@ MAP_PART: Part[ActuatorMap] = Part("map", map_group.write, map_group.read)
 
 
 def _write_journey(group: h5py.Group, journey: Journey) -> None:
-    start, goal, route = journey
-    states_group.write(group.create_group(START), start.batch)
-    states_group.write(group.create_group(GOAL), goal.batch)
-    route_group.write(group.create_group(ROUTE), route)
+    states_group.write(group.create_group(START), journey.start.batch)
+    states_group.write(group.create_group(GOAL), journey.goal.batch)
+    route_group.write(group.create_group(ROUTE), journey.route)
 
 
 def _read_journey(group: h5py.Group, structure: Structure) -> Journey:
     start, goal = (states_group.read(group[end], structure)[0] for end in (START, GOAL))
-    return start, goal, route_group.read(group[ROUTE], structure)
+    return Journey(start, goal, route_group.read(group[ROUTE], structure))
 
 
 JOURNEY_PART: Part[Journey] = Part("journey", _write_journey, _read_journey)

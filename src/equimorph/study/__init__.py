@@ -1,15 +1,15 @@
 """Studies: a problem file in, results and a report out."""
 
 from equimorph.study.memory import check_memory
-from equimorph.study.outcome import Outcome, RouteOutcome
+from equimorph.study.outcome import Answered, Outcome
 from equimorph.study.prepare import Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
 from equimorph.study.run import read_problem, run_study
 
 __all__ = [
+    "Answered",
     "Outcome",
     "Problem",
-    "RouteOutcome",
     "Study",
     "check_memory",
     "parse_study",

@@ -6,7 +6,7 @@ from jaxtyping import Float
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import State, States
-from equimorph.study.problem import StateSection
+from equimorph.study.sections.extent import StateSection
 
 AGREEMENT = 1e-3
 """A descriptor given with `near` agrees when it is this close: values are copied from a report."""

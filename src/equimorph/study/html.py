@@ -1,13 +1,15 @@
 """Pieces of a page that needs nothing but itself."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+
+from equimorph.model import Box, Constraint
 
 _MEDIA = {".png": "image/png", ".gif": "image/gif"}
 
@@ -52,6 +54,36 @@ def figure(file: Path, caption: str, *, larger: str = "", wide: bool = False) ->
     linked = f'<a href="{escape(larger)}">{image}</a>' if larger else image
     kind = ' class="wide"' if wide else ""
     return f"<figure{kind}>{linked}<figcaption>{words}</figcaption></figure>"
+
+
+def still(folder: Path, name: str, caption: str) -> str:
+    """Return the picture ``name.png`` of a folder, which links to ``name.svg``."""
+    return figure(folder / f"{name}.png", caption, larger=f"{name}.svg")
+
+
+def refused(why: str) -> str:
+    """Return the line of an answer that there is none, and why."""
+    return f'<p class="verdict refused"><strong>Refused.</strong> {escape(why)}</p>'
+
+
+def schedule_links(table: str) -> str:
+    """Return a line with links to a schedule and its sidecar."""
+    sidecar = table.replace(".csv", ".json")
+    return (
+        f'<p>Actuator schedule: <a href="{table}">{table}</a>, with the structure, the first state '
+        f'and the loads in <a href="{sidecar}">{sidecar}</a>.</p>'
+    )
+
+
+def extent(box: Box, fixed: Mapping[str, float], constraints: Sequence[Constraint]) -> list[str]:
+    """Return ranges, values and bounds in words, as plain text."""
+    ranges = [
+        f"{name} ∈ [{number(low)}, {number(high)}]"
+        for name, low, high in zip(box.names, box.lower, box.upper, strict=True)
+    ]
+    values = [f"{name} = {number(value)}" for name, value in fixed.items()]
+    caps = [str(each).replace("<=", "≤").replace(">=", "≥") for each in constraints]
+    return [*ranges, *values, *caps]
 
 
 def table(

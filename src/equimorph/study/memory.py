@@ -1,5 +1,6 @@
 """How much memory a study will take, and whether this machine has it."""
 
+import math
 import os
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.model import Progress
-from equimorph.study.prepare import MapTask, Problem
+from equimorph.study.prepare import Problem
 
 PROGRAM = 550e6
 """Bytes of libraries, compiled kernels, and the frames of a film."""
@@ -25,7 +26,7 @@ _GROUP_FILES = (
 )
 
 
-def estimated_memory(size: int, intervals: tuple[int, int]) -> float:
+def estimated_memory(size: int, intervals: tuple[int, ...]) -> float:
     """Peak of the resident memory of a run in bytes.
 
     For sets with one or two equilibria over most points, like those of the arch and the spring:
@@ -38,7 +39,7 @@ def estimated_memory(size: int, intervals: tuple[int, int]) -> float:
     intervals
         Of the grid.
     """
-    vertices = (intervals[0] + 1) * (intervals[1] + 1)
+    vertices = math.prod(count + 1 for count in intervals)
     return PROGRAM + vertices * (PER_VERTEX + PER_UNKNOWN * size)
 
 
@@ -56,7 +57,8 @@ def check_memory(problem: Problem) -> float:
         If there is less: with what is needed, what there is, and what to reduce.
     """
     available, most = available_memory(), 0.0
-    for key, intervals in _grids(problem).items():
+    for key, extent in problem.extents.items():
+        intervals = extent.intervals
         needed = estimated_memory(problem.structure.size, intervals)
         most = max(most, needed)
         if needed > available:
@@ -66,19 +68,6 @@ def check_memory(problem: Problem) -> float:
                 f"Reduce `{key}.intervals`."
             )
     return most
-
-
-def intervals_of(task: MapTask) -> tuple[int, int]:
-    """Intervals of a map's grid."""
-    first, second = task.grid.intervals
-    return first, second
-
-
-def _grids(problem: Problem) -> dict[str, tuple[int, int]]:
-    """Intervals of the set's grid and of those of maps, by their key in the study file."""
-    wanted = problem.equilibrium_set
-    of_set = {} if wanted is None else {"set": wanted.intervals}
-    return {**of_set, **{task.key: intervals_of(task) for task in problem.maps}}
 
 
 class MemoryWatch:

@@ -1,45 +1,26 @@
 """What a run of a study found."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.structures import State, States
-from equimorph.study.prepare import MapTask, Problem, Task
+from equimorph.structures import States
+from equimorph.study.kinds.kind import Asked
+from equimorph.study.prepare import Problem
 from equimorph.study.problem import Study
-from equimorph.tasks import ActuatorMap, Route
 
 
 @dataclass(frozen=True)
-class RouteOutcome:
-    """A route that was asked for: its ends, and the route or the refusal."""
+class Answered:
+    """A question with its answer."""
 
-    task: Task
-    start: State
-    goal: State
-    route: Route
+    asked: Asked
+    answer: Any
 
     @property
     def name(self) -> str:
-        """Name in the study file; files of the route begin with it."""
-        return self.task.section.name
-
-    @property
-    def arrived(self) -> bool:
-        """Whether there is a route."""
-        return self.route.arrived
-
-
-@dataclass(frozen=True)
-class MapOutcome:
-    """A map that was asked for."""
-
-    task: MapTask
-    map: ActuatorMap
-
-    @property
-    def name(self) -> str:
-        """Name in the study file; files of the map begin with it."""
-        return self.task.section.name
+        """Name in the study file; files of the answer begin with it."""
+        return self.asked.name
 
 
 @dataclass(frozen=True)
@@ -54,10 +35,8 @@ class Outcome:
         The set in the box, if it was asked for.
     points
         Equilibria at each wanted point, in the order of the file.
-    routes
-        Each wanted route, in the order of the file.
-    maps
-        Each wanted map, in the order of the file.
+    answers
+        Answers to the questions, in the order of `Problem.tasks`.
     reused
         Whether the set was read from the folder instead of computed.
     seconds
@@ -68,7 +47,11 @@ class Outcome:
     problem: Problem
     equilibrium_set: EquilibriumSet | None
     points: tuple[States, ...]
-    routes: tuple[RouteOutcome, ...]
-    maps: tuple[MapOutcome, ...]
+    answers: tuple[Answered, ...]
     reused: bool
     seconds: dict[str, float]
+
+    def of(self, table: str) -> dict[str, Any]:
+        """Answers to the questions of one kind, by name: ``outcome.of("route")``."""
+        mine = (each for each in self.answers if each.asked.kind.table == table)
+        return {each.name: each.answer for each in mine}

@@ -10,22 +10,21 @@ from typing import Any
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent
-from equimorph.storage import write_map, write_results, write_schedule
+from equimorph.storage import write_results
 from equimorph.storage.files import read_text
-from equimorph.storage.parts import JOURNEY_PART, STATES_PART, Journey, set_part
+from equimorph.storage.parts import STATES_PART, set_part
 from equimorph.structures import States
 from equimorph.study.checkpoints import Checkpoints
-from equimorph.study.choose import choose_state
 from equimorph.study.figures import draw_figures
 from equimorph.study.folder import ResultsFolder, open_results_folder
-from equimorph.study.maps import answered_map
+from equimorph.study.kinds.kind import Asked
+from equimorph.study.lookup import Extent, Ground, at_key
 from equimorph.study.memory import MemoryWatch, check_memory
-from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, map_files, schedule_table
-from equimorph.study.outcome import Outcome, RouteOutcome
-from equimorph.study.prepare import Problem, SetTask, Task, at_key, prepare
+from equimorph.study.names import INPUT_COPY, REPORT, RESULTS
+from equimorph.study.outcome import Answered, Outcome
+from equimorph.study.prepare import Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
 from equimorph.study.report import report
-from equimorph.tasks import plan
 
 
 def run_study(
@@ -108,98 +107,84 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
         Told how far the run is.
     """
     seconds: dict[str, float] = {}
-    answers = Checkpoints(folder, problem.structure)
+    checkpoints = Checkpoints(folder, problem.structure)
     eset: EquilibriumSet | None = None
     reused = False
     points: tuple[States, ...] = ()
-    routes: list[RouteOutcome] = []
-    if problem.equilibrium_set is not None:
+    ground = problem.ground
+    if ground.extent is not None:
         with _timed(seconds, "equilibrium set"):
-            eset = _equilibrium_set(study, problem, problem.equilibrium_set, answers, progress)
-        reused = bool(answers.found)
+            eset = _equilibrium_set(study, ground, ground.extent, checkpoints, progress)
+        reused = bool(checkpoints.found)
         with _timed(seconds, "equilibria"):
-            points = tuple(_equilibria(study, eset, point, answers) for point in problem.points)
-        for i, task in enumerate(problem.tasks):
-            progress.report("routes", i, len(problem.tasks))
-            with _timed(seconds, f"route {task.section.name}"):
-                routes.append(_route(study, problem, eset, task, answers))
-        progress.report("routes", len(routes), len(routes))
-    maps = []
-    for map_task in problem.maps:
-        with _timed(seconds, f"map {map_task.section.name}"):
-            maps.append(answered_map(problem.structure, map_task, answers, progress))
-    answers.forget_others()
-    return Outcome(study, problem, eset, points, tuple(routes), tuple(maps), reused, seconds)
+            points = tuple(_equilibria(study, eset, at, checkpoints) for at in problem.points)
+    answers = []
+    for asked in problem.tasks:
+        with _timed(seconds, f"{asked.kind.table} {asked.name}"):
+            answers.append(_answered(study, ground, eset, asked, checkpoints, progress))
+    checkpoints.forget_others()
+    return Outcome(study, problem, eset, points, tuple(answers), reused, seconds)
 
 
-def _set_question(study: Study) -> dict[str, Any]:
-    """Return all that the equilibrium set depends on."""
+def _question(study: Study, *, of_set: bool) -> dict[str, Any]:
+    """Return what an answer depends on: the structure, and the set if it is asked of that."""
     asked = study.model_dump(mode="json", by_alias=True)
-    return {"version": version("equimorph"), "structure": asked["structure"], "set": asked["set"]}
+    base = {"version": version("equimorph"), "structure": asked["structure"]}
+    return base | {"set": asked["set"]} if of_set else base
 
 
 def _equilibrium_set(
-    study: Study, problem: Problem, wanted: SetTask, answers: Checkpoints, progress: Progress
+    study: Study, ground: Ground, extent: Extent, checkpoints: Checkpoints, progress: Progress
 ) -> EquilibriumSet:
     def compute() -> EquilibriumSet:
         with at_key("set"):
             return equilibrium_set(
-                problem.structure,
-                wanted.box,
-                fixed=wanted.fixed,
-                within=wanted.constraints,
-                intervals=wanted.intervals,
+                ground.structure,
+                extent.box,
+                fixed=extent.fixed,
+                within=extent.constraints,
+                intervals=extent.intervals,
                 progress=progress,
             )
 
-    return answers.answer(_set_question(study), set_part(problem.height), compute)
+    return checkpoints.answer(_question(study, of_set=True), set_part(ground.height), compute)
 
 
 def _equilibria(
-    study: Study, eset: EquilibriumSet, point: dict[str, float], answers: Checkpoints
+    study: Study, eset: EquilibriumSet, point: dict[str, float], checkpoints: Checkpoints
 ) -> States:
-    question = {**_set_question(study), "at": point}
-    return answers.answer(question, STATES_PART, lambda: eset.at(**point))
+    question = {**_question(study, of_set=True), "at": point}
+    return checkpoints.answer(question, STATES_PART, lambda: eset.at(**point))
 
 
-def _route(
-    study: Study, problem: Problem, eset: EquilibriumSet, task: Task, answers: Checkpoints
-) -> RouteOutcome:
-    section = task.section
+def _answered(  # all that an answer depends on
+    study: Study,
+    ground: Ground,
+    eset: EquilibriumSet | None,
+    asked: Asked,
+    checkpoints: Checkpoints,
+    progress: Progress,
+) -> Answered:
+    kind, section = asked.kind, asked.section
+    words = section.model_dump(mode="json", exclude={"name"})
+    question = {**_question(study, of_set=section.needs_set), kind.table: words}
 
-    def compute() -> Journey:
-        start = choose_state(eset, section.start, f"{task.key}.start")
-        goal = choose_state(eset, section.goal, f"{task.key}.goal")
-        with at_key(task.key):
-            route = plan(
-                eset,
-                start,
-                goal,
-                via=section.via,
-                within=task.constraints,
-                margin=section.margin,
-                monitor=[problem.height],
-            )
-        return start, goal, route
+    def compute() -> Any:
+        return kind.answer(ground, eset, asked.task, progress)
 
-    asked = section.model_dump(mode="json", exclude={"name"})
-    question = {**_set_question(study), "route": asked}
-    return RouteOutcome(task, *answers.answer(question, JOURNEY_PART, compute))
+    return Answered(asked, checkpoints.answer(question, kind.part, compute))
 
 
 def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
     """Put the answers into the folder, as data for people and programs."""
     with folder.adding() as staging:
         (staging / INPUT_COPY).write_text(text, encoding="utf-8")
-        for each in outcome.routes:
-            if each.route.schedule is not None:
-                write_schedule(each.route.schedule, staging / schedule_table(each.name))
-        for amap in outcome.maps:
-            write_map(amap.map, staging / f"{map_files(amap.name)}.csv")
+        for each in outcome.answers:
+            each.asked.kind.write_tables(each.asked.task, each.answer, staging)
         if not folder.holds([RESULTS]):
-            maps = {amap.name: amap.map for amap in outcome.maps}
-            routes = {each.name: each.route for each in outcome.routes}
-            eset, height = outcome.equilibrium_set, outcome.problem.height
+            routes = {name: journey.route for name, journey in outcome.of("route").items()}
+            eset, height = outcome.equilibrium_set, outcome.problem.ground.height
+            maps = outcome.of("map")
             write_results(staging / RESULTS, eset, height, routes, outcome.points, maps)
 
 

@@ -1,0 +1,9 @@
+"""Kinds of questions that a study may ask, in the order in which they are answered."""
+
+from typing import Any
+
+from equimorph.study.kinds.kind import Kind
+from equimorph.study.kinds.map import MapKind
+from equimorph.study.kinds.route import RouteKind
+
+KINDS: tuple[Kind[Any, Any, Any], ...] = (RouteKind(), MapKind())

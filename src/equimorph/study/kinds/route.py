@@ -1,0 +1,127 @@
+"""Routes: ``[[route]]``."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from html import escape
+from pathlib import Path
+
+from rich.markup import escape as plain
+
+from equimorph import plotting
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Constraint, Progress
+from equimorph.storage import write_schedule
+from equimorph.storage.parts import JOURNEY_PART, Journey
+from equimorph.study import html
+from equimorph.study.choose import choose_state
+from equimorph.study.kinds.kind import Figure, Kind, still
+from equimorph.study.lookup import Ground, at_key, check_choice, check_point, constraints_of
+from equimorph.study.names import route_figures, schedule_table
+from equimorph.study.sections.tasks import RouteSection
+from equimorph.tasks import plan
+
+
+@dataclass(frozen=True)
+class RouteTask:
+    """A route that is wanted, with its constraints as objects."""
+
+    key: str
+    section: RouteSection
+    constraints: tuple[Constraint, ...]
+
+
+class RouteKind(Kind[RouteSection, RouteTask, Journey]):
+    """Routes between two states, along way-points or planned freely."""
+
+    table = "route"
+    part = JOURNEY_PART
+
+    def prepared(self, ground: Ground, section: RouteSection, key: str) -> RouteTask:
+        """Look up ends, way-points and constraints."""
+        for end, state in (("start", section.start), ("goal", section.goal)):
+            check_point(ground.box, state.at, f"{key}.{end}.at")
+            check_choice(ground.structure, state, f"{key}.{end}")
+        for i, corner in enumerate(section.via or ()):
+            check_point(ground.box, corner, f"{key}.via[{i}]", whole=False)
+        constraints = constraints_of(ground.structure, section.within, f"{key}.within")
+        return RouteTask(key, section, constraints)
+
+    def answer(
+        self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, sink: Progress
+    ) -> Journey:
+        """Choose both ends and plan."""
+        assert eset is not None
+        section = task.section
+        start = choose_state(eset, section.start, f"{task.key}.start")
+        goal = choose_state(eset, section.goal, f"{task.key}.goal")
+        with at_key(task.key):
+            route = plan(
+                eset,
+                start,
+                goal,
+                via=section.via,
+                within=task.constraints,
+                margin=section.margin,
+                monitor=[ground.height],
+            )
+        return Journey(start, goal, route)
+
+    def write_tables(self, task: RouteTask, answer: Journey, folder: Path) -> None:
+        """Write the schedule."""
+        if answer.route.schedule is not None:
+            write_schedule(answer.route.schedule, folder / schedule_table(task.section.name))
+
+    def figures(
+        self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, answer: Journey
+    ) -> Sequence[Figure]:
+        """Plane, shapes, margins and film; of a refused route the plane alone."""
+        assert eset is not None
+        names, route = route_figures(task.section.name), answer.route
+        plane = still(names.plane, partial(plotting.parameter_plane, eset, route))
+        if not route.arrived:
+            return [plane]
+        return [
+            plane,
+            still(names.shapes, partial(plotting.shapes, route)),
+            still(names.margins, partial(plotting.margins, route)),
+            Figure((names.film,), lambda folder: _draw_film(eset, answer, folder / names.film)),
+        ]
+
+    def report(self, task: RouteTask, answer: Journey, folder: Path) -> list[str]:
+        """Verdict, schedule and figures."""
+        name, route = task.section.name, answer.route
+        names = route_figures(name)
+        heading = f"<h2>Route {escape(name)}</h2>"
+        plane = html.still(folder, names.plane, "The route on the plane of the free parameters.")
+        if not route.arrived:
+            return [heading, html.refused(route.why), f'<div class="figures">{plane}</div>']
+        shapes = "Shapes at equal steps along the route, start to goal."
+        margins = "How far each state is from instability along the route."
+        pictures = [
+            html.figure(folder / names.film, "The structure along the route.", wide=True),
+            plane,
+            html.still(folder, names.shapes, shapes),
+            html.still(folder, names.margins, margins),
+        ]
+        return [
+            heading,
+            '<p class="verdict"><strong>Arrived.</strong> Every state on the way is stable: '
+            f"smallest margin {html.number(route.margin)}, length {html.number(route.length)}.</p>",
+            html.schedule_links(schedule_table(name)),
+            f'<div class="figures">{"".join(pictures)}</div>',
+        ]
+
+    def verdict(self, task: RouteTask, answer: Journey) -> str:
+        """Say whether it arrived."""
+        route, head = answer.route, f"Route {task.section.name}"
+        if not route.arrived:
+            return f"{head}: [bold red]refused[/]. {plain(route.why)}"
+        return (
+            f"{head}: [bold green]arrived[/] without a snap, smallest margin "
+            f"{route.margin:.3f}, length {route.length:.3f}."
+        )
+
+
+def _draw_film(eset: EquilibriumSet, journey: Journey, path: Path) -> None:
+    plotting.film(journey.route, path, eset=eset)

@@ -1,0 +1,1 @@
+"""Sections of a study file: what may be written, checked before anything is computed."""

@@ -1,0 +1,246 @@
+"""Structures of a study file."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, field_validator
+
+from equimorph.study.expressions import LARGEST
+from equimorph.study.sections.fields import (
+    Interval,
+    Number,
+    Section,
+    is_number,
+    is_table,
+    requirement,
+)
+
+
+def _load(shape: Any) -> Any:
+    """Check a load shape; one requirement for all forms makes one readable line."""
+    if shape not in ("uniform", "left-half") and not is_table(shape):
+        raise requirement(
+            'be "uniform", "left-half" or a table [[s, Q], ...] of finite numbers '
+            f"up to {LARGEST:g}"
+        )
+    return shape
+
+
+def _profile(shape: Any) -> Any:
+    if not (is_number(shape) or is_table(shape) or isinstance(shape, str)):
+        raise requirement(
+            f"be a number up to {LARGEST:g}, a table [[s, f], ...] of such, or a text with its unit"
+        )
+    return shape
+
+
+def _end(given: Any) -> Any:
+    table = isinstance(given, dict) and set(given) <= {"angle", "x", "y"}
+    parts = given.values() if table else [given]
+    if not all(isinstance(part, str) or (table and is_number(part)) for part in parts):
+        raise requirement(
+            'be a word like "clamped", or a table like { angle = "free", x = "held", y = 2.0 }'
+        )
+    return given
+
+
+def _terms(given: Any) -> Any:
+    """Check that terms are data of numbers, texts and lists; the rod itself knows their keys."""
+
+    def plain(value: Any) -> bool:
+        if isinstance(value, list):
+            return all(map(plain, value))
+        return isinstance(value, str) or is_number(value)
+
+    for term in given if isinstance(given, list) else [given]:
+        if not (isinstance(term, dict) and all(map(plain, term.values()))):
+            raise requirement(
+                'be a table like { term = "point force", s = 0.5 }, or a list of such tables, of '
+                f"texts and numbers up to {LARGEST:g}"
+            )
+    return given
+
+
+def _formula(given: Any) -> Any:
+    if not (isinstance(given, str) or (type(given) in (int, float) and abs(given) <= LARGEST)):
+        raise requirement(f"be a formula in quotes, or a finite number up to {LARGEST:g}")
+    return given
+
+
+def _quantity(given: Any) -> Any:
+    """Check its form; whether a unit fits is known to the structure."""
+    if not (is_number(given) or isinstance(given, str)):
+        raise requirement(f'be a number up to {LARGEST:g}, or a text with its unit like "2 N m^2"')
+    return given
+
+
+def _stiff(given: Any) -> Any:
+    if is_number(given) and not given > 0:
+        raise requirement("be greater than 0")
+    return _quantity(given)
+
+
+Formula = Annotated[Any, AfterValidator(_formula)]
+Quantity = Annotated[Any, AfterValidator(_quantity)]
+Stiffness = Annotated[Any, AfterValidator(_stiff)]
+UnitSystem = Annotated[dict[str, str], Field(min_length=2, max_length=2)]
+Profile = Annotated[Any, AfterValidator(_profile)]
+Term = Annotated[Any, AfterValidator(_terms)]
+EndOfRod = Annotated[Any, AfterValidator(_end)]
+
+
+class RodSection(Section):
+    """A planar rod: by default a curved one between two rotary actuators; see `equimorph.Rod`."""
+
+    kind: Literal["rod"]
+    load: Annotated[Any, AfterValidator(_load)] | None = None
+    ends: Annotated[list[EndOfRod], Field(min_length=2, max_length=2)] | None = None
+    stiffness: Profile | None = None
+    curvature: Profile | None = None
+    axial: Profile | None = None
+    loads: dict[str, Term] | None = None
+    actuators: dict[str, Term] | None = None
+    coordinates: dict[str, dict[str, Number]] | None = None
+    rise: Quantity | None = None
+    EI: Quantity | None = None
+    length: Quantity | None = None
+    units: UnitSystem | None = None
+    span: Stiffness | None = None
+    elements: int | None = Field(default=None, ge=2, le=1000)
+    degree: int | None = Field(default=None, ge=3, le=16)
+
+    @field_validator("span")
+    @classmethod
+    def _within_reach(cls, span: Any, info: Any) -> Any:
+        longest = info.data.get("length") or 1.0
+        texts = isinstance(span, str) or isinstance(longest, str)
+        if span is not None and not texts and info.data.get("axial") is None and not span < longest:
+            raise requirement(f"be less than {longest:g}")
+        return span
+
+
+class SpringSection(Section):
+    """The constrained spring."""
+
+    kind: Literal["spring"]
+    stiffness: float = Field(default=1.0, gt=0, le=LARGEST)
+
+
+class UnknownSection(Section):
+    """An unknown of an energy; see `equimorph.Unknown`."""
+
+    name: str
+    natural: Formula = 0.0
+    guesses: Interval | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+    mass: float = Field(default=1.0, gt=0, le=LARGEST)
+    unit: str = "1"
+
+
+class ParameterSection(Section):
+    """A parameter of an energy; see `equimorph.Parameter`."""
+
+    name: str
+    unit: str = "1"
+    scale: float = Field(default=1.0, gt=0, le=LARGEST)
+    role: Literal["actuator", "load", "fixed"] = "actuator"
+    default: Number | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+
+
+class EnergySection(Section):
+    """A structure given by its energy; see `equimorph.EnergyStructure`."""
+
+    kind: Literal["energy"]
+    energy: Formula
+    unknowns: list[UnknownSection] = Field(min_length=1)
+    parameters: list[ParameterSection]
+    constraints: list[Formula] = Field(default_factory=list)
+    definitions: dict[str, Formula] = Field(default_factory=dict)
+    descriptors: dict[str, Formula] = Field(default_factory=dict)
+    draw: list[Annotated[list[Formula], Field(min_length=2, max_length=2)]] = Field(
+        default_factory=list
+    )
+
+
+class BarSection(Section):
+    """A bar of a truss; see `equimorph.Bar`."""
+
+    ends: list[str] = Field(min_length=2, max_length=2)
+    EA: Stiffness = 1.0
+    EI: Stiffness | None = None
+    rest: Stiffness | None = None
+
+
+Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
+Place = Annotated[list[Quantity], Field(min_length=2, max_length=3)]
+
+
+class TrussSection(Section):
+    """Bars between joints; see `equimorph.Truss`."""
+
+    kind: Literal["truss"]
+    joints: dict[str, Place] = Field(min_length=2)
+    bars: list[BarSection] = Field(min_length=1)
+    supports: dict[str, str]
+    loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
+    actuators: dict[str, dict[str, Number]] = Field(default_factory=dict)
+    strain: Literal["engineering", "green"] = "engineering"
+    units: UnitSystem | None = None
+
+
+def _support(given: Any) -> Any:
+    table = given if isinstance(given, dict) else {}
+    fine = table and all(isinstance(value, str) or is_number(value) for value in table.values())
+    if not (isinstance(given, str) or fine):
+        raise requirement(
+            'be "fixed", "pinned", axes to hold like "y", or a table like '
+            '{ x = "held", angle = 2.0 }'
+        )
+    return given
+
+
+class MemberSection(Section):
+    """A member of a frame; see `equimorph.Member`."""
+
+    ends: list[str] = Field(min_length=2, max_length=2)
+    EI: Stiffness = 1.0
+    EA: Stiffness | None = None
+    curvature: Quantity = 0.0
+    hinges: list[str] = Field(default_factory=list)
+    weight: Stiffness | None = None
+
+
+Plane = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class EffectSection(Section):
+    """What an actuator of a frame does, per unit of its parameter."""
+
+    curvature: dict[str, Number] | None = None
+    length: dict[str, Number] | None = None
+    move: dict[str, Plane] | None = None
+    turn: dict[str, Number] | None = None
+
+
+class FrameSection(Section):
+    """Rods between joints; see `equimorph.Frame`."""
+
+    kind: Literal["frame"]
+    joints: dict[str, Annotated[list[Quantity], Field(min_length=2, max_length=2)]] = Field(
+        min_length=2
+    )
+    members: list[MemberSection] = Field(min_length=1)
+    supports: dict[str, Annotated[Any, AfterValidator(_support)]]
+    loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
+    actuators: dict[str, EffectSection] = Field(default_factory=dict)
+    elements: int = Field(default=2, ge=1, le=1000)
+    degree: int = Field(default=8, ge=3, le=16)
+    units: UnitSystem | None = None
+
+
+StructureSection = Annotated[
+    RodSection | SpringSection | EnergySection | TrussSection | FrameSection,
+    Field(discriminator="kind"),
+]

@@ -1,0 +1,62 @@
+"""Questions of a study file: routes and maps."""
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from equimorph.study.expressions import LARGEST
+from equimorph.study.names import PLANE, STABLE_PLANE
+from equimorph.study.sections.extent import StateSection
+from equimorph.study.sections.fields import (
+    ComparisonText,
+    Interval,
+    Intervals,
+    Name,
+    Number,
+    Point,
+    TaskSection,
+    requirement,
+    two,
+)
+
+
+def _unused(name: str) -> str:
+    """Refuse names under which files of the set are stored."""
+    if f"{name}-plane" in (STABLE_PLANE, PLANE):
+        raise requirement("be another name: figures of the set begin with it")
+    return name
+
+
+class RouteSection(TaskSection):
+    """A route between two states, along way-points or planned freely."""
+
+    name: Annotated[Name, AfterValidator(_unused)]
+    start: StateSection
+    goal: StateSection
+    via: list[Annotated[Point, Field(min_length=1)]] | None = Field(default=None, min_length=1)
+    within: list[ComparisonText] = Field(default_factory=list)
+    margin: float = Field(default=0.0, ge=0, le=LARGEST)
+
+
+class MapSection(TaskSection):
+    """A map over two actuators, from the natural states of their settings on."""
+
+    needs_set: ClassVar[bool] = False
+
+    kind: Literal["limit_load_map", "curvature_map"]
+    box: Annotated[dict[str, Interval], AfterValidator(two)]
+    intervals: Intervals
+    load: str
+    at: Number | None = None
+    descriptor: str | None = None
+    bound: float = Field(default=100.0, gt=0, le=LARGEST)
+    fixed: Point = Field(default_factory=dict)
+    within: list[ComparisonText] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _level(self) -> "MapSection":
+        if (self.kind == "curvature_map") != (self.at is not None):
+            raise requirement("give the load `at` in a curvature_map, and only there")
+        if self.kind == "limit_load_map" and self.descriptor is not None:
+            raise requirement("give a descriptor in a curvature_map only")
+        return self

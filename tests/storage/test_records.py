@@ -1,0 +1,125 @@
+"""Results of tasks, written field by field and read back."""
+
+from dataclasses import fields, is_dataclass
+
+import h5py
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.storage import record_group
+from equimorph.structures.naming import descriptor_named
+
+
+@pytest.fixture(scope="module")
+def spring():
+    return em.Spring()
+
+
+@pytest.fixture(scope="module")
+def eset(spring):
+    return em.equilibrium_set(spring, em.Box(x_l=(0.5, 1.3), F=(-0.2, 0.2)), intervals=(9, 9))
+
+
+def assert_equal(one, other):
+    """Whether two records have the same fields, arrays bit for bit."""
+    assert type(one) is type(other)
+    if isinstance(one, em.State | em.States):
+        np.testing.assert_array_equal(one.z, other.z)
+        np.testing.assert_array_equal(one.p, other.p)
+    elif isinstance(one, em.Descriptor | em.Structure | str | None):
+        assert one == other
+    else:
+        parts, others = _parts(one), _parts(other)
+        if parts is None:
+            np.testing.assert_array_equal(one, other)
+        else:
+            for pair in zip(parts, others, strict=True):
+                assert_equal(*pair)
+
+
+def _parts(record):
+    """What a record consists of, or None."""
+    if is_dataclass(record):
+        return [getattr(record, each.name) for each in fields(record)]
+    if isinstance(record, dict):
+        return [*record, *record.values()]
+    return record if isinstance(record, tuple | list) else None
+
+
+def back(tmp_path, record, structure):
+    with h5py.File(tmp_path / "record.h5", "w") as file:
+        record_group.write(file.create_group("record"), record)
+    with h5py.File(tmp_path / "record.h5") as file:
+        return record_group.read(file["record"], structure)
+
+
+def test_shapes_with_their_routes_come_back(tmp_path, eset, spring):
+    start = eset.at(x_l=0.8, F=0.0).stable[0]
+    found = em.solve_shape(
+        eset, {spring.descriptor("angle"): 0.4, em.value_of(spring, "F"): 0.01}, start=start
+    )
+    assert found.solved
+    assert_equal(back(tmp_path, found, spring), found)
+
+
+def test_a_motion_that_is_refused_comes_back(tmp_path, spring):
+    start = em.lift(spring.natural_state(x_l=0.8), {"F": 0.02}).end.state
+    refused = em.track(start, {spring.descriptor("angle"): 0.1}, actuators={"x_l": (0.5, 0.85)})
+    assert refused.failure == "actuator limit"
+    assert_equal(back(tmp_path, refused, spring), refused)
+
+
+def test_an_estimate_comes_back(tmp_path, eset, spring):
+    angle = spring.descriptor("angle")
+    known = em.estimate_state(eset, {angle: 0.5, "x_l": 0.8}, errors={angle: 0.01, "x_l": 0.01})
+    assert_equal(back(tmp_path, known, spring), known)
+
+
+def test_numbers_that_json_does_not_know(tmp_path, spring):
+    route = em.Route("refused", "why not", [{"x_l": 1.0}])
+    again = back(tmp_path, route, spring)
+    assert np.isnan(again.margin)
+    assert again.way_points == [{"x_l": 1.0}]
+
+
+def test_functions_are_refused_by_the_place_they_stand_at(tmp_path):
+    record = em.Route("refused", "why", [{"x_l": abs}])
+    with (
+        h5py.File(tmp_path / "record.h5", "w") as file,
+        pytest.raises(em.InputError, match=r"way_points/0/0.* builtin_function_or_method"),
+    ):
+        record_group.write(file.create_group("record"), record)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x_l",
+        "effort(F)",
+        "stability_margin",
+        "distance(disc(0.5, 0.2, 0.1))",
+        "distance(half_plane(0, 0, 0, 1))",
+        "outside(x_l 1 to 2, F 0 to 0.1)",
+        "angle",
+    ],
+)
+def test_descriptors_by_name(spring, text):
+    found = descriptor_named(spring, text)
+    assert descriptor_named(spring, found.name) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("effort(y)", "must be a parameter"),
+        ("distance(disc(1, 2))", "must be that from half_plane"),
+        ("distance(disc(1, 2, r))", "must be that from half_plane"),
+        ("outside(x_l 1)", "must read like outside"),
+        ("outside(x_l 2 to 1)", "lower < upper"),
+        ("curl", "curl"),
+    ],
+)
+def test_names_that_mean_nothing(spring, text, problem):
+    with pytest.raises(em.InputError, match=problem):
+        descriptor_named(spring, text)
