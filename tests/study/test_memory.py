@@ -13,11 +13,12 @@ from equimorph.study import check_memory, memory, parse_study, prepare
 from equimorph.study.template import template
 
 MEASURE = """
-import resource, sys
+import re, sys
 from pathlib import Path
 from equimorph.study import run_study
 run_study(Path(sys.argv[1]), Path(sys.argv[2]))
-print(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+peak = re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())
+print(1024 * int(peak[1]))
 """
 
 

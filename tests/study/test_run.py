@@ -111,7 +111,7 @@ def test_the_page_says_the_answers(finished: tuple[Outcome, Path]):
 def test_stages_report_up_to_their_end(spring_file: Path, out: Path):
     sink = Recorder()
     run_study(spring_file, out, progress=sink)
-    for stage in ("routes", "figures"):
+    for stage in ("questions", "figures"):
         done, total = sink.stages[stage][-1]
         assert done == total
 
@@ -134,8 +134,8 @@ def test_a_finished_run_is_not_repeated(
     def fail(*_: object, **__: object) -> None:
         raise AssertionError
 
-    for name in ("equilibrium_set", "plan", "choose_state"):
-        monkeypatch.setattr(f"equimorph.study.run.{name}", fail)
+    for name in ("run.equilibrium_set", "kinds.route.plan", "kinds.route.choose_state"):
+        monkeypatch.setattr(f"equimorph.study.{name}", fail)
     for name in ("surface", "parameter_plane", "shapes", "margins", "film", "save"):
         monkeypatch.setattr(plotting, name, fail)
     again = run_study(spring_file, copy)

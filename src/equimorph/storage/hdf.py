@@ -211,8 +211,9 @@ def _dimension(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
     """Nearest dimension of this name and size, in the group or above it, else a new one."""
     place = group
     while True:
-        if name in place and place[name].is_scale and place[name].shape == (size,):
-            return place[name]
+        known = place.get(name)
+        if isinstance(known, h5py.Dataset) and known.is_scale and known.shape == (size,):
+            return known
         if place.name == "/":
             return add_dimension(group, name, size)
         place = place.parent

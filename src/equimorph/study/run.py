@@ -119,9 +119,11 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
         with _timed(seconds, "equilibria"):
             points = tuple(_equilibria(study, eset, at, checkpoints) for at in problem.points)
     answers = []
-    for asked in problem.tasks:
+    for done, asked in enumerate(problem.tasks):
+        progress.report("questions", done, len(problem.tasks))
         with _timed(seconds, f"{asked.kind.table} {asked.name}"):
             answers.append(_answered(study, ground, eset, asked, checkpoints, progress))
+    progress.report("questions", len(problem.tasks), len(problem.tasks))
     checkpoints.forget_others()
     return Outcome(study, problem, eset, points, tuple(answers), reused, seconds)
 
