@@ -18,7 +18,7 @@ from equimorph.tasks.maps import (
     unloaded_base,
 )
 from equimorph.tasks.optimising import Certificate, Optima, Optimum, optimise
-from equimorph.tasks.plan import plan
+from equimorph.tasks.planning import plan
 from equimorph.tasks.reach import Reach, attainable, reachable
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes import Shapes, solve_shape

@@ -24,8 +24,8 @@ class Route:
 
     status: "arrived", or "refused" with the reason in `why`. A route that arrived was lifted again
     at a finer step: `path`, its smallest stability `margin`, its `length` in the structure's metric
-    and scaled parameters, and the `schedule` for the actuators. A refused one carries the path as
-    far as it went, if there is one.
+    and scaled parameters, what it was planned for (`objective`) and its `cost`, and the `schedule`
+    for the actuators. A refused one carries the path as far as it went, if there is one.
     """
 
     status: Literal["arrived", "refused"]
@@ -35,6 +35,8 @@ class Route:
     margin: float = np.nan
     length: float = np.nan
     schedule: Schedule | None = None
+    objective: str = "length"
+    cost: float = np.nan
 
     def __repr__(self) -> str:
         """Length and margin, or why there is no route."""

@@ -12,7 +12,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, position
 from equimorph.structures import State, States
-from equimorph.tasks.plan import plan
+from equimorph.tasks.planning import plan
 from equimorph.tasks.route import Route
 
 OVERHANG = 0.5

@@ -19,7 +19,7 @@ from equimorph.tasks.optimising.objectives import Objective
 from equimorph.tasks.optimising.plane import Spots, settled, spots_of, stepped
 from equimorph.tasks.optimising.programme import Programme
 from equimorph.tasks.optimising.stability import is_stability, stability
-from equimorph.tasks.plan import plan
+from equimorph.tasks.planning import plan
 from equimorph.tasks.prepared import (
     feasible_vertices,
     pieces_of_vertices,

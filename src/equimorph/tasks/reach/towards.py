@@ -13,7 +13,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.locate import cell_of
 from equimorph.model import Constraint, Descriptor, Schedule, position
 from equimorph.structures import State, States, Structure
-from equimorph.tasks.plan import plan
+from equimorph.tasks.planning import plan
 from equimorph.tasks.reach.regions import Region
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes import solve_shape

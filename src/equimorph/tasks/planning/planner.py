@@ -1,15 +1,19 @@
 """`plan`: a stable route between two states of an equilibrium set."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from equimorph.equilibria import check_start, way_points
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor
-from equimorph.structures import State
-from equimorph.tasks.network import free_route
+from equimorph.model import Constraint, Descriptor, position
+from equimorph.structures import State, States
+from equimorph.tasks.planning.links import Demands
+from equimorph.tasks.planning.network import cheapest_path, no_route
+from equimorph.tasks.planning.objectives import Wish, objective_of
+from equimorph.tasks.planning.straightening import relaxed, straightened
 from equimorph.tasks.route import Corners, Route, refused, verified
 
 RESERVES = (1.0, 1.02, 1.1)
@@ -24,13 +28,15 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
     via: Sequence[Mapping[str, float]] | None = None,
     within: Sequence[Constraint] = (),
     margin: float = 0.0,
+    objective: Wish = "length",
     monitor: Sequence[Descriptor] = (),
 ) -> Route:
     """Plan a route from `start` to `goal` on which every state is stable.
 
-    With `via`, the way-points are lifted as given. Without, the shortest path over the stable cells
-    of the complex is found, straightened by lifting, and its corners are the way-points. Either
-    way the route is lifted again at a finer step before it is returned.
+    With `via`, the way-points are lifted as given. Without, the cheapest path over the stable cells
+    of the complex is found, straightened by lifting and drawn to where it costs least; its corners
+    are the way-points. Either way the route is lifted again at a finer step before it is returned.
+    The network of the cells is kept with the set, so that later routes take less time.
 
     Parameters
     ----------
@@ -42,6 +48,11 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
         Constraints to obey on the way, beside those of the set.
     margin
         Smallest stability margin allowed, in the structure's metric.
+    objective
+        What the route should have least of: "length" (metric), "travel" (scaled parameters), "work"
+        (actuators that get nothing back), "clearance" (``∫ ds/margin``), `Rates` (time), or a sum
+        ``[(1, "length"), (0.2, "work")]``; see `Objective`. A local minimum near the best path over
+        the mesh.
     monitor
         Descriptors to record in the schedule, beside those of the constraints.
 
@@ -57,45 +68,65 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
     """
     if not margin >= 0.0:
         raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
-    constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
+    demands = Demands(
+        objective_of(objective, eset.structure),
+        tuple(dict.fromkeys((*eset.constraints, *within))),
+        margin,
+    )
     ends = {"start": start, "goal": goal}
     for name, state in ends.items():
         _check_belongs(eset, name, state)
     corners = None if via is None else _checked_corners(eset, start, goal, via)
-    faults = [_violation(name, state, constraints, margin) for name, state in ends.items()]
+    faults = [_violation(name, state, demands) for name, state in ends.items()]
     why = next((fault for fault in faults if fault), None)
     if why:
         return refused(why, corners)
     if corners is not None:
-        return _kept(verified(start, goal, corners, constraints, monitor), margin)
-    return _free(eset, (start, goal), constraints, margin, monitor)
+        return _kept(verified(start, goal, corners, demands.constraints, monitor), demands)
+    return _free(eset, (start, goal), demands, monitor)
 
 
 def _free(
     eset: EquilibriumSet,
     ends: tuple[State, State],
-    constraints: tuple[Constraint, ...],
-    margin: float,
+    demands: Demands,
     monitor: Sequence[Descriptor],
 ) -> Route:
-    """Return the shortest route found, searched with a growing reserve of margin."""
-    start, goal = ends
+    """Return the cheapest route found, searched with a growing reserve of margin."""
     for reserve in RESERVES:
-        found = free_route(eset, start, goal, constraints, margin * reserve)
-        if isinstance(found, str):
-            return refused(found)
-        route = _kept(verified(start, goal, found, constraints, monitor), margin)
+        tightened = replace(demands, margin=demands.margin * reserve)
+        path = cheapest_path(eset, ends, tightened)
+        if path is None:
+            return refused(no_route(eset, ends, tightened))
+        route = _kept(
+            verified(*ends, corners_of(eset, path, tightened), demands.constraints, monitor),
+            demands,
+        )
         if route.arrived:
             break
     return route
 
 
-def _kept(route: Route, margin: float) -> Route:
-    """Return the route, refused if its margin falls below what is demanded."""
-    if not route.arrived or route.margin >= margin:
+def corners_of(
+    eset: EquilibriumSet, path: States, demands: Demands, same_class: bool = False
+) -> Corners:
+    """Way-points of a straightened path."""
+    corners = straightened(path, demands, same_class)
+    free = np.array([position(eset.structure.parameters, name) for name in eset.names])
+    corners = relaxed(corners, demands, eset.box, free)
+    return [{name: corner[name] for name in eset.names} for corner in list(corners)[1:]]
+
+
+def _kept(route: Route, demands: Demands) -> Route:
+    """Return the route with its cost, refused if its margin falls below what is demanded."""
+    if not route.arrived:
         return route
+    if route.margin >= demands.margin:
+        assert route.path is not None
+        cost = demands.objective.along(route.path.states)
+        return replace(route, objective=str(demands.objective), cost=cost)
     return refused(
-        f"the stability margin falls to {route.margin:.4g} on the way, below {margin:g}",
+        f"the stability margin falls to {route.margin:.4g} on the way, below {demands.margin:g}",
         route.way_points,
         route.path,
     )
@@ -139,16 +170,14 @@ def _checked_corners(
     return corners
 
 
-def _violation(
-    name: str, state: State, constraints: tuple[Constraint, ...], margin: float
-) -> str | None:
+def _violation(name: str, state: State, demands: Demands) -> str | None:
     """Why a state is no admissible end of a route, if it is not."""
-    for constraint in constraints:
+    for constraint in demands.constraints:
         if not constraint.holds(state.batch)[0]:
             value = constraint.descriptor(state)
             return f"the {name} violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
     if not state.stable:
         return f"the {name} is unstable (index {state.index})"
-    if state.margin < margin:
-        return f"the {name} has a stability margin of {state.margin:.4g}, below {margin:g}"
+    if state.margin < demands.margin:
+        return f"the {name} has a stability margin of {state.margin:.4g}, below {demands.margin:g}"
     return None

@@ -1,0 +1,166 @@
+"""The stable cells of an equilibrium set as a network of lifts, prepared once for all routes."""
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.topology import faces_of
+from equimorph.model import Constraint
+from equimorph.structures import State, States
+from equimorph.tasks.planning.links import Demands, Flags, Values, links, shortest
+from equimorph.tasks.planning.objectives import Objective
+
+ON_FOLD = (1, 4)
+Ends = tuple[State, State]
+Pairs = Int[np.ndarray, "links 2"]
+
+_networks: "WeakKeyDictionary[EquilibriumSet, Network]" = WeakKeyDictionary()
+
+
+class Network:
+    """States of a set that a route may visit, links between them, and what is known of these.
+
+    Node numbers: the vertices of the set, then the start, then the goal.
+
+    Parameters
+    ----------
+    eset
+        The set.
+    """
+
+    def __init__(self, eset: EquilibriumSet) -> None:
+        stable = np.zeros(len(eset.points), bool)
+        cells = eset.cells[eset.cell_index == 0]
+        stable[cells] = True
+        stable &= ~np.isin(eset.kinds, ON_FOLD)
+        self.stable, self.cells = stable, cells
+        pairs = faces_of(cells, 2)
+        self.pairs = pairs[stable[pairs].all(axis=1)]
+        self._allowed: dict[tuple[tuple[Constraint, ...], float], Flags] = {}
+        self._broken: dict[tuple[tuple[Constraint, ...], float], Flags] = {}
+        self._lifted: dict[tuple[tuple[Constraint, ...], float], Flags] = {}
+        self._costs: dict[str, Values] = {}
+
+    def allowed(self, eset: EquilibriumSet, demands: Demands) -> Bool[np.ndarray, " V"]:
+        """Vertices of stable cells, off the folds, that obey the demands."""
+        key = demands.constraints, demands.margin
+        if key not in self._allowed:
+            some = np.flatnonzero(self.stable)
+            good = self.stable.copy()
+            good[some] = demands.admissible(eset.points[some])
+            self._allowed[key] = good
+        return self._allowed[key]
+
+    def costs(self, eset: EquilibriumSet, objective: Objective) -> Values:
+        """Cost of each link, along its chord."""
+        key = repr(objective)
+        if key not in self._costs:
+            self._costs[key] = objective.costs(eset.points, *self.pairs.T)
+        return self._costs[key]
+
+    def verdicts(self, demands: Demands) -> tuple[Flags, Flags]:
+        """Which links were lifted in vain, and which with success, in earlier searches."""
+        key = demands.constraints, demands.margin
+        for known in (self._broken, self._lifted):
+            known.setdefault(key, np.zeros(len(self.pairs), bool))
+        return self._broken[key], self._lifted[key]
+
+
+def network_of(eset: EquilibriumSet) -> Network:
+    """The network of a set, made on first use and kept as long as the set."""
+    if eset not in _networks:
+        _networks[eset] = Network(eset)
+    return _networks[eset]
+
+
+def cheapest_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States | None:
+    """States of the cheapest path over the network whose every link can be lifted.
+
+    Links are lifted only when a path uses them; what was found is remembered.
+    """
+    network = network_of(eset)
+    allowed = network.allowed(eset, demands)
+    broken, lifted = network.verdicts(demands)
+    costs = network.costs(eset, demands.objective)
+    states = with_ends(eset, ends)
+    count, inner = len(states), np.flatnonzero(allowed[network.pairs].all(axis=1) & ~broken)
+    own, own_costs = own_links(eset, ends, demands)
+    while True:
+        pairs = np.concatenate([network.pairs[inner], own])
+        weights = np.concatenate([costs[inner], own_costs])
+        path = shortest(count, pairs, weights, (count - 2, count - 1))
+        if path is None:
+            return None
+        used = inner[_on_path(network.pairs[inner], path, count)]
+        fresh = used[~lifted[used]]
+        if len(fresh) == 0:
+            return states[path]
+        first, second = network.pairs[fresh].T
+        good, _ = links(states[first], states[second], demands)
+        lifted[fresh[good]], broken[fresh[~good]] = True, True
+        inner = inner[~broken[inner]]
+
+
+def _on_path(pairs: Pairs, path: Int[np.ndarray, " n"], count: int) -> Flags:
+    """Which pairs are consecutive on a path."""
+    steps = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
+    code = np.array([count, 1])
+    return np.isin(np.sort(pairs, axis=1) @ code, steps @ code)
+
+
+def with_ends(eset: EquilibriumSet, ends: Ends) -> States:
+    """Vertices of the set, start and goal."""
+    return States(
+        eset.structure,
+        np.concatenate([eset.points.z, *(end.z[None] for end in ends)]),
+        np.concatenate([eset.points.p, *(end.p[None] for end in ends)]),
+    )
+
+
+def own_links(eset: EquilibriumSet, ends: Ends, demands: Demands) -> tuple[Pairs, Values]:
+    """Links of start and goal to the vertices around them, and to each other."""
+    count = len(eset.points)
+    allowed = network_of(eset).allowed(eset, demands)
+    pairs, costs = [], []
+    for number, end in enumerate(ends):
+        near, cost = neighbours(eset, allowed, end, demands)
+        pairs.append(np.stack([np.full(len(near), count + number), near], axis=1))
+        costs.append(cost)
+    direct, cost = links(ends[0].batch, ends[1].batch, demands)
+    if direct[0]:
+        pairs.append(np.array([[count, count + 1]]))
+        costs.append(cost)
+    return np.concatenate(pairs), np.concatenate(costs)
+
+
+def neighbours(
+    eset: EquilibriumSet, allowed: Bool[np.ndarray, " V"], end: State, demands: Demands
+) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Allowed vertices over the grid cells around a state that a straight lift reaches."""
+    cells = eset.mesh.cells
+    own = eset.mesh.locate(np.array([end[name] for name in eset.names]))
+    around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
+    near = np.flatnonzero(allowed & np.isin(eset.grid_vertex, around))
+    source = States(eset.structure, np.tile(end.z, (len(near), 1)), np.tile(end.p, (len(near), 1)))
+    linked, cost = links(source, eset.points[near], demands)
+    return near[linked], cost[linked]
+
+
+def no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:
+    """Tell whether instability alone or the other demands part start and goal."""
+    network, free = network_of(eset), Demands(demands.objective)
+    allowed = network.allowed(eset, free)
+    own, _ = own_links(eset, ends, free)
+    pairs = np.concatenate([network.pairs[allowed[network.pairs].all(axis=1)], own])
+    count = len(eset.points) + 2
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    if label[-1] != label[-2]:
+        return "start and goal lie on different stable components of the set"
+    words = [str(constraint) for constraint in demands.constraints]
+    words += [f"margin >= {demands.margin:g}"] if demands.margin > 0 else []
+    return f"start and goal are connected by stable states, but not within {' and '.join(words)}"
