@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.accounting import Complex
-from equimorph.manifold.fabric import Fabric, fabric_of
+from equimorph.manifold.fabric import Fabric, _bisected, edges_of, fabric_of
 from equimorph.manifold.pairing import Setting
+from equimorph.manifold.simplices import volumes
 from equimorph.manifold.surgery import collapse, flip, smallest_angle
-from equimorph.manifold.topology import euler_characteristic
+from equimorph.manifold.topology import adjacency, euler_characteristic
 from equimorph.model import Box, Descriptor
 from oracles.complexes import assert_faithful, assert_folds_are_singular, farthest
 from oracles.polynomial import bead_on_a_circle, fold_form
@@ -189,7 +190,7 @@ def coarse() -> Fabric:
 
 
 def test_flips_keep_vertices_and_topology_and_widen_angles(coarse):
-    flipped = flip(coarse, passes=4)
+    flipped = flip(coarse)
     assert len(flipped.cells) == len(coarse.cells)
     assert euler_characteristic(flipped.cells) == euler_characteristic(coarse.cells)
     assert set(np.unique(flipped.cells)) == set(np.unique(coarse.cells))
@@ -197,8 +198,69 @@ def test_flips_keep_vertices_and_topology_and_widen_angles(coarse):
     assert_sides_are_known(flipped)
 
 
+def gains_of_flips(fabric: Fabric) -> list[float]:
+    """Plain twin: what flips would gain that nothing forbids, edge by edge."""
+    place, rows, beside = fabric.vertices.place, fabric.vertices.rows, {}
+    for cell in fabric.cells.tolist():
+        for k in range(3):
+            beside.setdefault(frozenset(cell[:k] + cell[k + 1 :]), []).append((cell, k))
+    fixed = set(map(frozenset, fabric.facets.tolist()))
+    gains = []
+    for edge, around in beside.items():
+        if len(around) != 2 or edge in fixed:
+            continue
+        a, b = edge
+        c, d = (cell[k] for cell, k in around)
+        angles = [np.stack([place[a], place[b]]) - place[x] for x in (c, d)]
+        total = sum(np.arccos(x @ y / np.linalg.norm(x) / np.linalg.norm(y)) for x, y in angles)
+        if total <= np.pi + 1e-2 or frozenset((c, d)) in beside:
+            continue
+        flat = [(place[[a, b, c, d]] - place[a]) @ rows[x].T for x in (a, b, c, d)]
+        new = np.array([[area(x[0], x[3], x[2]), area(x[3], x[1], x[2])] for x in flat])
+        whole = new.sum(axis=1, keepdims=True)
+        if (new * np.sign(whole) > 2e-3 * np.abs(whole)).all():
+            gains.append(total - np.pi)
+    return gains
+
+
+def area(a, b, c):
+    return (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]
+
+
+def test_no_flip_is_left_that_would_widen_angles(coarse):
+    assert len(gains_of_flips(coarse)) > 50
+    flipped = flip(coarse)
+    assert gains_of_flips(flipped) == []
+    assert flip(flipped) is flipped
+
+
+def test_flips_do_not_make_edges_that_are_ruled_out(coarse):
+    def edges(fabric):
+        return {tuple(sorted(pair)) for a, b, c in fabric.cells.tolist()
+                for pair in ((a, b), (b, c), (c, a))}  # fmt: skip
+
+    new = np.array(sorted(edges(flip(coarse)) - edges(coarse)))
+    assert len(new) > 50
+    assert edges(flip(coarse, new)).isdisjoint(map(tuple, new.tolist()))
+
+
+def test_several_edges_of_a_cell_are_cut_alike_on_both_sides():
+    """All edges of two tetrahedra: their common face is cut into the same triangles."""
+    cells = np.array([[0, 1, 2, 3], [4, 2, 1, 3]])
+    edges, _ = edges_of(cells, 5)
+    order = np.random.default_rng(0).permutation(len(edges))
+    parts, parents = _bisected(cells, edges[order], 5)
+    assert euler_characteristic(parts) == 1
+    assert len(np.unique(parts)) == 5 + len(edges)
+    assert (adjacency(parts).counts <= 2).all()
+    corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
+    place = np.concatenate([corner, corner[edges[order]].mean(axis=1)])
+    whole = np.abs(volumes(corner[cells]))
+    np.testing.assert_allclose(np.bincount(parents, np.abs(volumes(place[parts]))), whole)
+
+
 def test_collapses_take_slivers_away_and_keep_the_topology(coarse):
-    less = collapse(flip(coarse, passes=4), passes=6)
+    less = collapse(flip(coarse), passes=6)
     assert len(less.cells) < len(coarse.cells)
     assert euler_characteristic(less.cells) == euler_characteristic(coarse.cells)
     assert smallest_angle(less) > 2 * smallest_angle(coarse)

@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from equimorph.manifold.accounting import Complex
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
+from equimorph.manifold.kernels import square_sides
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.points import CAP, CORNER, FOLD
 from equimorph.manifold.tangents import (
@@ -58,10 +59,10 @@ class Vertices:
         """Return some of the vertices."""
         return Vertices(*(column[some] for column in vars(self).values()))
 
-    def joined(self, more: "Vertices") -> "Vertices":
+    def joined(self, *more: "Vertices") -> "Vertices":
         """Return these vertices and more."""
-        pairs = zip(vars(self).values(), vars(more).values(), strict=True)
-        return Vertices(*(np.concatenate(pair) for pair in pairs))
+        columns = zip(*(vars(each).values() for each in (self, *more)), strict=True)
+        return Vertices(*(np.concatenate(column) for column in columns))
 
 
 @dataclass(frozen=True)
@@ -87,14 +88,18 @@ class Fabric:
         return len(self.setting.free)
 
     def edge_marks(self, edges: Int[np.ndarray, "E 2"]) -> Int[np.ndarray, " E"]:
-        """All marks of the facets around each edge; `edges` with sorted ends, in order."""
+        """All marks of the facets around each edge; `edges` with sorted ends."""
         base = len(self.vertices)
-        out = np.zeros(len(edges), int)
+        pairs = combinations(range(self.facets.shape[1]), 2)
+        own = [keys_of(self.facets[:, list(pair)], base) for pair in pairs]
+        if len(self.facets) == 0 or not own:
+            return np.zeros(len(edges), int)
+        known, inverse = np.unique(np.concatenate(own), return_inverse=True)
+        marks = np.zeros(len(known), int)
+        np.bitwise_or.at(marks, inverse, np.tile(self.marks, len(own)))
         keys = keys_of(edges, base)
-        for pair in combinations(range(self.facets.shape[1]), 2):
-            own = keys_of(self.facets[:, list(pair)], base)
-            np.bitwise_or.at(out, np.searchsorted(keys, own), self.marks)
-        return out
+        at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+        return np.where(known[at] == keys, marks[at], 0)
 
     @property
     def vertex_marks(self) -> Int[np.ndarray, " V"]:
@@ -106,40 +111,37 @@ class Fabric:
 
     def end(self, at: Int[np.ndarray, " edges"], mark: int) -> Ends:
         """Ends of edges with a mark: at its vertices, and what stays zero along the edges."""
-        store = self.vertices
-        frame = store.frame[at]
-        slopes = []
+        store, d = self.vertices, self.dimension
+        rows, slopes = store.rows[at], []
         if mark & ON_FOLD:
             slopes.append(store.fold_slope[at])
         if mark & ON_CAP:
             slopes.append(store.cap_slope[at])
-        first = frame.shape[2] - self.dimension
-        slopes.extend(frame[:, :, first + k] for k in held(mark, self.dimension))
-        stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, self.dimension))
-        return Ends(store.place[at], frame, store.rows[at], stacked)
+        slopes.extend(rows[:, :, rows.shape[2] - d + k] for k in held(mark, d))
+        stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, d))
+        return Ends(store.place[at], rows, stacked)
 
-    def bisected(
-        self,
-        edges: Int[np.ndarray, "E 2"],
-        more: Vertices,
-    ) -> "Fabric":
-        """Cut edges at new vertices, and all cells and facets around them; each at most once."""
-        middles = len(self.vertices) + np.arange(len(edges))
+    def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
+        """Cut edges at new vertices, and all cells and facets around them.
+
+        Cells with several of the edges are cut at the first of them first, so that neighbours agree
+        on what they share.
+        """
         base = len(self.vertices)
-        cells, of_cells = _bisected(self.cells, edges, middles, base)
-        facets, of_facets = _bisected(self.facets, edges, middles, base)
+        cells, of_cells = _bisected(self.cells, edges, base)
+        facets, of_facets = _bisected(self.facets, edges, base)
         vertices = self.vertices.joined(more)
-        squared = np.concatenate([self.squared, self.squared[of_cells]])
-        changed = np.concatenate([of_cells, np.arange(len(self.cells), len(cells))])
+        squared = self.squared[of_cells]
+        changed = np.flatnonzero((cells >= base).any(axis=1))
         squared[changed] = squared_sides(vertices.place, cells[changed])
         return replace(
             self,
             vertices=vertices,
             squared=squared,
             cells=cells,
-            cell_index=np.concatenate([self.cell_index, self.cell_index[of_cells]]),
+            cell_index=self.cell_index[of_cells],
             facets=facets,
-            marks=np.concatenate([self.marks, self.marks[of_facets]]),
+            marks=self.marks[of_facets],
         )
 
     def complex(self) -> Complex:
@@ -164,11 +166,10 @@ def squared_sides(
     place: Float[np.ndarray, "V coordinates"], cells: Int[np.ndarray, "n corners"]
 ) -> Float[np.ndarray, "n sides"]:
     """Squared lengths of the sides 01, 02, 12 and so on of cells."""
-    out = []
-    for i, j in combinations(range(cells.shape[1]), 2):
-        side = place[cells[:, i]] - place[cells[:, j]]
-        out.append(np.einsum("ni,ni->n", side, side))
-    return np.stack(out, axis=1)
+    corners = cells.shape[1]
+    out = np.empty((len(cells), corners * (corners - 1) // 2))
+    square_sides(place, np.ascontiguousarray(cells), out)
+    return out
 
 
 def held(mark: int, dimension: int) -> list[int]:
@@ -239,24 +240,28 @@ def _outer_marks(eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]) -> Int[np
 
 
 def _bisected(
-    rows: Int[np.ndarray, "n k"],
-    edges: Int[np.ndarray, "E 2"],
-    middles: Int[np.ndarray, " E"],
-    base: int,
-) -> tuple[Int[np.ndarray, "m k"], Int[np.ndarray, " parents"]]:
-    """Rows that hold one of the edges are cut in two; the second halves come last."""
-    keys = keys_of(edges, base)
+    rows: Int[np.ndarray, "n k"], edges: Int[np.ndarray, "E 2"], base: int
+) -> tuple[Int[np.ndarray, "m k"], Int[np.ndarray, " m"]]:
+    """Rows cut at vertices ``base + e`` on edges e that they hold, and the rows they come from."""
+    whole = base + len(edges)
+    keys = keys_of(edges, whole)
     order = np.argsort(keys)
-    which = np.full(len(rows), -1)
-    for pair in combinations(range(rows.shape[1]), 2):
-        own = keys_of(rows[:, list(pair)], base)
-        at = order[np.minimum(np.searchsorted(keys, own, sorter=order), len(order) - 1)]
-        which = np.where(keys[at] == own, at, which)
-    cut = np.flatnonzero(which >= 0)
-    (a, b), m = edges[which[cut]].T, middles[which[cut]][:, None]
-    halves = rows.copy()
-    halves[cut] = np.where(rows[cut] == b[:, None], m, rows[cut])
-    return np.concatenate([halves, np.where(rows[cut] == a[:, None], m, rows[cut])]), cut
+    keys = keys[order]
+    rows, owner, active = rows.copy(), np.arange(len(rows)), np.arange(len(rows))
+    while len(active) and len(edges):
+        which = np.full(len(active), len(edges))
+        for pair in combinations(range(rows.shape[1]), 2):
+            own = keys_of(rows[active][:, list(pair)], whole)
+            at = np.minimum(np.searchsorted(keys, own), len(keys) - 1)
+            which = np.where(keys[at] == own, np.minimum(which, order[at]), which)
+        held = which < len(edges)
+        cut, which = active[held], which[held]
+        (a, b), middle = edges[which].T, base + which[:, None]
+        halves = np.where(rows[cut] == a[:, None], middle, rows[cut])
+        rows[cut] = np.where(rows[cut] == b[:, None], middle, rows[cut])
+        active = np.concatenate([cut, np.arange(len(rows), len(rows) + len(cut))])
+        rows, owner = np.concatenate([rows, halves]), np.concatenate([owner, owner[cut]])
+    return rows, owner
 
 
 def edges_of(

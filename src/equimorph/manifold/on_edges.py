@@ -33,7 +33,9 @@ def on_edges(
     z, p = store.z[ends], store.p[ends]
     moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
     chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
-    dz, dp = split_step(setting, t[:, None] * chord + Cubics(first, second).step(chord, t))
+    frames = store.frame[ends[:, 0]], store.frame[ends[:, 1]]
+    bend = Cubics(first, second).step(frames, chord, t)
+    dz, dp = split_step(setting, t[:, None] * chord + bend)
     z, p = z[:, 0] + dz, p[:, 0] + dp
     keep = held(mark, d)
     for k in keep:

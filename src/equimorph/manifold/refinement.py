@@ -30,13 +30,21 @@ from equimorph.manifold.topology import keys_of
 from equimorph.model import Progress, Silent
 
 ROUNDS = 200
-TIDIED = 2
+TIDIED = 1
 """How often slivers are taken away in between."""
 SHARE = {1: 1.0, 2: 0.75, 3: 2.0 / 3.0}
 """Part of the tolerance that edges may use up: inside a cell their deviations add up to 2d/(d + 1)
 of the largest."""
 PREFERENCE = 1.6
 """How much longer an edge must be than those that deviate to be bisected before them."""
+COARSE = 4.0
+"""Deviation, in tolerances, of edges whose halves are likely to deviate too much as well."""
+BULGE = 0.5
+"""How long edges on folds may be, relative to edges at their ends that could not be bisected."""
+FEW = 50
+"""Fewer than one in so many edges are bisected all at once."""
+CHUNK = 4096
+"""Edges that are worked on together: their work arrays stay small."""
 PLACES = (0.5, 0.3, 0.7)
 """Where along an edge a vertex is tried, one place after the other."""
 HOPELESS = 60
@@ -74,10 +82,10 @@ def refine(
     free = np.array([[q.name for q in eset.structure.parameters].index(n) for n in eset.names])
     base = eset.points.p[0].copy() if len(eset.points) else np.zeros(0)
     setting = Setting(eset.structure, base, free, eset.constraints)
-    fabric = _tidied(fabric_of(setting, eset)) if len(eset.cells) else None
-    if fabric is None:
+    if len(eset.cells) == 0:
         return eset
     memory = _Memory()
+    fabric = _tidied(fabric_of(setting, eset), memory)
     fabric = _refined(fabric, SHARE[len(free)] * accuracy, memory, progress or Silent())
     edges = _known(fabric, memory)
     audit = eset.audit
@@ -108,7 +116,10 @@ def check_accuracy(accuracy: float) -> None:
 
 @dataclass(frozen=True)
 class _Edges:
-    """Edges of a fabric, those of each cell, their marks, length and deviation from the set."""
+    """Edges of a fabric, those of each cell, their marks, length and deviation from the set.
+
+    stuck: cannot be bisected; pressing: must be, whatever they deviate.
+    """
 
     ends: Int[np.ndarray, "E 2"]
     of_cells: Int[np.ndarray, "C sides"]
@@ -116,6 +127,17 @@ class _Edges:
     length: Float[np.ndarray, " E"]
     error: Float[np.ndarray, " E"]
     stuck: Bool[np.ndarray, " E"]
+    pressing: Bool[np.ndarray, " E"]
+
+    def deviating(self, tolerance: float) -> Bool[np.ndarray, " E"]:
+        """Edges that should be bisected now, and can be.
+
+        Where folds and constraints bulge far out between their vertices, they come first: edges
+        beside them would cross them.
+        """
+        first = (self.error > COARSE * tolerance) & ((self.marks & (ON_FOLD | ON_CAP)) > 0)
+        first = (first | self.pressing) & ~self.stuck
+        return first if first.any() else np.asarray((self.error > tolerance) & ~self.stuck)
 
 
 @dataclass
@@ -123,8 +145,11 @@ class _Memory:
     """Deviations of edges that were measured before, and edges that could not be bisected."""
 
     keys: Int[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, int))
+    """Of the edges whose deviation is known; so numbered that they stay when vertices are added."""
     error: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
     stuck: set[tuple[int, int]] = field(default_factory=set)
+    cut: Int[np.ndarray, "m 2"] = field(default_factory=lambda: np.zeros((0, 2), int))
+    """Edges that were bisected: flips must not bring them back."""
     failures: int = 0
 
 
@@ -133,30 +158,29 @@ def _refined(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progre
     tidied = 0
     for _ in range(ROUNDS):
         edges = _known(fabric, memory)
-        wanted = (edges.error > tolerance) & ~edges.stuck
         hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
         if hopeless or len(fabric.vertices) > MOST:
             break
-        if not wanted.any():
+        if not edges.deviating(tolerance).any():
             if tidied == TIDIED:
                 break
             tidied += 1
-            cells, fabric = fabric.cells, _tidied(fabric)
+            cells, fabric = fabric.cells, _tidied(fabric, memory)
             if fabric.cells is cells:
                 break
             continue
         progress.report("refining", int((edges.error <= tolerance).sum()), len(edges.error))
-        fabric = _bisect(fabric, edges, _terminal(edges, wanted), memory)
+        fabric = _bisect(fabric, edges, _chosen(edges, tolerance), memory)
         if fabric.dimension == 2:
-            fabric = flip(fabric, passes=2)
+            fabric = flip(fabric, memory.cut)
     return fabric
 
 
-def _tidied(fabric: Fabric) -> Fabric:
+def _tidied(fabric: Fabric, memory: _Memory) -> Fabric:
     """Take slivers away."""
     if fabric.dimension != 2:
         return fabric
-    return flip(collapse(flip(fabric, passes=4), passes=4), passes=4)
+    return flip(collapse(flip(fabric, memory.cut), passes=4), memory.cut)
 
 
 def _known(fabric: Fabric, memory: _Memory) -> _Edges:
@@ -164,8 +188,7 @@ def _known(fabric: Fabric, memory: _Memory) -> _Edges:
     base = len(fabric.vertices)
     ends, of_cells = edges_of(fabric.cells, base)
     marks = fabric.edge_marks(ends)
-    # keys that stay the same while vertices are added
-    keys = ends[:, 1] * (ends[:, 1] - 1) // 2 + ends[:, 0]
+    keys = _keys(ends)
     at = np.minimum(np.searchsorted(memory.keys, keys), max(len(memory.keys) - 1, 0))
     old = memory.keys[at] == keys if len(memory.keys) else np.zeros(len(keys), bool)
     error = np.empty(len(keys))
@@ -177,10 +200,34 @@ def _known(fabric: Fabric, memory: _Memory) -> _Edges:
     length = np.empty(len(ends))
     length[of_cells] = np.sqrt(fabric.squared)
     stuck = (marks & HOLE) > 0
+    failed = np.zeros(len(ends), bool)
     if memory.stuck:
         refused = np.array(sorted(memory.stuck))
-        stuck |= np.isin(keys_of(ends, base), keys_of(refused, base))
-    return _Edges(ends, of_cells, marks, length, error, stuck)
+        failed = np.isin(keys_of(ends, base), keys_of(refused, base))
+    pressing = _pressing(ends, marks, length, failed)
+    return _Edges(ends, of_cells, marks, length, error, stuck | failed, pressing)
+
+
+def _pressing(
+    ends: Int[np.ndarray, "E 2"],
+    marks: Int[np.ndarray, " E"],
+    length: Float[np.ndarray, " E"],
+    failed: Bool[np.ndarray, " E"],
+) -> Bool[np.ndarray, " E"]:
+    """Longer edges on folds and constraints next to edges that could not be bisected.
+
+    Those may cross a fold that bulges out between its vertices.
+    """
+    reach = np.full(int(ends.max(initial=0)) + 1, np.inf)
+    for side in range(2):
+        np.minimum.at(reach, ends[failed, side], length[failed])
+    short = np.minimum(reach[ends[:, 0]], reach[ends[:, 1]])
+    return np.asarray(((marks & (ON_FOLD | ON_CAP)) > 0) & (length > BULGE * short))
+
+
+def _keys(ends: Int[np.ndarray, "E 2"]) -> Int[np.ndarray, " E"]:
+    """Numbers of edges with sorted ends that stay the same while vertices are added."""
+    return np.asarray(ends[:, 1] * (ends[:, 1] - 1) // 2 + ends[:, 0])
 
 
 def _deviations(
@@ -188,47 +235,74 @@ def _deviations(
 ) -> Float[np.ndarray, " E"]:
     """How far the set is from straight edges."""
     out = np.zeros(len(ends))
-    for mark in np.unique(marks).tolist():
-        own = np.flatnonzero(marks == mark)
-        for some in np.array_split(own, len(own) // 8192 + 1):
-            first, second = (fabric.end(ends[some, side], mark) for side in range(2))
-            out[some] = Cubics(first, second).error
+    for own in _chunks(np.arange(len(ends)), marks):
+        first, second = (fabric.end(ends[own, side], int(marks[own[0]])) for side in range(2))
+        out[own] = Cubics(first, second).error
     return out
 
 
-def _terminal(edges: _Edges, wanted: Bool[np.ndarray, " E"]) -> Int[np.ndarray, " n"]:
-    """Edges to be bisected now: those that all cells around them choose.
+def _chunks(
+    chosen: Int[np.ndarray, " n"], marks: Int[np.ndarray, " E"]
+) -> list[Int[np.ndarray, " k"]]:
+    """Edges in chunks of equal marks."""
+    chunks: list[Int[np.ndarray, " k"]] = []
+    for mark in np.unique(marks[chosen]).tolist():
+        own = chosen[marks[chosen] == mark]
+        chunks.extend(own[at : at + CHUNK] for at in range(0, len(own), CHUNK))
+    return chunks
 
-    A cell with a wanted edge chooses the longest of these, or its longest edge, which is wanted
-    then, too, if that is longer by more than `PREFERENCE`.
+
+def _chosen(edges: _Edges, tolerance: float) -> Int[np.ndarray, " n"]:
+    """Edges to be bisected now, those first that cells with several are to be cut at first.
+
+    Those that deviate so much that their halves may, too; of the others, those that all cells
+    around them want to be cut at first: the rest may then be within the tolerance, or flipped.
     """
-    chosen, sides = wanted.copy(), edges.of_cells
-    own = np.arange(len(sides))
+    deviating = edges.deviating(tolerance)
+    few = np.count_nonzero(deviating) * FEW < len(deviating)
+    coarse, _ = _closed(edges, deviating & (few | (edges.error > COARSE * tolerance)))
+    wanted, weight = _closed(edges, coarse | deviating)
+    cells = edges.of_cells[wanted[edges.of_cells].any(axis=1)]
+    longest = cells[np.arange(len(cells)), weight[cells].argmax(axis=1)]
+    around = np.bincount(edges.of_cells.ravel(), minlength=len(weight))
+    agreed = np.bincount(longest, minlength=len(weight)) == around
+    out = np.flatnonzero(coarse | (agreed & wanted))
+    return out[np.argsort(-weight[out], kind="stable")]
+
+
+def _closed(
+    edges: _Edges, wanted: Bool[np.ndarray, " E"]
+) -> tuple[Bool[np.ndarray, " E"], Float[np.ndarray, " E"]]:
+    """Wanted edges and what follows; and by how much cells prefer to be cut at each edge.
+
+    In every cell with a wanted edge the longest one is wanted, too, if that is longer by more than
+    `PREFERENCE`.
+    """
+    wanted = wanted & ~edges.stuck
+    weight = np.where(wanted, PREFERENCE, 1.0) * edges.length
+    weight[edges.stuck] = -1.0
     while True:
-        weight = np.where(edges.stuck, -1.0, np.where(chosen, PREFERENCE, 1.0) * edges.length)
-        rank = np.empty(len(weight), int)
-        rank[np.argsort(weight, kind="stable")] = np.arange(len(weight))
-        choice = sides[own, rank[sides].argmax(axis=1)]
-        active = chosen[sides].any(axis=1)
-        count = np.count_nonzero(chosen)
-        chosen[choice[active]] = True
-        if np.count_nonzero(chosen) == count:
-            break
-    around = np.bincount(sides.ravel(), minlength=len(weight))
-    agreeing = np.bincount(choice[active], minlength=len(weight))
-    return np.flatnonzero((agreeing == around) & chosen & ~edges.stuck)
+        cells = edges.of_cells[wanted[edges.of_cells].any(axis=1)]
+        longest = cells[np.arange(len(cells)), weight[cells].argmax(axis=1)]
+        more = longest[~wanted[longest]]
+        if len(more) == 0:
+            return wanted, weight
+        wanted[more] = True
+        weight[more] = PREFERENCE * edges.length[more]
 
 
 def _bisect(
     fabric: Fabric, edges: _Edges, chosen: Int[np.ndarray, " n"], memory: _Memory
 ) -> Fabric:
     """Put exact vertices on edges; remember where that failed."""
-    ends, parts, done = edges.ends, [], []
+    ends = edges.ends
     lowest = np.full(len(ends), np.iinfo(int).max)
     for side in edges.of_cells.T:
         np.minimum.at(lowest, side, fabric.cell_index)
-    for mark in np.unique(edges.marks[chosen]).tolist():
-        own = chosen[edges.marks[chosen] == mark]
+
+    parts, done = [], []
+    for some in _chunks(chosen, edges.marks):
+        own, mark = some, int(edges.marks[some[0]])
         for t in PLACES:
             places = np.full(len(own), t)
             found, vertices = on_edges(fabric, ends[own], mark, lowest[own], places)
@@ -241,10 +315,13 @@ def _bisect(
         memory.failures += len(own)
     if not done:
         return fabric
-    more = parts[0]
-    for part in parts[1:]:
-        more = more.joined(part)
+    more = parts[0].joined(*parts[1:])
     at = np.concatenate(done)
+    rank = np.empty(len(ends), int)
+    rank[chosen] = np.arange(len(chosen))
+    order = np.argsort(rank[at])
+    at, more = at[order], more.take(order)
+    memory.cut = np.concatenate([memory.cut, ends[at]])
     if np.isin(edges.marks[at], (ON_FOLD, ON_CAP)).any():
         memory.stuck.clear()  # beside a fold that is better known they may succeed
     return fabric.bisected(ends[at], more) if len(at) else fabric

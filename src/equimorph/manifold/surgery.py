@@ -4,13 +4,14 @@ Angles are measured in the embedding. Nothing may fold over: seen in the tangent
 vertices involved, new triangles keep the orientation of those that they replace.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.fabric import Fabric, edges_of, squared_sides
+from equimorph.manifold.kernels import flip_edges
 from equimorph.manifold.topology import keys_of
 
 SLENDER = np.radians(20.0)
@@ -29,6 +30,8 @@ def smallest_angle(fabric: Fabric) -> float:
     """Smallest angle of all triangles, in degrees; 0 where there are none."""
     if fabric.dimension == 1:
         return 0.0
+    if fabric.dimension == 2:
+        return float(np.degrees(_smallest(fabric.squared).min(initial=np.inf)))
     angles = [
         _angles(fabric, fabric.cells[:, list(chosen)]).min()
         for chosen in combinations(range(fabric.cells.shape[1]), 3)
@@ -36,19 +39,17 @@ def smallest_angle(fabric: Fabric) -> float:
     return float(np.degrees(min(angles)))
 
 
-def flip(fabric: Fabric, passes: int) -> Fabric:
-    """Flip edges whose opposite angles add up to more than π, as far as nothing folds over."""
-    for _ in range(passes):
-        pairs = _flippable(fabric, _cotangents(fabric.squared))
-        if len(pairs.left) == 0:
-            break
-        cells = fabric.cells.copy()
-        cells[pairs.left] = np.stack([pairs.a, pairs.d, pairs.c], axis=1)
-        cells[pairs.right] = np.stack([pairs.d, pairs.b, pairs.c], axis=1)
-        changed, squared = np.concatenate([pairs.left, pairs.right]), fabric.squared.copy()
-        squared[changed] = squared_sides(fabric.vertices.place, cells[changed])
-        fabric = replace(fabric, cells=cells, squared=squared)
-    return fabric
+def flip(fabric: Fabric, but: Int[np.ndarray, "m 2"] | None = None) -> Fabric:
+    """Flip edges whose opposite angles add up to more than π, as far as nothing folds over.
+
+    Edges between the pairs of vertices `but` do not come into being.
+    """
+    cells, squared = fabric.cells.copy(), fabric.squared.copy()
+    fixed = fabric.facets if but is None else np.concatenate([fabric.facets, but])
+    store = fabric.vertices
+    parts = (fabric.cell_index, np.ascontiguousarray(fixed), store.place, store.rows)
+    count = flip_edges(cells, squared, *parts, GAIN)
+    return replace(fabric, cells=cells, squared=squared) if count else fabric
 
 
 def _cotangents(squared: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3"]:
@@ -58,81 +59,6 @@ def _cotangents(squared: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3"]:
     four_areas = np.sqrt(np.maximum(area, 1e-28 * total**2))
     # the side opposite to corner 0 comes last
     return np.asarray((total[:, None] - 2.0 * squared[:, ::-1]) / four_areas[:, None])
-
-
-@dataclass(frozen=True)
-class _Pairs:
-    """Edges ab between cells `left` = abc and `right` = bad."""
-
-    a: Int[np.ndarray, " n"]
-    b: Int[np.ndarray, " n"]
-    c: Int[np.ndarray, " n"]
-    d: Int[np.ndarray, " n"]
-    left: Int[np.ndarray, " n"]
-    right: Int[np.ndarray, " n"]
-
-    def take(self, some: Int[np.ndarray, " m"] | Bool[np.ndarray, " n"]) -> "_Pairs":
-        """Return some of the pairs."""
-        return _Pairs(*(column[some] for column in vars(self).values()))
-
-
-def _flippable(fabric: Fabric, cotangents: Float[np.ndarray, "T 3"]) -> _Pairs:
-    """Pairs of triangles to flip, no triangle in two of them."""
-    cells, base = fabric.cells, len(fabric.vertices)
-    keys = keys_of(cells[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), base)
-    order = np.argsort(keys, kind="stable")
-    keys = keys[order]
-    same = np.concatenate([[False], keys[1:] == keys[:-1], [False]])
-    two = np.flatnonzero(same[1:-1] & ~same[:-2] & ~same[2:])
-    gain = -cotangents.ravel()[order[two]] - cotangents.ravel()[order[two + 1]]
-    two, gain = two[gain > GAIN], gain[gain > GAIN]
-    left, right = order[two], order[two + 1]
-    pairs = _Pairs(
-        cells[left // 3, (left + 1) % 3], cells[left // 3, (left + 2) % 3],
-        cells[left // 3, left % 3], cells[right // 3, right % 3],
-        left // 3, right // 3,
-    )  # fmt: skip
-    new = keys_of(np.stack([pairs.c, pairs.d], axis=1), base)
-    allowed = keys[np.minimum(np.searchsorted(keys, new), len(keys) - 1)] != new
-    allowed &= fabric.cell_index[pairs.left] == fabric.cell_index[pairs.right]
-    allowed &= ~np.isin(keys[two], keys_of(fabric.facets, base))
-    allowed[allowed] = _unfolded(fabric, pairs.take(allowed))
-    chosen = np.flatnonzero(allowed)
-    chosen = chosen[np.argsort(-gain[chosen], kind="stable")]
-    return pairs.take(chosen[_first_come(pairs.take(chosen), new[chosen])])
-
-
-def _first_come(pairs: _Pairs, new: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-    """Pairs that are the first to ask for both their triangles, and for their new edge."""
-    rank = np.arange(len(new))
-    both = np.concatenate([pairs.left, pairs.right])
-    best = np.full(int(both.max(initial=-1)) + 1, len(new))
-    np.minimum.at(best, both, np.concatenate([rank, rank]))
-    first = (best[pairs.left] == rank) & (best[pairs.right] == rank)
-    return np.asarray(first & np.isin(rank, np.unique(new, return_index=True)[1]))
-
-
-def _unfolded(fabric: Fabric, pairs: _Pairs) -> Bool[np.ndarray, " n"]:
-    """Whether the triangles after a flip keep their side up in the tangent planes at all corners.
-
-    The same must hold of those before, else nothing is known.
-    """
-    good = np.ones(len(pairs.a), bool)
-    for plane in (pairs.a, pairs.b, pairs.c, pairs.d):
-        old = [
-            _area(fabric, plane, t)
-            for t in ((pairs.a, pairs.b, pairs.c), (pairs.b, pairs.a, pairs.d))
-        ]
-        new = [
-            _area(fabric, plane, t)
-            for t in ((pairs.a, pairs.d, pairs.c), (pairs.d, pairs.b, pairs.c))
-        ]
-        signs = np.sign(np.stack([*old, *new]))
-        # slivers may look either way
-        whole = np.abs(old[0] + old[1])
-        flat = np.minimum(np.abs(new[0]), np.abs(new[1])) < 1e-3 * whole
-        good &= (signs[2] == signs[3]) & (signs[2] == np.sign(old[0] + old[1])) & ~flat
-    return good
 
 
 def _area(
@@ -194,7 +120,10 @@ def _moves(fabric: Fabric) -> Int[np.ndarray, "m 2"]:
     corners = cells[slender]
     around = [corners[:, [i, j]] for i in range(3) for j in range(3) if i != j]
     moves = np.unique(np.concatenate(around), axis=0)
-    edges, _ = edges_of(cells, base)
+    near = np.zeros(base, bool)
+    near[corners] = True
+    # all cells around the ends of moves
+    edges, _ = edges_of(cells[near[cells].any(axis=1)], base)
     moves = moves[_free_to_move(fabric, moves, edges)]
     gain = _gains(fabric, moves)
     moves, gain = moves[gain > 0], gain[gain > 0]
@@ -207,9 +136,9 @@ def _free_to_move(
 ) -> Bool[np.ndarray, " m"]:
     """Whether what the vertex lies on goes on along the edge, and the surface stays one."""
     base = len(fabric.vertices)
-    keys, marks = keys_of(edges, base), fabric.edge_marks(edges)
+    keys = keys_of(edges, base)
     own = fabric.vertex_marks[moves[:, 0]]
-    along = marks[np.searchsorted(keys, keys_of(moves, base))]
+    along = fabric.edge_marks(np.sort(moves, axis=1))
     ends = np.bincount(fabric.facets.ravel(), minlength=base)[moves[:, 0]]
     good = (own == along) & ((own == 0) | (ends == 2))
     # common neighbours of both ends: only those across the triangles beside the edge
@@ -247,7 +176,10 @@ def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, "
     And, less than one, by how much the smallest angle around it grows. Minus one where a triangle
     would fold over, get much more slender or much longer.
     """
-    cells, base = fabric.cells, len(fabric.vertices)
+    base = len(fabric.vertices)
+    going = np.zeros(base, bool)
+    going[moves[:, 0]] = True
+    cells = fabric.cells[going[fabric.cells].any(axis=1)]
     order = np.argsort(cells.ravel(), kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(cells.ravel(), minlength=base))])
     row, at = _spread(starts, moves[:, 0])

@@ -94,10 +94,9 @@ def cap_slopes(
 
 @dataclass(frozen=True)
 class Ends:
-    """One end of edges: its point, frame, and the slopes of what must stay zero along the edge."""
+    """One end of edges: its point, tangent space, and the slopes of what must stay zero on them."""
 
     place: Float[np.ndarray, "edges coordinates"]
-    frame: Frames
     rows: Rows
     slopes: Float[np.ndarray, "edges m d"]
 
@@ -157,12 +156,18 @@ class Cubics:
         return np.asarray(np.maximum(middle, S_SHAPE * slope))
 
     def step(
-        self, chord: Float[np.ndarray, "edges full"], t: Float[np.ndarray, " edges"]
+        self,
+        frames: tuple[Frames, Frames],
+        chord: Float[np.ndarray, "edges full"],
+        t: Float[np.ndarray, " edges"],
     ) -> Float[np.ndarray, "edges full"]:
-        """Step from the chords, changes of z and of the scaled parameters, to the curves at t."""
+        """Step from the chords, changes of z and of the scaled parameters, to the curves at t.
+
+        `frames` are those at both ends.
+        """
         _, a, b = self._along
-        off_a = np.einsum("ed,edf->ef", a, self.first.frame) - chord
-        off_b = np.einsum("ed,edf->ef", b, self.second.frame) - chord
+        off_a = np.einsum("ed,edf->ef", a, frames[0]) - chord
+        off_b = np.einsum("ed,edf->ef", b, frames[1]) - chord
         share = t[:, None]
         return np.asarray(share * (1 - share) ** 2 * off_a - share**2 * (1 - share) * off_b)
 
