@@ -8,13 +8,19 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.equilibria import Event, Leg, Path, Waypoint, lift
+from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, position
-from equimorph.structures import State, Structure
+from equimorph.structures import State, States, Structure, value_of
+from equimorph.tasks.known import Start, known_state
+from equimorph.tasks.motion.course import Course
+from equimorph.tasks.motion.followed import DENSE, dense_path, path_of, uniform
+from equimorph.tasks.motion.redundant import steer
 from equimorph.tasks.route import FINE, place, scheduled
 
 Failure = Literal["", "snap-through", "singular Jacobian", "actuator limit", "constraint", "lost"]
+SAME = 1e-8
+"""Relative distance of targets that are the same."""
 CRITICAL = ("critical", "branch point", "index")
 """Ends at which a stable state loses its stability."""
 
@@ -45,6 +51,7 @@ class Tracking:
     why: str
     path: Path
     targets: tuple[Descriptor, ...]
+    actuators: tuple[str, ...] = ()
     schedule: Schedule | None = None
 
     def __repr__(self) -> str:
@@ -69,34 +76,64 @@ class Tracking:
         return float(self.path.states.margin.min())
 
     @property
-    def states(self) -> Mapping[str, Float[np.ndarray, " steps"]]:
+    def states(self) -> States:
+        """Exact states along the path."""
+        return self.path.states
+
+    @property
+    def values(self) -> Mapping[str, Float[np.ndarray, " steps"]]:
         """Values of the targets along the path, by name."""
         return {each.name: each(self.path.states) for each in self.targets}
 
+    @cached_property
+    def holonomy(self) -> Mapping[str, float] | None:
+        """Change of each actuator around the loop, if the motion comes back to earlier targets.
+
+        Zero where the actuators come back, too; None if the targets do not close.
+        """
+        at, states = self.path.at, self.path.states
+        corners = np.flatnonzero(np.isclose(at, np.round(at), rtol=0, atol=1e-12))
+        if not self.arrived or len(corners) < 2:
+            return None
+        parameters = self.path.states.structure.parameters
+        free = [position(parameters, name) for name in self.actuators]
+        columns = np.delete(states.p[corners], free, axis=1)
+        values = np.stack([each(states[corners]) for each in self.targets], axis=1)
+        columns = np.concatenate([columns, values], axis=1)
+        size = 1.0 + np.abs(columns).max(axis=0)
+        same = np.flatnonzero((np.abs(columns - columns[-1]) <= SAME * size).all(axis=1))
+        if len(same) < 2:
+            return None
+        change = states.p[corners[-1]] - states.p[corners[same[0]]]
+        return dict(zip(self.actuators, change[free].tolist(), strict=True))
+
 
 def track(
-    start: State,
+    start: Start,
     targets: Leg | Sequence[Leg],
     *,
     actuators: Sequence[str] | Mapping[str, tuple[float, float]],
     within: Sequence[Constraint] = (),
     monitor: Sequence[Descriptor] = (),
 ) -> Tracking:
-    """Follow targets S*(t) with as many actuators; loads may be prescribed at the same time.
+    """Follow targets S*(t) with as many actuators or more, while loads may move.
 
     ``S_a ȧ = Ṡ* − S_l l̇``, corrected onto the set at every step: an error-controlled continuation
-    in pseudo-arclength. The motion is followed once coarsely, and again finely before it is called
-    good.
+    in pseudo-arclength, once coarsely, and again finely before it is called good. Many close
+    targets are corrected side by side. With more actuators than targets the shortest motion of the
+    actuators is taken at every moment, in their scales; one that meets its limit is held there as
+    long as the others can go on.
 
     Parameters
     ----------
     start
-        A stable equilibrium.
+        A stable equilibrium; what `locate` or `estimate_state` says of a measured one will do.
     targets
         One leg or several: ``{descriptor: value, "q": value}``, approached at a constant rate, or
         functions of t from 0 to 1 that return such mappings and begin at the start's values.
     actuators
-        Parameters to solve for, as many as descriptors; with limits: ``{"Theta": (0.2, 2.5)}``.
+        Parameters to solve for, at least as many as descriptors; with limits:
+        ``{"Theta": (0.2, 2.5)}``.
     within
         Constraints to obey on the way.
     monitor
@@ -105,13 +142,13 @@ def track(
     Returns
     -------
     The motion with its schedule, or where and why it cannot be followed. Of a motion that comes
-    back to its first targets the actuators need not come back: compare the ends.
+    back to its first targets the actuators need not come back: see `Tracking.holonomy`.
 
     Raises
     ------
     InputError
-        If `start` is no stable equilibrium or violates a bound, or for targets and actuators
-        without meaning.
+        If `start` is no stable equilibrium, not known, or violates a bound, or for targets and
+        actuators without meaning.
 
     Examples
     --------
@@ -122,24 +159,49 @@ def track(
     >>> turned.arrived, float(turned.schedule.values[-1, 0].round(6))
     (True, 0.677282)
     """
-    structure = start.structure
+    state = known_state(start)
+    structure, names = state.structure, tuple(actuators)
     limits = dict(actuators) if isinstance(actuators, Mapping) else {}
     bounds = [bound for name, ends in limits.items() for bound in _limits(structure, name, ends)]
-    if not start.stable:
-        raise InputError(f"`start` must be stable; got a state of index {start.index}.")
-    legs = [_freed(leg, tuple(actuators)) for leg in _listed(targets)]
-    asked = _descriptors(legs)
-    constraints = (*within, *bounds)
-    path = lift(start, legs, within=constraints)
-    if path.arrived:
-        path = lift(start, legs, within=constraints, options=FINE)
-    end = path.end
-    failure = _failure(end, bounds)
+    if not state.stable:
+        raise InputError(f"`start` must be stable; got a state of index {state.index}.")
+    legs = _listed(targets)
+    asked = _descriptors([_checked(leg(0.0) if callable(leg) else leg, names) for leg in legs])
+    path = _path(state, legs, names, (tuple(within), tuple(bounds), limits))
+    failure = _failure(path.end, bounds)
     if failure:
-        return Tracking("refused", failure, _why(end, failure, tuple(actuators)), path, asked)
+        why = _why(path.end, failure, names)
+        return Tracking("refused", failure, why, path, asked, names)
     monitored = tuple(dict.fromkeys((*asked, *(c.descriptor for c in within), *monitor)))
     schedule = scheduled(path, path.states.margin, monitored)
-    return Tracking("arrived", "", "", path, asked, schedule)
+    return Tracking("arrived", "", "", path, asked, names, schedule)
+
+
+def _path(
+    start: State,
+    legs: Sequence[Leg],
+    names: tuple[str, ...],
+    bounds: tuple[
+        tuple[Constraint, ...], tuple[Constraint, ...], Mapping[str, tuple[float, float]]
+    ],
+) -> Path:
+    """Path of a motion by the method that suits it."""
+    within, at_limits, limits = bounds
+    parameters = start.structure.parameters
+    first = legs[0](0.0) if callable(legs[0]) else legs[0]
+    if sum(isinstance(key, Descriptor) for key in first) < len(names):
+        course = Course.of(start, legs, names)
+        check_start(start, (*within, *at_limits))
+        places = {position(parameters, name): ends for name, ends in limits.items()}
+        motion = steer(course, start, within, places)
+        return path_of(motion.stretch.states, motion.stretch.times, motion.end)
+    every = (*within, *at_limits)
+    if len(legs) >= DENSE and uniform(legs):
+        check_start(start, every)
+        return dense_path(Course.of(start, legs, names), start, every, FINE)
+    freed = [_freed(leg, names) for leg in legs]
+    path = lift(start, freed, within=every)
+    return lift(start, freed, within=every, options=FINE) if path.arrived else path
 
 
 def _listed(targets: Leg | Sequence[Leg]) -> list[Leg]:
@@ -147,48 +209,40 @@ def _listed(targets: Leg | Sequence[Leg]) -> list[Leg]:
 
 
 def _freed(leg: Leg, actuators: tuple[str, ...]) -> Leg:
-    """Leg with the actuators left unknown.
-
-    Raises
-    ------
-    InputError
-        If it prescribes an actuator, or as many descriptors as there are no actuators.
-    """
+    """Leg with the actuators left unknown."""
     if callable(leg):
-        return lambda t: _checked(leg(t), actuators)
-    return _checked(leg, actuators)
+        return lambda t: {**_checked(leg(t), actuators), **dict.fromkeys(actuators)}
+    return {**_checked(leg, actuators), **dict.fromkeys(actuators)}
 
 
 def _checked(values: Waypoint, actuators: tuple[str, ...]) -> Waypoint:
     if not isinstance(values, Mapping):
         raise InputError(f"`targets` must give {{descriptor: value}}; got {values!r}.")
     asked = [key for key in values if isinstance(key, Descriptor)]
-    if len(asked) != len(actuators):
+    if not 0 < len(asked) <= len(actuators):
         raise InputError(
             f"`targets` must prescribe as many descriptors as there are actuators "
-            f"({len(actuators)}); got {len(asked)}."
+            f"({len(actuators)}), or fewer; got {len(asked)}."
         )
     for name in actuators:
         if name in values:
             raise InputError(
                 f"`targets` must leave the actuator {name} free; got {values[name]!r}."
             )
-    return {**values, **dict.fromkeys(actuators)}
+    return values
 
 
-def _descriptors(legs: Sequence[Leg]) -> tuple[Descriptor, ...]:
-    first = [leg(0.0) if callable(leg) else leg for leg in legs]
+def _descriptors(first: Sequence[Waypoint]) -> tuple[Descriptor, ...]:
     keys = (key for leg in first for key in leg)
     return tuple(dict.fromkeys(key for key in keys if isinstance(key, Descriptor)))
 
 
 def _limits(structure: Structure, name: str, ends: tuple[float, float]) -> list[Constraint]:
     """Both limits of an actuator, as constraints."""
-    at, (low, high) = position(structure.parameters, name), ends
+    low, high = ends
     if not low < high:
         raise InputError(f"`actuators` must give limits in order; got {name} = {ends}.")
-    unit = structure.parameters[at].unit
-    itself = Descriptor(name, unit, lambda _, p: p[:, at].copy(), name, structure.signature)
+    itself = value_of(structure, name)
     return [itself >= low, itself <= high]
 
 
@@ -199,6 +253,8 @@ def _failure(end: Event, bounds: Sequence[Constraint]) -> Failure:
         return "snap-through"
     if end.kind == "fold":
         return "singular Jacobian"
+    if end.kind == "limit":
+        return "actuator limit"
     if end.kind == "constraint":
         limits = {str(bound) for bound in bounds}
         return "actuator limit" if end.detail in limits else "constraint"

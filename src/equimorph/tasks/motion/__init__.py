@@ -1,0 +1,1 @@
+"""How motions of descriptors are followed: many targets at once, and with actuators to spare."""

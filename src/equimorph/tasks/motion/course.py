@@ -1,0 +1,151 @@
+"""Motions to follow: targets of descriptors and prescribed parameters as functions of time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria import Leg
+from equimorph.equilibria.lifting.legs import changed
+from equimorph.errors import InputError
+from equimorph.model import Descriptor, position
+from equimorph.structures import State, Structure
+
+RATE = 1e-4
+"""Share of a leg over which the rates of curves are measured."""
+CLOSED = 1e-9
+"""Relative distance of targets that are the same."""
+
+Times = Float[np.ndarray, " n"]
+Prescribed = Float[np.ndarray, "n columns"]
+
+
+@dataclass(frozen=True)
+class Course:
+    """Prescribed parameters and targets S* along legs, as functions of time.
+
+    Time counts legs: 1.5 is half-way through the second. Columns are all parameters (those of the
+    actuators do not count) and then the targets.
+
+    Parameters
+    ----------
+    structure
+        What moves.
+    descriptors
+        What has targets, the same on all legs.
+    free
+        Places of the actuators.
+    corners
+        Columns at the ends of the legs, the start first.
+    curves
+        Legs that are curves, by number.
+    """
+
+    structure: Structure
+    descriptors: tuple[Descriptor, ...]
+    free: Int[np.ndarray, " k"]
+    corners: Float[np.ndarray, "corners columns"]
+    curves: dict[int, Any]
+
+    @classmethod
+    def of(cls, start: State, legs: Sequence[Leg], actuators: Sequence[str]) -> "Course":
+        """Course of legs that all prescribe the same descriptors.
+
+        Raises
+        ------
+        InputError
+            If they do not, or one begins elsewhere than the one before ended.
+        """
+        structure, p = start.structure, start.p[None]
+        free = np.array([position(structure.parameters, name) for name in actuators])
+        first = legs[0](0.0) if callable(legs[0]) else legs[0]
+        descriptors = tuple(key for key in first if isinstance(key, Descriptor))
+        here = np.concatenate([start.p, [each(start) for each in descriptors]])
+        corners, curves = [here], {}
+        for number, leg in enumerate(legs):
+            if callable(leg):
+                curves[number] = leg
+                begin = _columns(structure, p, leg(0.0), descriptors)
+                _check_beginning(structure, free, here, begin)
+            values = leg(1.0) if callable(leg) else leg
+            here = _columns(structure, p, values, descriptors)
+            here[free] = start.p[free]
+            p = here[None, : len(start.p)]
+            corners.append(here)
+        return cls(structure, descriptors, free, np.array(corners), curves)
+
+    @property
+    def legs(self) -> int:
+        """Number of legs."""
+        return len(self.corners) - 1
+
+    def at(self, times: Times) -> Prescribed:
+        """Columns at times; those of the actuators have no meaning."""
+        leg = np.clip(times.astype(int), 0, self.legs - 1)
+        share = (times - leg)[:, None]
+        out = np.asarray((1.0 - share) * self.corners[leg] + share * self.corners[leg + 1])
+        for number, curve in self.curves.items():
+            base = self.corners[number][None, : len(self.structure.parameters)]
+            for k in np.flatnonzero(leg == number):
+                out[k] = _columns(self.structure, base, curve(float(share[k, 0])), self.descriptors)
+        return out
+
+    def rate(self, time: float) -> Float[np.ndarray, " columns"]:
+        """Change of the columns per leg, within the leg of a time."""
+        leg = min(int(time), self.legs - 1)
+        if leg not in self.curves:
+            return np.asarray(self.corners[leg + 1] - self.corners[leg])
+        ends = np.clip([time - RATE, time + RATE], leg, leg + 1)
+        values = self.at(np.minimum(ends, np.nextafter(leg + 1.0, leg)))
+        return np.asarray((values[1] - values[0]) / (ends[1] - ends[0]))
+
+    def split(
+        self, columns: Prescribed
+    ) -> tuple[Float[np.ndarray, "n parameters"], Float[np.ndarray, "n m"]]:
+        """Parameters and targets."""
+        count = len(self.structure.parameters)
+        return columns[:, :count].copy(), columns[:, count:]
+
+    def loop(self) -> tuple[int, int] | None:
+        """First and last of the corners with the same targets and loads as the last one."""
+        columns = np.delete(self.corners, self.free, axis=1)
+        size = 1.0 + np.abs(columns).max(axis=0)
+        same = (np.abs(columns - columns[-1]) <= CLOSED * size).all(axis=1)
+        first = int(np.flatnonzero(same)[0])
+        return (first, self.legs) if first < self.legs else None
+
+
+def _columns(
+    structure: Structure,
+    p: Float[np.ndarray, "1 parameters"],
+    values: Any,
+    descriptors: tuple[Descriptor, ...],
+) -> Float[np.ndarray, " columns"]:
+    asked = {key for key in values if isinstance(key, Descriptor)}
+    if asked != set(descriptors):
+        raise InputError(
+            f"`targets` must prescribe the same descriptors on all legs "
+            f"({', '.join(each.name for each in descriptors)}); got "
+            f"{', '.join(sorted(each.name for each in asked))}."
+        )
+    targets = np.array([float(values[each]) for each in descriptors])
+    if not np.isfinite(targets).all():
+        raise InputError(f"`targets` must be finite; got {targets.tolist()}.")
+    return np.concatenate([changed(structure, p, values)[0], targets])
+
+
+def _check_beginning(
+    structure: Structure,
+    free: Int[np.ndarray, " k"],
+    here: Float[np.ndarray, " columns"],
+    begin: Float[np.ndarray, " columns"],
+) -> None:
+    gap = np.abs(begin - here)
+    gap[free] = 0.0
+    if (gap > 1e-8 * (1.0 + np.abs(here))).any():
+        raise InputError(
+            f"`targets` must begin where the leg before ends, at {here.tolist()} "
+            f"(parameters, descriptors); got {begin.tolist()}."
+        )
