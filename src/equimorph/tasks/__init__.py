@@ -18,7 +18,7 @@ from equimorph.tasks.maps import (
     unloaded_base,
 )
 from equimorph.tasks.optimising import Certificate, Optima, Optimum, optimise
-from equimorph.tasks.planning import plan
+from equimorph.tasks.planning import Objective, SamplingOptions, plan, plan_sampled
 from equimorph.tasks.reach import Reach, attainable, reachable
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes import Shapes, solve_shape
@@ -34,12 +34,14 @@ __all__ = [
     "MapCurve",
     "MeasuredShape",
     "MeasuredValues",
+    "Objective",
     "Optima",
     "Optimum",
     "Proof",
     "Reach",
     "Resolving",
     "Route",
+    "SamplingOptions",
     "Shapes",
     "StateEstimate",
     "Tracking",
@@ -52,6 +54,7 @@ __all__ = [
     "natural_states_over",
     "optimise",
     "plan",
+    "plan_sampled",
     "reachable",
     "solve_shape",
     "track",

@@ -2,5 +2,6 @@
 
 from equimorph.tasks.planning.objectives import Objective, objective_of
 from equimorph.tasks.planning.planner import plan
+from equimorph.tasks.planning.sampling import SamplingOptions, plan_sampled
 
-__all__ = ["Objective", "objective_of", "plan"]
+__all__ = ["Objective", "SamplingOptions", "objective_of", "plan", "plan_sampled"]

@@ -55,22 +55,28 @@ class Demands:
 
 def links(source: States, target: States, demands: Demands) -> tuple[Flags, Values]:
     """Whether straight lifts lead from states to states, admissible all the way; their costs."""
-    structure = source.structure
-    velocity = target.p - source.p
-    still = np.abs(velocity).max(axis=1, initial=0.0) == 0.0
-    same = distances(structure.mass, source.z - target.z) < MATCH
-    linked, cost = still & same, np.zeros(len(source))
-    moving = np.flatnonzero(~still)
+    z, linked, cost = straight_lifts(source, target.p, demands)
+    linked &= distances(source.structure.mass, z - target.z) < MATCH
+    return linked, cost
+
+
+def straight_lifts(
+    source: States, p: Float[np.ndarray, "lanes parameters"], demands: Demands
+) -> tuple[Lanes, Flags, Values]:
+    """Where straight lifts to parameters end; whether they got there admissibly; their costs."""
+    structure, z = source.structure, source.z.copy()
+    velocity = p - source.p
+    there, cost = np.ones(len(source), bool), np.zeros(len(source))
+    moving = np.flatnonzero(np.abs(velocity).max(axis=1, initial=0.0) > 0.0)
     if len(moving):
         line = ParameterLine(structure, source.p[moving].copy(), velocity[moving])
-        outcome = follow(line, source.z[moving].copy(), demands.constraints, demands.options)
+        outcome = follow(line, z[moving], demands.constraints, demands.options)
         arrived = outcome.code == ARRIVAL
-        arrived &= distances(structure.mass, outcome.z - target.z[moving]) < MATCH
         if demands.margin > 0.0:
             arrived &= _keeps_margin(line, outcome, demands)
-        linked[moving] = arrived
+        z[moving], there[moving] = outcome.z, arrived
         cost[moving] = _costs(source[moving], line, outcome, demands.objective)
-    return linked, cost
+    return z, there, cost
 
 
 def distances(mass: Float[np.ndarray, " n"], dz: Lanes) -> Values:

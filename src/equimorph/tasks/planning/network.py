@@ -1,7 +1,5 @@
 """The stable cells of an equilibrium set as a network of lifts, prepared once for all routes."""
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
@@ -13,12 +11,11 @@ from equimorph.model import Constraint
 from equimorph.structures import State, States
 from equimorph.tasks.planning.links import Demands, Flags, Values, links, shortest
 from equimorph.tasks.planning.objectives import Objective
+from equimorph.tasks.prepared import kept
 
 ON_FOLD = (1, 4)
 Ends = tuple[State, State]
 Pairs = Int[np.ndarray, "links 2"]
-
-_networks: "WeakKeyDictionary[EquilibriumSet, Network]" = WeakKeyDictionary()
 
 
 class Network:
@@ -72,9 +69,8 @@ class Network:
 
 def network_of(eset: EquilibriumSet) -> Network:
     """The network of a set, made on first use and kept as long as the set."""
-    if eset not in _networks:
-        _networks[eset] = Network(eset)
-    return _networks[eset]
+    network: Network = kept(eset, "network", lambda: Network(eset))
+    return network
 
 
 def cheapest_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States | None:

@@ -1,0 +1,281 @@
+"""`plan_sampled`: routes for many actuators, where no grid of the set is possible."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria import check_start, way_points
+from equimorph.errors import InputError
+from equimorph.model import Box, Constraint, Descriptor, position
+from equimorph.structures import State, States, Structure
+from equimorph.tasks.planning.links import Demands, links, straight_lifts
+from equimorph.tasks.planning.objectives import Wish, objective_of
+from equimorph.tasks.planning.pushing import insides, pushed, slopes_of
+from equimorph.tasks.planning.straightening import relaxed, straightened
+from equimorph.tasks.planning.trees import Course, Tree, joined_path
+from equimorph.tasks.route import Corners, Route, refused, verified
+
+RESERVES = (1.0, 1.1)
+CONNECTIONS = 4
+"""Nodes of the other tree that are tried for each new one."""
+
+
+@dataclass(frozen=True)
+class SamplingOptions:
+    """Knobs of the sampling planner.
+
+    lifts: most straight lifts; batch: lanes side by side; reach: longest extension, in scaled
+    parameters; seed: of the random numbers.
+    """
+
+    lifts: int = 40000
+    batch: int = 128
+    reach: float = 0.5
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the knobs."""
+        for name in ("lifts", "batch"):
+            if getattr(self, name) < 1:
+                raise InputError(f"`{name}` must be at least 1; got {getattr(self, name)!r}.")
+        if not (np.isfinite(self.reach) and self.reach > 0.0):
+            raise InputError(f"`reach` must be a positive number; got {self.reach!r}.")
+
+
+def plan_sampled(  # noqa: PLR0913  # all but three by keyword
+    start: State,
+    goal: State | None,
+    actuators: Box,
+    *,
+    loads: Sequence[Mapping[str, float]] = (),
+    within: Sequence[Constraint] = (),
+    margin: float = 0.0,
+    objective: Wish = "length",
+    monitor: Sequence[Descriptor] = (),
+    options: SamplingOptions | None = None,
+) -> Route:
+    """Plan a route for up to about eight actuators by random trees of lifted edges.
+
+    RRT-Connect [KuffnerLaValle2000]_ on the equilibrium set: trees of exact states grow from start
+    and goal towards random settings, many straight lifts at a time, until a lift joins them. The
+    path is straightened and drawn to where it costs least, and lifted again finely.
+
+    Parameters
+    ----------
+    start
+        A stable equilibrium.
+    goal
+        Another one; None with `loads`: any admissible state under the last load.
+    actuators
+        What may be moved, and how far.
+    loads
+        Way-points of the environment, in order: loads move along straight legs from one to the
+        next, never back, while the actuators do what they like.
+    within
+        Constraints to obey on the way.
+    margin
+        Smallest stability margin allowed.
+    objective
+        As of `plan`.
+    monitor
+        Further descriptors for the schedule.
+    options
+        Knobs; see `SamplingOptions`.
+
+    Returns
+    -------
+    A verified route. A refusal after so many lifts is no proof that there is none.
+
+    Raises
+    ------
+    InputError
+        If an end is no equilibrium, lies outside the box or does not fit the loads, names are
+        unknown or both actuator and load, or `margin` is negative.
+    """
+    if not margin >= 0.0:
+        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
+    options = options or SamplingOptions()
+    wish = objective_of(objective, start.structure)
+    demands = Demands(wish, tuple(dict.fromkeys(within)), margin)
+    course = _course(start, actuators, loads)
+    ends = _checked_ends(start, goal, course)
+    for name, state in ends.items():
+        if not state.stable:
+            return refused(f"the {name} is unstable (index {state.index})")
+        if not demands.admissible(state.batch)[0]:
+            return refused(f"the {name} violates the constraints or the margin")
+    route = refused("")
+    for reserve in RESERVES:
+        tightened = replace(demands, margin=margin * reserve)
+        path = _Search(course, start, goal, tightened, options).path()
+        if path is None:
+            return refused(
+                f"no route was found with {options.lifts} lifts, which is no proof that none exists"
+            )
+        corners = _corners(course, path, tightened)
+        last = goal or path[0][-1]
+        route = _kept(verified(start, last, corners, demands.constraints, monitor), demands)
+        if route.arrived:
+            break
+    return route
+
+
+def _kept(route: Route, demands: Demands) -> Route:
+    if not route.arrived:
+        return route
+    if route.margin < demands.margin:
+        why = f"the stability margin falls to {route.margin:.4g}, below {demands.margin:g}"
+        return refused(why, route.way_points, route.path)
+    assert route.path is not None
+    cost = demands.objective.along(route.path.states)
+    return replace(route, objective=str(demands.objective), cost=cost)
+
+
+def _course(start: State, actuators: Box, loads: Sequence[Mapping[str, float]]) -> Course:
+    structure = start.structure
+    free = np.array([position(structure.parameters, name) for name in actuators.names])
+    for leg in loads:
+        both = [name for name in leg if name in actuators.names]
+        if both:
+            raise InputError(f"`loads` must not move actuators; got {both[0]!r}.")
+    corners = way_points(structure, start.p, list(loads)) if loads else [start.p]
+    return Course(actuators, free, np.array(corners))
+
+
+def _checked_ends(start: State, goal: State | None, course: Course) -> dict[str, State]:
+    """Both ends, by name."""
+    if goal is None and course.legs == 0:
+        raise InputError("`goal` must be given, unless loads move; got none.")
+    ends = {"start": start} if goal is None else {"start": start, "goal": goal}
+    for name, state in ends.items():
+        try:
+            check_start(state)
+        except InputError as error:
+            raise InputError(str(error).replace("`state`", f"`{name}`")) from None
+        if not course.box.contains(state.p[course.free], slack=1e-9):
+            raise InputError(f"`{name}` must lie in {course.box}; got {state.parameters}.")
+        last = course.corners[-1 if name == "goal" else 0].copy()
+        last[course.free] = state.p[course.free]
+        if not np.allclose(last, state.p, rtol=0, atol=1e-9):
+            raise InputError(
+                f"`{name}` must have the loads and fixed parameters of its end of the way; "
+                f"got {state.parameters}."
+            )
+    return ends
+
+
+class _Search:
+    """Two trees that grow towards random settings and each other; one if there is no goal."""
+
+    def __init__(
+        self,
+        course: Course,
+        start: State,
+        goal: State | None,
+        demands: Demands,
+        options: SamplingOptions,
+    ) -> None:
+        self.course, self.demands, self.options = course, demands, options
+        self.structure: Structure = start.structure
+        self.trees = [Tree(start, 0.0, 1.0)]
+        if goal is not None:
+            self.trees.append(Tree(goal, float(course.legs), -1.0))
+        self.generator = np.random.default_rng(options.seed)
+        self.lifts = 0
+
+    def path(self) -> tuple[States, Float[np.ndarray, " nodes"]] | None:
+        """States from start to goal with their places along the course, or None."""
+        if len(self.trees) == 2 and (found := self._join(0, np.zeros(1, int))):
+            return found
+        turn = 0
+        while self.lifts < self.options.lifts:
+            own = turn % len(self.trees)
+            new = self._grow(own)
+            if len(self.trees) == 1:
+                done = new[self.trees[0].s[new] == self.course.legs]
+                if len(done):
+                    return joined_path(self.trees[0], int(done[0]), None, 0)
+            elif len(new) and (found := self._join(own, new)):
+                return found
+            turn += 1
+        return None
+
+    def _grow(self, which: int) -> Int[np.ndarray, " new"]:
+        """Extend a tree towards random settings; numbers of the new nodes."""
+        tree, course = self.trees[which], self.course
+        a, s = course.sample(self.options.batch, self.generator)
+        near = tree.nearest(course, a, s)
+        near, a, s = near[near >= 0], a[near >= 0], s[near >= 0]
+        a, s = course.towards(tree, near, (a, s), self.options.reach)
+        states = States(self.structure, tree.z[near], tree.p[near])
+        if self.demands.constraints:
+            a = self._pushed(states, tree.s[near], a, s)
+        p = course.parameters(a, s)
+        z, there, _ = straight_lifts(states, p, self.demands)
+        there &= np.abs(p - states.p).max(axis=1, initial=0.0) > 0.0
+        self.lifts += len(near)
+        return tree.add(z[there], p[there], s[there], near[there])
+
+    def _pushed(
+        self,
+        states: States,
+        now: Float[np.ndarray, " lanes"],
+        a: Float[np.ndarray, "lanes d"],
+        s: Float[np.ndarray, " lanes"],
+    ) -> Float[np.ndarray, "lanes d"]:
+        """Settings near the given ones that the constraints, linearised at nodes, allow."""
+        course, within = self.course, self.demands.constraints
+        half = 0.5 * (course.box.upper - course.box.lower)
+        here = states.p[:, course.free]
+        directions = np.zeros((len(states), len(half) + 1, states.p.shape[1]))
+        directions[:, np.arange(len(half)), course.free] = half
+        directions[:, -1] = course.parameters(here, s) - course.parameters(here, now)
+        excess, slopes = slopes_of(states, directions, within)
+        # loads move by the whole of the last direction, actuators by shares of the others
+        excess = excess + slopes[:, :, -1]
+        room = ((course.box.lower - here) / half, (course.box.upper - here) / half)
+        change = pushed((a - here) / half, excess, slopes[:, :, :-1], room, insides(within))
+        return np.asarray(here + change * half)
+
+    def _join(
+        self, which: int, new: Int[np.ndarray, " new"]
+    ) -> tuple[States, Float[np.ndarray, " nodes"]] | None:
+        """Path through the first of new nodes that a straight lift joins with the other tree."""
+        own, other = self.trees[which], self.trees[1 - which]
+        mine, theirs = other.candidates(self.course, own, new, CONNECTIONS)
+        if len(mine) == 0:
+            return None
+        first = States(self.structure, own.z[mine], own.p[mine])
+        second = States(self.structure, other.z[theirs], other.p[theirs])
+        linked, _ = links(first, second, self.demands)
+        self.lifts += len(mine)
+        good: Bool[np.ndarray, " n"] = np.flatnonzero(linked)
+        if len(good) == 0:
+            return None
+        pair = int(mine[good[0]]), int(theirs[good[0]])
+        here, there = pair if which == 0 else pair[::-1]
+        return joined_path(self.trees[0], here, self.trees[1], there)
+
+
+def _corners(
+    course: Course, path: tuple[States, Float[np.ndarray, " nodes"]], demands: Demands
+) -> Corners:
+    """Way-points of a path, straightened leg by leg of the loads."""
+    states, s = path
+    names = [parameter.name for parameter in states.structure.parameters]
+    corners: Corners = []
+    for leg in range(max(course.legs, 1)):
+        inside = np.flatnonzero((s >= leg) & (s <= leg + 1)) if course.legs else np.arange(len(s))
+        section = states[inside]
+        if course.legs == 0:
+            section = relaxed(straightened(section, demands), demands, course.box, course.free)
+        else:
+            section = straightened(section, demands)
+        moving = np.ptp(np.concatenate([states.p, course.corners]), axis=0) > 0.0
+        corners += [
+            {name: corner[name] for name, moves in zip(names, moving, strict=True) if moves}
+            for corner in list(section)[1:]
+        ]
+    return corners
