@@ -13,7 +13,7 @@ from equimorph.study.problem import parse_study
 from typecheck import unchecked
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-NAMES = ("strip", "arm", "beam", "deep_arch")
+NAMES = ("strip", "arm", "beam", "deep_arch", "stack")
 
 
 def study(name):
@@ -60,6 +60,14 @@ def test_the_deep_arch_snaps_at_the_printed_load_and_carries_more_when_turned():
     assert em.limit_load(built, "P").value == pytest.approx(8.97309, abs=6e-6)
     turned = em.lift(built, {"theta_A": 2.1}).end.state
     assert em.limit_load(turned, "P").value > 10.8
+
+
+def test_the_stack_has_nine_equilibria_four_of_them_stable():
+    """Three heights of each element."""
+    truss = study("stack").structure
+    with unchecked():
+        found = em.find_equilibria(truss, {"a": 0.001, "F": 0.0})
+    np.testing.assert_array_equal(np.sort(found.index), [0, 0, 0, 0, 1, 1, 1, 1, 2])
 
 
 @pytest.mark.slow

@@ -88,7 +88,7 @@ def test_version_is_shown(shell: Shell):
     assert shell.out.startswith("equimorph 0.")
 
 
-@pytest.mark.parametrize("kind", ["arch", "column", "maps", "spring", "truss"])
+@pytest.mark.parametrize("kind", ["arch", "column", "lee", "maps", "spring", "truss"])
 def test_a_new_study_passes_the_check(kind: str, shell: Shell):
     assert shell("new", "mine.toml", "--kind", kind) == 0
     assert shell("check", "mine.toml") == 0
@@ -292,7 +292,7 @@ USAGE = {
     "run x.toml --out": "Option '--out' requires an argument. See equimorph",
     "run x.toml y.toml": "extra argument",
     "rnu x.toml": "No such command 'rnu'. Did you mean 'run'?",
-    "new x.toml --kind beam": "'beam' is not one of 'arch', 'column', 'maps', 'spring', 'truss'",
+    "new x.toml --kind cantilever": "'cantilever' is not one of 'arch', 'arm', 'beam'",
     "--sideways": "No such option: --sideways",
 }
 

@@ -94,6 +94,27 @@ def test_inflating_a_slack_strip_makes_it_a_circle():
     assert errors[0] / errors[1] == pytest.approx(10.0, rel=0.3)
 
 
+def test_elements_that_are_too_long_for_a_pressure_are_named():
+    """Six elements at p = 10⁴, where layers at the pins are as long as a fiftieth of the rod.
+
+    Angles look smooth; what is integrated inside the elements shows that they are not. Ten times
+    less is resolved, and the error estimate agrees.
+    """
+    rod = em.Rod(
+        ends=("pinned", "pinned"), actuators={"k": em.Curvature()}, loads={"p": em.Pressure()},
+        span=0.7, EI=1.0, length=1.0,
+    )  # fmt: skip
+    with unchecked():
+        fine = em.lift(rod.natural_state(k=-3.0), {"p": 1e3}).end
+        coarse = em.lift(fine.state, {"p": 1e4}).end
+    assert fine.state.resolved
+    assert fine.detail == ""
+    assert fine.state.error_estimate < 1e-6
+    assert not coarse.state.resolved
+    assert coarse.detail == "the discretisation does not resolve the state: refine it"
+    assert coarse.state.error_estimate > 1.0
+
+
 @pytest.mark.parametrize("degree", [3, 4])
 def test_curvature_converges_with_twice_the_degree_under_pressure(degree):
     """Observed order of max |κ|, recovered from moments: 2·degree within 0.3, of a much finer one.

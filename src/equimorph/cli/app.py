@@ -32,9 +32,17 @@ class Kind(StrEnum):
     """Kinds of studies that can be begun."""
 
     arch = "arch"
+    arm = "arm"
+    beam = "beam"
+    bridge = "bridge"
     column = "column"
+    deep_arch = "deep_arch"
+    lee = "lee"
     maps = "maps"
+    network = "network"
     spring = "spring"
+    stack = "stack"
+    bistable_strip = "strip"  # a member called strip would hide that of str
     truss = "truss"
 
 
@@ -89,7 +97,11 @@ def _options(
 def new(
     file: Annotated[Path, typer.Argument(help="Study file to write, say my-arch.toml.")],
     kind: Annotated[
-        Kind, typer.Option(help="What to begin with: a rod (arch), an energy (column), ...")
+        Kind,
+        typer.Option(
+            help="What to begin with: a rod (arch, arm, beam, deep_arch, strip), a frame (lee, "
+            "network), a truss (bridge, stack, truss), an energy (column), maps, the spring."
+        ),
     ] = Kind.arch,
 ) -> None:
     """Begin a study: write an example file to change."""

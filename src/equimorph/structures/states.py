@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.model import names_of, position
 from equimorph.structures.contract import Structure
@@ -83,6 +83,11 @@ class States:
         """Estimated discretisation error; see the structure for what it bounds."""
         return self.structure.error_estimate(self.z, self.p)
 
+    @cached_property
+    def resolved(self) -> Bool[np.ndarray, " lanes"]:
+        """Whether the discretisation represents the states."""
+        return self.structure.resolved(self.z, self.p)
+
     def shape(
         self, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points 2"]:
@@ -152,6 +157,11 @@ class State:
     def error_estimate(self) -> float:
         """Estimated discretisation error; see the structure for what it bounds."""
         return float(self.batch.error_estimate[0])
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the discretisation represents the state."""
+        return bool(self.batch.resolved[0])
 
     def shape(self, s: Float[np.ndarray, " points"] | None = None) -> Float[np.ndarray, "points 2"]:
         """Coordinates to draw, in the structure's unit of length."""

@@ -5,7 +5,10 @@ from pathlib import Path
 
 from equimorph.errors import InputError
 
-KINDS = ("arch", "column", "maps", "spring", "truss")
+KINDS = (
+    *("arch", "arm", "beam", "bridge", "column", "deep_arch", "lee", "maps", "network", "spring"),
+    *("stack", "strip", "truss"),
+)
 
 
 def template(kind: str) -> str:

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.hidden import with_hidden_events
 from equimorph.equilibria.lifting.legs import Leg, listed, prepared
+from equimorph.equilibria.march import UNRESOLVED
 from equimorph.equilibria.multiple import with_multiple_points
 from equimorph.equilibria.normal_form import criticality
 from equimorph.equilibria.outcome import KINDS, LOST, Outcome, follow
@@ -165,6 +166,8 @@ def _end(curve: Curve, outcome: Outcome, number: int, within: tuple[Constraint, 
     if code == BRANCH:
         critical = criticality(curve, z, t)[0]
         detail = critical
+    if code != LOST and not detail and not state.resolved:
+        detail = UNRESOLVED
     return Event(kind, state, number + float(t[0]), critical, detail)
 
 

@@ -22,6 +22,9 @@ Parameters = Float[np.ndarray, "lanes parameters"]
 Nodal = Float[np.ndarray, "lanes nodes"]
 Values = Float[np.ndarray, " lanes"]
 
+LARGEST_TAIL = 1e-3
+"""Highest Legendre coefficients of θ, in radians, of an element that represents its part."""
+
 
 class Mechanics(ABC):
     """Energy, residual, derivatives and solves of a discretised rod in batches of lanes.
@@ -124,9 +127,13 @@ class Mechanics(ABC):
 
     def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
         """Whether the highest Legendre coefficients of θ are small in every element."""
+        return self.tail(z, p) < LARGEST_TAIL
+
+    def tail(self, z: Lanes, p: Parameters) -> Values:
+        """Largest of the two highest Legendre coefficients of θ in all elements."""
         theta = self.nodal_angles(z, p)[:, self.mesh.element_nodes]
         tail = np.abs(theta @ self.mesh.reference.to_legendre[-2:].T)
-        return np.asarray(tail.max(axis=(1, 2)) < 1e-3)
+        return np.asarray(tail.max(axis=(1, 2)))
 
     @abstractmethod
     def symmetries(self) -> tuple[Symmetry, ...]:

@@ -3,7 +3,7 @@
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout
@@ -18,7 +18,7 @@ from equimorph.structures.rod.general.kernels import linearise_lanes, second_lan
 from equimorph.structures.rod.general.model import RodModel
 from equimorph.structures.rod.general.step.kernels import advance_lanes
 from equimorph.structures.rod.general.symmetry import mirrors
-from equimorph.structures.rod.interface import Mechanics
+from equimorph.structures.rod.interface import LARGEST_TAIL, Mechanics
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -29,6 +29,10 @@ Points = Float[np.ndarray, "lanes points"]
 
 BLOCK = 64
 """Full matrices put together at a time: they stay in the cache."""
+SMOOTH = 1e-6
+"""Highest Legendre coefficients of θ below which nothing inside the elements can go wrong."""
+LARGEST_GAP = 1e-4
+"""Radians between θ as integrated and as solved for; errors of κ are about 100 times larger."""
 FORCES = 8.0
 """Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
 
@@ -117,6 +121,21 @@ class GeneralMechanics(Mechanics):
     def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
         """max_s |κ(s)| and where it occurs."""
         return self._fields.largest_curvature(self.nodal_angles(z, p), self.scalars(z, p))
+
+    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """Whether θ is smooth in every element, and the rod's equations integrated there meet it.
+
+        Forces much above the buckling load of an element, like high pressure, amplify the error of
+        its ends inside it, before the coefficients of θ show anything.
+        """
+        tail = self.tail(z, p)
+        good = tail < LARGEST_TAIL
+        doubtful = np.flatnonzero(good & (tail > SMOOTH))
+        if len(doubtful):
+            some, at = z[doubtful], p[doubtful]
+            gap = self._fields.gap(self.nodal_angles(some, at), self.scalars(some, at))
+            good[doubtful] = gap < LARGEST_GAP
+        return np.asarray(good)
 
     # --- contract ---------------------------------------------------------------------------
 

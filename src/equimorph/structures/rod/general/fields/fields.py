@@ -102,6 +102,15 @@ class Fields:
         there = self.everywhere(angles, scalars)[:, element][:, :, [THETA, KAPPA, X, Y]]
         return np.asarray(np.einsum("lpfi,pi->lpf", there, weights))
 
+    def gap(self, angles: Angles, scalars: Scalars) -> Values:
+        """Largest difference of θ integrated inside the elements from θ at their inner nodes."""
+        mesh = self.model.mesh
+        inner = legendre.legvander(2.0 * mesh.reference.nodes[1:-1] - 1.0, self.reference.degree)
+        theta = self.everywhere(angles, scalars)[:, :, THETA]
+        integrated = np.einsum("ij,lej->lei", inner @ self.reference.to_legendre, theta)
+        gap = np.abs(integrated - angles[:, mesh.element_nodes[:, 1:-1]]).max(axis=(1, 2))
+        return np.where(np.isfinite(gap), gap, np.inf)
+
     def largest_curvature(self, angles: Angles, scalars: Scalars) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs.
 
