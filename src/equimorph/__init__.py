@@ -119,6 +119,7 @@ _HOMES = {
         "plan_sampled",
         "reachable",
         "solve_shape",
+        "solve_shapes",
         "track",
         "verify",
     ),

@@ -6,6 +6,7 @@ import pytest
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.structures import State
+from typecheck import unchecked
 
 ANGLE, FORCE = 0.62, 0.009908
 
@@ -89,11 +90,205 @@ def test_every_state_is_found_by_its_heights(arch_set):
             assert gaps.min() < 1e-7, state
 
 
+def independent_roots(arch, descriptors, wanted, near):
+    """Newton on (F, S − S*) in all unknowns and both actuators, from states, by dense algebra."""
+    size, found = arch.size, []
+    for z, p in zip(near.z, near.p, strict=True):
+        x = np.concatenate([z, p[:2]])
+        for _ in range(12):
+            lanes = x + 1e-6 * np.concatenate([np.eye(size + 2), -np.eye(size + 2)])
+            many = np.concatenate([x[None], lanes])
+            full = np.tile(p, (len(many), 1))
+            full[:, :2] = many[:, size:]
+            states = np.ascontiguousarray(many[:, :size])
+            values = [each.function(states, full) for each in descriptors]
+            rest = np.column_stack([arch.residual(states, full), *values])
+            rest[:, size:] -= wanted
+            slopes = (rest[1 : size + 3] - rest[size + 3 :]).T / 2e-6
+            step = np.linalg.solve(slopes, -rest[0])
+            x = x + step * min(1.0, 0.5 / np.abs(step).max())
+            if np.abs(step).max() < 1e-9:
+                found.append(x)
+                break
+    return found
+
+
+def test_targets_have_the_solutions_that_brute_force_finds(arch_set):
+    """24 of the 200 targets of the slow test."""
+    brute_force(arch_set, 24)
+
+
+@pytest.mark.slow
+def test_two_hundred_targets_have_the_solutions_that_brute_force_finds(arch_set):
+    """Newton from every vertex nearby finds no solution that is not among the answers."""
+    assert brute_force(arch_set, 200) >= 300
+
+
+def brute_force(arch_set, count):
+    """Compare all answers; number of solutions."""
+    arch, names = arch_set.structure, ("Theta", "Delta")
+    heights = arch.height(1 / 3), arch.height(2 / 3)
+    values = np.stack([each(arch_set.points) for each in heights], axis=1)
+    generator = np.random.default_rng(11)
+    picked = generator.choice(len(values), count)
+    wanted = values[picked] + generator.normal(0, 3e-3, (count, 2))
+    answers = em.solve_shapes(arch_set, dict(zip(heights, wanted.T, strict=True)))
+    total = 0
+    for target, answer in zip(wanted, answers, strict=True):
+        near = np.argsort(np.hypot(*(values - target).T))[:12]
+        places = np.stack([answer.states[name] for name in names], axis=1)
+        for each in heights:
+            aim = target[heights.index(each)]
+            assert each(answer.states) == pytest.approx(aim, abs=1e-10) if len(answer) else True
+        with unchecked():
+            roots = independent_roots(arch, heights, target, arch_set.points[near])
+        for x in roots:
+            z, p = x[None, : arch.size].copy(), arch_set.points.p[:1].copy()
+            p[0, :2] = x[arch.size :]
+            if not arch_set.box.contains(p[0, :2]) or not arch.resolved(z, p)[0]:
+                continue
+            if arch.max_curvature.function(z, p)[0] > 20:
+                continue
+            assert len(places)
+            assert np.abs(places - p[0, :2]).max(axis=1).min() < 1e-7
+        total += len(answer)
+    return total
+
+
+def test_more_targets_than_actuators_are_fitted(arch_set):
+    """Targets of a state are met exactly; others leave a misfit that no state nearby beats."""
+    arch = arch_set.structure
+    heights = [arch.height(s) for s in (1 / 3, 1 / 2, 2 / 3)]
+    state = max(arch_set.at(Theta=1.1, Delta=0.3).stable, key=arch.height(0.5))
+    exact = em.solve_shape(arch_set, {each: each(state) for each in heights})
+    assert exact.status == "solved"
+    assert exact.misfit[0] < 1e-8
+    assert exact.states.p[0] == pytest.approx(state.p, abs=1e-6)
+    wanted = (0.15, 0.17, 0.16)
+    fits = em.solve_shape(arch_set, dict(zip(heights, wanted, strict=True)))
+    assert fits.status == "fitted"
+    assert (np.diff(fits.misfit) >= -1e-12).all()
+    spread = np.array([np.ptp(each(arch_set.points)) for each in heights])
+
+    def misfit(state):
+        return np.linalg.norm((np.array([h(state) for h in heights]) - wanted) / spread)
+
+    best = fits.states[0]
+    assert misfit(best) == pytest.approx(fits.misfit[0], abs=1e-10)
+    for step in np.random.default_rng(1).normal(0, 1e-3, (8, 2)):
+        at = {"Theta": best["Theta"] + step[0], "Delta": best["Delta"] + step[1]}
+        assert misfit(em.lift(best, at).end.state) > fits.misfit[0]
+
+
+def test_fewer_targets_than_actuators_leave_a_family(arch_set):
+    """All states with y(½) = 0.17: curves, exact at their vertices, through every solution."""
+    arch = arch_set.structure
+    rise = arch.height(0.5)
+    found = em.solve_shape(arch_set, {rise: 0.17})
+    assert found.solved
+    assert rise(found.states) == pytest.approx(0.17, abs=1e-10)
+    family = found.family
+    assert family is not None
+    assert rise(family.states) == pytest.approx(0.17, abs=1e-10)
+    assert sum(map(len, family.pieces)) > 20
+    square = em.solve_shape(arch_set, {rise: 0.17, arch.height(1 / 3): 0.15})
+    assert square.family is None
+
+
+def test_the_nearest_state_to_what_cannot_be_reached_is_exact(arch_set):
+    """No stable neighbour of it comes nearer."""
+    arch = arch_set.structure
+    heights = arch.height(1 / 3), arch.height(2 / 3)
+    found = em.solve_shape(arch_set, dict.fromkeys(heights, 0.3))
+    nearest = found.nearest
+    assert nearest is not None
+    spread = [np.ptp(each(arch_set.points)) for each in heights]
+
+    def gap(state):
+        return np.hypot(*((each(state) - 0.3) / s for each, s in zip(heights, spread, strict=True)))
+
+    assert gap(nearest) < gap(found.closest) + 1e-12
+    for step in np.random.default_rng(1).normal(0, 1e-3, (8, 2)):
+        at = {"Theta": nearest["Theta"] + step[0], "Delta": nearest["Delta"] + step[1]}
+        assert gap(em.lift(nearest, at).end.state) > gap(nearest)
+
+
+@pytest.fixture(scope="module")
+def arm_set():
+    """Soft arm of three segments, upright under half a unit at its tip, over all of them."""
+    segments = {f"k{i + 1}": em.Curvature(1.0, i / 3, (i + 1) / 3) for i in range(3)}
+    arm = em.Rod(
+        ends=("clamped", "free"),
+        actuators=segments,
+        loads={"P": em.PointForce(1.0)},
+        EI=1.0,
+        length=1.0,
+        elements=3,
+        degree=7,
+    )
+    box = em.Box(k1=(-1.5, 1.5), k2=(-1.5, 1.5), k3=(-1.5, 1.5))
+    with unchecked():
+        return em.equilibrium_set(
+            arm, box, fixed={"theta_A": np.pi / 2, "P": 0.5}, intervals=(4, 4, 4), checks=0
+        )
+
+
+def reached(arm_set, count):
+    """Random tips with their angles are all met, by the very settings that they come from."""
+    arm = arm_set.structure
+    pose = (*arm.position(1.0), arm.angle(1.0))
+    k = np.random.default_rng(1).uniform(-1.4, 1.4, (count, 3))
+    with unchecked():
+        tips = arm_set.over(k1=k[:, 0], k2=k[:, 1], k3=k[:, 2]).states
+        answers = em.solve_shapes(arm_set, {each: each(tips) for each in pose})
+        places = em.solve_shapes(arm_set, {each: each(tips) for each in pose[:2]})
+    assert len(tips) == count
+    for number, (answer, place) in enumerate(zip(answers, places, strict=True)):
+        assert answer.solved
+        assert np.abs(answer.states.p - tips.p[number]).max(axis=1).min() < 1e-9
+        assert (answer.states.residual < 1e-8).all()
+        assert place.solved
+        for each in pose[:2]:
+            assert each(place.states) == pytest.approx(each(tips[number]), abs=1e-8)
+            assert each(answer.states) == pytest.approx(each(tips[number]), abs=1e-9)
+
+
+def test_an_arm_reaches_random_tips(arm_set):
+    reached(arm_set, 25)
+
+
+@pytest.mark.slow
+def test_an_arm_reaches_five_hundred_random_tips(arm_set):
+    reached(arm_set, 500)
+
+
+def test_what_an_arm_cannot_reach_is_refused_with_the_nearest_tip(arm_set):
+    """A tip beyond the length of the arm; the nearest one lies on a side of the box."""
+    arm = arm_set.structure
+    x, y = arm.position(1.0)
+    with unchecked():
+        found = em.solve_shape(arm_set, {x: 0.9, y: 0.9})
+        nearest = found.nearest
+    assert found.status == "refused"
+    assert "no state of the set has x(1) = 0.9, height(1) = 0.9" in found.why
+    assert nearest["k1"] == pytest.approx(-1.5)
+    grid = np.linspace(-1.5, 1.5, 15)
+    k2, k3 = (each.ravel() for each in np.meshgrid(grid, grid))
+    edge = arm_set.over(k1=np.full(k2.shape, -1.5), k2=k2, k3=k3).states
+    spread = [np.ptp(each(arm_set.points)) for each in (x, y)]
+    gap = np.hypot((x(edge) - 0.9) / spread[0], (y(edge) - 0.9) / spread[1])
+    own = np.hypot((x(nearest) - 0.9) / spread[0], (y(nearest) - 0.9) / spread[1])
+    assert own <= gap.min() + 1e-12
+    assert own == pytest.approx(gap.min(), abs=5e-3)
+
+
 def test_bad_questions_are_refused(spring_set):
     angle = spring_set.structure.descriptor("angle")
     energy = spring_set.structure.descriptor("energy")
-    with pytest.raises(InputError, match=r"as many descriptors as .* \(x_l, F\); got 1"):
-        em.solve_shape(spring_set, {angle: 0.1})
+    with pytest.raises(InputError, match="at least one descriptor; got none"):
+        em.solve_shape(spring_set, {})
+    with pytest.raises(InputError, match="equally many values"):
+        em.solve_shapes(spring_set, {angle: np.ones(2), energy: np.ones(3)})
     with pytest.raises(InputError, match="must be finite; got energy = nan"):
         em.solve_shape(spring_set, {angle: 0.1, energy: np.nan})
     with pytest.raises(InputError, match="route if there is a start"):

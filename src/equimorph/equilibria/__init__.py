@@ -1,6 +1,5 @@
 """Equilibria: solving, lifting, events, limit loads, searching."""
 
-from equimorph.equilibria.aiming import newton_at_targets
 from equimorph.equilibria.both_ways import CriticalCurve
 from equimorph.equilibria.completeness import Completeness
 from equimorph.equilibria.critical_curves import (
@@ -56,7 +55,6 @@ __all__ = [
     "lift",
     "limit_load",
     "newton",
-    "newton_at_targets",
     "search_points",
     "snap_landing",
     "way_points",

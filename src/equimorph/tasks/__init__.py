@@ -21,7 +21,7 @@ from equimorph.tasks.optimising import Certificate, Optima, Optimum, optimise
 from equimorph.tasks.planning import Objective, SamplingOptions, plan, plan_sampled
 from equimorph.tasks.reach import Reach, attainable, reachable
 from equimorph.tasks.route import Route
-from equimorph.tasks.shapes import Shapes, solve_shape
+from equimorph.tasks.shapes import Shapes, solve_shape, solve_shapes
 from equimorph.tasks.tracking import Tracking, track
 from equimorph.tasks.verification import Proof, Verification, verify
 
@@ -57,6 +57,7 @@ __all__ = [
     "plan_sampled",
     "reachable",
     "solve_shape",
+    "solve_shapes",
     "track",
     "unloaded_base",
     "verify",

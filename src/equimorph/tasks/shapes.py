@@ -2,58 +2,72 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria import newton_at_targets
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, position
+from equimorph.manifold import EquilibriumSet, Level
+from equimorph.manifold.nearest import local_minima
+from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
+from equimorph.tasks.kinematics import Predictor, aimed, best_fits, family, predictor
+from equimorph.tasks.optimising.plane import Spots, spots_of
+from equimorph.tasks.optimising.stability import stability
 from equimorph.tasks.planning import plan
+from equimorph.tasks.prepared import feasible_vertices, stable_vertices
 from equimorph.tasks.route import Route
 
-OVERHANG = 0.5
-"""How far beyond a cell, in barycentric coordinates, its linear prediction is still tried."""
 SAME = 1e-6
 """Distance, in the metric and scaled parameters, below which two solutions are the same."""
 AT_EDGE = 1e-9
 """By how much a solution may exceed the box or a constraint."""
+EXACT = 1e-8
+"""Misfit, in ranges over the set, below which values are met."""
+STARTS = 12
+"""Vertices from which members of a family are searched."""
 
 Rank = Literal["route", "energy", "margin"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shapes:
     """Answer to "at which settings does the structure take this shape".
 
     Parameters
     ----------
     status
-        "solved", or "refused" with the reason in `why`.
+        "solved"; "fitted": there are more descriptors than free parameters and no state meets them
+        all; or "refused" with the reason in `why`.
     states
-        All solutions, best first: stable ones before unstable ones, then by rank.
+        All solutions, best first: stable ones before unstable ones, then by rank. Of fits, the
+        local minima of the misfit, the least first. Of families (fewer descriptors than free
+        parameters), the members nearest to the vertices that come nearest; see `family`.
     index
         Negative eigenvalues of each; 0 is stable.
-    margin
-        Stability margin of each.
+    misfit
+        What each leaves of the targets: root of the sum of squares, in ranges over the set.
     routes
         Way to each from the start, or why there is none; empty without a start.
-    closest
-        Vertex of the set whose descriptors come nearest to the targets, each measured by its range
-        over the set, and how far it is from them: what is left where there is no solution.
+    closest, miss
+        Vertex of the set whose descriptors come nearest to the targets, and how far it is from
+        them; see `nearest` for the exact state.
     """
 
-    status: Literal["solved", "refused"]
+    status: Literal["solved", "fitted", "refused"]
     why: str
     states: States
     index: Int[np.ndarray, " lanes"]
-    margin: Float[np.ndarray, " lanes"]
+    misfit: Float[np.ndarray, " lanes"]
     routes: tuple[Route, ...]
     closest: State
     miss: Mapping[str, float]
+    known: Predictor
+    wanted: Float[np.ndarray, " k"]
+    within: tuple[Constraint, ...]
 
     def __repr__(self) -> str:
         """How many there are, or why there is none."""
@@ -76,6 +90,32 @@ class Shapes:
         mine: States = self.states[self.index == 0]
         return mine
 
+    @cached_property
+    def margin(self) -> Float[np.ndarray, " lanes"]:
+        """Stability margin of each solution."""
+        return self.states.margin if len(self) else np.zeros(0)
+
+    @cached_property
+    def nearest(self) -> State | None:
+        """Stable state within the constraints that comes nearest to the targets."""
+        eset = self.known.eset
+        allowed = feasible_vertices(eset, self.within)
+        if not allowed.any():
+            allowed = stable_vertices(eset)
+        within = (*self.within, stability(eset.structure, 0.0))
+        found, _ = best_fits(self.known, self.wanted, within, allowed)
+        return found[0] if len(found) else None
+
+    @cached_property
+    def family(self) -> Level | None:
+        """All states that meet fewer targets than there are free parameters: curves or surfaces.
+
+        None for as many targets as free parameters, or more.
+        """
+        if len(self.wanted) >= len(self.known.eset.names):
+            return None
+        return family(self.known, self.wanted)
+
 
 def solve_shape(
     eset: EquilibriumSet,
@@ -88,15 +128,16 @@ def solve_shape(
     """Find all states of a set at which descriptors take given values.
 
     Cells over which the linear interpolation of the descriptors comes near the targets predict
-    states, which Newton corrects in the unknowns and the free parameters together; folds are no
-    obstacle. A solution that no cell predicts would need two in one cell: refine the set there.
+    states, which Newton corrects along the set; folds are no obstacle. A solution that no cell
+    predicts would need two in one cell: refine the set there. With more descriptors than free
+    parameters the fits of least squares are found, with fewer the family of solutions.
 
     Parameters
     ----------
     eset
         The set over the actuators.
     targets
-        As many descriptors as the set has free parameters, with their values.
+        Descriptors of the structure with their values.
     within
         Constraints that solutions have to obey, beside those of the set.
     start
@@ -107,99 +148,164 @@ def solve_shape(
 
     Returns
     -------
-    The solutions. None is an answer: refused, with the vertex that comes nearest.
+    The solutions. None is an answer: refused, with what comes nearest.
 
     Raises
     ------
     InputError
-        For a number of targets that is not that of the free parameters, values that are not
-        finite, an empty set, or a rank by routes without a start.
+        Without targets, for values that are not finite, an empty set, or a rank by routes without
+        a start.
     """
-    descriptors, wanted = tuple(targets), _numbers(eset, targets)
+    columns = {each: np.array([value], dtype=float) for each, value in targets.items()}
+    return solve_shapes(eset, columns, within=within, start=start, rank=rank)[0]
+
+
+def solve_shapes(
+    eset: EquilibriumSet,
+    targets: Mapping[Descriptor, Float[np.ndarray, " many"]],
+    *,
+    within: Sequence[Constraint] = (),
+    start: State | None = None,
+    rank: Rank | None = None,
+) -> tuple[Shapes, ...]:
+    """Answer many questions of `solve_shape` at once: values of each descriptor, one per question.
+
+    What the set has to be asked is kept with it, so that later questions are answered faster.
+
+    Raises
+    ------
+    InputError
+        As for `solve_shape`, and for different numbers of values.
+    """
+    wanted = _numbers(eset, targets)
     rank = rank or ("energy" if start is None else "route")
     if rank not in ("route", "energy", "margin") or (rank == "route" and start is None):
         raise InputError(
             f"`rank` must be energy or margin, or route if there is a start; got {rank!r}."
         )
-    values = np.stack([each.function(eset.points.z, eset.points.p) for each in descriptors], 1)
-    found = _roots(eset, descriptors, values, wanted)
-    for constraint in (*eset.constraints, *within):
-        found = found[constraint.excess(found.z, found.p) <= AT_EDGE]
-    index = found.index if len(found) else np.zeros(0, int)
-    margin = found.margin if len(found) else np.zeros(0)
-    routes = [] if start is None else [_route(eset, start, each, within) for each in found]
-    energy = found.energy if len(found) else np.zeros(0)
-    key = {"route": [each.length for each in routes], "energy": energy, "margin": -margin}[rank]
-    order = np.lexsort((np.nan_to_num(np.asarray(key, float), nan=np.inf), index))
-    closest, miss = _closest(eset, descriptors, values, wanted)
-    why = "" if len(order) else _why(descriptors, wanted, miss)
-    return Shapes(
-        "refused" if why else "solved",
-        why,
-        found[order],
-        index[order],
-        margin[order],
-        tuple(routes[k] for k in order) if routes else (),
-        closest,
-        miss,
-    )
+    known = predictor(eset, tuple(targets))
+    constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
+    if wanted.shape[1] > len(eset.names):
+        groups = [_fitted(known, each, constraints) for each in wanted]
+    else:
+        groups = _solved(known, wanted, constraints)
+    answers = []
+    for values, (states, misfit) in zip(wanted, groups, strict=True):
+        routes = [] if start is None else [plan(eset, start, s, within=within) for s in states]
+        question = (known, values, constraints)
+        answers.append(_answer(question, states, misfit, (rank, routes)))
+    return tuple(answers)
 
 
-def _numbers(eset: EquilibriumSet, targets: Mapping[Descriptor, float]) -> Float[np.ndarray, " k"]:
-    if len(targets) != len(eset.names):
-        raise InputError(
-            f"`targets` must give as many descriptors as the set has free parameters "
-            f"({', '.join(eset.names)}); got {len(targets)}."
-        )
+def _numbers(
+    eset: EquilibriumSet, targets: Mapping[Descriptor, Float[np.ndarray, " many"]]
+) -> Float[np.ndarray, "many k"]:
+    if not targets:
+        raise InputError("`targets` must give at least one descriptor; got none.")
     for descriptor, value in targets.items():
-        if not np.isfinite(value):
-            raise InputError(f"`targets` must be finite; got {descriptor.name} = {value!r}.")
+        bad = np.asarray(value)[~np.isfinite(value)]
+        if len(bad):
+            raise InputError(
+                f"`targets` must be finite; got {descriptor.name} = {float(bad[0])!r}."
+            )
+    if len({np.shape(value) for value in targets.values()}) != 1:
+        raise InputError(
+            "`targets` must give equally many values of each descriptor; got "
+            f"{', '.join(f'{len(v)} of {d.name}' for d, v in targets.items())}."
+        )
     if not len(eset.cells):
         raise InputError("`eset` must have cells; got an empty set.")
-    return np.array([float(value) for value in targets.values()])
+    return np.stack([np.asarray(value, dtype=float) for value in targets.values()], axis=1)
 
 
-def _roots(
-    eset: EquilibriumSet,
-    descriptors: tuple[Descriptor, ...],
-    values: Float[np.ndarray, "V k"],
-    wanted: Float[np.ndarray, " k"],
-) -> States:
-    """Exact solutions in the box, each once."""
-    structure = eset.structure
-    share, cells = _predicted(values[eset.cells], wanted)
-    corners = eset.cells[cells]
-    z = np.einsum("ck,cki->ci", share, eset.points.z[corners])
-    p = np.einsum("ck,cki->ci", share, eset.points.p[corners])
-    free = np.array([position(structure.parameters, name) for name in eset.names])
-    p[:, free] = np.clip(p[:, free], eset.box.lower, eset.box.upper)
-    if not len(z):
-        return States(structure, z, p)
-    many = np.repeat(wanted[None], len(z), axis=0)
-    z, p, found = newton_at_targets(structure, (z, p), free, descriptors, many)
-    found &= eset.box.contains(p[:, free], slack=AT_EDGE)
+def _answer(
+    question: tuple[Predictor, Float[np.ndarray, " k"], tuple[Constraint, ...]],
+    states: States,
+    misfit: Float[np.ndarray, " lanes"],
+    order_by: tuple[Rank, list[Route]],
+) -> Shapes:
+    """Solutions in order."""
+    known, wanted, _ = question
+    rank, routes = order_by
+    index = states.index if len(states) else np.zeros(0, int)
+    own = np.zeros(len(states))
+    if len(states) and rank == "route":
+        own = np.nan_to_num([each.length for each in routes], nan=np.inf)
+    elif len(states):
+        own = states.energy if rank == "energy" else -states.margin
+    fits = misfit > EXACT
+    order = np.lexsort((own, index, np.where(fits, misfit, 0.0)))
+    closest, miss = _closest(known, wanted)
+    status: Literal["solved", "fitted", "refused"] = "solved"
+    if len(order) == 0 or fits.all():
+        status = "fitted" if len(order) else "refused"
+    why = "" if status == "solved" else _why(known.descriptors, wanted, miss)
+    return Shapes(
+        status, why, states[order], index[order], misfit[order],
+        tuple(routes[k] for k in order) if routes else (), closest, miss, *question,
+    )  # fmt: skip
+
+
+def _solved(
+    known: Predictor, wanted: Float[np.ndarray, "many k"], within: tuple[Constraint, ...]
+) -> list[tuple[States, Float[np.ndarray, " lanes"]]]:
+    """Exact solutions of each question in the box and within constraints, each once."""
+    structure, eset = known.eset.structure, known.eset
+    spots, owner = _guesses(known, wanted)
+    z, p, found = aimed(known.setting, spots, known.descriptors, wanted[owner])
+    found &= eset.box.contains(p[:, known.setting.free], slack=AT_EDGE)
     found[found] &= structure.resolved(z[found], p[found])
-    z, p = z[found], p[found]
-    kept = _distinct(States(structure, z, p))
-    return States(structure, z[kept], p[kept])
+    for constraint in within:
+        room = AT_EDGE * max(1.0, abs(constraint.bound))
+        found[found] &= constraint.excess(z[found], p[found]) <= room
+    states = States(structure, z[found], p[found])
+    owner = owner[found]
+    bounds = np.searchsorted(owner, np.arange(len(wanted) + 1))
+    groups = []
+    for first, last in pairwise(bounds):
+        own = states[first:last]
+        own = own[_distinct(own)]
+        groups.append((own, np.zeros(len(own))))
+    if wanted.shape[1] < len(eset.names):
+        # the shortest way to a family may leave the box
+        groups = [
+            group if len(group[0]) else _members(known, values, within)
+            for group, values in zip(groups, wanted, strict=True)
+        ]
+    return groups
 
 
-def _predicted(
-    values: Float[np.ndarray, "C corners k"], wanted: Float[np.ndarray, " k"]
-) -> tuple[Float[np.ndarray, "some corners"], Int[np.ndarray, " some"]]:
-    """Barycentric coordinates at which cells take the values, in or near them; which cells."""
-    low, high = values.min(axis=1), values.max(axis=1)
-    reach = values.shape[2] * OVERHANG * (high - low)
-    cells = np.flatnonzero(((low - reach <= wanted) & (wanted <= high + reach)).all(axis=1))
-    sides = values[cells, 1:] - values[cells, :1]
-    size = np.maximum(np.abs(sides).max(axis=(1, 2), initial=0.0), 1e-300)
-    regular = np.abs(np.linalg.det(sides)) > 1e-12 * size ** sides.shape[1]
-    cells, sides = cells[regular], sides[regular]
-    gap = wanted - values[cells, 0]
-    inner = np.linalg.solve(np.swapaxes(sides, 1, 2), gap[:, :, None])[:, :, 0]
-    share = np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)
-    near = share.min(axis=1) >= -OVERHANG
-    return share[near], cells[near]
+def _members(
+    known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
+) -> tuple[States, Float[np.ndarray, " lanes"]]:
+    """Members of a family within the box and constraints."""
+    states, misfit = _fitted(known, wanted, within)
+    return states[misfit <= EXACT], misfit[misfit <= EXACT]
+
+
+def _guesses(
+    known: Predictor, wanted: Float[np.ndarray, "many k"]
+) -> tuple[Spots, Int[np.ndarray, " lanes"]]:
+    """Starts of Newton's method, and the questions that they belong to."""
+    if wanted.shape[1] < len(known.eset.names):
+        starts = [local_minima(known.edges, known.misfits(each))[:STARTS] for each in wanted]
+        vertices = np.concatenate(starts)
+        owner = np.repeat(np.arange(len(wanted)), [len(each) for each in starts])
+        used, place = np.unique(vertices, return_inverse=True)
+        return spots_of(known.eset, used).take(place), owner
+    parts = [known.cells(each) for each in wanted]
+    owner = np.repeat(np.arange(len(wanted)), [len(cells) for _, cells in parts])
+    shares, cells = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return known.guesses(shares, cells), owner
+
+
+def _fitted(
+    known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
+) -> tuple[States, Float[np.ndarray, " lanes"]]:
+    """Different fits of least squares."""
+    states, misfit = best_fits(known, wanted, within)
+    kept = _distinct(states)
+    return states[kept], misfit[kept]
 
 
 def _distinct(states: States) -> Int[np.ndarray, " distinct"]:
@@ -214,21 +320,11 @@ def _distinct(states: States) -> Int[np.ndarray, " distinct"]:
     return np.array(kept, dtype=int)
 
 
-def _route(eset: EquilibriumSet, start: State, goal: State, within: Sequence[Constraint]) -> Route:
-    return plan(eset, start, goal, within=within)
-
-
-def _closest(
-    eset: EquilibriumSet,
-    descriptors: tuple[Descriptor, ...],
-    values: Float[np.ndarray, "V k"],
-    wanted: Float[np.ndarray, " k"],
-) -> tuple[State, dict[str, float]]:
-    spread = np.maximum(np.ptp(values, axis=0), 1e-300)
-    best = int(np.argmin((((values - wanted) / spread) ** 2).sum(axis=1)))
-    gaps = (values[best] - wanted).tolist()
-    names = [each.name for each in descriptors]
-    return eset.points[best], dict(zip(names, gaps, strict=True))
+def _closest(known: Predictor, wanted: Float[np.ndarray, " k"]) -> tuple[State, dict[str, float]]:
+    best = int(known.misfits(wanted).argmin())
+    gaps = (known.values[best] - wanted).tolist()
+    names = [each.name for each in known.descriptors]
+    return known.eset.points[best], dict(zip(names, gaps, strict=True))
 
 
 def _why(
