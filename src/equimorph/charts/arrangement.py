@@ -53,6 +53,8 @@ def arrange(places: OldPlaces, edges: OldEdges, jump: OldJumps) -> Drawing:
     """
     places, edges, jump = _weld(places, edges, jump)
     for _ in range(_ROUNDS):
+        if not len(edges):
+            break
         start, along = places[edges[:, 0]], places[edges[:, 1]] - places[edges[:, 0]]
         owner, fraction, place = _cuts(start, along)
         if not len(owner):

@@ -61,11 +61,14 @@ class Cells:
         The coordinates.
     numbers
         Which of its cells.
+    cut
+        Vertices along which the set itself was cut off.
     """
 
     eset: EquilibriumSet
     coordinates: Coordinates
     numbers: Int[np.ndarray, " own"]
+    cut: Bool[np.ndarray, " V"] | None = None
 
     @cached_property
     def values(self) -> Float[np.ndarray, "V d"]:
@@ -311,10 +314,15 @@ def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
         on_box |= (np.abs(lines - bound) <= SLACK * size).all(axis=1).any(axis=1)
     capped = np.isin(eset.kinds, (2, CORNER))[facets].all(axis=1)
     ended = whole.counts[some] == 1
+    if cells.cut is not None:
+        capped &= ~cells.cut[facets].all(axis=1)
+    cut = np.ones(len(facets), bool)
+    if cells.cut is not None:  # where an edge could not be cut, whole cells are left out
+        cut = (cells.cut | np.isin(eset.kinds, (FOLD, CORNER)))[facets].all(axis=1)
     kinds = np.select(
         [flags_of(facets, np.concatenate(folds)), ended & on_box & outer, ended & capped & outer,
-         ended],
-        ["fold", "box", "cap", "cut"],
+         ended & cut, ended],
+        ["fold", "box", "cap", "cut", "hole"],
         "singular",
     )  # fmt: skip
     return facets, kinds

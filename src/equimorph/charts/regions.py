@@ -113,12 +113,15 @@ def regions_within(
     edges, jump
         Directed edges, and by how much the count on their left exceeds that on their right.
     """
+    none = np.empty(0, int)
+    nothing = Regions((), np.empty((0, 2)), np.empty((0, 2), int), none, none)
     if not len(edges):
-        none = np.empty(0, int)
-        return Regions((), np.empty((0, 2)), np.empty((0, 2), int), none, none)
+        return nothing
     origin, extent = coordinates.min(axis=0), np.ptp(coordinates, axis=0)
     for spacing in _SPACINGS:
         places, pieces, jumps = arrange((coordinates - origin) / (extent * spacing), edges, jump)
+        if not len(pieces):
+            return nothing
         left, right = sides(places[pieces], jumps)
         if _balanced(pieces, left, right):
             break

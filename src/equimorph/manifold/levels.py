@@ -29,6 +29,11 @@ STILL = 1e-12
 
 Values = Float[np.ndarray, " V"]
 Function = Callable[[Vertices], Values]
+Ends = Int[np.ndarray, "n 2"]
+About = tuple[int, Int[np.ndarray, " n"]]
+Between = Callable[
+    [Fabric, Ends, About, Float[np.ndarray, "n 2"]], tuple[Bool[np.ndarray, " n"], Vertices]
+]
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
     fabric = _fabric(eset)
     cut = _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors))
     nothing = np.zeros(len(cut.values), bool)
-    whole = _part(eset, cut.fabric, np.ones(len(cut.fabric.cells), bool), (nothing, cut.lost))
+    whole = part_of(eset, cut.fabric, np.ones(len(cut.fabric.cells), bool), (nothing, cut.lost))
     side = np.sign(cut.values[cut.fabric.cells].sum(axis=1)).astype(int)
     return Division(whole, cut.on_level, side, cut.lost)
 
@@ -135,7 +140,7 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
     inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
     constraints = (*eset.constraints, constraint)
     setting = replace(fabric.setting, constraints=constraints)
-    return _part(eset, replace(cut.fabric, setting=setting), inside, (cut.on_level, cut.lost))
+    return part_of(eset, replace(cut.fabric, setting=setting), inside, (cut.on_level, cut.lost))
 
 
 def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
@@ -152,11 +157,11 @@ def part(eset: EquilibriumSet, cells: Bool[np.ndarray, " C"]) -> EquilibriumSet:
     """Some of the cells as a set of its own, like the stable ones: ``eset.cell_index == 0``."""
     fabric = _fabric(eset)
     nothing = np.zeros(len(fabric.vertices), bool)
-    return _part(eset, fabric, cells, (nothing, 0))
+    return part_of(eset, fabric, cells, (nothing, 0))
 
 
 @dataclass(frozen=True)
-class _Cut:
+class Cut:
     """A fabric cut along a level, values at its vertices, and how many edges could not be cut."""
 
     fabric: Fabric
@@ -190,10 +195,30 @@ def _level(eset: EquilibriumSet, function: Function) -> Level:
     return Level(states, tuple(pieces(inverse.reshape(facets.shape))), cut.lost)
 
 
-def _cut(fabric: Fabric, function: Function) -> _Cut:
+def _cut(fabric: Fabric, function: Function) -> Cut:
     """Put vertices where a function vanishes on edges, until no edge crosses its level."""
     values = function(fabric.vertices)
     values = np.where(np.abs(values) <= ROUND_OFF * np.abs(values).max(initial=0.0), 0.0, values)
+
+    def between(
+        fabric: Fabric, ends: Ends, about: About, known: Float[np.ndarray, "n 2"]
+    ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+        return roots(fabric, ends, about, known, lambda at, _: function(at))
+
+    return cut_between(fabric, values, between)
+
+
+def cut_between(fabric: Fabric, values: Values, between: Between) -> Cut:
+    """Put vertices on edges whose ends have values of different signs, until there are none.
+
+    Parameters
+    ----------
+    values
+        At the vertices of the fabric; new vertices have the value zero.
+    between
+        Finds the new vertices: of a fabric, edges, their mark and indices, and their values; tells
+        on which edges it found some.
+    """
     lost: set[tuple[int, int]] = set()
     while True:
         ends, of_cells = edges_of(fabric.cells, len(fabric.vertices))
@@ -202,7 +227,7 @@ def _cut(fabric: Fabric, function: Function) -> _Cut:
             crossed &= [tuple(pair) not in lost for pair in ends.tolist()]
         chosen = _one_per_cell(crossed, of_cells)
         if len(chosen) == 0:
-            return _Cut(fabric, values, len(lost))
+            return Cut(fabric, values, len(lost))
         marks = fabric.edge_marks(ends)
         lowest = np.full(len(ends), np.iinfo(int).max)
         for side in of_cells.T:
@@ -210,9 +235,7 @@ def _cut(fabric: Fabric, function: Function) -> _Cut:
         for mark in np.unique(marks[chosen]).tolist():
             own = chosen[marks[chosen] == mark]
             known = values[ends[own]]
-            done, more = roots(
-                fabric, ends[own], (mark, lowest[own]), known, lambda at, _: function(at)
-            )
+            done, more = between(fabric, ends[own], (mark, lowest[own]), known)
             lost.update(map(tuple, ends[own[~done]].tolist()))
             if done.any():
                 fabric = fabric.bisected(ends[own[done]], more)
@@ -285,7 +308,7 @@ def roots(
     return done, whole.take(np.argsort(np.concatenate(lanes)))
 
 
-def _part(
+def part_of(
     eset: EquilibriumSet,
     fabric: Fabric,
     cells: Bool[np.ndarray, " C"],

@@ -1,0 +1,220 @@
+"""Where neighbouring points do not have neighbouring preferred states, or none at all."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.charts.domain import Domain, Edge, kinds_along, wide
+from equimorph.charts.location import Cells, facet_kinds
+from equimorph.charts.preference import Preference
+from equimorph.charts.regions import regions_within
+from equimorph.manifold.topology import flags_of, pieces
+from equimorph.model import Box
+from equimorph.structures import States
+
+Points = Float[np.ndarray, "points d"]
+
+ASIDE = 1e-7
+"""Distance across an edge, in ranges of the parameters, at which the other side is looked at."""
+JUMP = 1e-3
+"""Distance in the metric from which on states on both sides are no neighbours."""
+SHORT = 1e-6
+"""Extent, in ranges of the parameters, of barriers that are round-off at a cusp."""
+BESIDE = 0.4
+"""Distance from another barrier, in lengths of its edges, within which a barrier is its image."""
+
+
+@dataclass(frozen=True, eq=False)
+class Barrier:
+    """A curve across which the preferred state jumps.
+
+    Parameters
+    ----------
+    kind
+        "fold" or "cap" where the near side ends; "tie" where the preference changes between two
+        states that both go on.
+    points
+        Free parameters along it; a point (d = 1), a polyline (d = 2) or points of a surface.
+    near, far
+        Preferred states on both sides: on the curve, and just across it.
+    jump
+        Their distances in the metric.
+    facets
+        Over three parameters: triangles of points, one a row.
+    """
+
+    kind: str
+    points: Points
+    near: States
+    far: States
+    jump: Float[np.ndarray, " points"]
+    facets: Int[np.ndarray, "..."]
+
+    def __repr__(self) -> str:
+        """Kind and range of jumps."""
+        low, high = self.jump.min(), self.jump.max()
+        return f"Barrier({self.kind}: {len(self.points)} points, jumps {low:.3g} to {high:.3g})"
+
+    def distance(self, points: Points, size: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
+        """Distance of points from it as it is drawn, in units of `size`."""
+        if self.points.shape[1] != 2 or len(self.points) < 2:
+            gap = (points[:, None] - self.points) / size
+            return np.asarray(np.linalg.norm(gap, axis=2).min(axis=1))
+        a, b = self.points[:-1] / size, self.points[1:] / size
+        best = np.full(len(points), np.inf)
+        for at in range(0, len(points), 512):
+            own = points[at : at + 512] / size
+            reach, along = own[:, None] - a, b - a
+            squared = np.maximum((along**2).sum(axis=1), 1e-300)
+            share = np.clip((reach * along).sum(axis=2) / squared, 0.0, 1.0)
+            gap = np.linalg.norm(reach - share[:, :, None] * along, axis=2)
+            best[at : at + 512] = gap.min(axis=1)
+        return best
+
+
+def barriers_of(cells: Cells, preference: Preference) -> tuple[Barrier, ...]:
+    """Barriers around the preferred cells; each is known once, from the side that ends there.
+
+    Parameters
+    ----------
+    cells
+        The preferred cells.
+    preference
+        The choice.
+    """
+    facets, kinds = facet_kinds(cells)
+    kinds = np.where(kinds == "cut", "tie", kinds)
+    ended = flags_of(facets, cells.whole.facets[cells.whole.counts == 1]) & ~np.isin(
+        kinds, ("box", "hole")
+    )
+    facets, kinds = facets[ended], kinds[ended]
+    used = np.unique(facets)
+    if len(used) == 0:
+        return ()
+    z, p, jump = _across(cells, facets, used, preference)
+    number = np.searchsorted(used, facets)
+    apart = jump[number]
+    # where a barrier ends, as at a cusp, its jump vanishes
+    real = np.isfinite(apart).all(axis=1) & (apart > JUMP).any(axis=1)
+    structure = cells.eset.structure
+    found = []
+    for kind in dict.fromkeys(kinds[real].tolist()):
+        for piece in pieces(number[real & (kinds == kind)]):
+            own = np.unique(piece) if piece.ndim == 2 else piece
+            local = np.searchsorted(own, piece) if piece.ndim == 2 else np.arange(len(own))
+            near = cells.eset.points[used[own]]
+            far = States(structure, z[own], p[own])
+            points = cells.values[used[own]]
+            found.append(Barrier(kind, points, near, far, jump[own], local))
+    return _each_once(found, cells)
+
+
+def _across(
+    cells: Cells,
+    facets: Int[np.ndarray, "n d"],
+    used: Int[np.ndarray, " some"],
+    preference: Preference,
+) -> tuple[Float[np.ndarray, "some size"], Float[np.ndarray, "some P"], Float[np.ndarray, " some"]]:
+    """Preferred states just across vertices of the boundary, and how far they are; ∞ if none."""
+    eset, structure = cells.eset, cells.eset.structure
+    size = eset.box.upper - eset.box.lower
+    outward = _outward(cells, facets, used, size)
+    there = preference.over(cells.values[used] + ASIDE * size * outward)
+    own = eset.points[used]
+    z, p = np.full(own.z.shape, np.nan), np.full(own.p.shape, np.nan)
+    z[there.point], p[there.point] = there.states.z, there.states.p
+    gap = np.sqrt((z - own.z)[:, : structure.unknowns] ** 2 @ structure.mass)
+    return z, p, np.where(np.isfinite(gap), gap, np.inf)
+
+
+def _outward(
+    cells: Cells,
+    facets: Int[np.ndarray, "n d"],
+    used: Int[np.ndarray, " some"],
+    size: Float[np.ndarray, " d"],
+) -> Float[np.ndarray, "some d"]:
+    """Directions at vertices of the boundary that lead out of the cells beside it."""
+    whole = cells.whole
+    base = int(whole.facets.max()) + 1
+    keys = (whole.facets * base ** np.arange(whole.facets.shape[1])).sum(axis=1)
+    wanted = (np.sort(facets, axis=1) * base ** np.arange(facets.shape[1])).sum(axis=1)
+    cell, corner = np.nonzero(np.isin(keys, wanted)[whole.cell_facets])
+    at = cells.values[cells.corners[cell]] / size
+    first = np.take_along_axis(at, ((corner + 1) % at.shape[1])[:, None, None], axis=1)
+    own = at[np.arange(len(cell)), corner]
+    rest = np.stack([np.delete(a, k, axis=0) for a, k in zip(at, corner, strict=True)])
+    along = rest[:, 1:] - rest[:, :1]
+    away = first[:, 0] - own
+    if along.shape[1]:
+        basis = np.linalg.qr(np.swapaxes(along, 1, 2))[0]
+        away = away - np.einsum("ndk,nk->nd", basis, np.einsum("ndk,nd->nk", basis, away))
+    away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
+    out = np.zeros((len(used), at.shape[2]))
+    for k in range(1, at.shape[1]):
+        vertex = cells.corners[cell, (corner + k) % at.shape[1]]
+        place = np.searchsorted(used, vertex)
+        known = (place < len(used)) & (used[np.minimum(place, len(used) - 1)] == vertex)
+        np.add.at(out, place[known], away[known])
+    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300))
+
+
+def _each_once(found: list[Barrier], cells: Cells) -> tuple[Barrier, ...]:
+    """Barriers without their images from the other side.
+
+    The other side of a sheet's end is where the preference changes on another sheet; of a tie both
+    sides are cut, and the one with the greater descriptor counts that tells sheets apart.
+    """
+    ends = [barrier for barrier in found if barrier.kind != "tie"]
+    elevation = cells.eset.structure.elevation
+    size = cells.eset.box.upper - cells.eset.box.lower
+    kept = [barrier for barrier in ends if _extent(barrier, size) > SHORT]
+    for barrier in found:
+        if barrier.kind != "tie" or _extent(barrier, size) <= SHORT:
+            continue
+        steps = np.linalg.norm(np.diff(barrier.points / size, axis=0), axis=1)
+        step = float(np.median(steps)) if len(steps) else 1e-6
+        gap = np.min([e.distance(barrier.points, size) for e in ends], axis=0) if ends else np.inf
+        if np.median(gap) < BESIDE * step:
+            continue
+        middle = len(barrier.points) // 2
+        near, far = barrier.near[middle].batch, barrier.far[middle].batch
+        if elevation(near)[0] >= elevation(far)[0]:
+            kept.append(barrier)
+    return tuple(kept)
+
+
+def _extent(barrier: Barrier, size: Float[np.ndarray, " d"]) -> float:
+    """Extent of a barrier in units of `size`; single points are no shorter than they can be."""
+    if barrier.points.shape[1] == 1:
+        return np.inf
+    return float((np.ptp(barrier.points, axis=0) / size).max())
+
+
+def gaps_of(domain: Domain, box: Box, cell: Float[np.ndarray, " d"]) -> Domain:
+    """What a domain leaves of a box, but for slivers thinner than a share of a cell."""
+    names = domain.names
+    low, high = box.lower, box.upper
+    if len(names) != 2:
+        return Domain(names, cells=np.zeros((0, len(names) + 1, len(names))))
+    corners = np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
+    loops = [corners, *domain.loops]
+    starts = np.cumsum([0, *(len(loop) for loop in loops)])
+    edges = np.concatenate(
+        [np.stack([np.arange(a, b - 1), np.arange(a + 1, b)], axis=1)
+         for a, b in pairwise(starts.tolist())]
+    )  # fmt: skip
+    jump = np.concatenate(
+        [np.full(len(loop) - 1, 1 if k == 0 else -1) for k, loop in enumerate(loops)]
+    )
+    regions = regions_within(np.concatenate(loops), edges, jump)
+    kept = wide(regions.loops(lambda n: n > 0), cell)
+    ends = np.concatenate([np.stack([loop[:-1], loop[1:]], axis=1) for loop in loops])
+    kinds = np.concatenate([np.full(4, "box", dtype=object), *domain.loop_kinds])
+    return Domain(names, kept, tuple(kinds_along(loop, ends, kinds) for loop in kept))
+
+
+def gap_edges(gaps: Domain) -> tuple[Edge, ...]:
+    """Edges of gaps inside the box."""
+    return tuple(edge for edge in gaps.edges if edge.kind != "box")

@@ -1,0 +1,213 @@
+"""The choice of a rule over points and at states, and the part of a set that it prefers."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.charts.location import Cells, Found
+from equimorph.charts.rules import Chooser
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.fabric import (
+    ON_CAP,
+    ON_FOLD,
+    Fabric,
+    Vertices,
+    fabric_of,
+    vertices_of,
+)
+from equimorph.manifold.levels import About, Ends, cut_between, fabric_setting, part_of
+from equimorph.manifold.on_edges import on_edges
+from equimorph.manifold.over import exact_states, rooted
+from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
+from equimorph.manifold.topology import adjacency, flags_of
+from equimorph.structures import States
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Points = Float[np.ndarray, "points d"]
+
+DIFFERENT = 1e-4
+"""Distance in the metric from which on two states over a point are different ones."""
+BESIDE = 0.02
+"""How far beside a fold, in lengths of edges, the preference is looked at."""
+PARTS, ROUNDS = 3, 17
+"""Edges are divided in so many parts so often: the preference changes within 1e-8 of them."""
+
+Solved = tuple[Lanes, Parameters, Bool[np.ndarray, " n"]]
+Way = Callable[[Int[np.ndarray, " n"], Float[np.ndarray, " n"]], Solved]
+
+
+@dataclass(frozen=True, eq=False)
+class Preference:
+    """A rule and the cells among which it chooses."""
+
+    cells: Cells
+    choose: Chooser
+
+    def over(self, points: Points) -> Found:
+        """Preferred states over points."""
+        found = self.cells.find(points)
+        return found.take(self.choose(found, points))
+
+    def prefers(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+        """Whether states of the set are the preferred ones over their points."""
+        structure = self.cells.eset.structure
+        points, n = self.cells.coordinates(z, p), structure.unknowns
+        found = self.cells.find(points)
+        gap = (found.states.z - z[found.point])[:, :n] ** 2 @ structure.mass
+        own = np.sqrt(gap) < DIFFERENT
+        # the state itself takes part as it is: at a fold no search would find it
+        cell = np.full(len(z), -1)
+        cell[found.point[own]] = found.cell[own]
+        others = found.take(~own)
+        states = States(
+            structure,
+            np.concatenate([others.states.z, z]),
+            np.concatenate([others.states.p, p]),
+        )
+        itself = np.arange(len(z))
+        both = Found(
+            states,
+            np.concatenate([others.point, itself]),
+            np.concatenate([others.cell, cell]),
+            np.concatenate([others.inside, np.ones(len(z), bool)]),
+        )
+        return self.choose(both, points)[len(others.point) :]
+
+
+def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndarray, " V"], int]:
+    """The preferred part of a set, which of its vertices lie on cuts, and edges without a cut."""
+    eset = preference.cells.eset
+    fabric = fabric_of(fabric_setting(eset), eset)
+    among = np.zeros(len(eset.cells), bool)
+    among[preference.cells.numbers] = True
+    values = _signs(preference)
+    # only candidates are cut: of their neighbours beyond folds nothing is asked
+    fabric = _only(fabric, among)
+
+    def between(
+        fabric: Fabric, ends: Ends, about: About, known: Float[np.ndarray, "n 2"]
+    ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+        return _narrowed(preference, fabric, ends, about, known)
+
+    cut = cut_between(fabric, values, between)
+    inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
+    used = np.unique(cut.fabric.cells[inside])
+    chosen = part_of(eset, cut.fabric, inside, (cut.on_level, cut.lost))
+    return chosen, cut.on_level[used], cut.lost
+
+
+def _only(fabric: Fabric, cells: Bool[np.ndarray, " C"]) -> Fabric:
+    """Some cells of a fabric, with their facets."""
+    own = flags_of(fabric.facets, adjacency(fabric.cells[cells]).facets)
+    return replace(
+        fabric,
+        cells=fabric.cells[cells],
+        cell_index=fabric.cell_index[cells],
+        squared=fabric.squared[cells],
+        facets=fabric.facets[own],
+        marks=fabric.marks[own],
+    )
+
+
+def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
+    """−1 at preferred vertices, 1 at others."""
+    eset, corners = preference.cells.eset, preference.cells.corners
+    values = np.ones(len(eset.points))
+    used = np.unique(corners)
+    states = eset.points[used]
+    values[used] = np.where(preference.prefers(states.z, states.p), -1.0, 1.0)
+    folded = np.isin(eset.kinds, (FOLD, CORNER))
+    # paths to a fold end just before it or there: look a little way off
+    doubtful = used[folded[used] & (values[used] > 0.0)]
+    pairs = np.unique(
+        np.concatenate([corners[:, list(two)] for two in permutations(range(corners.shape[1]), 2)]),
+        axis=0,
+    )
+    pairs = pairs[np.isin(pairs[:, 0], doubtful) & ~folded[pairs[:, 1]]]
+    fold, other = pairs[np.diff(pairs[:, 0], prepend=-1) > 0].T
+    points = preference.cells.values
+    there = preference.over((1.0 - BESIDE) * points[fold] + BESIDE * points[other])
+    n, mass = eset.structure.unknowns, eset.structure.mass
+    z = eset.points.z[:, :n]
+    far = (there.states.z[:, :n] - z[fold[there.point]]) ** 2 @ mass
+    own = far < (z[other[there.point]] - z[fold[there.point]]) ** 2 @ mass
+    values[fold[there.point[own]]] = -1.0
+    return values
+
+
+def _narrowed(
+    preference: Preference,
+    fabric: Fabric,
+    ends: Ends,
+    about: About,
+    known: Float[np.ndarray, "n 2"],
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Vertices on edges where the preference changes first on the way from their first ends."""
+    way = _straight(fabric, ends, about)
+    low, high = np.zeros(len(ends)), np.ones(len(ends))
+    first: Bool[np.ndarray, " n"] = known[:, 0] < 0.0
+    todo: Int[np.ndarray, " n"] = np.arange(len(ends))
+    shares = np.arange(1, PARTS) / PARTS
+    for _ in range(ROUNDS):
+        if len(todo) == 0:
+            break
+        step = (high - low)[todo]
+        at = low[todo, None] + step[:, None] * shares
+        lanes = np.repeat(todo, len(shares))
+        z, p, good = way(lanes, at.ravel())
+        same = np.zeros(len(lanes), bool)
+        same[good] = preference.prefers(z[good], p[good]) == first[lanes[good]]
+        good, same = good.reshape(at.shape), same.reshape(at.shape)
+        todo, step, same = todo[good.all(axis=1)], step[good.all(axis=1)], same[good.all(axis=1)]
+        passed = np.where(same.all(axis=1), PARTS - 1, same.argmin(axis=1))
+        low[todo] += passed * step / PARTS
+        high[todo] = low[todo] + step / PARTS
+    done = np.zeros(len(ends), bool)
+    z, p, good = way(todo, 0.5 * (low + high)[todo])
+    done[todo[good]] = True
+    return done, _vertices(fabric, ends[done], about[1][done], (z[good], p[good]))
+
+
+def _straight(fabric: Fabric, ends: Ends, about: About) -> Way:
+    """States over straight lines between the ends of edges; those on constraints stay on them."""
+    store, structure = fabric.vertices, fabric.setting.structure
+    folded = np.isin(store.kinds[ends], (FOLD, CORNER))
+    bent = np.full(len(ends), bool(about[0] & (ON_CAP | ON_FOLD))) | folded.all(axis=1)
+
+    def way(lanes: Int[np.ndarray, " n"], t: Float[np.ndarray, " n"]) -> Solved:
+        weights = np.stack([1.0 - t, t], axis=1)
+        p = np.einsum("nk,nkp->np", weights, store.p[ends[lanes]])
+        some = np.flatnonzero(folded[lanes].any(axis=1) & ~folded[lanes].all(axis=1))
+        weights[some] = rooted(weights[some], folded[lanes[some]])
+        z = np.einsum("nk,nki->ni", weights, store.z[ends[lanes]])
+        good = np.zeros(len(lanes), bool)
+        plain = np.flatnonzero(~bent[lanes])
+        z[plain], good[plain], index = exact_states(structure, z[plain], p[plain])
+        good[plain] &= index == about[1][lanes[plain]]
+        rest = np.flatnonzero(~good)
+        if len(rest):
+            some = lanes[rest]
+            found, at = on_edges(fabric, ends[some], about[0], about[1][some], t[rest])
+            z[rest[found]], p[rest[found]], good[rest] = at.z, at.p, found
+        return z, p, good
+
+    return way
+
+
+def _vertices(
+    fabric: Fabric, ends: Ends, index: Int[np.ndarray, " n"], states: tuple[Lanes, Parameters]
+) -> Vertices:
+    """Vertices amid edges, on what both ends lie on."""
+    store = fabric.vertices
+    kinds = store.kinds[ends]
+    on_fold = np.isin(kinds, (FOLD, CORNER)).all(axis=1)
+    on_cap = np.isin(kinds, (CAP, CORNER)).all(axis=1)
+    kind = np.select([on_fold & on_cap, on_fold, on_cap], [CORNER, FOLD, CAP], REFINED)
+    plain = np.isin(kinds[:, 0], (FOLD, CORNER)).astype(int)
+    rows = store.rows[ends[np.arange(len(ends)), plain]]
+    others = (index, np.full(len(ends), -1))
+    return vertices_of(fabric.setting, states, kind, others, np.ascontiguousarray(rows))

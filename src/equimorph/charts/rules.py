@@ -1,0 +1,139 @@
+"""Rules that prefer one of the states over a point."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial import cKDTree
+
+from equimorph.charts.location import Found
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.nearest import setting_of
+from equimorph.model import Descriptor
+from equimorph.structures import State, States
+
+Scores = Float[np.ndarray, " found"]
+Points = Float[np.ndarray, "points d"]
+Chooser = Callable[[Found, Points], Bool[np.ndarray, " found"]]
+"""Which of the states over points are preferred: at most one over each."""
+
+
+class Rule(ABC):
+    """A way to prefer at most one of the states over each point."""
+
+    @abstractmethod
+    def on(self, eset: EquilibriumSet) -> Chooser:
+        """Return the rule made ready for a set."""
+
+
+@dataclass(frozen=True, repr=False)
+class _Least(Rule):
+    """The state with the least score, as a function of states and the cells that they lie on."""
+
+    name: str
+    score: Callable[[EquilibriumSet], Callable[[Found], Scores]] = field(repr=False)
+
+    def __repr__(self) -> str:
+        """Return what is preferred."""
+        return self.name
+
+    def on(self, eset: EquilibriumSet) -> Chooser:
+        """Prefer the least score."""
+        score = self.score(eset)
+
+        def choose(found: Found, points: Points) -> Bool[np.ndarray, " found"]:
+            del points
+            return first_of_each(found, score(found), eset.structure.elevation)
+
+        return choose
+
+
+def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np.ndarray, " found"]:
+    """Which states have the least finite score over their points; the highest of equal ones."""
+    height = elevation.function(found.states.z, found.states.p)
+    order = np.lexsort((-height, score, found.point))
+    first = np.ones(len(order), bool)
+    first[1:] = np.diff(found.point[order]) > 0
+    chosen = np.zeros(len(order), bool)
+    chosen[order[first]] = True
+    return np.asarray(chosen & np.isfinite(score))
+
+
+def lowest(descriptor: Descriptor) -> Rule:
+    """Prefer the lowest value of a descriptor, like the energy."""
+    return _Least(
+        f"lowest {descriptor.name}",
+        lambda _: lambda found: descriptor.function(found.states.z, found.states.p),
+    )
+
+
+def highest(descriptor: Descriptor) -> Rule:
+    """Prefer the highest value of a descriptor."""
+    return _Least(
+        f"highest {descriptor.name}",
+        lambda _: lambda found: -descriptor.function(found.states.z, found.states.p),
+    )
+
+
+def nearest(to: State | int) -> Rule:
+    """Prefer what is nearest, in the metric, to a state or to a stratum of the set.
+
+    Of a state its configuration counts. States on the stratum come first; elsewhere the distance in
+    configuration and scaled parameters to the nearest of its vertices counts.
+
+    Raises
+    ------
+    InputError
+        Later, for a stratum that the set does not have.
+    """
+    if isinstance(to, State):
+        n, mass, u = to.structure.unknowns, to.structure.mass, to.z[: to.structure.unknowns]
+        return _Least(
+            "nearest to a state",
+            lambda _: lambda found: np.asarray((found.states.z[:, :n] - u) ** 2 @ mass),
+        )
+    return _Least(f"nearest to stratum {to}", lambda eset: _distance_from(eset, to))
+
+
+def by_score(function: Callable[[States], Scores]) -> Rule:
+    """Prefer the least value of a function of states."""
+    return _Least("by score", lambda _: lambda found: np.asarray(function(found.states), float))
+
+
+def rule_of(prefer: Rule | Callable[[States], Scores]) -> Rule:
+    """Return a rule, or a function of states as one.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
+    if isinstance(prefer, Rule):
+        return prefer
+    if callable(prefer):
+        return by_score(prefer)
+    raise InputError(
+        "`prefer` must be a rule (quasi_static, first_stable_on_path, lowest, highest, nearest) or "
+        f"a function of states; got {prefer!r}."
+    )
+
+
+def _distance_from(eset: EquilibriumSet, stratum: int) -> Callable[[Found], Scores]:
+    if not 0 <= stratum < len(eset.strata):
+        raise InputError(
+            f"`nearest` must name one of {len(eset.strata)} strata, from 0 on; got {stratum!r}."
+        )
+    setting = setting_of(eset)
+    used = np.unique(eset.cells[eset.stratum == stratum])
+    tree = cKDTree(embed(setting, eset.points.z[used], eset.points.p[used]))
+
+    def score(found: Found) -> Scores:
+        distance = tree.query(embed(setting, found.states.z, found.states.p))[0]
+        own = (found.cell >= 0) & (eset.stratum[found.cell] == stratum)
+        return np.where(own, 0.0, distance)
+
+    return score
