@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.cells import Cells
+from equimorph.manifold.crossing_curves import lonely
 from equimorph.manifold.equilibrium_set import (
     Boundary,
     Component,
@@ -17,6 +18,7 @@ from equimorph.manifold.equilibrium_set import (
 from equimorph.manifold.hard import EFFORTS
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.pairing import Pairing, Setting, abandoned
+from equimorph.manifold.points import CROSSING
 from equimorph.manifold.topology import (
     Adjacency,
     adjacency,
@@ -24,12 +26,15 @@ from equimorph.manifold.topology import (
     flags_of,
     keys_of,
     labels,
-    orientation,
     pieces,
-    projected_volume,
+    senses,
+    unbalanced,
 )
 from equimorph.model import Box
 from equimorph.structures import States
+
+SHEETS_AT_A_CROSSING = 4
+"""Cells around a facet in which two sheets cross."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,7 @@ class Complex:
     """Vertices, cells and marked facets, from which everything else about a set follows.
 
     index: negative eigenvalues at the vertices, kinds and grid_vertex as in `EquilibriumSet`;
-    folds, caps (n, d): facets on folds and on constraints.
+    folds, caps, crossings (n, d): facets on folds, on constraints and where sheets cross.
     """
 
     points: States
@@ -48,6 +53,7 @@ class Complex:
     cell_index: Int[np.ndarray, " C"]
     folds: Int[np.ndarray, "f d"]
     caps: Int[np.ndarray, "c d"]
+    crossings: Int[np.ndarray, "x d"]
 
 
 @dataclass(frozen=True)
@@ -93,6 +99,7 @@ def account(
         cells.index,
         _kept(number[cells.folds]),
         _kept(number[cells.caps]),
+        _kept(number[cells.crossings]),
     )
     lost = abandoned(pairing)
     lifting = Lifting(
@@ -100,7 +107,7 @@ def account(
         sum(int(pairing.effort[edge]) >= EFFORTS for _, edge in lost),
         pairing.conflicts,
         _parity_violations(pairing),
-        cells.doubtful,
+        cells.doubtful if len(pairing.setting.free) > 1 else len(lonely(pairing)),
         bisected,
     )
     return described(Frame(pairing.setting, pairing.mesh, *given), whole, lifting)
@@ -110,7 +117,9 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
     """Pieces, folds, boundaries and audit of a complex."""
     corners, points = given.cells, given.points
     whole = adjacency(corners)
-    folds, caps = (flags_of(whole.facets, each) for each in (given.folds, given.caps))
+    folds, caps, crossed = (
+        flags_of(whole.facets, each) for each in (given.folds, given.caps, given.crossings)
+    )
     component = labels(len(corners), whole.links)
     stratum = labels(len(corners), whole.links[whole.manifold & ~folds[whole.across]])
     boundaries = _boundaries(whole, caps, folds)
@@ -119,7 +128,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
     coordinates = points.p[:, frame.setting.free]
-    parts = (corners, given.cell_index, component, whole, coordinates)
+    parts = (corners, given.cell_index, crossed, whole, coordinates)
     return EquilibriumSet(
         structure=frame.setting.structure,
         box=frame.box,
@@ -140,6 +149,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         audit=_audit(points, lifting, parts, boundaries),
         mesh=frame.mesh,
         grid_vertex=given.grid_vertex,
+        crossings=tuple(pieces(whole.facets[crossed])),
     )
 
 
@@ -199,28 +209,26 @@ def _audit(
     parts: tuple[
         Int[np.ndarray, "C corners"],
         Int[np.ndarray, " C"],
-        Int[np.ndarray, " C"],
+        Bool[np.ndarray, " F"],
         Adjacency,
         Float[np.ndarray, "V d"],
     ],
     boundaries: tuple[Boundary, ...],
 ) -> Audit:
-    corners, cell_index, component, whole, coordinates = parts
-    signs, contradictions = orientation(corners, whole)
-    demanded = np.where(cell_index % 2 == 0, 1, -1) * signs
-    volume = projected_volume(coordinates, corners) * demanded
-    total = np.bincount(component, weights=volume) if len(volume) else np.zeros(0)
-    overturned = int((volume * np.sign(total)[component] < 0).sum()) if len(volume) else 0
+    corners, cell_index, crossed, whole, coordinates = parts
+    sense = senses(corners, cell_index, coordinates, whole)
+    regular = crossed & (whole.counts == SHEETS_AT_A_CROSSING)
     kinds = [boundary.kind for boundary in boundaries]
     return Audit(
         vertices=len(points),
         cells=len(corners),
         **vars(lifting),
-        non_manifold=int((whole.counts > 2).sum()),
-        contradictions=contradictions,
-        overturned=overturned,
+        non_manifold=int(((whole.counts > 2) & ~regular).sum()),
+        crossings=int(regular.sum()),
+        contradictions=sense.contradictions + unbalanced(corners, whole, sense, regular),
+        overturned=int(sense.overturned.sum()),
         euler_characteristic=euler_characteristic(corners),
-        components=int(component.max(initial=-1)) + 1,
+        components=int(labels(len(corners), whole.links).max(initial=-1)) + 1,
         loops=tuple((kind, kinds.count(kind)) for kind in sorted(set(kinds))),
         largest_residual=float(points.residual.max(initial=0.0)),
         checked=0,
@@ -230,11 +238,17 @@ def _audit(
 
 
 def _parity_violations(pairing: Pairing) -> int:
-    """Curves whose ends contradict sign det F_z: equal parity across, opposite on return."""
+    """Curves whose ends contradict sign det F_z: equal parity across, opposite on return.
+
+    It is the other way round behind a crossing, where det [F_z F_t; tᵀ] changes its sign.
+    """
     curves, points = pairing.curves, pairing.points
     start, end = np.array(curves.start, int), np.array(curves.end, int)
+    crossed = np.zeros(len(start), int)
+    for curve, inner in curves.inner.items():
+        crossed[curve] = np.count_nonzero(points.kind[inner] == CROSSING)
     closed = end >= 0
     start, end = start[closed], end[closed]
-    returned = points.vertex[start] == points.vertex[end]
-    odd = (points.index[start] - points.index[end]) % 2 == 1
-    return int((odd != returned).sum())
+    returned = (points.vertex[start] == points.vertex[end]).astype(int)
+    change = points.index[start] - points.index[end] - returned - crossed[closed]
+    return int((change % 2 == 1).sum())

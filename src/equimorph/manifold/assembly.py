@@ -1,12 +1,14 @@
 """Sheet lifting, part four: polygons become triangulated discs that fit together."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
+from equimorph.manifold.crossing_curves import lonely
 from equimorph.manifold.cutting import (
+    MEETING,
+    TURN,
     Chord,
     Piece,
     chords_to_split,
@@ -15,12 +17,13 @@ from equimorph.manifold.cutting import (
     triangulate,
 )
 from equimorph.manifold.embedding import embed
+from equimorph.manifold.meetings import join_crossings, pin_ends, put_hubs, split_crossings
 from equimorph.manifold.normals import existence_normals
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.pins import lower_index, pin
-from equimorph.manifold.points import CAP, CORNER, FOLD
+from equimorph.manifold.plans import SINGULAR, Plan, chord_of, planes
+from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.polygons import Loops, Polygon
-from equimorph.manifold.simplices import plane_bases
 
 SAME_SIDE = 0.3
 """Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
@@ -31,8 +34,8 @@ class Discs:
     """Triangulated discs over the grid triangles.
 
     corners (n, 3): points; index: of each triangle; owner: the grid triangle below it; folds,
-    caps: their sides on folds and on constraints; doubtful: grid triangles whose polygons could
-    not be closed and cut without doubt.
+    caps, crossings: their sides on folds, on constraints, and where sheets cross; doubtful: grid
+    triangles whose polygons could not be closed and cut without doubt.
     """
 
     corners: Int[np.ndarray, "n 3"]
@@ -40,6 +43,7 @@ class Discs:
     owner: Int[np.ndarray, " n"]
     folds: Int[np.ndarray, "f 2"]
     caps: Int[np.ndarray, "c 2"]
+    crossings: Int[np.ndarray, "x 2"]
     doubtful: Int[np.ndarray, " k"]
 
 
@@ -52,26 +56,15 @@ class _Found:
     owner: list[int] = field(default_factory=list)
     folds: set[Chord] = field(default_factory=set)
     caps: set[Chord] = field(default_factory=set)
+    crossings: set[Chord] = field(default_factory=set)
     undecided: set[int] = field(default_factory=set)
-
-
-@dataclass
-class _Plan:
-    """How a polygon will be cut: its points and chords, once extra points are found."""
-
-    polygon: Polygon
-    points: list[int]
-    sides: dict[int, int]
-    """Sides of the grid triangle on which each point lies, one bit each; extra points inside it lie
-    on none."""
-    chords: list[Chord] = field(default_factory=list)
-    middle: dict[Chord, int] = field(default_factory=dict)
 
 
 def assemble(pairing: Pairing, loops: Loops) -> Discs:
     """Triangulate all polygons; plain ones are triangles already."""
     found = _Found()
     found.undecided.update(loops.ambiguous, loops.broken)
+    found.undecided.update(_alone(pairing))
     plans = [_plan(pairing, polygon) for polygon in loops.polygons]
     _close(pairing, plans, found)
     plans = _join_folds(pairing, plans, found)
@@ -83,11 +76,18 @@ def assemble(pairing: Pairing, loops: Loops) -> Discs:
         np.concatenate([loops.plain_triangle, np.array(found.owner, int)]),
         np.array(sorted(found.folds), int).reshape(-1, 2),
         np.array(sorted(found.caps), int).reshape(-1, 2),
+        np.array(sorted(found.crossings), int).reshape(-1, 2),
         np.array(sorted(found.undecided), int),
     )
 
 
-def _plan(pairing: Pairing, polygon: Polygon) -> _Plan:
+def _alone(pairing: Pairing) -> list[int]:
+    """Grid triangles beside crossings through which other than two curves lead."""
+    edges = pairing.points.edge[lonely(pairing)]
+    return np.flatnonzero(np.isin(pairing.mesh.sides, edges).any(axis=1)).tolist()
+
+
+def _plan(pairing: Pairing, polygon: Polygon) -> Plan:
     mesh, store = pairing.mesh, pairing.points
     at_edge = {edge: 1 << k for k, edge in enumerate(mesh.sides[polygon.triangle].tolist())}
     at_corner = {
@@ -100,56 +100,60 @@ def _plan(pairing: Pairing, polygon: Polygon) -> _Plan:
         point: at_corner[vertex] if vertex >= 0 else at_edge[edge]
         for point, vertex, edge in zip(polygon.points, vertices, edges, strict=True)
     }
-    return _Plan(polygon, list(polygon.points), sides)
+    kinds = {point: int(store.kind[point]) for point in polygon.points}
+    return Plan(polygon, list(polygon.points), sides, kinds)
 
 
-def _same_side(plan: _Plan, chord: Chord) -> bool:
+def _same_side(plan: Plan, chord: Chord) -> bool:
     """Whether two points lie on one side of the grid triangle."""
-    first, second = _sides_of(plan, chord)
+    first, second = plan.on(chord)
     return bool(first & second)
 
 
-def _is_fold(pairing: Pairing, point: int) -> bool:
-    return int(pairing.points.kind[point]) in {FOLD, CORNER}
+def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
+    """Close open polygons along the constraint, through a corner if a singular curve leaves there.
 
-
-def _close(pairing: Pairing, plans: list[_Plan], found: _Found) -> None:
-    """Close open polygons along the constraint, through a corner if a fold leaves there."""
-    wanted: list[tuple[_Plan, int]] = []
+    That is a fold, or where another sheet crosses.
+    """
+    wanted: list[tuple[Plan, int]] = []
     for plan in plans:
         if not plan.polygon.open:
             continue
         first, last = plan.points[0], plan.points[-1]
-        odd = sum(_is_fold(pairing, point) for point in plan.points) % 2
-        if odd:
-            wanted.append((plan, CORNER))
+        odd = [kind for kind in (TURN, MEETING) if len(plan.those(kind)) % 2]
+        if len(odd) == 2:
+            found.undecided.add(plan.polygon.triangle)
+        elif odd:
+            wanted.append((plan, CORNER if odd == [TURN] else CROSSING))
         elif _same_side(plan, (first, last)):
             wanted.append((plan, CAP))
         else:
-            found.caps.add(_chord(first, last))
+            found.caps.add(chord_of(first, last))
     pairs = [(plan, (plan.points[0], plan.points[-1]), kind) for plan, kind in wanted]
     extra = _pinned(pairing, pairs)
+    crossing = [k for k, (_, kind) in enumerate(wanted) if kind == CROSSING]
+    ends = pin_ends(pairing, [wanted[k][0] for k in crossing])
+    for k, point in zip(crossing, ends, strict=True):
+        extra[k] = point
     for (plan, _), point in zip(wanted, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
             continue
-        found.caps.update({_chord(plan.points[0], point), _chord(plan.points[-1], point)})
-        plan.points.append(point)
+        found.caps.update({chord_of(plan.points[0], point), chord_of(plan.points[-1], point)})
+        plan.append(point, int(pairing.points.kind[point]))
 
 
-def _join_folds(pairing: Pairing, plans: list[_Plan], found: _Found) -> list[_Plan]:
+def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan]:
     """Decide which folds of each polygon belong together; return plans where that is certain."""
     index = pairing.points.index
     ways = [
-        match_folds(
-            plan.points, lambda point: _is_fold(pairing, point), lambda point: int(index[point])
-        )
-        for plan in plans
+        match_folds(plan.points, plan.singular, lambda point: int(index[point])) for plan in plans
     ]
     several = [k for k, each in enumerate(ways) if len(each) > 1]
     continuous = _continuous(pairing, [(plans[k], ways[k]) for k in several])
     for k, each in zip(several, continuous, strict=True):
         ways[k] = each
+    ways = join_crossings(plans, ways)
     decided = []
     for plan, each in zip(plans, ways, strict=True):
         if len(each) == 1:
@@ -157,11 +161,20 @@ def _join_folds(pairing: Pairing, plans: list[_Plan], found: _Found) -> list[_Pl
             decided.append(plan)
         else:
             found.undecided.add(plan.polygon.triangle)
-    return decided
+    # what is said of a crossing must be said of both sheets
+    crossed = [bool(plan.those(MEETING)) for plan in decided]
+    decided = [
+        plan
+        for plan, own in zip(decided, crossed, strict=True)
+        if not (own and plan.polygon.triangle in found.undecided)
+    ]
+    lost = put_hubs(pairing, decided)
+    found.undecided.update(lost)
+    return [plan for plan in decided if plan.polygon.triangle not in lost]
 
 
 def _continuous(
-    pairing: Pairing, choices: list[tuple[_Plan, list[list[Chord]]]]
+    pairing: Pairing, choices: list[tuple[Plan, list[list[Chord]]]]
 ) -> list[list[list[Chord]]]:
     """Ways in which every chord joins folds whose sheets lie on the same side.
 
@@ -170,13 +183,14 @@ def _continuous(
     """
     at = [
         (number, fold)
-        for number, (_, ways) in enumerate(choices)
+        for number, (plan, ways) in enumerate(choices)
         for fold in sorted({fold for way in ways for chord in way for fold in chord})
+        if plan.singular(fold) == TURN
     ]
     if not at:
-        return []
+        return [ways for _, ways in choices]
     normals = existence_normals(pairing.setting, pairing.points, np.array([fold for _, fold in at]))
-    bases = _planes(pairing, [choices[number][0].polygon.triangle for number, _ in at])
+    bases = planes(pairing, [choices[number][0].polygon.triangle for number, _ in at])
     flat = np.einsum("nkd,nd->nk", bases, normals)
     flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
     normal = dict(zip(at, flat, strict=True))
@@ -184,42 +198,43 @@ def _continuous(
         [
             way
             for way in ways
-            if all(normal[number, a] @ normal[number, b] > SAME_SIDE for a, b in way)
+            if all(
+                normal[number, a] @ normal[number, b] > SAME_SIDE
+                for a, b in way
+                if plan.singular(a) == TURN
+            )
         ]
-        for number, (_, ways) in enumerate(choices)
+        for number, (plan, ways) in enumerate(choices)
     ]
 
 
-def _planes(pairing: Pairing, triangles: list[int]) -> Float[np.ndarray, "n 2 d"]:
-    """Orthonormal bases of the planes of grid triangles, in scaled parameters."""
-    mesh = pairing.mesh
-    return plane_bases(mesh.vertices[mesh.triangles[triangles]] / pairing.setting.scales)
-
-
-def _split_chords(pairing: Pairing, plans: list[_Plan], found: _Found) -> None:
-    """Put an exact fold point on chords that would lie on a grid edge, or block triangulation."""
+def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
+    """Put an exact point on chords that would lie on a grid edge, or block triangulation."""
     wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
-    extra = _pinned(pairing, [(plan, chord, FOLD) for plan, chord in wanted])
-    for (plan, chord), point in zip(wanted, extra, strict=True):
+    folds = [(plan, chord) for plan, chord in wanted if plan.singular(chord[0]) == TURN]
+    extra = _pinned(pairing, [(plan, chord, FOLD) for plan, chord in folds])
+    for (plan, chord), point in zip(folds, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
         else:
             plan.middle[chord] = point
+    met = {
+        (plan.polygon.triangle, chord)
+        for plan, chord in wanted
+        if plan.singular(chord[0]) == MEETING
+    }
+    found.undecided.update(split_crossings(pairing, plans, met))
 
 
-def _chords_to_split(plan: _Plan) -> list[Chord]:
+def _chords_to_split(plan: Plan) -> list[Chord]:
     """Chords that need a point of their own; see `chords_to_split`."""
     place = {point: at for at, point in enumerate(plan.points)}
-    chords = {(place[a], place[b]): (a, b) for a, b in plan.chords}
-    chosen = chords_to_split(tuple(_sides_of(plan, plan.points)), tuple(chords))
+    chords = {(place[a], place[b]): (a, b) for a, b in plan.chords if {a, b} <= set(place)}
+    chosen = chords_to_split(tuple(plan.on(plan.points)), tuple(chords))
     return [chords[chord] for chord in chosen]
 
 
-def _sides_of(plan: _Plan, piece: Sequence[int]) -> list[int]:
-    return [plan.sides.get(point, 0) for point in piece]
-
-
-def _pinned(pairing: Pairing, wanted: list[tuple[_Plan, Chord, int]]) -> list[int | None]:
+def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int | None]:
     """Numbers of new exact points of some kind between pairs; None where none was found."""
     out: list[int | None] = [None] * len(wanted)
     for kind in (FOLD, CAP, CORNER):
@@ -227,7 +242,7 @@ def _pinned(pairing: Pairing, wanted: list[tuple[_Plan, Chord, int]]) -> list[in
         if not own:
             continue
         pairs = [wanted[k][1] for k in own]
-        planes = _planes(pairing, [wanted[k][0].polygon.triangle for k in own])
+        planes = planes(pairing, [wanted[k][0].polygon.triangle for k in own])
         pinned = pin(pairing.setting, pairing.points, pairs, kind, planes)
         good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
         lows = pairing.points.index[np.array(pairs)].min(axis=1)
@@ -240,15 +255,16 @@ def _pinned(pairing: Pairing, wanted: list[tuple[_Plan, Chord, int]]) -> list[in
     return out
 
 
-def _fill(pairing: Pairing, plans: list[_Plan], found: _Found) -> None:
+def _fill(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     """Cut polygons and triangulate their pieces, all pieces with equally many corners together."""
-    by_size: dict[int, list[tuple[_Plan, Piece, int]]] = {}
+    by_size: dict[int, list[tuple[Plan, Piece, int]]] = {}
     for plan in plans:
         for chord in plan.chords:
+            marked = found.crossings if plan.singular(chord[0]) == MEETING else found.folds
             if chord in plan.middle:
-                found.folds.update(_chord(end, plan.middle[chord]) for end in chord)
+                marked.update(chord_of(end, plan.middle[chord]) for end in chord)
             else:
-                found.folds.add(chord)
+                marked.add(chord_of(*chord))
         for piece in cut(plan.points, plan.chords, plan.middle):
             index = _index(pairing, piece)
             if index is None or len(piece) < 3:
@@ -261,16 +277,17 @@ def _fill(pairing: Pairing, plans: list[_Plan], found: _Found) -> None:
 
 def _index(pairing: Pairing, piece: Piece) -> int | None:
     """Index of the points of a piece that are not on folds; None if they differ."""
-    index = {int(pairing.points.index[point]) for point in piece if not _is_fold(pairing, point)}
+    kind, own = pairing.points.kind, pairing.points.index
+    index = {int(own[point]) for point in piece if int(kind[point]) not in SINGULAR}
     return index.pop() if len(index) == 1 else None
 
 
-def _triangulate(pairing: Pairing, pieces: list[tuple[_Plan, Piece, int]], found: _Found) -> None:
+def _triangulate(pairing: Pairing, pieces: list[tuple[Plan, Piece, int]], found: _Found) -> None:
     """Enter the triangles of pieces with equally many corners."""
     store = pairing.points
     corners = np.array([piece for _, piece, _ in pieces])
     places = embed(pairing.setting, store.z[corners.ravel()], store.p[corners.ravel()])
-    sides = np.array([_sides_of(plan, piece) for plan, piece, _ in pieces])
+    sides = np.array([plan.on(piece) for plan, piece, _ in pieces])
     triangles, possible = triangulate(places.reshape(*corners.shape, -1), sides)
     rows = np.arange(len(corners))[:, None, None]
     for (plan, _, index), own, good in zip(
@@ -282,7 +299,3 @@ def _triangulate(pairing: Pairing, pieces: list[tuple[_Plan, Piece, int]], found
         found.corners.extend(own)
         found.index.extend([index] * len(own))
         found.owner.extend([plan.polygon.triangle] * len(own))
-
-
-def _chord(a: int, b: int) -> Chord:
-    return (a, b) if a < b else (b, a)

@@ -10,6 +10,8 @@ class Audit:
     Must be zero for a clean set: `unpaired` (curves that could not be lifted), `conflicts` left,
     `parity_violations`, `undecided` triangles, `non_manifold` edges, orientation `contradictions`.
     `retraced` conflicts were resolved by finer steps, `bisected` triangles by subdivision.
+    Facets at which two sheets cross (`crossings`: four cells each, whose orientations cancel) are
+    not counted among the non-manifold ones.
     `overturned` cells project against the orientation that their index demands: slivers at folds.
     Of the equilibria found by random search at random points, `recovered` were missing and have
     been added; in the last round, `missing` of `checked` were, which must be zero too.
@@ -41,6 +43,7 @@ class Audit:
     deviation: float = 0.0
     unrefined: int = 0
     smallest_angle: float = 0.0
+    crossings: int = 0
 
     @property
     def clean(self) -> bool:
@@ -73,6 +76,7 @@ class Audit:
             ("parity violations", str(self.parity_violations)),
             ("undecided triangles", f"{self.undecided} ({self.bisected} resolved by bisection)"),
             ("non-manifold edges", str(self.non_manifold)),
+            *([("edges where sheets cross", str(self.crossings))] if self.crossings else []),
             ("orientation contradictions", str(self.contradictions)),
             ("overturned cells", str(self.overturned)),
             ("components", str(self.components)),

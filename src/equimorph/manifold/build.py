@@ -11,6 +11,7 @@ from equimorph.manifold.accounting import account
 from equimorph.manifold.bisection import bisect
 from equimorph.manifold.cells import Cells, find_cells
 from equimorph.manifold.completeness import check, seeds_from
+from equimorph.manifold.crossing_curves import flood_crossings
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.flooding import flood
 from equimorph.manifold.mesh import Lines, coarse_grid, grid_lines, grid_mesh
@@ -181,7 +182,7 @@ def _lifted(pairing: Pairing, progress: Progress) -> tuple[Cells, int]:
     """Flood, close, assemble; bisect what is not certain and go on."""
     bisected = first = 0
     for number in range(BISECTIONS):
-        flood(pairing, progress)
+        flood_crossings(pairing, progress)
         progress.report("closing loops", 0, 1)
         cells = find_cells(pairing)
         doubtful = cells.doubtful

@@ -9,7 +9,7 @@ from jaxtyping import Int
 from equimorph.manifold.assembly import assemble
 from equimorph.manifold.balls import fill
 from equimorph.manifold.pairing import Pairing
-from equimorph.manifold.points import CAP, FOLD
+from equimorph.manifold.points import CAP, CROSSING, FOLD
 from equimorph.manifold.polygons import find_loops
 
 
@@ -19,16 +19,18 @@ def _nothing() -> Int[np.ndarray, " 0"]:
 
 @dataclass(frozen=True)
 class Cells:
-    """Segments, triangles or tetrahedra of points with their index, and facets of two kinds.
+    """Segments, triangles or tetrahedra of points with their index, and facets of three kinds.
 
-    corners (C, d + 1), index (C,); folds, caps: facets on folds and on constraints; the doubtful:
-    grid cells over which the set could not be closed and cut without doubt.
+    corners (C, d + 1), index (C,); folds, caps, crossings: facets on folds, on constraints and
+    where sheets cross; the doubtful: grid cells over which the set could not be closed and cut
+    without doubt.
     """
 
     corners: Int[np.ndarray, "C corners"]
     index: Int[np.ndarray, " C"]
     folds: Int[np.ndarray, "f d"]
     caps: Int[np.ndarray, "c d"]
+    crossings: Int[np.ndarray, "x d"]
     doubtful_triangles: Int[np.ndarray, " t"] = field(default_factory=_nothing)
     doubtful_tetrahedra: Int[np.ndarray, " n"] = field(default_factory=_nothing)
 
@@ -44,11 +46,11 @@ def find_cells(pairing: Pairing) -> Cells:
         return _segments(pairing)
     discs = assemble(pairing, find_loops(pairing))
     if pairing.mesh.dimension == 2:
-        return Cells(discs.corners, discs.index, discs.folds, discs.caps, discs.doubtful)
+        marked = (discs.folds, discs.caps, discs.crossings)
+        return Cells(discs.corners, discs.index, *marked, discs.doubtful)
     balls = fill(pairing, discs)
-    return Cells(
-        balls.corners, balls.index, balls.folds, balls.caps, discs.doubtful, balls.doubtful
-    )
+    marked = (balls.folds, balls.caps, np.zeros((0, 3), int))
+    return Cells(balls.corners, balls.index, *marked, discs.doubtful, balls.doubtful)
 
 
 def _segments(pairing: Pairing) -> Cells:
@@ -63,9 +65,8 @@ def _segments(pairing: Pairing) -> Cells:
             pairs.extend(pairwise(line))
     corners = np.array(pairs, int).reshape(-1, 2)
     kind, index = points.kind[: points.count], points.index[: points.count]
-    # of two neighbours on a curve at most one is a fold
-    regular = np.where(kind[corners[:, 0]] == FOLD, corners[:, 1], corners[:, 0])
+    # of two neighbours on a curve at most one is singular
+    regular = np.where(np.isin(kind[corners[:, 0]], (FOLD, CROSSING)), corners[:, 1], corners[:, 0])
     used = np.unique(corners)
-    return Cells(
-        corners, index[regular], used[kind[used] == FOLD, None], used[kind[used] == CAP, None]
-    )
+    marked = (used[kind[used] == each, None] for each in (FOLD, CAP, CROSSING))
+    return Cells(corners, index[regular], *marked)

@@ -9,16 +9,21 @@ from jaxtyping import Bool, Float, Int
 Piece = tuple[int, ...]
 Chord = tuple[int, int]
 
+REGULAR, TURN, MEETING = 0, 1, 2
+"""What the points of polygons are."""
+
 
 def match_folds(
-    polygon: Sequence[int], is_fold: Callable[[int], bool], index: Callable[[int], int]
+    polygon: Sequence[int], singular: Callable[[int], int], index: Callable[[int], int]
 ) -> list[list[Chord]]:
     """All ways to join the folds of a polygon by chords that do not cross and part the indices.
 
     Returned are sets of chords for which every piece has one index; exactly one means that the
-    folds are joined without doubt, none that the polygon contradicts itself.
+    folds are joined without doubt, none that the polygon contradicts itself. `singular` tells what
+    a point is: `REGULAR`, a `TURN` (fold), or a `MEETING` with another sheet. Meetings are joined
+    with each other, and may part equal indices.
     """
-    start = next((k for k, point in enumerate(polygon) if is_fold(point)), None)
+    start = next((k for k, point in enumerate(polygon) if singular(point)), None)
     if start is None:
         same = len({index(point) for point in polygon}) == 1
         return [[]] if same else []
@@ -26,7 +31,7 @@ def match_folds(
     folds: list[int] = []
     arcs: list[int | None] = []
     for point in turned:
-        if is_fold(point):
+        if singular(point):
             folds.append(point)
             arcs.append(None)
         elif arcs[-1] is None or arcs[-1] == index(point):
@@ -35,30 +40,37 @@ def match_folds(
             return []
     if len(folds) % 2 or any(arc is None for arc in arcs):
         return []
-    found = {frozenset(chords) for chords in _matchings(folds, [arc or 0 for arc in arcs])}
+    kinds = {point: singular(point) for point in folds}
+    ways = _matchings(folds, [arc or 0 for arc in arcs], kinds)
+    found = {frozenset(chords) for chords in ways}
     return [sorted(chords) for chords in sorted(found, key=sorted)]
 
 
-def _matchings(folds: list[int], arcs: list[int]) -> list[list[Chord]]:
+def _matchings(folds: list[int], arcs: list[int], kinds: dict[int, int]) -> list[list[Chord]]:
     """Chords for folds in a circle; arcs[k] is the index between folds k and k + 1.
 
     A set of chords that do not cross always joins two neighbours; the arc between them becomes a
     piece, and the arcs on both sides merge, so that they must have the same index.
     """
+
+    def fits(a: int, b: int, inside: int, outside: int) -> bool:
+        return kinds[a] == kinds[b] and (kinds[a] == MEETING or inside != outside)
+
     if len(folds) == 2:
         low, high = sorted(folds)
-        return [[(low, high)]] if arcs[0] != arcs[1] else []
+        return [[(low, high)]] if fits(low, high, *arcs) else []
     found: list[list[Chord]] = []
     count = len(folds)
     for k in range(count):
         after, before = (k + 1) % count, (k - 1) % count
-        if arcs[before] != arcs[after] or arcs[k] == arcs[after]:
+        if arcs[before] != arcs[after] or not fits(folds[k], folds[after], arcs[k], arcs[after]):
             continue
         keep = [i for i in range(count) if i not in {k, after}]
         # fold `before` is now followed by the merged arc; the arcs of k and of `after` are gone
         rest_folds, rest_arcs = [folds[i] for i in keep], [arcs[i] for i in keep]
         low, high = sorted((folds[k], folds[after]))
-        found.extend([(low, high), *rest] for rest in _matchings(rest_folds, rest_arcs))
+        rest_ways = _matchings(rest_folds, rest_arcs, kinds)
+        found.extend([(low, high), *rest] for rest in rest_ways)
     return found
 
 

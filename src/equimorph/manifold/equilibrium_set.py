@@ -61,7 +61,8 @@ class EquilibriumSet:
         States of the vertices.
     kinds
         0 over the grid, 1 on a fold, 2 on a constraint, 3 between folds of one grid edge, 4 where a
-        fold meets a constraint, 5 amid others over a grid tetrahedron, 6 added by refinement.
+        fold meets a constraint, 5 amid others over a grid tetrahedron, 6 added by refinement, 7
+        where two sheets cross.
     index
         Negative eigenvalues at the vertices; on folds that of the lower side.
     cells, cell_index, component, stratum
@@ -69,6 +70,9 @@ class EquilibriumSet:
     folds
         Connected folds: points (d = 1), vertices along each fold curve, closed ones with the first
         repeated (d = 2), or fold surfaces as triangles, one a row (d = 3).
+    crossings
+        Branch points of the set, in the same form: there two smooth sheets cross, as the symmetric
+        and the asymmetric states do in symmetric slices.
     """
 
     structure: Structure
@@ -91,6 +95,7 @@ class EquilibriumSet:
     mesh: BaseMesh
     grid_vertex: Int[np.ndarray, " V"]
     """Vertex of `mesh` below each vertex of the complex, −1 for those not over the grid."""
+    crossings: tuple[Int[np.ndarray, "..."], ...] = ()
 
     def __repr__(self) -> str:
         """Box, size and whether the audit is clean."""
@@ -182,7 +187,8 @@ class EquilibriumSet:
         free = [position(self.structure.parameters, name) for name in self.names]
         caps = [piece.vertices for piece in self.boundaries if piece.kind != "box"]
         folded, capped = np.zeros((2, len(self.points)), bool)
-        for flags, pieces in ((folded, self.folds), (capped, caps)):
+        singular = (*self.folds, *self.crossings)
+        for flags, pieces in ((folded, singular), (capped, caps)):
             for piece in pieces:
                 flags[piece] = True
         return Sheets(

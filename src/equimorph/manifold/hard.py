@@ -1,4 +1,7 @@
-"""Hard edges: traced by pseudo-arclength through folds, to constraints, in ever finer steps."""
+"""Hard edges: traced by pseudo-arclength, in ever finer steps.
+
+Through folds and points where two curves cross, to the other end or to constraints.
+"""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -6,8 +9,11 @@ from jaxtyping import Bool, Float, Int
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
+from equimorph.manifold.crossing_points import corrected_crossings
+from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import ABANDONED, Pairing, Rays
-from equimorph.manifold.points import BETWEEN, CAP
+from equimorph.manifold.pins import Aim, Pinned, lower_index
+from equimorph.manifold.points import BETWEEN, CAP, CROSSING
 from equimorph.manifold.points import FOLD as ON_FOLD
 
 EFFORTS = 4
@@ -40,10 +46,9 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
     )
     outcome = follow(line, pairing.points.z[rays.points], pairing.setting.constraints, options)
     good = np.isin(outcome.code, (ARRIVAL, RETURN, CONSTRAINT))
-    good[outcome.passed.lanes[outcome.passed.code == BRANCH]] = False
+    inner = _inner(pairing, rays, outcome, line, good)
     np.add.at(pairing.effort, rays.edges[~good], 1)
     ends = _ends(pairing, rays, outcome, good)
-    inner = _folds(outcome, line)
     for lane, cap in _caps(pairing, outcome, line, good).items():
         inner.setdefault(lane, []).append(cap)
     points, edges = rays.points.tolist(), rays.edges.tolist()
@@ -52,9 +57,16 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
         known = pairing.ray(point, edge)
         if known >= 0 and (end < 0 or pairing.other_end(known, point) == end):
             continue  # the same curve, traced from its other end in the same batch
-        numbers = [pairing.points.add(*each, edge) for each in inner.get(lane, [])]
+        numbers = [_number(pairing, each, edge) for each in inner.get(lane, [])]
         pairing.enter(point, edge, end, numbers)
     pairing.fit()
+
+
+def _number(pairing: Pairing, point: Inner, edge: int) -> int:
+    """Number of a point inside an edge; one where curves cross belongs to both."""
+    if point[3] == CROSSING:
+        return pairing.crossing(*point[:3], edge)
+    return pairing.points.add(*point, edge)
 
 
 def _ends(
@@ -85,21 +97,51 @@ def _caps(
     return {int(lane): (z[k], p[k], index[k], CAP) for k, lane in enumerate(lanes)}
 
 
-def _folds(outcome: Outcome, line: ParameterLine) -> dict[int, list[Inner]]:
-    """Folds of each lane in order, with one regular point between neighbours."""
+def _inner(
+    pairing: Pairing,
+    rays: Rays,
+    outcome: Outcome,
+    line: ParameterLine,
+    good: Bool[np.ndarray, " lanes"],
+) -> dict[int, list[Inner]]:
+    """Folds and crossings of each lane in order, with one regular point between neighbours.
+
+    Lanes on which a crossing cannot be polished are not `good` any more.
+    """
     passed = outcome.passed
-    p = line.start[passed.lanes] + passed.t[:, None] * line.velocity[passed.lanes]
+    at = np.flatnonzero(np.isin(passed.code, (FOLD, BRANCH)))
+    z, index = passed.z[at].copy(), passed.index[at].min(axis=1)
+    p = line.start[passed.lanes[at]] + passed.t[at][:, None] * line.velocity[passed.lanes[at]]
+    kind = np.where(passed.code[at] == FOLD, ON_FOLD, CROSSING)
+    own = np.flatnonzero(kind == CROSSING)
+    if len(own):
+        pinned = _crossings(pairing, rays.take(passed.lanes[at[own]]), z[own], p[own])
+        z[own], p[own] = pinned.z, pinned.p
+        index[own] = lower_index(pairing.setting, pinned.z, pinned.p)
+        good[passed.lanes[at[own[~pinned.found]]]] = False
     rows: dict[int, list[Inner]] = {}
-    places: dict[int, list[float]] = {}
-    for i in np.flatnonzero(passed.code == FOLD):
-        lane = int(passed.lanes[i])
-        row = (passed.z[i], p[i], int(passed.index[i].min()), ON_FOLD)
-        before = places.setdefault(lane, [])
-        if before:
-            rows[lane].append(_between(outcome, line, lane, (before[-1], passed.travelled[i])))
-        rows.setdefault(lane, []).append(row)
-        before.append(float(passed.travelled[i]))
+    places: dict[int, float] = {}
+    for k, i in enumerate(at):
+        lane, travelled = int(passed.lanes[i]), float(passed.travelled[i])
+        own_rows = rows.setdefault(lane, [])
+        if lane in places:
+            own_rows.append(_between(outcome, line, lane, (places[lane], travelled)))
+        own_rows.append((z[k], p[k], int(index[k]), int(kind[k])))
+        places[lane] = travelled
     return rows
+
+
+def _crossings(
+    pairing: Pairing, rays: Rays, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Pinned:
+    """Crossing points on edges, polished."""
+    setting, mesh = pairing.setting, pairing.mesh
+    ends = mesh.vertices[mesh.edges[rays.edges]] / setting.scales
+    span = ends[:, 1] - ends[:, 0]
+    span /= np.linalg.norm(span, axis=1, keepdims=True)
+    place = embed(setting, z, p)
+    aim = Aim(setting, False, False, span[:, None], place, place[:, None][:, :0])
+    return corrected_crossings(aim, z, p, np.zeros(len(z)))
 
 
 def _between(outcome: Outcome, line: ParameterLine, lane: int, span: tuple[float, float]) -> Inner:
@@ -107,7 +149,7 @@ def _between(outcome: Outcome, line: ParameterLine, lane: int, span: tuple[float
     points = outcome.points
     own = slice(*np.searchsorted(points.lanes, [lane, lane + 1]))
     inside = (points.travelled[own] >= span[0]) & (points.travelled[own] <= span[1])
-    assert inside.any(), "two folds in one step are refused by the tracer"
+    assert inside.any(), "two events in one step are refused by the tracer"
     off = np.abs(points.travelled[own] - 0.5 * (span[0] + span[1]))
     at = own.start + int(np.argmin(np.where(inside, off, np.inf)))
     p = line.start[lane] + points.t[at] * line.velocity[lane]

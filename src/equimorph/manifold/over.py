@@ -11,8 +11,7 @@ from equimorph.equilibria import ParameterLine, TraceOptions, distinct
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.manifold.cell_index import CellIndex, Hits
-from equimorph.manifold.simplices import volumes
-from equimorph.manifold.topology import adjacency, orientation
+from equimorph.manifold.topology import adjacency, senses
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
 
@@ -135,11 +134,9 @@ class Sheets:
     @cached_property
     def _overturned(self) -> Bool[np.ndarray, " C"]:
         """Cells that project against the orientation that their index demands."""
-        signs, _ = orientation(self.cells, adjacency(self.cells))
-        volume = volumes(self.points.p[:, self.free][self.cells])
-        volume *= signs * np.where(self.cell_index % 2 == 0, 1, -1)
-        total = np.bincount(self.component, volume)
-        return np.asarray(volume * np.sign(total)[self.component] < 0.0)
+        places = self.points.p[:, self.free]
+        whole = adjacency(self.cells)
+        return senses(self.cells, self.cell_index, places, whole).overturned
 
     def over(self, p: Points) -> tuple[States, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
         """States over points (all parameters given), sorted by point; the points; the cells.

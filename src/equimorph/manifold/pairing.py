@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import ParameterLine
 from equimorph.manifold.mesh import BaseMesh
-from equimorph.manifold.points import Points
+from equimorph.manifold.points import CROSSING, SAME, Points
 from equimorph.model import Constraint
 from equimorph.structures import Structure
 
@@ -103,6 +103,8 @@ class Pairing:
     """Edges of each vertex, in the order of their slots; −1 beyond."""
     effort: Int[np.ndarray, " E"]
     conflicts: int = 0
+    crossings: dict[int, list[int]] = field(default_factory=dict)
+    """Points of each edge at which two curves cross."""
 
     def ray(self, point: int, edge: int) -> int:
         """Curve at a point along an edge."""
@@ -124,6 +126,22 @@ class Pairing:
         start = setting.parameters(mesh.vertices[mesh.edges[rays.edges, rays.sides]])
         end = setting.parameters(mesh.vertices[mesh.edges[rays.edges, 1 - rays.sides]])
         return ParameterLine(setting.structure, start, end - start)
+
+    def crossing(
+        self, z: Float[np.ndarray, " size"], p: Float[np.ndarray, " P"], index: int, edge: int
+    ) -> int:
+        """Number of a polished crossing point on an edge, known or added."""
+        known, n = self.crossings.setdefault(edge, []), self.setting.structure.unknowns
+        for point in known:
+            gap = self.points.z[point, :n] - z[:n]
+            if gap**2 @ self.setting.structure.mass < SAME**2:
+                return point
+        known.append(self.points.add(z, p, index, CROSSING, edge))
+        return known[-1]
+
+    def alive(self, curve: int) -> bool:
+        """Whether a curve has not been taken back."""
+        return self.ray(self.curves.start[curve], self.curves.edge[curve]) == curve
 
     def marked(self, mark: int) -> Rays:
         """Rays with a certain mark: of each edge from one end, lest curves be traced twice."""

@@ -34,7 +34,7 @@ class Pinned:
 
 
 @dataclass(frozen=True)
-class _Condition:
+class Condition:
     """Scalar condition with its gradients with respect to z and to steps along the span."""
 
     value: Values
@@ -92,7 +92,7 @@ def pin(
         As many conditions as are left put the point into the normal space of the group through
         its middle, so that it lies amid the group.
     """
-    z, p, deviations = _middles(setting, points, groups)
+    z, p, deviations = middles(setting, points, groups)
     fold, cap = kind in {FOLD, CORNER}, kind in {CAP, CORNER}
     rows = principal_directions(deviations, span.shape[1] - fold - cap)
     around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
@@ -133,7 +133,7 @@ def lower_index(setting: Setting, z: Lanes, p: Parameters) -> Int[np.ndarray, " 
     return np.asarray(structure.solve(z, p, nothing, shift=shift).negative - structure.constraints)
 
 
-def _middles(
+def middles(
     setting: Setting, points: Points, groups: Sequence[Sequence[int]]
 ) -> tuple[Lanes, Parameters, Float[np.ndarray, "lanes points coordinates"]]:
     """Middles of groups, and where their points lie relative to them."""
@@ -160,8 +160,8 @@ def _newton_step(
         fold, b = _fold_condition(aim, z, p, b)
         conditions.append(fold)
     if aim.cap:
-        conditions.append(_cap_condition(aim, z, p))
-    conditions += _amid(aim, z, p)
+        conditions.append(cap_condition(aim, z, p))
+    conditions += amid(aim, z, p)
     values = np.stack([each.value for each in conditions], axis=1)
     rhs = -np.concatenate([structure.residual(z, p), values], axis=1)
     columns = [structure.parameter_derivative(z, p, aim.direction(i)) for i in range(k)]
@@ -173,7 +173,7 @@ def _newton_step(
     return structure.solve(z, p, rhs[:, None], border).x[:, 0], b
 
 
-def _fold_condition(aim: Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[_Condition, Lanes]:
+def _fold_condition(aim: Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[Condition, Lanes]:
     """Test function g of ``[F_z b; bᵀ 0] [v; g] = [0; 1]``, and v for the next round."""
     structure, lanes = aim.setting.structure, len(z)
     rhs = np.zeros((lanes, 1, structure.size + 1))
@@ -188,10 +188,10 @@ def _fold_condition(aim: Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[_Condi
     for k in range(directions):
         mixed = structure.second_derivative(z, p, (v, none_p), (none_z, aim.direction(k)))
         by_step[:, k] = -np.einsum("li,li->l", v, mixed)
-    return _Condition(g, by_z, by_step), v / np.linalg.norm(v, axis=1, keepdims=True)
+    return Condition(g, by_z, by_step), v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def _cap_condition(aim: Aim, z: Lanes, p: Parameters) -> _Condition:
+def cap_condition(aim: Aim, z: Lanes, p: Parameters) -> Condition:
     """Largest excess over the constraints, its gradients by central differences."""
     lanes, size = z.shape
 
@@ -208,10 +208,10 @@ def _cap_condition(aim: Aim, z: Lanes, p: Parameters) -> _Condition:
     for k in range(directions):
         dp = DIFFERENCE * aim.direction(k)
         by_step[:, k] = (worst(z, p + dp) - worst(z, p - dp)) / (2 * DIFFERENCE)
-    return _Condition(worst(z, p), by_z, by_step)
+    return Condition(worst(z, p), by_z, by_step)
 
 
-def _amid(aim: Aim, z: Lanes, p: Parameters) -> list[_Condition]:
+def amid(aim: Aim, z: Lanes, p: Parameters) -> list[Condition]:
     """Distances from the middle along the directions of each group."""
     setting, n = aim.setting, aim.setting.structure.unknowns
     away = embed(setting, z, p) - aim.middle
@@ -221,5 +221,5 @@ def _amid(aim: Aim, z: Lanes, p: Parameters) -> list[_Condition]:
         by_z = np.zeros_like(z)
         by_z[:, :n] = row[:, :n] * np.sqrt(setting.structure.mass)
         by_step = np.einsum("ld,lkd->lk", row[:, n:], aim.span)
-        conditions.append(_Condition(np.einsum("li,li->l", row, away), by_z, by_step))
+        conditions.append(Condition(np.einsum("li,li->l", row, away), by_z, by_step))
     return conditions

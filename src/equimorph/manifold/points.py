@@ -8,9 +8,10 @@ from jaxtyping import Bool, Float, Int
 from equimorph.manifold.kernels import match_or_add
 from equimorph.structures import Structure
 
-GRID, FOLD, CAP, BETWEEN, CORNER, AMID, REFINED = 0, 1, 2, 3, 4, 5, 6
+GRID, FOLD, CAP, BETWEEN, CORNER, AMID, REFINED, CROSSING = 0, 1, 2, 3, 4, 5, 6, 7
 """Kinds of points: over a grid vertex, on a fold, on a constraint, between folds on an edge, on a
-fold and a constraint at once, amid others over a grid tetrahedron, added by refinement."""
+fold and a constraint at once, amid others over a grid tetrahedron, added by refinement, where two
+sheets cross."""
 
 SAME = 1e-6
 """Distance in the metric below which two polished equilibria over one vertex are the same."""

@@ -13,6 +13,7 @@ from jaxtyping import Int
 
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Pairing
+from equimorph.manifold.points import CROSSING
 
 NEARER = 0.5
 """Most that the gap in a chain may be, relative to the distance from another chain."""
@@ -55,11 +56,25 @@ def find_loops(pairing: Pairing) -> Loops:
         chains = [polygon for polygon in found if polygon is not None and polygon.open]
         if any(polygon is None for polygon in found):
             broken.append(triangle)
-        elif len(chains) > 1 and not _close_themselves(pairing, chains):
+        elif len(chains) > 1 and not _closed(pairing, chains):
             ambiguous.append(triangle)
         else:
             polygons.extend(polygon for polygon in found if polygon is not None)
     return Loops(plain, owner, polygons, ambiguous, broken)
+
+
+def _closed(pairing: Pairing, chains: list[Polygon]) -> bool:
+    """Whether each of several open chains must be closed by itself: two smooth sheets that cross.
+
+    Or its ends are near enough.
+    """
+    crossings = [
+        {point for point in chain.points if pairing.points.kind[point] == CROSSING}
+        for chain in chains
+    ]
+    if len(chains) == 2 and len(crossings[0]) == 1 and crossings[0] == crossings[1]:
+        return True
+    return _close_themselves(pairing, chains)
 
 
 def _close_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:

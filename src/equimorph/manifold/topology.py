@@ -199,3 +199,45 @@ def projected_volume(
 ) -> Float[np.ndarray, " C"]:
     """Signed volumes of the cells over the space of the free parameters."""
     return volumes(coordinates[cells])
+
+
+@dataclass(frozen=True)
+class Senses:
+    """How cells are oriented.
+
+    signs: coherent orientation of the manifold patches, in which the projected volume of most cells
+    has the sign of the parity of their index; overturned: cells that project against it.
+    """
+
+    signs: Int[np.ndarray, " C"]
+    contradictions: int
+    overturned: Bool[np.ndarray, " C"]
+
+
+def senses(
+    cells: Cells,
+    index: Int[np.ndarray, " C"],
+    coordinates: Float[np.ndarray, "V d"],
+    whole: Adjacency,
+) -> Senses:
+    """Orientation of cells with the index that each has.
+
+    Patches end where more than two cells share a facet.
+    """
+    signs, contradictions = orientation(cells, whole)
+    patch = labels(len(cells), whole.links[whole.manifold])
+    volume = projected_volume(coordinates, cells) * signs * np.where(index % 2 == 0, 1, -1)
+    total = np.sign(np.bincount(patch, weights=volume, minlength=1)).astype(int)
+    return Senses(signs * total[patch], contradictions, volume * total[patch] < 0)
+
+
+def unbalanced(
+    cells: Cells, whole: Adjacency, sense: Senses, facets: Bool[np.ndarray, " F"]
+) -> int:
+    """Number of the facets whose cells, with the orientation of their index, do not cancel.
+
+    As they do where sheets cross: det [F_z F_p; tᵀ] changes its sign along each of them.
+    """
+    induced = _induced_signs(cells) * sense.signs[:, None]
+    total = np.bincount(whole.cell_facets.ravel(), weights=induced.ravel())
+    return int((total[facets] != 0).sum()) if len(cells) else 0
