@@ -11,7 +11,6 @@ from equimorph.model import Box, Descriptor
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 from oracles.polynomial import bead_on_a_circle
 from oracles.surfaces import (
-    crossing_sheets,
     cusp,
     sphere,
     swallowtail,
@@ -184,13 +183,6 @@ def test_constraint_that_is_never_active_changes_nothing():
     held = lifted(sphere(), box, within=[x <= 5.0], intervals=(9, 9))
     assert np.array_equal(free.cells, held.cells)
     assert np.array_equal(free.points.z, held.points.z)
-
-
-def test_set_that_crosses_itself_is_not_called_clean():
-    """Along a = 0 the set is no surface: two sheets cross, which this complex cannot hold."""
-    eset = lifted(crossing_sheets(), Box(a=(-1, 1.1), b=(-1, 1.5)), intervals=(2, 2))
-    assert not eset.audit.clean
-    assert eset.audit.unpaired > 0
 
 
 def test_set_without_equilibria_is_empty_and_says_so():

@@ -4,10 +4,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.topology import adjacency, flags_of, orientation, projected_volume
+from equimorph.manifold.topology import (
+    adjacency,
+    flags_of,
+    labels,
+    orientation,
+    projected_volume,
+)
 
 REGULAR = (0, 3, 5, 6)
 FOLDED = (1, 4)
+CROSSED = 7
+SINGULAR = (*FOLDED, CROSSED)
 CAPPED = (2, 4)
 
 
@@ -50,12 +58,12 @@ def assert_folds_are_singular(eset: EquilibriumSet, tolerance: float) -> None:
 def assert_index_of_cells(eset: EquilibriumSet) -> None:
     """The index of a cell is that of its regular vertices, counted anew."""
     index = eset.structure.index(eset.points.z, eset.points.p)
-    regular = ~np.isin(eset.kinds, FOLDED)
+    regular = ~np.isin(eset.kinds, SINGULAR)
     assert np.array_equal(index[regular], eset.index[regular])
     for corner in eset.cells.T:
         own = regular[corner]
         assert np.array_equal(index[corner[own]], eset.cell_index[own])
-    # and on folds the lower of both sides
+    # and on folds and crossings the lowest of all sides
     folded = np.flatnonzero(~regular)
     low = np.full(len(eset.points), 99)
     np.minimum.at(low, eset.cells.ravel(), np.repeat(eset.cell_index, eset.cells.shape[1]))
@@ -67,11 +75,14 @@ def assert_orientation_alternates(eset: EquilibriumSet) -> None:
 
     Slivers at folds, where straight cells cut the corners of a curved fold, may be overturned.
     """
-    signs, contradictions = orientation(eset.cells, adjacency(eset.cells))
+    whole = adjacency(eset.cells)
+    signs, contradictions = orientation(eset.cells, whole)
     assert contradictions == 0
     volume = projected_volume(eset.coordinates, eset.cells) * signs * (-1) ** eset.cell_index
-    for k in range(eset.audit.components):
-        own = volume[eset.component == k] * np.sign(volume[eset.component == k].sum())
+    # where sheets cross the orientation has no meaning beyond
+    patch = labels(len(eset.cells), whole.links[whole.manifold])
+    for k in range(patch.max(initial=-1) + 1):
+        own = volume[patch == k] * np.sign(volume[patch == k].sum())
         assert -own[own < 0].sum() < 0.01 * own.sum()
         assert (own < 0).sum() < 0.05 * len(own)
 
@@ -84,16 +95,39 @@ def facets_of(piece: np.ndarray, d: int) -> np.ndarray:
 def assert_folds_part_indices(eset: EquilibriumSet) -> None:
     """Cells on both sides of a facet differ in index by one on folds, and nowhere else."""
     whole, d = adjacency(eset.cells), len(eset.names)
-    a, b = whole.links.T
+    a, b = whole.links[whole.manifold].T
+    across = whole.across[whole.manifold]
     jump = np.abs(eset.cell_index[a] - eset.cell_index[b])
     folded = np.concatenate([np.zeros((0, d), int), *(facets_of(piece, d) for piece in eset.folds)])
     assert jump.max(initial=0) <= 1
-    assert np.array_equal(flags_of(whole.facets, folded)[whole.across], jump == 1)
-    assert np.isin(eset.kinds[folded], FOLDED).all()
+    assert np.array_equal(flags_of(whole.facets, folded)[across], jump == 1)
+    assert np.isin(eset.kinds[folded], SINGULAR).all()
+
+
+def assert_crossings(eset: EquilibriumSet) -> None:
+    """Four cells around each facet, of two sheets whose strata end there; F_z is singular."""
+    whole, d = adjacency(eset.cells), len(eset.names)
+    crossed = np.concatenate([facets_of(piece, d) for piece in eset.crossings])
+    flags = flags_of(whole.facets, crossed)
+    assert np.array_equal(flags, whole.counts > 2)
+    assert (whole.counts[flags] == 4).all()
+    assert len(crossed) == eset.audit.crossings == flags.sum()
+    assert np.array_equal(np.unique(crossed), np.flatnonzero(eset.kinds == CROSSED))
+    for facet in np.flatnonzero(flags):
+        around = np.flatnonzero((whole.cell_facets == facet).any(axis=1))
+        assert len(np.unique(eset.stratum[around])) == 4
+        # one sheet changes its index, and det [F_z F_p; tᵀ] its sign on both
+        assert np.ptp(eset.cell_index[around]) == 1
+    z, p = (each[eset.kinds == CROSSED] for each in (eset.points.z, eset.points.p))
+    nothing, shift = np.zeros((len(z), 0, eset.structure.size)), np.full(len(z), 1e-7)
+    above, below = (
+        eset.structure.solve(z, p, nothing, shift=sign * shift).negative for sign in (1, -1)
+    )
+    assert (above - below >= 1).all()
 
 
 def assert_boundaries(eset: EquilibriumSet) -> None:
-    """Pieces are closed; their vertices lie on the box or on a constraint."""
+    """Pieces are closed, or end where sheets cross; they lie on the box or on a constraint."""
     size = eset.box.upper - eset.box.lower
     x = eset.coordinates
     low, high = np.abs(x - eset.box.lower), np.abs(x - eset.box.upper)
@@ -104,7 +138,8 @@ def assert_boundaries(eset: EquilibriumSet) -> None:
     for loop in eset.boundaries:
         own = np.unique(loop.vertices)
         capped = np.abs(excess[own]) < 1e-8
-        assert_closed(loop.vertices, len(eset.names))
+        if not (eset.kinds[loop.vertices.flat[[0, -1]]] == CROSSED).all():
+            assert_closed(loop.vertices, len(eset.names))
         assert (on_box[own] | capped).all()
         assert loop.kind in {"box", "cap", "mixed"}
         assert loop.kind != "box" or on_box[own].all()

@@ -55,5 +55,36 @@ def torus(tilt: float = 0.0) -> Polynomial:
 
 
 def crossing_sheets() -> Polynomial:
-    """x (x² + b x + a): the sheet x = 0 crosses another along a = 0, where the set is singular."""
+    """x (x² + b x + a): the sheet x = 0 crosses another along a = 0, where that folds at b = 0."""
     return Polynomial(lambda x, a, b: integral(x**3 + b * x**2 + a * x), 1, ("a", "b"))
+
+
+def pitchforks(cubic: float, slant: float) -> Polynomial:
+    """x (cubic·x² − a − slant·b): x = 0 crosses a parabolic cylinder along a + slant·b = 0."""
+    return Polynomial(lambda x, a, b: integral(cubic * x**3 - (a + slant * b) * x), 1, ("a", "b"))
+
+
+def transcriticals(skew: float, slant: float) -> Polynomial:
+    """x (skew·x − a − slant·b): two planes that exchange their stability."""
+    return Polynomial(lambda x, a, b: integral(skew * x**2 - (a + slant * b) * x), 1, ("a", "b"))
+
+
+def tricritical(cubic: float) -> Polynomial:
+    """x (x⁴ + cubic·b x² − a): pitchforks at a = 0, subcritical and folded where cubic·b < 0.
+
+    The folds are a = −(cubic·b)²/4, x² = −cubic·b/2.
+    """
+    return Polynomial(lambda x, a, b: integral(x**5 + cubic * b * x**3 - a * x), 1, ("a", "b"))
+
+
+def hilltop(k: float) -> Polynomial:
+    """s² + k x² = a, x (s − b) = 0: the fold of the sheet x = 0 passes its pitchforks at b = 0.
+
+    The pitchforks are s = b, a = b². The other sheet, s = b, has no fold.
+    """
+    return Polynomial(lambda s, x, a, b: s**3 * (1 / 3) + k * x**2 * (s - b) - a * s, 2, ("a", "b"))
+
+
+def three_planes() -> Polynomial:
+    """x (x − a) (x − b): three sheets that all meet in one point, with three crossings."""
+    return Polynomial(lambda x, a, b: integral(x * (x - a) * (x - b)), 1, ("a", "b"))

@@ -115,20 +115,11 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
 
     That is a fold, or where another sheet crosses.
     """
-    wanted: list[tuple[Plan, int]] = []
-    for plan in plans:
-        if not plan.polygon.open:
-            continue
-        first, last = plan.points[0], plan.points[-1]
-        odd = [kind for kind in (TURN, MEETING) if len(plan.those(kind)) % 2]
-        if len(odd) == 2:
-            found.undecided.add(plan.polygon.triangle)
-        elif odd:
-            wanted.append((plan, CORNER if odd == [TURN] else CROSSING))
-        elif _same_side(plan, (first, last)):
-            wanted.append((plan, CAP))
-        else:
-            found.caps.add(chord_of(first, last))
+    wanted = [(plan, _through(plan)) for plan in plans if plan.polygon.open]
+    found.caps.update(
+        chord_of(plan.points[0], plan.points[-1]) for plan, kind in wanted if not kind
+    )
+    wanted = [(plan, kind) for plan, kind in wanted if kind]
     pairs = [(plan, (plan.points[0], plan.points[-1]), kind) for plan, kind in wanted]
     extra = _pinned(pairing, pairs)
     crossing = [k for k, (_, kind) in enumerate(wanted) if kind == CROSSING]
@@ -141,6 +132,18 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
             continue
         found.caps.update({chord_of(plan.points[0], point), chord_of(plan.points[-1], point)})
         plan.append(point, int(pairing.points.kind[point]))
+
+
+def _through(plan: Plan) -> int:
+    """Kind of the point through which an open polygon is closed; 0 for none.
+
+    Where the ends of a fold and of a crossing are both missing, no point is found.
+    """
+    if len(plan.those(TURN)) % 2:
+        return CORNER
+    if len(plan.those(MEETING)) % 2:
+        return CROSSING
+    return CAP if _same_side(plan, (plan.points[0], plan.points[-1])) else 0
 
 
 def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan]:
@@ -242,8 +245,8 @@ def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int
         if not own:
             continue
         pairs = [wanted[k][1] for k in own]
-        planes = planes(pairing, [wanted[k][0].polygon.triangle for k in own])
-        pinned = pin(pairing.setting, pairing.points, pairs, kind, planes)
+        span = planes(pairing, [wanted[k][0].polygon.triangle for k in own])
+        pinned = pin(pairing.setting, pairing.points, pairs, kind, span)
         good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
         lows = pairing.points.index[np.array(pairs)].min(axis=1)
         if kind in {FOLD, CORNER}:

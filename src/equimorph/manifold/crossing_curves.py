@@ -46,9 +46,7 @@ def flood_crossings(pairing: Pairing, progress: Progress) -> None:
 def lonely(pairing: Pairing) -> Int[np.ndarray, " n"]:
     """Crossings of edges in use through which other than two curves lead."""
     curves, used = pairing.curves, pairing.mesh.edges_in_use
-    through = {
-        point: 0 for edge, own in pairing.crossings.items() if used[edge] for point in own
-    }
+    through = {point: 0 for edge, own in pairing.crossings.items() if used[edge] for point in own}
     for curve, inner in curves.inner.items():
         for point in inner:
             if point in through and pairing.alive(curve):
@@ -83,9 +81,7 @@ def _switch(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
         options = TraceOptions(
             through_folds=True, through_branch_points=True, first_step=0.005, record=False
         )
-        outcome = follow(
-            ParameterLine(setting.structure, p, way), z, setting.constraints, options
-        )
+        outcome = follow(ParameterLine(setting.structure, p, way), z, setting.constraints, options)
         there = outcome.code == ARRIVAL
         seeds = polished(setting, mesh, goal[there], outcome.z[there])
         store.over_vertices(*seeds)
@@ -136,7 +132,9 @@ def _tangents(
     span = line.velocity[:, setting.free] / setting.scales
     length = np.linalg.norm(span, axis=1)
     place = embed(setting, z, p)
-    aim = Aim(setting, False, False, (span / length[:, None])[:, None], place, place[:, None][:, :0])
+    aim = Aim(
+        setting, False, False, (span / length[:, None])[:, None], place, place[:, None][:, :0]
+    )
     known = reduction(aim, z, p, null_border(structure, z, p))
     values, vectors = np.linalg.eigh(known.hessian)
     low, high = np.sqrt(np.maximum(-values[:, :1], 0.0)), np.sqrt(np.maximum(values[:, 1:], 0.0))

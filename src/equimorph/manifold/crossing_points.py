@@ -78,8 +78,8 @@ def reduction(aim: Aim, z: Lanes, p: Parameters, b: Lanes) -> Reduction:
             hessian[:, i, j] = hessian[:, j, i] = np.einsum("li,li->l", v, twice)
         twice = structure.second_derivative(z, p, one, (remainder, still))
         gradient[:, i] += np.einsum("li,li->l", v, twice)
-    along = (np.stack([each[i] for each in tangents], axis=1) for i in range(2))
-    return Reduction(*along, remainder, gradient, hessian)
+    along_z, along_p = (np.stack([each[i] for each in tangents], axis=1) for i in range(2))
+    return Reduction(along_z, along_p, remainder, gradient, hessian)
 
 
 def pin_crossings(

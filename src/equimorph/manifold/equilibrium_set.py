@@ -40,8 +40,8 @@ class Boundary:
 
     Of parts of sets also on a "fold"; "mixed" if on several of these.
 
-    vertices: one point (d = 1), a loop with the first vertex repeated (d = 2), or triangles, one a
-    row (d = 3).
+    vertices: one point (d = 1), a loop with the first vertex repeated (d = 2; an arc between ends
+    of crossings, where there are such), or triangles, one a row (d = 3).
     """
 
     vertices: Int[np.ndarray, "..."]

@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.errors import InputError
 from equimorph.manifold.accounting import Complex
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
@@ -159,6 +160,7 @@ class Fabric:
             self.cell_index,
             number[self.facets[(self.marks & ON_FOLD) > 0]],
             number[self.facets[(self.marks & ON_CAP) > 0]],
+            np.zeros((0, self.dimension), int),
         )
 
 
@@ -201,7 +203,19 @@ def vertices_of(
 
 
 def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
-    """Return a set as a fabric."""
+    """Return a set as a fabric.
+
+    Raises
+    ------
+    InputError
+        If sheets of the set cross: where they do, they have no common tangent space.
+    """
+    if eset.crossings:
+        raise InputError(
+            "`eset` must be a set whose sheets do not cross; got one that crosses itself along "
+            f"{len(eset.crossings)} curves. Break its symmetry, for example by a small offset of a "
+            "fixed parameter."
+        )
     z, p = eset.points.z, eset.points.p
     whole = adjacency(eset.cells)
     rows = best_corners(setting, z, p, eset.cells, orientation(eset.cells, whole)[0])

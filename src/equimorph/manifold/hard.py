@@ -3,6 +3,8 @@
 Through folds and points where two curves cross, to the other end or to constraints.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -12,11 +14,13 @@ from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETU
 from equimorph.manifold.crossing_points import corrected_crossings
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import ABANDONED, Pairing, Rays
-from equimorph.manifold.pins import Aim, Pinned, lower_index
+from equimorph.manifold.pins import Aim, Pinned, corrected, lower_index
 from equimorph.manifold.points import BETWEEN, CAP, CROSSING
 from equimorph.manifold.points import FOLD as ON_FOLD
 
 EFFORTS = 4
+NOISE = 1e-6
+"""Distance in the metric below which two crossings are one, and by which folds may be misplaced."""
 
 Inner = tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"], int, int]
 """Unknowns, parameters, index and kind of a point inside an edge."""
@@ -113,16 +117,22 @@ def _inner(
     z, index = passed.z[at].copy(), passed.index[at].min(axis=1)
     p = line.start[passed.lanes[at]] + passed.t[at][:, None] * line.velocity[passed.lanes[at]]
     kind = np.where(passed.code[at] == FOLD, ON_FOLD, CROSSING)
+    keep = np.ones(len(at), bool)
     own = np.flatnonzero(kind == CROSSING)
     if len(own):
-        pinned = _crossings(pairing, rays.take(passed.lanes[at[own]]), z[own], p[own])
+        pinned = _pinned(pairing, rays.take(passed.lanes[at[own]]), (z[own], p[own]), CROSSING)
         z[own], p[own] = pinned.z, pinned.p
         index[own] = lower_index(pairing.setting, pinned.z, pinned.p)
         good[passed.lanes[at[own[~pinned.found]]]] = False
+        crossed = passed.lanes[at[own]]
+        keep[own] = _first_ones(pairing, crossed, pinned)
+        doubtful = np.flatnonzero((kind == ON_FOLD) & np.isin(passed.lanes[at], crossed))
+        there = (z[doubtful], p[doubtful])
+        keep[doubtful] = _pinned(pairing, rays.take(passed.lanes[at[doubtful]]), there, FOLD).found
     rows: dict[int, list[Inner]] = {}
     places: dict[int, float] = {}
-    for k, i in enumerate(at):
-        lane, travelled = int(passed.lanes[i]), float(passed.travelled[i])
+    for k in np.flatnonzero(keep):
+        lane, travelled = int(passed.lanes[at[k]]), float(passed.travelled[at[k]])
         own_rows = rows.setdefault(lane, [])
         if lane in places:
             own_rows.append(_between(outcome, line, lane, (places[lane], travelled)))
@@ -131,17 +141,38 @@ def _inner(
     return rows
 
 
-def _crossings(
-    pairing: Pairing, rays: Rays, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+def _first_ones(
+    pairing: Pairing, lanes: Int[np.ndarray, " n"], pinned: Pinned
+) -> Bool[np.ndarray, " n"]:
+    """Which crossings are not those that their lanes met just before."""
+    place = embed(pairing.setting, pinned.z, pinned.p)
+    gap = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    again = (np.diff(lanes) == 0) & (gap < NOISE)
+    return np.concatenate([[True], ~again])
+
+
+def _pinned(
+    pairing: Pairing,
+    rays: Rays,
+    states: tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]],
+    kind: int,
 ) -> Pinned:
-    """Crossing points on edges, polished."""
+    """Crossings or folds on edges, polished, and which of them are where they were thought to be.
+
+    A side branch of a pitchfork turns back there, and an eigenvalue touches zero: its sign is
+    round-off for a while, which looks like folds.
+    """
     setting, mesh = pairing.setting, pairing.mesh
     ends = mesh.vertices[mesh.edges[rays.edges]] / setting.scales
     span = ends[:, 1] - ends[:, 0]
     span /= np.linalg.norm(span, axis=1, keepdims=True)
-    place = embed(setting, z, p)
-    aim = Aim(setting, False, False, span[:, None], place, place[:, None][:, :0])
-    return corrected_crossings(aim, z, p, np.zeros(len(z)))
+    place, fold = embed(setting, *states), kind == FOLD
+    aim = Aim(setting, fold, False, span[:, None], place, place[:, None][:, :0])
+    pinned = (corrected if fold else corrected_crossings)(aim, *states, np.zeros(len(place)))
+    if fold:
+        moved = np.linalg.norm(embed(setting, pinned.z, pinned.p) - place, axis=1)
+        pinned = replace(pinned, found=pinned.found & (moved < NOISE))
+    return pinned
 
 
 def _between(outcome: Outcome, line: ParameterLine, lane: int, span: tuple[float, float]) -> Inner:
@@ -153,4 +184,6 @@ def _between(outcome: Outcome, line: ParameterLine, lane: int, span: tuple[float
     off = np.abs(points.travelled[own] - 0.5 * (span[0] + span[1]))
     at = own.start + int(np.argmin(np.where(inside, off, np.inf)))
     p = line.start[lane] + points.t[at] * line.velocity[lane]
-    return points.z[at], p, int(points.index[at]), BETWEEN
+    # counted anew: near crossings the tracer may have met round-off
+    index = int(line.structure.index(points.z[at : at + 1], p[None])[0])
+    return points.z[at], p, index, BETWEEN

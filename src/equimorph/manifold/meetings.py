@@ -4,18 +4,19 @@ Each crossing point lies on two polygons. Where a fold of one of the sheets cros
 all meet in a hub: an exact crossing point at which a test function of the fold vanishes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from itertools import product
 
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import brentq
 
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.manifold.crossing_points import corrected_crossings, pin_crossings
 from equimorph.manifold.cutting import MEETING, TURN, Chord
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Pairing
-from equimorph.manifold.pins import Aim, lower_index
+from equimorph.manifold.pins import Aim, Pinned, lower_index
 from equimorph.manifold.plans import Plan, chord_of, planes
 from equimorph.manifold.points import CROSSING
 
@@ -25,7 +26,10 @@ COMBINATIONS = 256
 """Ways to cut all polygons over a triangle beyond which it is undecided at once."""
 SHEETS = 2
 """To each of which a crossing belongs."""
-HALVINGS = 45
+HUB = 1e-13
+"""Precision of the place of a hub, relative to its chord."""
+NEAR, FAR = 1e-6, 1e-3
+"""The same where a second eigenvalue vanishes: what is wanted, and what is good enough."""
 SKEW = 1e-4
 """Quadratic over cubic coefficient, a length in the metric, below which it counts as zero."""
 
@@ -102,9 +106,7 @@ def split_crossings(
     pairing: Pairing, plans: list[Plan], wanted: set[tuple[int, Chord]]
 ) -> list[int]:
     """Put exact points on chords of crossings, for both sheets; return triangles without one."""
-    known = {
-        (plan.polygon.triangle, chord) for plan in plans for chord in plan.middle
-    }
+    known = {(plan.polygon.triangle, chord) for plan in plans for chord in plan.middle}
     todo = sorted(wanted - known)
     points = _pinned(pairing, todo, cap=False)
     at = dict(zip(todo, points, strict=True))
@@ -131,7 +133,7 @@ def pin_ends(pairing: Pairing, plans: list[Plan]) -> list[int | None]:
 
 
 def _pinned(
-    pairing: Pairing, wanted: list[tuple[int, tuple[int, ...]]], *, cap: bool
+    pairing: Pairing, wanted: Sequence[tuple[int, tuple[int, ...]]], *, cap: bool
 ) -> list[int | None]:
     """Numbers of new crossing points amid points over triangles; None where none was found."""
     if not wanted:
@@ -150,57 +152,70 @@ def _pinned(
 def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     """Crossing between two others at which a fold of a sheet crosses, too.
 
-    Found by bisection: the number of other negative eigenvalues changes, or the quadratic
-    coefficient of the reduced equation changes its sign, or at pitchforks the cubic one.
+    There the quadratic coefficient of the reduced equation changes its sign; at pitchforks, where
+    it is zero all along, the cubic one does, or its inverse if another eigenvalue vanishes.
     """
+    if chord in pairing.hubs:
+        return pairing.hubs[chord]
     setting, store, ends = pairing.setting, pairing.points, list(chord)
-    place = embed(setting, store.z[ends], store.p[ends])
+    z, p = store.z[ends], store.p[ends]
+    place = embed(setting, z, p)
     way = place[1] - place[0]
     length = float(np.linalg.norm(way))
     span, rows = planes(pairing, [triangle]), (way / length)[None, None]
-    sense = null_border(setting.structure, store.z[ends[:1]], store.p[ends[:1]])[0]
-    first, last = _tests(pairing, store.z[ends], store.p[ends], sense)
-    symmetric = np.abs((first[1], last[1])) < SKEW * np.abs((first[2], last[2]))
-    # at pitchforks the quadratic coefficient is zero all along
-    changing = np.flatnonzero((first * last < 0.0) & [True, not symmetric.all(), True])
-    if len(changing) == 0:
-        return None
-    which = changing[0]
-    sides = [(store.z[end], store.p[end]) for end in ends]
-    low, high = 0.0, 1.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        aim = Aim(setting, False, False, span, (place[0] + middle * way)[None], rows)
-        share = (middle - low) / (high - low)
-        z, p = (((1 - share) * a + share * b)[None] for a, b in zip(*sides, strict=True))
-        pinned = corrected_crossings(aim, z, p, np.array([length]))
+    sense = null_border(setting.structure, z[:1], p[:1])[0]
+    quadratic, cubic = _coefficients(pairing, z, p, sense)
+    other = int(np.ptp(lower_index(setting, z, p)))
+    skew = (np.abs(quadratic) > SKEW * np.abs(cubic)).any()
+    found: list[Pinned] = []
+
+    def test(share: float) -> float:
+        aim = Aim(setting, False, False, span, (place[0] + share * way)[None], rows)
+        guess_z, guess_p = ((1.0 - share) * each[:1] + share * each[1:] for each in (z, p))
+        pinned = corrected_crossings(aim, guess_z, guess_p, np.array([length]))
         if not pinned.found[0]:
-            break
-        beyond = _tests(pairing, pinned.z, pinned.p, sense)[0, which] * first[which] < 0.0
-        sides[int(beyond)] = (pinned.z[0], pinned.p[0])
-        low, high = (low, middle) if beyond else (middle, high)
-    if high - low > 1e-6:
+            raise _NoCrossingError
+        found.append(pinned)
+        values = _coefficients(pairing, pinned.z, pinned.p, sense)
+        return float(1.0 / values[1][0] if other else values[1 - skew][0])
+
+    try:
+        _halve(test) if other else test(brentq(test, 0.0, 1.0, xtol=HUB))
+    except (_NoCrossingError, ValueError):
         return None
     index = int(store.index[ends].min())
-    return store.add(*sides[0], index, CROSSING)
+    pairing.hubs[chord] = store.add(found[-1].z[0], found[-1].p[0], index, CROSSING)
+    return pairing.hubs[chord]
 
 
-def _tests(
+def _halve(test: Callable[[float], float]) -> None:
+    """Go near a change of sign, at which the test itself may fail: another eigenvalue vanishes."""
+    low, high = 0.0, 1.0
+    sign = np.sign(test(low))
+    while high - low > NEAR:
+        middle = 0.5 * (low + high)
+        try:
+            same = test(middle) * sign > 0.0
+        except _NoCrossingError:
+            if high - low > FAR:
+                raise
+            return
+        low, high = (middle, high) if same else (low, middle)
+
+
+class _NoCrossingError(Exception):
+    """Raised where the search for a hub leaves the crossing."""
+
+
+def _coefficients(
     pairing: Pairing,
     z: Float[np.ndarray, "n size"],
     p: Float[np.ndarray, "n P"],
     sense: Float[np.ndarray, " size"],
-) -> Float[np.ndarray, "n tests"]:
-    """What changes its sign at hubs.
-
-    The parity of other negative eigenvalues; the quadratic coefficient, with a null vector that
-    does not point against `sense`; the cubic one.
-    """
-    setting = pairing.setting
-    structure, n = setting.structure, setting.structure.unknowns
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Quadratic and cubic coefficient with null vectors that do not point against `sense`."""
+    structure, n = pairing.setting.structure, pairing.setting.structure.unknowns
     b = null_border(structure, z, p)
     norm = np.sqrt(b[:, :n] ** 2 @ structure.mass)
     at = Critical(structure, z, p, np.ascontiguousarray(b * norm[:, None]))
-    parity = 1.0 - 2.0 * (lower_index(setting, z, p) % 2)
-    skew = at.quadratic * np.sign(at.v @ sense)
-    return np.stack([parity, skew, at.cubic], axis=1)
+    return at.quadratic * np.sign(at.v @ sense), at.cubic

@@ -105,6 +105,8 @@ class Pairing:
     conflicts: int = 0
     crossings: dict[int, list[int]] = field(default_factory=dict)
     """Points of each edge at which two curves cross."""
+    hubs: dict[tuple[int, int], int] = field(default_factory=dict)
+    """Points between two of these at which a fold of one of the sheets crosses, too."""
 
     def ray(self, point: int, edge: int) -> int:
         """Curve at a point along an edge."""

@@ -51,7 +51,10 @@ class Paint:
 
 
 def corner_normals(
-    corners: Corners, cells: Int[np.ndarray, "cells 3"], index: Int[np.ndarray, " cells"]
+    corners: Corners,
+    cells: Int[np.ndarray, "cells 3"],
+    index: Int[np.ndarray, " cells"],
+    sharp: Int[np.ndarray, " some"] | None = None,
 ) -> Corners:
     """Unit normals at the corners of the cells, averaged over all cells around a vertex.
 
@@ -67,6 +70,8 @@ def corner_normals(
         Vertex numbers of the corners.
     index
         Index of the cells.
+    sharp
+        Vertices at which every cell keeps its own normal, because several sheets meet there.
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     upward = np.where(index % 2 == 0, 1.0, -1.0)
@@ -77,7 +82,10 @@ def corner_normals(
         one, two = (_unit(corners[:, (k + j) % 3] - corners[:, k]) for j in (1, 2))
         angle = np.arccos(np.clip((one * two).sum(axis=1), -1.0, 1.0))
         np.add.at(total, cells[:, k], angle[:, None] * normals)
-    return np.asarray(_unit(total)[cells])
+    smooth = _unit(total)[cells]
+    if sharp is None or len(sharp) == 0:
+        return np.asarray(smooth)
+    return np.where(np.isin(cells, sharp)[:, :, None], normals[:, None], smooth)
 
 
 def lit(

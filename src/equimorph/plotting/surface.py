@@ -37,6 +37,11 @@ _ROUTE_SLACK = 0.015
 _BOX: dict[str, Any] = {"color": style.INK, "linewidth": 0.5}
 _CAP: dict[str, Any] = {"color": "#4d4d4d", "linewidth": 0.9}
 _FOLD: dict[str, Any] = {"color": style.INK, "linewidth": 1.5, "capstyle": "round"}
+_CROSSING: dict[str, Any] = {
+    "color": style.INK,
+    "linewidth": 1.5,
+    "linestyle": (0, (4, 1.2, 1, 1.2)),
+}
 _HIDDEN_FOLD: dict[str, Any] = {
     "color": style.INK,
     "linewidth": 0.6,
@@ -140,7 +145,12 @@ def _curves(eset: EquilibriumSet, points: Points) -> tuple[list[Curve], list[Pat
     """Folds and boundaries of the set, and the entries of a legend for them and for the cells."""
     folds = [line for line, _ in fold_pieces(eset)]
     caps, box = ([line for line, _ in boundary_pieces(eset, box=side)] for side in (False, True))
-    looks = [(box, _BOX, None), (caps, _CAP, None), (folds, _FOLD, _HIDDEN_FOLD)]
+    looks = [
+        (box, _BOX, None),
+        (caps, _CAP, None),
+        (folds, _FOLD, _HIDDEN_FOLD),
+        (eset.crossings, _CROSSING, None),
+    ]
     curves = [Curve(points[line], seen, hidden) for lines, seen, hidden in looks for line in lines]
     return curves, _legend(eset, bool(folds), bool(caps))
 
@@ -152,7 +162,12 @@ def _paint(ax: Axes3D, eset: EquilibriumSet, points: Points) -> Paint:
     palette = np.array([style.rgba(style.index_colour(k))[:3] for k in range(1 + eset.index.max())])
     steps = [np.diff(style.few_ticks().tick_values(*ends))[0] for ends in limits[:2]]
     return Paint(
-        corner_normals(points[eset.cells] * proportions, eset.cells, eset.cell_index),
+        corner_normals(
+            points[eset.cells] * proportions,
+            eset.cells,
+            eset.cell_index,
+            np.unique(np.concatenate([np.zeros(0, int), *eset.crossings])),
+        ),
         proportions,
         palette[eset.cell_index],
         tuple(float(step) / _LINES_PER_TICK for step in steps),
@@ -169,6 +184,9 @@ def _legend(eset: EquilibriumSet, folds: bool, caps: bool) -> list[Patch | Line2
     ]
     if folds:
         entries.append(Line2D([], [], label="fold", color=style.INK, linewidth=1.5))
+    if eset.crossings:
+        look = {name: _CROSSING[name] for name in ("color", "linewidth", "linestyle")}
+        entries.append(Line2D([], [], **look, label="branch points"))
     if caps:
         label = constraint_label(eset.constraints)
         entries.append(Line2D([], [], **_CAP, label=label))

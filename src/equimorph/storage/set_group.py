@@ -58,6 +58,7 @@ def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
     for name in GRID:
         put(group, f"grid_{name}", getattr(eset.mesh, name), [f"grid_{name}_entry", f"of_{name}"])
     _put_chains(group, "fold", eset.folds)
+    _put_chains(group, "crossing", eset.crossings)
     _put_chains(group, "boundary", [each.vertices for each in eset.boundaries])
     put_json(group, ABOUT, _about(eset))
 
@@ -101,6 +102,8 @@ def read(group: h5py.Group, structure: Structure) -> EquilibriumSet:
             **{name: get(group, f"grid_{name}") for name in GRID if f"grid_{name}" in group}
         ),
         grid_vertex=get(group, "grid_vertex"),
+        # older files have none
+        crossings=tuple(_chains(group, "crossing", d)) if "crossing_end" in group else (),
     )
     _check_parts(eset)
     _check_states(eset)
@@ -112,7 +115,7 @@ def _check_parts(eset: EquilibriumSet) -> None:
     points, count, cells = eset.points, len(eset.points), len(eset.cells)
     shapes = (points.z.shape, points.p.shape)
     sizes = eset.structure.size, len(eset.structure.parameters)
-    pieces = [*eset.folds, *(each.vertices for each in eset.boundaries)]
+    pieces = [*eset.folds, *eset.crossings, *(each.vertices for each in eset.boundaries)]
     fits = (
         shapes == ((count, sizes[0]), (count, sizes[1])),
         all(len(each) == count for each in (eset.kinds, eset.index, eset.grid_vertex)),

@@ -1,0 +1,282 @@
+"""Sets whose smooth sheets cross, as in symmetric slices: closed forms, and the arch at Δ = 0."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from equimorph import lift, plotting, storage
+from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.manifold.topology import adjacency
+from equimorph.model import Box, Descriptor
+from equimorph.structures import Rod
+from oracles.complexes import assert_crossings, assert_faithful
+from oracles.polynomial import slaved
+from oracles.surfaces import (
+    crossing_sheets,
+    hilltop,
+    pitchforks,
+    three_planes,
+    transcriticals,
+    tricritical,
+)
+from typecheck import unchecked
+
+few = settings(
+    max_examples=4,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize=True,
+    phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes
+)
+intervals = st.tuples(st.integers(3, 7), st.integers(3, 7))
+cubics = st.sampled_from([-2.0, -0.7, 0.6, 1.0, 1.9])
+slants = st.sampled_from([-0.4, 0.0, 0.3])
+BOX = Box(a=(-1.0, 1.1), b=(-1.0, 1.2))
+
+
+def lifted(structure, box, checks=0, **options) -> EquilibriumSet:
+    """Set without checks of shapes, which the tests that lift by `equilibrium_set` make."""
+    with unchecked():
+        return equilibrium_set(structure, box, checks=checks, **options)
+
+
+def crossed(eset: EquilibriumSet) -> np.ndarray:
+    """Unknowns and parameters where sheets cross."""
+    at = eset.kinds == 7
+    return np.column_stack([eset.points.z[at], eset.coordinates[at]])
+
+
+@few
+@given(cubics, st.integers(2, 12))
+def test_pitchfork_diagram_has_all_four_branches_in_one_point(cubic, count):
+    """x (cubic·x² − a) = 0 over a."""
+    eset = lifted(pitchforks(cubic, 0.0), Box(a=(-1, 1.3)), fixed={"b": 0.0}, intervals=(count,))
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert crossed(eset) == pytest.approx(np.zeros((1, 2)), abs=1e-12)
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
+    assert len(eset.boundaries) == 4
+    assert sorted(piece.index for piece in eset.strata) == (
+        [0, 0, 0, 1] if cubic > 0 else [0, 1, 1, 1]
+    )
+    beyond = 1.0 if cubic > 0 else -0.9
+    states = eset.at(a=beyond)
+    root = np.sqrt(beyond / cubic)
+    assert np.sort(states.z[:, 0]) == pytest.approx([-root, 0.0, root], abs=1e-12)
+
+
+@few
+@given(cubics, slants, st.integers(2, 12))
+def test_transcritical_diagram_exchanges_stability(skew, b, count):
+    """x (skew·x − a − b/2) = 0: both branches change their index where they cross."""
+    eset = lifted(transcriticals(skew, 0.5), Box(a=(-1, 1.3)), fixed={"b": b}, intervals=(count,))
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert crossed(eset) == pytest.approx(np.array([[0.0, -b / 2]]), abs=1e-12)
+    assert sorted(piece.index for piece in eset.strata) == [0, 0, 1, 1]
+
+
+def test_slaved_unknowns_and_checks_of_shapes_change_nothing():
+    eset = equilibrium_set(
+        slaved(pitchforks(1.0, 0.3), 2.0, 0.5), BOX, fixed={}, intervals=(3, 4), checks=2
+    )
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert eset.audit.missing == 0
+
+
+@few
+@given(cubics, slants, intervals)
+def test_pitchfork_curve_joins_both_halves_of_a_cylinder_to_a_plane(cubic, slant, grid):
+    """x (cubic·x² − a − slant·b) = 0; the crossing a + slant·b = 0 runs through the box."""
+    eset = lifted(pitchforks(cubic, slant), BOX, intervals=grid)
+    assert_faithful(eset)
+    assert_crossings(eset)
+    x, a, b = crossed(eset).T
+    np.testing.assert_allclose(x, 0.0, atol=1e-9)
+    np.testing.assert_allclose(a + slant * b, 0.0, atol=1e-12)
+    assert (len(eset.crossings), eset.folds) == (1, ())
+    assert sorted(b[[b.argmin(), b.argmax()]]) == pytest.approx([-1.0, 1.2])
+    assert sorted(piece.index for piece in eset.strata) == (
+        [0, 0, 0, 1] if cubic > 0 else [0, 1, 1, 1]
+    )
+    # two discs that share an arc
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
+
+
+@few
+@given(cubics, slants, intervals)
+def test_transcritical_planes_cross_along_a_line(skew, slant, grid):
+    eset = lifted(transcriticals(skew, slant), BOX, intervals=grid)
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert (len(eset.crossings), eset.folds, len(eset.strata)) == (1, (), 4)
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
+
+
+@few
+@given(cubics, intervals)
+def test_folds_leave_the_pitchforks_where_these_turn_subcritical(cubic, grid):
+    """x (x⁴ + cubic·b x² − a): one fold curve a = −(cubic·b)²/4 through the origin."""
+    eset = lifted(tricritical(cubic), BOX, intervals=grid)
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert (len(eset.crossings), len(eset.folds)) == (1, 1)
+    x, b = eset.points.z[:, 0], eset.points["b"]
+    folded = eset.folds[0]
+    np.testing.assert_allclose(x[folded] ** 2, -cubic * b[folded] / 2, atol=1e-8)
+    hub = np.intersect1d(eset.folds[0], eset.crossings[0])
+    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-9)
+    assert sorted(piece.index for piece in eset.strata) == [0, 0, 0, 1, 1, 1]
+
+
+@few
+@given(st.sampled_from([0.4, 1.0, 2.5]), intervals)
+def test_fold_of_the_symmetric_sheet_passes_its_pitchforks(k, grid):
+    """s² + k x² = a, x (s − b) = 0: hilltop at the origin, where two eigenvalues vanish."""
+    eset = lifted(hilltop(k), BOX, intervals=grid)
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert (len(eset.crossings), len(eset.folds)) == (1, 1)
+    s, x, a, b = crossed(eset).T
+    np.testing.assert_allclose(np.stack([s - b, x, a - b**2]), 0.0, atol=1e-7)
+    hub = np.intersect1d(eset.folds[0], eset.crossings[0])
+    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
+
+
+@few
+@given(intervals)
+def test_sheet_can_fold_where_it_crosses_another(grid):
+    """x (x² + b x + a): the second sheet, a = −x² − b x, folds at x = −b/2."""
+    # off the round numbers, which put a grid line through the origin, where three kinds meet
+    eset = lifted(crossing_sheets(), Box(a=(-1, 1.1), b=(-1.03, 1.5)), intervals=grid)
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert (len(eset.crossings), len(eset.folds)) == (1, 1)
+    hub = np.intersect1d(eset.folds[0], eset.crossings[0])
+    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-9)
+
+
+def test_constraint_cuts_both_sheets_where_they_cross():
+    """b ≤ 0.3 + x + a/2 cuts the plane and the cylinder, and their crossing at b = 0.3."""
+    slanted = Descriptor("cut", "1", lambda z, p: p[:, 1] - z[:, 0] - 0.5 * p[:, 0])
+    eset = lifted(pitchforks(1.0, 0.0), BOX, within=[slanted <= 0.3], intervals=(4, 5))
+    assert_faithful(eset)
+    assert_crossings(eset)
+    ends = eset.crossings[0][[0, -1]]
+    assert sorted(eset.points["b"][ends]) == pytest.approx([-1.0, 0.3])
+
+
+def test_three_sheets_that_meet_in_one_point_are_not_called_clean():
+    """x (x − a) (x − b): three crossings meet at the origin, which this complex cannot hold."""
+    eset = lifted(three_planes(), BOX, intervals=(2, 3))
+    assert not eset.audit.clean
+    assert eset.audit.undecided > 0
+
+
+@pytest.fixture(scope="module")
+def symmetric_slice():
+    """The arch over (Θ, q) at Δ = 0."""
+    arch = Rod()
+    return lifted(
+        arch,
+        Box(Theta=(0.5, 1.5), q=(0.0, 6.0)),
+        fixed={"Delta": 0.0},
+        within=[arch.max_curvature <= 20],
+        intervals=(8, 12),
+        checks=2,
+    )
+
+
+def first_pitchforks(eset: EquilibriumSet) -> np.ndarray:
+    """Crossings that end the stability of the upright symmetric arch, in order of Θ."""
+    cells = eset.cells[eset.cell_index == 0]
+    stable = np.intersect1d(cells, np.flatnonzero((eset.kinds == 7) & (eset.index == 0)))
+    stable = stable[eset.structure.height(0.5)(eset.points)[stable] > 0]
+    return stable[np.argsort(eset.points["Theta"][stable])]
+
+
+def test_symmetric_slice_of_the_arch_is_clean(symmetric_slice):
+    eset = symmetric_slice
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert eset.audit.checked > 0
+    # inverted arch without load, ends turned by ±α: pitchfork at α = 0.80846 (PHYSICS §5)
+    unloaded = (eset.kinds == 7) & (eset.points["q"] < 1e-9) & (eset.index == 0)
+    assert eset.points["Theta"][unloaded] == pytest.approx([0.80846], abs=5e-6)
+
+
+def test_pitchforks_of_the_slice_are_those_that_lifts_along_the_load_meet(symmetric_slice):
+    """At each Θ of a vertex the load is raised from the natural state to the branch point."""
+    eset = symmetric_slice
+    chosen = first_pitchforks(eset)[::3]
+    assert len(chosen) >= 4
+    for vertex in chosen:
+        state = eset.points[vertex]
+        path = lift(eset.structure.natural_state(Theta=state["Theta"]), to={"q": 8.0})
+        assert path.end.kind == "branch point"
+        assert path.end.state["q"] == pytest.approx(state["q"], abs=1e-8)
+
+
+def test_pitchfork_curve_passes_through_the_known_load():
+    """(0.9, 0): q = 4.2439977594 (PHYSICS §5), in the diagram over q, and its four branches."""
+    arch = Rod()
+    eset = lifted(
+        arch,
+        Box(q=(0, 6)),
+        fixed={"Theta": 0.9, "Delta": 0.0},
+        within=[arch.max_curvature <= 20],
+        intervals=(30,),
+        checks=1,
+    )
+    assert_faithful(eset)
+    assert_crossings(eset)
+    loads = eset.points["q"][eset.kinds == 7]
+    assert np.abs(loads - 4.2439977594).min() < 1e-9
+    # all that is connected through the crossing: both symmetric halves and both side branches
+    at = int(np.argmin(np.where(eset.kinds == 7, np.abs(eset.points["q"] - 4.2439977594), np.inf)))
+    around = np.flatnonzero((eset.cells == at).any(axis=1))
+    assert sorted(eset.cell_index[around]) == [0, 1, 1, 1]
+    assert len(np.unique(eset.stratum[around])) == 4
+    assert len(np.unique(eset.component[around])) == 1
+    # the fold of the symmetric path (PHYSICS §5) lies beyond the box; that of no other is lost
+    assert eset.audit.missing == 0
+
+
+def test_both_asymmetric_sheets_are_attached_along_the_pitchfork(symmetric_slice):
+    """Of the four cells two are their own mirror image; the others are each other's."""
+    eset = symmetric_slice
+    (mirror,) = eset.structure.symmetries()
+    whole = adjacency(eset.cells)
+    n, mass = eset.structure.unknowns, eset.structure.mass
+    image, _ = mirror.apply(eset.points.z, eset.points.p)
+    off = np.sqrt((image - eset.points.z)[:, :n] ** 2 @ mass)
+    crossed = np.isin(eset.kinds, (7,))
+    for facet in np.flatnonzero(whole.counts == 4):
+        around = np.flatnonzero((whole.cell_facets == facet).any(axis=1))
+        free = [[v for v in eset.cells[cell] if not crossed[v]] for cell in around]
+        symmetric = [bool(off[own].max() < 1e-6) for own in free]
+        assert symmetric.count(True) == 2
+        assert (off[eset.cells[around[np.array(symmetric)]]] < 1e-6).all()
+    # above (0.9, 4.2) two mirror images of equal energy lie just beside the symmetric arch
+    over = eset.at(Theta=0.9, q=4.2)
+    height = eset.structure.height(0.5)(over)
+    tilted = np.flatnonzero((over.index == 1) & (height > 0))
+    assert len(tilted) == 2
+    assert np.ptp(over.energy[tilted]) < 1e-12
+
+
+def test_set_with_crossings_comes_back_from_its_file(symmetric_slice, tmp_path):
+    path = tmp_path / "slice.h5"
+    storage.save_set(path, symmetric_slice)
+    again = storage.load_set(path)
+    assert all(map(np.array_equal, again.crossings, symmetric_slice.crossings))
+    assert again.audit == symmetric_slice.audit
+    assert np.array_equal(again.stratum, symmetric_slice.stratum)
+
+
+def test_figure_names_the_branch_points(symmetric_slice):
+    eset = symmetric_slice
+    ax = plotting.surface(eset, eset.structure.height(1 / 3))
+    assert "branch points" in [text.get_text() for text in ax.get_legend().get_texts()]
