@@ -15,7 +15,8 @@ from equimorph.model import Constraint, Descriptor
 
 _KEPT: WeakKeyDictionary[EquilibriumSet, dict[Any, Any]] = WeakKeyDictionary()
 
-ON_FOLD = (1, 4)
+CRITICAL = (1, 4, 7)
+"""Kinds of vertices at which stability ends: on folds, and where sheets cross."""
 SLACK = 1e-9
 """Relative excess over a bound that counts as none."""
 
@@ -66,7 +67,7 @@ def pieces_of_vertices(
 ) -> Int[np.ndarray, " V"]:
     """Numbers of the connected pieces of allowed vertices, along stable edges off the folds."""
     edges = stable_edges(eset)
-    inner = allowed & ~np.isin(eset.kinds, ON_FOLD)
+    inner = allowed & ~np.isin(eset.kinds, CRITICAL)
     edges = edges[allowed[edges].all(axis=1) & inner[edges].any(axis=1)]
     count = len(eset.points)
     graph = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))

@@ -13,7 +13,8 @@ from equimorph.tasks.planning.links import Demands, Flags, Values, links, shorte
 from equimorph.tasks.planning.objectives import Objective
 from equimorph.tasks.prepared import kept
 
-ON_FOLD = (1, 4)
+CRITICAL = (1, 4, 7)
+"""Kinds of vertices at which stability ends: on folds, and where sheets cross."""
 Ends = tuple[State, State]
 Pairs = Int[np.ndarray, "links 2"]
 
@@ -33,7 +34,7 @@ class Network:
         stable = np.zeros(len(eset.points), bool)
         cells = eset.cells[eset.cell_index == 0]
         stable[cells] = True
-        stable &= ~np.isin(eset.kinds, ON_FOLD)
+        stable &= ~np.isin(eset.kinds, CRITICAL)
         self.stable, self.cells = stable, cells
         pairs = faces_of(cells, 2)
         self.pairs = pairs[stable[pairs].all(axis=1)]
