@@ -100,6 +100,7 @@ _HOMES = {
     ),
     "equimorph.tasks": (
         "Calibration",
+        "Family",
         "Certificate",
         "CurvatureMap",
         "LimitLoadMap",

@@ -2,6 +2,7 @@
 
 from equimorph.tasks.calibration import (
     Calibration,
+    Family,
     MeasuredShape,
     MeasuredValues,
     calibrate,
@@ -30,6 +31,7 @@ __all__ = [
     "Calibration",
     "Certificate",
     "CurvatureMap",
+    "Family",
     "LimitLoadMap",
     "MapCurve",
     "MeasuredShape",

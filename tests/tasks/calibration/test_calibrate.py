@@ -74,7 +74,7 @@ def test_the_jacobian_is_that_of_the_equilibria(nominal):
     free = unknowns(nominal, WANTED)
     measured = MeasuredValues(nominal.structure.descriptor("angle"), np.zeros(9))
     ones = np.ones((9, 1))
-    branch = Branch(free, [measured], np.zeros((9, 1)), ones, nominal.z, nominal.p)
+    branch = Branch(free, [measured], np.zeros((9, 1)), ones, nominal.z, nominal.p, free.start)
     branch.residuals(free.start)
     found = branch.jacobian(free.start)
     delta, x_l = nominal.z[:, 0], nominal["x_l"]

@@ -2,5 +2,6 @@
 
 from equimorph.tasks.calibration.calibrate import Calibration, calibrate
 from equimorph.tasks.calibration.measured import MeasuredShape, MeasuredValues
+from equimorph.tasks.calibration.unknowns import Family
 
-__all__ = ["Calibration", "MeasuredShape", "MeasuredValues", "calibrate"]
+__all__ = ["Calibration", "Family", "MeasuredShape", "MeasuredValues", "calibrate"]

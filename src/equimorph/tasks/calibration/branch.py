@@ -1,6 +1,6 @@
 """Residuals of a calibration and their Jacobian, on the branches of the states it starts from."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +9,15 @@ from jaxtyping import Float
 from equimorph.equilibria import ParameterLine, TraceOptions, follow, newton
 from equimorph.equilibria.outcome import KINDS
 from equimorph.equilibria.tracing import ARRIVAL
-from equimorph.structures import States
-from equimorph.tasks.calibration.measured import Columns, Lanes, Measurement, derivative
+from equimorph.errors import InputError
+from equimorph.structures import States, Structure
+from equimorph.tasks.calibration.measured import (
+    Columns,
+    Lanes,
+    Measurement,
+    by_data,
+    derivative,
+)
 from equimorph.tasks.calibration.unknowns import Parameters, Unknowns, Vector
 
 Residuals = Float[np.ndarray, " numbers"]
@@ -19,6 +26,8 @@ Jacobian = Float[np.ndarray, "numbers k"]
 SHORT = 1e-6
 """Moves in the parameter space, in scales, over which Newton's method needs no steps."""
 
+TRANSFERS = (1, 8, 64)
+"""Steps in which states are carried over to a structure with other data, if fewer do not do."""
 STEPS = 200
 """Of one lift; a trial further away is not worth more, since the trust region shrinks."""
 FAILURES = 20
@@ -43,6 +52,7 @@ class Branch:
     sigma: Columns
     z: Lanes
     p: Parameters
+    x: Vector
     trial: tuple[Lanes, Parameters] | None = None
     accepted: tuple[Vector, Residuals, Jacobian] | None = None
     failure: tuple[str, str] = ("", "")
@@ -51,22 +61,21 @@ class Branch:
     @property
     def states(self) -> States:
         """States at the last accepted unknowns."""
-        return States(self.unknowns.structure, self.z, self.p)
+        return States(self.unknowns.made(self.x), self.z, self.p)
 
     def residuals(self, x: Vector) -> Residuals:
         """(predicted − measured)/σ where there is a measurement."""
         p = self.unknowns.parameters(x)
-        z = self._lifted(p)
+        z = self._reached(x, p)
         if z is None:
             self.failures += 1
             if self.failures > FAILURES:
                 raise BranchEnds
             return np.full(np.isfinite(self.measured).sum(), np.inf)
         self.trial = z, p
-        return self._missed(z, p)
+        return self._missed(self.unknowns.made(x), z, p)
 
-    def _missed(self, z: Lanes, p: Parameters) -> Residuals:
-        structure = self.unknowns.structure
+    def _missed(self, structure: Structure, z: Lanes, p: Parameters) -> Residuals:
         predicted = [each.predicted(structure, z, p) for each in self.measurements]
         return self._selected(np.concatenate(predicted, axis=1) - self.measured)
 
@@ -76,36 +85,83 @@ class Branch:
         Sensitivities of the states: dz = −F_z⁻¹ F_p dp.
         """
         assert self.trial is not None
-        self.z, self.p = self.trial
+        self.x, (self.z, self.p) = x.copy(), self.trial
         assert np.array_equal(self.p, self.unknowns.parameters(x))
-        structure, z, p = self.unknowns.structure, self.z, self.p
-        changes = self.unknowns.columns
-        columns = np.stack([structure.parameter_derivative(z, p, dp) for dp in changes], axis=1)
+        structure, z, p = self.unknowns.made(x), self.z, self.p
+        columns = np.stack([self._force(k) for k in range(len(x))], axis=1)
         moves = -structure.solve(z, p, columns).x
-        slopes = [
-            np.concatenate(
-                [
-                    derivative(each, structure, (z, p), np.ascontiguousarray(moves[:, k]), dp)
-                    for each in self.measurements
-                ],
-                axis=1,
-            )
-            for k, dp in enumerate(changes)
-        ]
+        slopes = [self._slope(k, np.ascontiguousarray(moves[:, k])) for k in range(len(x))]
         jacobian = np.stack([self._selected(slope) for slope in slopes], axis=1)
-        self.accepted = x.copy(), self._missed(z, p), jacobian
+        self.accepted = x.copy(), self._missed(structure, z, p), jacobian
         return jacobian
+
+    def _changed(self, k: int) -> Callable[[float], Structure]:
+        """Structures beside that of the accepted unknowns, by a change of unknown k."""
+        unit = np.zeros_like(self.x)
+        unit[k] = 1.0
+        return lambda amount: self.unknowns.made(self.x + amount * unit)
+
+    def _force(self, k: int) -> Lanes:
+        """Derivative of F by unknown k."""
+        z, p = self.z, self.p
+        if k not in self.unknowns.data.values():
+            here = self.unknowns.made(self.x)
+            return here.parameter_derivative(z, p, self.unknowns.columns[k])
+        still = np.zeros_like(z)
+        size = abs(self.x[k])
+        return by_data(lambda made, at: made.residual(at, p), self._changed(k), size, (z, still))
+
+    def _slope(self, k: int, moves: Lanes) -> Columns:
+        """Derivative of what is predicted by unknown k, with the moves of the states."""
+        z, p = self.z, self.p
+
+        def predicted(made: Structure, at: Lanes) -> Columns:
+            return np.concatenate([each.predicted(made, at, p) for each in self.measurements], 1)
+
+        if k in self.unknowns.data.values():
+            return by_data(predicted, self._changed(k), abs(self.x[k]), (z, moves))
+        here, dp = self.unknowns.made(self.x), self.unknowns.columns[k]
+        parts = [derivative(each, here, (z, p), moves, dp) for each in self.measurements]
+        return np.concatenate(parts, axis=1)
 
     def _selected(self, table: Columns) -> Residuals:
         return np.asarray((table / self.sigma)[np.isfinite(self.measured)])
 
-    def _lifted(self, p: Parameters) -> Lanes | None:
-        """States at parameters on the branches of the accepted ones; None if one is not reached."""
-        name = self.unknowns.outside(p)
+    def _reached(self, x: Vector, p: Parameters) -> Lanes | None:
+        """States of unknowns on the branches of the accepted ones; None if one is not reached."""
+        try:
+            structure = self.unknowns.made(x)
+        except InputError as error:
+            self.failure = ("limit", f"no structure has such data: {error}")
+            return None
+        name = self.unknowns.outside(p, structure)
         if name:
             self.failure = ("limit", f"{name} leaves the limits of its meaning")
             return None
-        structure, z = self.unknowns.structure, self.z.copy()
+        z = self._carried(x)
+        return None if z is None else self._lifted(structure, z, p)
+
+    def _carried(self, x: Vector) -> Lanes | None:
+        """States at the accepted parameters of the structure with other data, step by step."""
+        own = list(self.unknowns.data.values())
+        if np.array_equal(x[own], self.x[own]):
+            return self.z.copy()
+        index = self.states.index
+        for steps in TRANSFERS:
+            z, good = self.z.copy(), True
+            for k in range(1, steps + 1):
+                made = self.unknowns.made(self.x + (x - self.x) * (k / steps))
+                z, found = newton(made, z, self.p)
+                good = bool(found.all())
+                if not good:
+                    break
+            if good and np.array_equal(States(made, z, self.p).index, index):
+                return z
+        self._note("lost", 0)
+        return None
+
+    def _lifted(self, structure: Structure, z: Lanes, p: Parameters) -> Lanes | None:
+        """States of a structure lifted to parameters from the accepted ones."""
         length = np.linalg.norm((p - self.p) / structure.scales, axis=1)
         near, far = np.flatnonzero((length > 0.0) & (length <= SHORT)), length > SHORT
         if len(near):

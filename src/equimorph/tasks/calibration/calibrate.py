@@ -13,7 +13,7 @@ from equimorph.errors import InputError
 from equimorph.structures import States
 from equimorph.tasks.calibration.branch import Branch, BranchEnds, Jacobian, Residuals
 from equimorph.tasks.calibration.measured import Columns, Measurement
-from equimorph.tasks.calibration.unknowns import Unknowns, Vector, Wanted, unknowns
+from equimorph.tasks.calibration.unknowns import Family, Unknowns, Vector, Wanted, unknowns
 
 CONVERGED = 1e-13
 EVALUATIONS = 200
@@ -88,7 +88,13 @@ class Calibration:
         return float(self.residuals @ self.residuals)
 
 
-def calibrate(start: States, unknown: Wanted, measured: Sequence[Measurement]) -> Calibration:
+def calibrate(
+    start: States,
+    unknown: Wanted,
+    measured: Sequence[Measurement],
+    *,
+    family: Family | None = None,
+) -> Calibration:
     """Fit values, offsets or gains of parameters to measured descriptors and shapes.
 
     Least squares over exact equilibria by a trust-region method with the exact sensitivities of
@@ -104,9 +110,13 @@ def calibrate(start: States, unknown: Wanted, measured: Sequence[Measurement]) -
         What to fit: ``{name: kind}`` with kinds "value" (the parameter itself, the same in all
         states), "offset" (of the true parameter from the nominal one) or "gain" (true over
         nominal). A tuple of names shares one unknown: ``{("q", "f"): "gain"}``. The stiffness of a
-        structure whose loads are relative to it is the inverse of their common gain.
+        structure whose loads are relative to it is the inverse of their common gain. "data" are
+        those of the structure itself, like a stiffness or a length; see `family`.
     measured
         `MeasuredValues` of descriptors and `MeasuredShape` points.
+    family
+        Structures by their data, if some of these are unknown. Derivatives by data are differences
+        of fourth order; states are carried over by Newton's method with an unchanged index.
 
     Returns
     -------
@@ -130,7 +140,7 @@ def calibrate(start: States, unknown: Wanted, measured: Sequence[Measurement]) -
     """
     for state in start:
         check_start(state)
-    free = unknowns(start, unknown)
+    free = unknowns(start, unknown, family)
     tables = [each.table(start) for each in measured]
     values, sigma = _joined(tables)
     count = int(np.isfinite(values).sum())
@@ -140,7 +150,7 @@ def calibrate(start: States, unknown: Wanted, measured: Sequence[Measurement]) -
             f"{len(free.names)}; got {count}."
         )
     weights = np.ones_like(values) if sigma is None else sigma
-    branch = Branch(free, measured, values, weights, start.z, start.p)
+    branch = Branch(free, measured, values, weights, start.z, start.p, free.start)
     with suppress(BranchEnds):
         least_squares(
             branch.residuals, free.start, branch.jacobian, x_scale="jac", ftol=1e-15,

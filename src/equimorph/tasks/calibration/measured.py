@@ -1,6 +1,6 @@
 """What was measured: descriptors or shapes, with standard deviations."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -58,9 +58,11 @@ class MeasuredValues:
         return values, _deviations(self.sigma, shape, 1)
 
     def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
-        """Return the values of the descriptor."""
-        del structure
-        return np.asarray(self.descriptor.function(z, p)[:, None])
+        """Return the values of the descriptor, or of that of its name on another structure."""
+        own = self.descriptor
+        if own.origin != structure.signature:
+            own = structure.descriptor(own.name)
+        return np.asarray(own.function(z, p)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +114,23 @@ def derivative(
         for steps, weight in WEIGHTS
     )
     return np.asarray(total / h)
+
+
+def by_data(
+    value: Callable[[Structure, Lanes], Float[np.ndarray, "lanes n"]],
+    made: Callable[[float], Structure],
+    size: float,
+    at: tuple[Lanes, Lanes],
+) -> Float[np.ndarray, "lanes n"]:
+    """Derivative of a value by data of the structure, as unknowns z move along dz with them.
+
+    made: structure where the data are changed by an amount; size: of the data. Fourth order.
+    """
+    z, along = at
+    h = STEP * size
+    return np.asarray(
+        sum(weight * value(made(steps * h), z + steps * h * along) for steps, weight in WEIGHTS) / h
+    )
 
 
 def _fitting(name: str, given: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""What is unknown in a calibration: values, offsets and gains of parameters."""
+"""What is unknown in a calibration: values, offsets, gains of parameters; data of structures."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -11,10 +11,27 @@ from equimorph.errors import InputError
 from equimorph.model import position
 from equimorph.structures import States, Structure
 
-Kind = Literal["value", "offset", "gain"]
+Kind = Literal["value", "offset", "gain", "data"]
 Wanted = Mapping[str | tuple[str, ...], Kind]
 Vector = Float[np.ndarray, " k"]
 Parameters = Float[np.ndarray, "lanes parameters"]
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Structures that differ in data which are no parameters: a stiffness, a length, a rise.
+
+    Parameters
+    ----------
+    make
+        Structure of given data, by name: ``lambda EI: Rod(EI=EI, length=0.3, ...)``. All members
+        have the same unknowns and parameters.
+    nominal
+        Data of the structure that the states belong to.
+    """
+
+    make: Callable[..., Structure]
+    nominal: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,12 +40,16 @@ class Unknowns:
 
     Attributes
     ----------
+    structure
+        The nominal one.
     names
         What each unknown is called.
     start
-        Unknowns at which the parameters are the nominal ones.
+        Unknowns at which parameters and structure are the nominal ones.
     base, columns
         Of the linear function, one lane per state.
+    family, data
+        Structures by the unknowns among their data: name and place among the unknowns.
     """
 
     structure: Structure
@@ -36,34 +57,61 @@ class Unknowns:
     start: Vector
     base: Parameters
     columns: Float[np.ndarray, "k lanes parameters"]
+    family: Family | None
+    data: Mapping[str, int]
+
+    def made(self, x: Vector) -> Structure:
+        """Structure of some unknowns.
+
+        Raises
+        ------
+        InputError
+            If there is none, as with a stiffness that is not positive.
+        """
+        values = {name: float(x[at]) for name, at in self.data.items()}
+        if self.family is None or np.array_equal(x[list(self.data.values())], self._nominal):
+            return self.structure
+        return self.family.make(**{**self.family.nominal, **values})
+
+    @property
+    def _nominal(self) -> Vector:
+        return self.start[list(self.data.values())]
 
     def parameters(self, x: Vector) -> Parameters:
         """All parameters of all states."""
         return np.asarray(self.base + np.einsum("k,klp->lp", x, self.columns))
 
-    def outside(self, p: Parameters) -> str:
+    def outside(self, p: Parameters, structure: Structure) -> str:
         """Name of a parameter that leaves the limits of its meaning, or nothing."""
-        for column, each in zip(p.T, self.structure.parameters, strict=True):
+        for column, each in zip(p.T, structure.parameters, strict=True):
             if not ((each.lower < column) & (column < each.upper)).all():
                 return each.name
         return ""
 
 
-def unknowns(start: States, wanted: Wanted) -> Unknowns:
+def unknowns(start: States, wanted: Wanted, family: Family | None = None) -> Unknowns:
     """Linear function of the unknowns that are wanted.
 
     Raises
     ------
     InputError
         For nothing, an unknown name or kind, a parameter in two unknowns, a value that differs
-        between the states, or a gain of zeros.
+        between the states, a gain of zeros, data without a family or that it does not have, or a
+        family whose nominal member is another structure.
     """
     if not wanted:
         raise InputError("`unknown` must name at least one parameter; got nothing.")
     structure, base = start.structure, start.p.copy()
-    names, first, columns = [], [], []
+    names, first, columns = list[str](), list[float](), []
     used: set[str] = set()
+    data: dict[str, int] = {}
     for key, kind in wanted.items():
+        if kind == "data":
+            data[_datum(key, family)] = len(names)
+            names.append(str(key))
+            first.append(float(family.nominal[str(key)]) if family else np.nan)
+            columns.append(np.zeros_like(base))
+            continue
         group = (key,) if isinstance(key, str) else tuple(key)
         places = [position(structure.parameters, name) for name in group]
         _check(kind, group, start.p[:, places], used)
@@ -76,7 +124,32 @@ def unknowns(start: States, wanted: Wanted) -> Unknowns:
         words = " and ".join(group)
         names.append(words if kind == "value" else f"{kind} of {words}")
         columns.append(column)
-    return Unknowns(structure, tuple(names), np.array(first), base, np.array(columns))
+    if family is not None:
+        _check_family(structure, family)
+    table = np.array(columns)
+    return Unknowns(structure, tuple(names), np.array(first), base, table, family, data)
+
+
+def _datum(key: Any, family: Family | None) -> str:
+    """Name of an unknown among the data of a structure."""
+    if family is None:
+        raise InputError(
+            f"`family` must be given to fit the data of a structure; got none for {key!r}."
+        )
+    if not isinstance(key, str) or key not in family.nominal:
+        raise InputError(
+            f"`unknown` must name data of the family ({', '.join(family.nominal)}); got {key!r}."
+        )
+    return key
+
+
+def _check_family(structure: Structure, family: Family) -> None:
+    member = family.make(**family.nominal)
+    if member.signature != structure.signature:
+        raise InputError(
+            f"`family` must make the structure of the states from its nominal data; got {member!r} "
+            f"with other data than {structure!r}."
+        )
 
 
 def _check(kind: str, group: tuple[str, ...], nominal: Parameters, used: set[str]) -> None:
