@@ -1,0 +1,183 @@
+"""Derivatives of states, descriptors and limit loads with respect to parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria import LimitLoad, check_start
+from equimorph.errors import InputError
+from equimorph.model import Constraint, Descriptor, names_of, position
+from equimorph.structures import State, Structure
+
+STEP = 1e-5
+"""Step of central differences along the set, in scaled parameters."""
+CRITICAL = 1e-5
+"""Size of the smallest singular value, relative to the next, up to which a state is critical."""
+FLAT = 1e-6
+"""φᵀF_q relative to its factors, below which the path in q does not turn: a branch point."""
+
+Vector = Float[np.ndarray, " k"]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """How a state changes with parameters, by the implicit function theorem.
+
+    Parameters
+    ----------
+    names
+        The parameters.
+    unknowns
+        dz/dp: changes of unknowns and multipliers, one row for each parameter.
+    descriptors
+        dS/dp of each descriptor, by its name: one number for each parameter.
+    """
+
+    names: tuple[str, ...]
+    unknowns: Float[np.ndarray, "parameters size"]
+    descriptors: Mapping[str, Vector]
+
+    def __getitem__(self, key: tuple[str, str]) -> float:
+        """Derivative of a descriptor by a parameter: ``found["height(0.5)", "Theta"]``."""
+        descriptor, name = key
+        return float(self.descriptors[descriptor][self.names.index(name)])
+
+
+def sensitivity(
+    state: State, descriptors: Sequence[Descriptor] = (), names: Sequence[str] | None = None
+) -> Sensitivity:
+    """Derivatives of a state and of descriptors: ``dz = −F_z⁻¹ F_p dp``, ``dS = S_z dz + S_p dp``.
+
+    Parameters
+    ----------
+    state
+        A regular equilibrium.
+    descriptors
+        Scalars; where they have a kink the mean of both sides is given.
+    names
+        Parameters, imperfections among them; all of them by default.
+
+    Raises
+    ------
+    InputError
+        If the state is no equilibrium or a critical one, or for an unknown name.
+    """
+    check_start(state)
+    structure = state.structure
+    chosen = tuple(names_of(structure.parameters) if names is None else names)
+    at = [position(structure.parameters, name) for name in chosen]
+    g, _ = _null_vector(state)
+    if abs(g) < CRITICAL:
+        raise InputError(
+            f"`state` must be regular; got a critical one, {state}. See `limit_sensitivity`."
+        )
+    directions = np.eye(len(structure.parameters))[at]
+    dz = _tangents(state, directions)
+    slopes = {each.name: _slopes(state, each, dz, directions) for each in descriptors}
+    return Sensitivity(chosen, dz, slopes)
+
+
+def limit_sensitivity(
+    limit: LimitLoad,
+    load: str,
+    names: Sequence[str],
+    within: Sequence[Constraint] = (),
+) -> dict[str, float]:
+    """Derivatives of a limit load with respect to parameters.
+
+    At a fold with null vector φ: ``dq/da = −(φᵀF_a)/(φᵀF_q)``. Where a constraint ends the path:
+    ``dq/da = −(dS/da)/(dS/dq)`` along the set.
+
+    Parameters
+    ----------
+    limit
+        As found by `limit_load`.
+    load
+        The parameter that grew.
+    names
+        Parameters and imperfections.
+    within
+        The constraints of the limit load, where one of them was met.
+
+    Raises
+    ------
+    InputError
+        At branch points, where imperfections count with a fractional power (`imperfection_law`),
+        for limits that have no derivative, unknown names, or a constraint that is not given.
+    """
+    structure, state = limit.state.structure, limit.state
+    places = {name: position(structure.parameters, name) for name in (*names, load)}
+    if limit.kind == "fold":
+        _, phi = _null_vector(state)
+        slopes = {name: float(phi @ _column(state, place)) for name, place in places.items()}
+        size = np.linalg.norm(phi) * np.linalg.norm(_column(state, places[load]))
+        if abs(slopes[load]) < FLAT * size:
+            raise InputError(f"`limit` must be a fold in {load}; got one in other directions.")
+        return {name: -slopes[name] / slopes[load] for name in names}
+    if limit.kind == "constraint":
+        met = [constraint for constraint in within if str(constraint) == limit.detail]
+        detail = limit.detail or "a constraint"
+        if limit.path is not None:
+            met = met or [c for c in within if str(c) == limit.path.end.detail]
+        if not met:
+            raise InputError(f"`within` must hold the constraint that was met, {detail}; got none.")
+        found = sensitivity(state, [met[0].descriptor], [*names, load])
+        key = met[0].descriptor.name
+        return {name: -found[key, name] / found[key, load] for name in names}
+    if limit.kind == "branch point":
+        raise InputError(
+            "`limit` must be a fold or a constraint; got a branch point, near which the limit load "
+            "changes with a fractional power of imperfections. See `imperfection_law`."
+        )
+    raise InputError(f"`limit` must be a fold or a constraint; got {limit.kind!r}.")
+
+
+def _tangents(
+    state: State, directions: Float[np.ndarray, "k parameters"]
+) -> Float[np.ndarray, "k size"]:
+    structure, count = state.structure, len(directions)
+    z, p = np.tile(state.z, (count, 1)), np.tile(state.p, (count, 1))
+    columns = structure.parameter_derivative(z, p, directions)
+    return np.asarray(-structure.solve(state.z[None], state.p[None], columns[None]).x[0])
+
+
+def _slopes(
+    state: State,
+    descriptor: Descriptor,
+    dz: Float[np.ndarray, "k size"],
+    directions: Float[np.ndarray, "k parameters"],
+) -> Vector:
+    """Derivatives of a descriptor along the set."""
+    scale = (np.abs(directions) @ state.structure.scales)[:, None]
+    h = STEP * scale
+    ahead, behind = (
+        descriptor.function(state.z + sign * h * dz, state.p + sign * h * directions)
+        for sign in (1.0, -1.0)
+    )
+    return np.asarray((ahead - behind) / (2.0 * h[:, 0]))
+
+
+def _column(state: State, place: int) -> Float[np.ndarray, " size"]:
+    """F_p for one parameter."""
+    direction = np.zeros((1, len(state.p)))
+    direction[0, place] = 1.0
+    found = state.structure.parameter_derivative(state.z[None], state.p[None], direction)
+    return np.asarray(found[0])
+
+
+def _null_vector(state: State) -> tuple[float, Float[np.ndarray, " size"]]:
+    """Test function g, zero at critical states, and the vector φ with F_z φ = −g b, b·φ = 1."""
+    structure: Structure = state.structure
+    b = np.cos(1.7 * np.arange(structure.size)) + 1.3
+    for _ in range(3):
+        column = (b / np.linalg.norm(b))[None, None]
+        rhs = np.zeros((1, 1, structure.size + 1))
+        rhs[0, 0, -1] = 1.0
+        border = (column, column, np.zeros((1, 1, 1)))
+        solved = structure.solve(state.z[None], state.p[None], rhs, border).x[0, 0]
+        phi, g = solved[:-1], float(solved[-1])
+        b = phi
+    size = float(np.linalg.norm(phi))
+    return g / size, phi / size

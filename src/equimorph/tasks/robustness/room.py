@@ -1,0 +1,212 @@
+"""The largest box, or ellipsoid, of parameters around states that stays stable."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria import ParameterLine, TraceOptions, follow
+from equimorph.equilibria.outcome import KINDS
+from equimorph.equilibria.starts import check_starts
+from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.errors import InputError
+from equimorph.model import Box, Constraint, position
+from equimorph.structures import State, States
+
+Directions = Float[np.ndarray, "directions d"]
+Shape = Literal["box", "ellipsoid"]
+
+RANDOM = 64
+"""Random directions beside axes and corners."""
+MOST_CORNERS = 64
+ROUNDS, AROUND = 10, 12
+"""Rounds in which the worst directions of each state are searched around, and how many each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """How far parameters may stray from states, in all directions at once.
+
+    Parameters
+    ----------
+    scale
+        Largest multiple of the tolerances that stays stable and within the constraints, of each
+        state: exact along the rays that were lifted, an upper bound otherwise. At least
+        `most` where nothing was met.
+    met
+        Where the worst ray of each state ended.
+    kind
+        What it met: as of `Event`, "arrived" if nothing.
+    boxes
+        The boxes, or those around the ellipsoids.
+    """
+
+    shape: Shape
+    scale: Float[np.ndarray, " states"]
+    met: States
+    kind: tuple[str, ...]
+    boxes: tuple[Box, ...]
+
+    def __repr__(self) -> str:
+        """Smallest scale and what bounds it."""
+        worst = int(np.argmin(self.scale))
+        return f"Room({self.shape}: {self.scale[worst]:.6g} tolerances, then {self.kind[worst]})"
+
+    @property
+    def least(self) -> float:
+        """Smallest of the scales: of a route, the room all along."""
+        return float(self.scale.min())
+
+
+def stable_room(  # all but two by keyword
+    states: State | States,
+    tolerances: Mapping[str, float],
+    *,
+    shape: Shape = "box",
+    within: Sequence[Constraint] = (),
+    most: float = 100.0,
+    seed: int = 0,
+) -> Room:
+    """Largest box or ellipsoid of parameters around a state, or states of a route, that is stable.
+
+    Rays in many directions are lifted from each state until stability or a constraint is lost; the
+    worst directions are searched around with narrower and narrower spread. As all points of a box
+    lie on rays from its middle, its states are those that these lifts pass.
+
+    Parameters
+    ----------
+    states
+        Stable equilibria.
+    tolerances
+        Half widths by parameter, actuators, loads or imperfections: the shape is scaled as a whole.
+    shape
+        "box": all tolerances at once; "ellipsoid": their squares add up.
+    within
+        Constraints that have to hold, too.
+    most
+        Largest multiple of the tolerances that is tried.
+    seed
+        Of the random directions.
+
+    Raises
+    ------
+    InputError
+        If a state is no stable equilibrium, for unknown names, or tolerances that are not positive.
+    """
+    batch = states.batch if isinstance(states, State) else states
+    structure = batch.structure
+    places = np.array([position(structure.parameters, name) for name in tolerances], dtype=int)
+    widths = np.array([float(value) for value in tolerances.values()])
+    if len(widths) == 0 or not (np.isfinite(widths).all() and (widths > 0.0).all()):
+        raise InputError(f"`tolerances` must be positive numbers; got {dict(tolerances)!r}.")
+    if shape not in ("box", "ellipsoid"):
+        raise InputError(f"`shape` must be box or ellipsoid; got {shape!r}.")
+    if not (np.isfinite(most) and most > 0.0):
+        raise InputError(f"`most` must be a positive number; got {most!r}.")
+    check_starts(batch)
+    if (batch.index != 0).any():
+        raise InputError("`states` must be stable; got unstable ones.")
+    rays = _Rays(batch, (places, widths), shape, tuple(within), most)
+    generator = np.random.default_rng(seed)
+    rays.try_all(_directions(len(widths), generator))
+    spread = 0.5
+    for _ in range(ROUNDS):
+        rays.try_around(spread, generator)
+        spread *= 0.5
+    return rays.room(tuple(tolerances))
+
+
+def _directions(d: int, generator: np.random.Generator) -> Directions:
+    """Both ways along each parameter, corners of the box, and random ones."""
+    units = np.concatenate([np.eye(d), -np.eye(d)])
+    if 2**d <= MOST_CORNERS:
+        corners = np.array(list(product((-1.0, 1.0), repeat=d)))
+    else:
+        corners = generator.choice([-1.0, 1.0], (MOST_CORNERS, d))
+    return np.concatenate([units, corners, generator.normal(size=(RANDOM, d))])
+
+
+class _Rays:
+    """Rays from states, the worst so far of each, and what it met."""
+
+    def __init__(
+        self,
+        states: States,
+        widths: tuple[Int[np.ndarray, " d"], Float[np.ndarray, " d"]],
+        shape: Shape,
+        within: tuple[Constraint, ...],
+        most: float,
+    ) -> None:
+        self.states, self.within, self.shape, self.most = states, within, shape, most
+        self.places, self.widths = widths
+        count = len(states)
+        self.scale = np.full(count, most)
+        self.direction = np.zeros((count, len(self.widths)))
+        self.z, self.p = states.z.copy(), states.p.copy()
+        self.code = np.full(count, ARRIVAL)
+
+    def try_all(self, directions: Directions) -> None:
+        """Lift rays in the same directions from all states."""
+        count = len(self.states)
+        lanes = np.repeat(np.arange(count), len(directions))
+        self._lift(lanes, np.tile(directions, (count, 1)))
+
+    def try_around(self, spread: float, generator: np.random.Generator) -> None:
+        """Lift rays in directions near the worst one of each state."""
+        lanes = np.repeat(np.flatnonzero(self.scale < self.most), AROUND)
+        if len(lanes):
+            noise = generator.normal(size=(len(lanes), len(self.widths)))
+            self._lift(lanes, self.direction[lanes] + spread * noise)
+
+    def _lift(self, lanes: Int[np.ndarray, " lanes"], directions: Directions) -> None:
+        """Lift rays no further than the worst so far, and keep those that end earlier."""
+        norm = np.abs(directions).max(axis=1)
+        if self.shape == "ellipsoid":
+            norm = np.linalg.norm(directions, axis=1)
+        directions = directions / norm[:, None]
+        start = self.states[lanes]
+        velocity = np.zeros_like(start.p)
+        velocity[:, self.places] = directions * self.widths
+        reach = self._furthest(start.p, velocity, self.scale[lanes])
+        velocity *= reach[:, None]
+        line = ParameterLine(self.states.structure, start.p.copy(), velocity)
+        outcome = follow(line, start.z.copy(), self.within, TraceOptions(record=False))
+        ended = np.where(outcome.code == ARRIVAL, np.inf, outcome.t * reach)
+        for lane in np.flatnonzero(ended < self.scale[lanes]):
+            owner = lanes[lane]
+            if ended[lane] < self.scale[owner]:
+                self.scale[owner], self.direction[owner] = ended[lane], directions[lane]
+                self.z[owner], self.code[owner] = outcome.z[lane], outcome.code[lane]
+                self.p[owner] = start.p[lane] + outcome.t[lane] * velocity[lane]
+
+    def _furthest(
+        self,
+        p: Float[np.ndarray, "lanes parameters"],
+        velocity: Float[np.ndarray, "lanes parameters"],
+        scale: Float[np.ndarray, " lanes"],
+    ) -> Float[np.ndarray, " lanes"]:
+        """Multiples of rays that stay within the meaning of all parameters."""
+        most = scale.copy()
+        for place in self.places:
+            parameter = self.states.structure.parameters[place]
+            for bound in (parameter.lower, parameter.upper):
+                if np.isfinite(bound):
+                    with np.errstate(divide="ignore", invalid="ignore"):
+                        share = (bound - p[:, place]) / velocity[:, place]
+                    most = np.where(share > 0.0, np.minimum(most, (1.0 - 1e-9) * share), most)
+        return most
+
+    def room(self, names: tuple[str, ...]) -> Room:
+        """What was found."""
+        middle, half = self.states.p[:, self.places], self.scale[:, None] * self.widths
+        boxes = tuple(
+            Box(**{n: (low, high) for n, low, high in zip(names, a, b, strict=True)})
+            for a, b in zip((middle - half).tolist(), (middle + half).tolist(), strict=True)
+        )
+        kinds = tuple(KINDS[int(code)] for code in self.code)
+        return Room(
+            self.shape, self.scale, States(self.states.structure, self.z, self.p), kinds, boxes
+        )

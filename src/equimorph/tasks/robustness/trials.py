@@ -1,0 +1,140 @@
+"""Monte Carlo: a schedule executed by structures that are not quite what they should be."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, Shaped
+
+from equimorph.equilibria import lift, way_points
+from equimorph.errors import InputError
+from equimorph.model import Constraint, Schedule, names_of, position
+from equimorph.structures import State, States
+
+CONFIDENT = 1.96
+"""Standard deviations of the interval around the share of successes: 95 %."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """What became of a schedule under random imperfections.
+
+    Parameters
+    ----------
+    names, offsets
+        Parameters that were off, and by how much in each trial.
+    kind
+        How each trial ended: "arrived", or what it met (see `Event`); "start" if the imperfection
+        alone was too much.
+    at
+        Where: number of the step + share of it.
+    states
+        Last states.
+    margin
+        Stability margins of the last states; 0 where stability was lost.
+    """
+
+    names: tuple[str, ...]
+    offsets: Float[np.ndarray, "trials names"]
+    kind: Shaped[np.ndarray, " trials"]
+    at: Float[np.ndarray, " trials"]
+    states: States
+
+    def __repr__(self) -> str:
+        """Share of successes with its interval, and what the others met."""
+        low, high = self.interval
+        kinds, counts = np.unique(self.kind[~self.arrived], return_counts=True)
+        others = "".join(f", {n} {k}" for k, n in zip(kinds, counts, strict=True))
+        return f"Trials({self.share:.4g} ({low:.3g} … {high:.3g}) of {len(self.kind)}{others})"
+
+    @property
+    def arrived(self) -> Bool[np.ndarray, " trials"]:
+        """Which trials came to the end without a snap."""
+        return np.asarray(self.kind == "arrived")
+
+    @property
+    def share(self) -> float:
+        """Share of the trials that arrived."""
+        return float(self.arrived.mean())
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval of 95 % confidence for the probability to arrive [Wilson1927]_."""
+        n, p, q = len(self.kind), self.share, CONFIDENT**2
+        middle = (p + q / (2 * n)) / (1 + q / n)
+        half = CONFIDENT * np.sqrt(p * (1 - p) / n + q / (4 * n * n)) / (1 + q / n)
+        return float(middle - half), float(middle + half)
+
+
+def random_trials(  # all but three by keyword
+    start: State,
+    schedule: Schedule | Sequence[Mapping[str, float]],
+    spreads: Mapping[str, float],
+    *,
+    trials: int = 200,
+    within: Sequence[Constraint] = (),
+    seed: int = 0,
+) -> Trials:
+    """Execute a schedule with parameters that are off by normally distributed amounts.
+
+    Actuators with an offset keep it all along. Imperfect loads and shapes are parameters, too: a
+    rod with a further `LineLoad` or `Curvature` pattern of amplitude 0 becomes imperfect by an
+    amplitude that is not. All trials are lifted side by side.
+
+    Parameters
+    ----------
+    start
+        State of the perfect structure in which the schedule begins.
+    schedule
+        A schedule of the structure, or way-points.
+    spreads
+        Standard deviations by parameter.
+    trials, seed
+        Number of trials, and seed of the random numbers.
+    within
+        Constraints to obey.
+
+    Raises
+    ------
+    InputError
+        For unknown names, spreads that are not positive, or no trials.
+    """
+    structure = start.structure
+    names = tuple(spreads)
+    places = np.array([position(structure.parameters, name) for name in names], dtype=int)
+    widths = np.array([float(value) for value in spreads.values()])
+    if len(widths) == 0 or not (np.isfinite(widths).all() and (widths > 0.0).all()):
+        raise InputError(f"`spreads` must be positive numbers; got {dict(spreads)!r}.")
+    if trials < 1:
+        raise InputError(f"`trials` must be at least 1; got {trials!r}.")
+    rows = _rows(start, schedule)
+    offsets = np.random.default_rng(seed).normal(size=(trials, len(names))) * widths
+    shift = np.zeros((trials, len(start.p)))
+    shift[:, places] = offsets
+    perfect = States(structure, np.tile(start.z, (trials, 1)), np.tile(start.p, (trials, 1)))
+    every = names_of(structure.parameters)
+    legs = [_leg(every, row + shift) for row in (start.p, *rows)]
+    lifts = lift(perfect, legs, within=within)
+    kind = np.where((lifts.kind != "arrived") & (lifts.at < 1.0), "start", lifts.kind)
+    return Trials(names, offsets, kind, np.maximum(lifts.at - 1.0, 0.0), lifts.states)
+
+
+def _leg(
+    names: tuple[str, ...], p: Float[np.ndarray, "lanes parameters"]
+) -> dict[str, Float[np.ndarray, " lanes"]]:
+    return {name: p[:, k].copy() for k, name in enumerate(names)}
+
+
+def _rows(
+    start: State, schedule: Schedule | Sequence[Mapping[str, float]]
+) -> Float[np.ndarray, "rows parameters"]:
+    """All parameters at the corners after the start."""
+    if not isinstance(schedule, Schedule):
+        return np.array(way_points(start.structure, start.p, list(schedule)))[1:]
+    if schedule.names != names_of(start.structure.parameters):
+        raise InputError(
+            f"`schedule` must give the parameters of the structure; got {schedule.names}."
+        )
+    corners: Int[np.ndarray, " n"] = schedule.way_points
+    steps = corners[corners > 0] if len(corners) > 1 else np.arange(1, len(schedule.values))
+    return np.asarray(schedule.values[steps])
