@@ -214,7 +214,7 @@ def test_a_parameter_keeps_its_meaning(nominal):
     [
         ({}, np.zeros(9), None, "`unknown` must name at least one parameter"),
         ({"stiffness": "value"}, np.zeros(9), None, "`stiffness` must be a parameter"),
-        ({"k": "factor"}, np.zeros(9), None, "`unknown` must be one of value, offset, gain, data for k"),
+        ({"k": "factor"}, np.zeros(9), None, "`unknown` must be one of value, offset, gain, data"),
         ({"x_l": "value"}, np.zeros(9), None, "`start` must have one value of x_l"),
         (
             {("k", "F"): "gain", "k": "value"},
