@@ -50,10 +50,10 @@ WRONG = {
         r"`set\.box\.Theta` must be \[lower, upper\] with lower < upper; got \[2\.5, 0\.2\]",
     ),
     "one bound": ("[0.2, 2.5]", "[0.2]", r"`set\.box\.Theta` must have at least 2 entries"),
-    "one free parameter": (
+    "one free parameter less": (
         ", Delta = [-2.0, 2.0]",
         "",
-        r"`set\.box` must span exactly two free parameters",
+        r"`set` must give one number of intervals for each parameter of its box",
     ),
     "span too long": (
         'load = "uniform"',

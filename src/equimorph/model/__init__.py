@@ -1,7 +1,8 @@
 """Plain data: parameters, boxes, descriptors, constraints, schedules, progress sinks."""
 
 from equimorph.model.box import Box, Grid
-from equimorph.model.descriptor import Constraint, Descriptor, combined, largest_of
+from equimorph.model.descriptor import Constraint, Descriptor, combined, eased, largest_of
+from equimorph.model.keeping import NOT_KEPT
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.parameter import (
     Parameter,
@@ -16,6 +17,7 @@ from equimorph.model.schedule import Schedule
 from equimorph.model.spline import Spline
 
 __all__ = [
+    "NOT_KEPT",
     "Box",
     "Constraint",
     "Descriptor",
@@ -31,6 +33,7 @@ __all__ = [
     "Silent",
     "Spline",
     "combined",
+    "eased",
     "largest_of",
     "names_of",
     "parameter_vector",

@@ -1,7 +1,7 @@
 """Descriptors: scalars of a state; constraints: comparisons of descriptors with numbers."""
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol, overload, runtime_checkable
 
 import numpy as np
@@ -18,6 +18,9 @@ Branches = Callable[
     [Float[np.ndarray, "lanes size"], Float[np.ndarray, "lanes parameters"]],
     tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]],
 ]
+
+EASE = 1e-9
+"""Relative room beside a bound that counts as rounding."""
 
 
 @runtime_checkable
@@ -203,3 +206,11 @@ def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
         return values, np.tile(np.arange(float(len(descriptors))), (len(z), 1))
 
     return Descriptor(name, unit, whole.function, name, branches=branches)
+
+
+def eased(constraint: Constraint) -> Constraint:
+    """Constraint with a bound that rounding does not violate: optima lie on bounds."""
+    room = EASE * max(1.0, abs(constraint.bound))
+    return replace(
+        constraint, bound=constraint.bound + (room if constraint.sense == "<=" else -room)
+    )

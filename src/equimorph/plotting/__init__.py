@@ -1,16 +1,19 @@
 """Figures and films of results; nothing else in the package draws."""
 
 from equimorph.plotting.curvature_map import curvature_map
+from equimorph.plotting.diagram import diagram
 from equimorph.plotting.film import film
 from equimorph.plotting.load_map import load_map
 from equimorph.plotting.margins import margins
 from equimorph.plotting.plane import parameter_plane
 from equimorph.plotting.shapes import shapes
+from equimorph.plotting.solutions import solutions
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 
 __all__ = [
     "curvature_map",
+    "diagram",
     "film",
     "house_style",
     "load_map",
@@ -18,5 +21,6 @@ __all__ = [
     "parameter_plane",
     "save",
     "shapes",
+    "solutions",
     "surface",
 ]

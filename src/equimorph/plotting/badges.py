@@ -1,11 +1,11 @@
-"""Numbers of the way-points of a route, each beside its point where there is room."""
+"""Numbers of way-points and other places, each beside its point where there is room."""
 
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.transforms import Affine2D
+from matplotlib.transforms import Affine2D, Transform
 
 from equimorph.plotting import style
 
@@ -34,30 +34,46 @@ _LEADER: dict[str, Any] = {
 def number_way_points(ax: Axes, corners: Places) -> Places:
     """Mark the way-points and number them; those at one place share a badge.
 
+    Returns
+    -------
+    Places around the badges, where nothing else should be written.
+    """
+    for place, _ in _badges(corners, _to_points(ax).transform(corners)):
+        ax.plot(*place, "o", **_DOT, zorder=7)
+    return number_points(ax, corners)
+
+
+def number_points(ax: Axes, places: Places) -> Places:
+    """Number places; those that are the same share a badge.
+
     A badge stands where it hides no curve already drawn, with a thin line to its point.
 
     Returns
     -------
     Places around the badges, where nothing else should be written.
     """
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    to_points = ax.transData + Affine2D().scale(72 / figure.dpi)
+    to_points = _to_points(ax)
     lines = [to_points.transform(np.asarray(line.get_xydata())) for line in ax.lines]
     taken = np.concatenate([np.empty((0, 2)), *(_dense(line) for line in lines if len(line) > 1)])
     frame = to_points.transform(np.column_stack([ax.get_xlim(), ax.get_ylim()]))
     rims = np.empty((0, 2))
-    for place, text in _badges(corners, to_points.transform(corners)):
+    for place, text in _badges(places, to_points.transform(places)):
         here, half = to_points.transform(place), np.array([2.0 + 1.9 * len(text), 5.0])
         middle = _roomiest(here, half, np.concatenate([taken, rims]), frame)
         rims = np.concatenate([rims, _dense(middle + half * _RIM)])
-        ax.plot(*place, "o", **_DOT, zorder=7)
         offset = (float(middle[0] - here[0]), float(middle[1] - here[1]))
         ax.annotate(
             text, tuple(place.tolist()), offset, textcoords="offset points", size=6.5,
             ha="center", va="center", zorder=7.5, bbox=_BOX, arrowprops=_LEADER,
         )  # fmt: skip
     return np.asarray(to_points.inverted().transform(rims))
+
+
+def _to_points(ax: Axes) -> Transform:
+    """From data to typographic points."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    return ax.transData + Affine2D().scale(72 / figure.dpi)
 
 
 def _badges(corners: Places, there: Places) -> list[tuple[Float[np.ndarray, " 2"], str]]:
@@ -71,7 +87,7 @@ def _badges(corners: Places, there: Places) -> list[tuple[Float[np.ndarray, " 2"
             badges[k] = [k + 1]
         elif np.allclose(corners[near[0]], corners[k], rtol=0, atol=1e-9):
             badges[near[0]].append(k + 1)
-    return [(corners[k], ", ".join(map(str, numbers))) for k, numbers in badges.items()]
+    return [(corners[k], ", ".join(map(str, sorted(numbers)))) for k, numbers in badges.items()]
 
 
 def _roomiest(

@@ -36,7 +36,7 @@ _CAP: dict[str, Any] = {
 _ROUTE: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.6, "zorder": 6}
 
 _FRAME_HEIGHT = 2.16  # inches
-_LEFT, _BOTTOM, _RIGHT, _TOP = 0.5, 0.4, 0.4, 0.08  # inches around the frame
+_LEFT, _BOTTOM, _RIGHT, _TOP = 0.58, 0.4, 0.4, 0.08  # inches around the frame
 _LEGEND_COLUMNS, _LEGEND_ROW, _LEGEND_GAP = 2, 0.15, 0.06
 # Slivers of the mesh smaller than this share of the picture are no region of their own.
 _INVISIBLE = 1e-4

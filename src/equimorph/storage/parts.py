@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import h5py
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
-from equimorph.storage import map_group, route_group, set_group, states_group
+from equimorph.storage import map_group, record_group, route_group, set_group, states_group
 from equimorph.storage.hdf import content, opened
 from equimorph.structures import State, States, Structure
 from equimorph.tasks import ActuatorMap, Route
@@ -87,3 +87,7 @@ def _read_journey(group: h5py.Group, structure: Structure) -> Journey:
 
 
 JOURNEY_PART: Part[Journey] = Part("journey", _write_journey, _read_journey)
+
+
+RECORD_PART: Part[Any] = Part("record", record_group.write, record_group.read)
+"""Results of tasks that are records."""

@@ -6,7 +6,7 @@ constraints are kept by name: the structure knows the rest.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
 from typing import Any
 
 import h5py
@@ -67,11 +67,16 @@ def _encoded(group: h5py.Group, value: Any, place: str) -> Any:
         return {"mapping": _pairs(group, value, place)}
     kind = type(value).__name__
     if kind in RECORDS:
-        values = {each.name: getattr(value, each.name) for each in fields(value)}
+        values = {each.name: getattr(value, each.name) for each in _kept(value)}
         named = values.items()
         own = {key: _encoded(group, each, f"{place}/{key}".strip("/")) for key, each in named}
         return {"record": [kind, own]}
     return _put(group, value, place)
+
+
+def _kept(record: Any) -> list[Field[Any]]:
+    """Fields that are written."""
+    return [each for each in fields(record) if each.metadata.get("kept", True)]
 
 
 def _pairs(group: h5py.Group, value: Mapping[Any, Any], place: str) -> list[list[Any]]:

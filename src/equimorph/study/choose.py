@@ -6,6 +6,7 @@ from jaxtyping import Float
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import State, States
+from equimorph.structures.naming import descriptor_named
 from equimorph.study.sections.extent import StateSection
 
 AGREEMENT = 1e-3
@@ -39,10 +40,10 @@ def choose_state(eset: EquilibriumSet, section: StateSection, key: str) -> State
     if section.near is not None:
         return _nearest(here, section.near, key)
     if section.highest is not None:
-        values = eset.structure.descriptor(section.highest)(stable)
+        values = descriptor_named(eset.structure, section.highest)(stable)
         return stable[int(np.argmax(values))]
     if section.lowest is not None:
-        values = eset.structure.descriptor(section.lowest)(stable)
+        values = descriptor_named(eset.structure, section.lowest)(stable)
         return stable[int(np.argmin(values))]
     if len(stable) > 1:
         raise InputError(
@@ -54,7 +55,7 @@ def choose_state(eset: EquilibriumSet, section: StateSection, key: str) -> State
 
 def _nearest(here: States, near: dict[str, float], key: str) -> State:
     ((text, wanted),) = near.items()
-    values: Float[np.ndarray, " lanes"] = here.structure.descriptor(text)(here)
+    values: Float[np.ndarray, " lanes"] = descriptor_named(here.structure, text)(here)
     best = int(np.argmin(np.abs(values - wanted)))
     state = here[best]
     if abs(values[best] - wanted) > AGREEMENT:

@@ -10,6 +10,7 @@ from typing import Literal, cast
 from equimorph.errors import InputError
 from equimorph.model import Constraint
 from equimorph.structures import Structure
+from equimorph.structures.naming import descriptor_named
 
 LARGEST = 1e9
 """Largest number of a study; all scales of a structure are near 1."""
@@ -27,7 +28,7 @@ class Comparison:
 
     def on(self, structure: Structure) -> Constraint:
         """Return the same comparison with the descriptor of a structure."""
-        return Constraint(structure.descriptor(self.descriptor), self.sense, self.bound)
+        return Constraint(descriptor_named(structure, self.descriptor), self.sense, self.bound)
 
 
 def parse_comparison(text: str) -> Comparison:

@@ -7,7 +7,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
 from equimorph.study.folder import ResultsFolder
 from equimorph.study.kinds.kind import Figure, still
-from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE
+from equimorph.study.names import DIAGRAM, PLANE, STABLE_PLANE, SURFACE
 from equimorph.study.outcome import Outcome
 
 
@@ -42,9 +42,13 @@ def _figures(outcome: Outcome) -> list[Figure]:
 
 
 def _figures_of_set(outcome: Outcome, eset: EquilibriumSet) -> list[Figure]:
+    height = outcome.problem.ground.height
+    if len(eset.names) == 1:
+        return [still(DIAGRAM, partial(plotting.diagram, eset, height))]
+    if len(eset.names) == 3:
+        return []
     routes = [journey.route for journey in outcome.of("route").values()]
     first = next((route for route in routes if route.arrived), None)
-    height = outcome.problem.ground.height
     figures = [
         still(SURFACE, partial(plotting.surface, eset, height, route=first)),
         still(STABLE_PLANE, partial(plotting.parameter_plane, eset, count="stable")),

@@ -61,6 +61,21 @@ def still(folder: Path, name: str, caption: str) -> str:
     return figure(folder / f"{name}.png", caption, larger=f"{name}.svg")
 
 
+def pictures(folder: Path, wide: Mapping[str, str], captions: Mapping[str, str]) -> str:
+    """Return those of some pictures that are in a folder, by file name with their captions."""
+    large = [
+        figure(folder / name, text, wide=True)
+        for name, text in wide.items()
+        if (folder / name).exists()
+    ]
+    small = [
+        figure(folder / name, text, larger=name.replace(".png", ".svg"))
+        for name, text in captions.items()
+        if (folder / name).exists()
+    ]
+    return f'<div class="figures">{"".join([*large, *small])}</div>'
+
+
 def refused(why: str) -> str:
     """Return the line of an answer that there is none, and why."""
     return f'<p class="verdict refused"><strong>Refused.</strong> {escape(why)}</p>'

@@ -10,6 +10,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import INTERVALS
 from equimorph.model import Box, Constraint, Descriptor, parameter_vector, position
 from equimorph.structures import Structure
+from equimorph.structures.naming import descriptor_named
 from equimorph.study.expressions import parse_comparison
 from equimorph.study.sections.extent import SetSection, StateSection
 
@@ -120,13 +121,25 @@ def constraints_of(structure: Structure, texts: Sequence[str], key: str) -> tupl
     return tuple(constraints)
 
 
-def check_choice(structure: Structure, section: StateSection, key: str) -> None:
-    """Refuse descriptors to choose by that the structure does not have."""
-    choices = (section.highest, section.lowest, *(section.near or ()))
-    for text in choices:
+def check_state(ground: Ground, section: StateSection, key: str) -> None:
+    """Refuse a point outside the box, and descriptors to choose by that there are not."""
+    check_point(ground.box, section.at, f"{key}.at")
+    for text in (section.highest, section.lowest, *(section.near or ())):
         if text is not None:
-            with at_key(key):
-                structure.descriptor(text)
+            descriptor_at(ground.structure, text, key)
+
+
+def descriptor_at(structure: Structure, text: str, key: str) -> Descriptor:
+    """Look up a descriptor; `InputError` names the key if it means nothing."""
+    with at_key(key):
+        return descriptor_named(structure, text)
+
+
+def descriptors_of(
+    structure: Structure, values: Mapping[str, float], key: str
+) -> dict[Descriptor, float]:
+    """Look up the descriptors of values."""
+    return {descriptor_at(structure, text, key): value for text, value in values.items()}
 
 
 def _check_fixed(structure: Structure, box: Box, fixed: Mapping[str, float]) -> None:

@@ -7,6 +7,7 @@ RESULTS = "results.h5"
 REPORT = "index.html"
 
 SURFACE = "surface"
+DIAGRAM = "diagram"
 PLANE = "parameter-plane"
 STABLE_PLANE = "stable-plane"
 
@@ -29,6 +30,11 @@ def route_figures(name: str) -> RouteFigures:
 def map_files(name: str) -> str:
     """Beginning of the names of all files of the map called `name`: a figure and two tables."""
     return f"{name}-map"
+
+
+def task_files(table: str, name: str) -> str:
+    """Beginning of the names of the files of a question of one kind."""
+    return f"{name}-{table}"
 
 
 def schedule_table(name: str) -> str:

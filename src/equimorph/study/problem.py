@@ -1,8 +1,8 @@
 """Study files: what a user may write, checked before anything is computed.
 
 A study is data only. It names a structure and what is wanted: a part of its equilibrium set, with
-equilibria at points and routes between states, or maps over actuators, or both. Types are strict
-and unknown keys are refused.
+equilibria at points and questions on it, like routes between states, or maps over actuators, or
+both. Types are strict and unknown keys are refused.
 """
 
 from pathlib import Path
@@ -14,7 +14,13 @@ from equimorph.study.complaint import complaint
 from equimorph.study.sections.extent import PointSection, SetSection
 from equimorph.study.sections.fields import Section, TaskSection, requirement
 from equimorph.study.sections.structures import StructureSection
-from equimorph.study.sections.tasks import MapSection, RouteSection
+from equimorph.study.sections.tasks import (
+    EstimateSection,
+    MapSection,
+    OptimumSection,
+    RouteSection,
+    ShapeSection,
+)
 from equimorph.study.syntax import parse_toml
 
 
@@ -26,6 +32,9 @@ class Study(Section):
     equilibrium_set: SetSection | None = Field(default=None, alias="set")
     equilibria: list[PointSection] = Field(default_factory=list)
     routes: list[RouteSection] = Field(default_factory=list, alias="route")
+    shapes: list[ShapeSection] = Field(default_factory=list, alias="shape")
+    optima: list[OptimumSection] = Field(default_factory=list, alias="optimum")
+    estimates: list[EstimateSection] = Field(default_factory=list, alias="estimate")
     maps: list[MapSection] = Field(default_factory=list, alias="map")
 
     @property
@@ -47,7 +56,7 @@ class Study(Section):
         asked = [section for sections in self.tasks.values() for section in sections]
         if self.equilibrium_set is None:
             if self.equilibria or any(section.needs_set for section in asked):
-                raise requirement("have a [set] in which its equilibria and routes are")
+                raise requirement("have a [set] to which its equilibria and questions belong")
             if not asked:
                 raise requirement("ask for something: a [set] or a [[map]]")
         return self

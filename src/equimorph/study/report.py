@@ -5,18 +5,16 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from equimorph.manifold import Audit
 from equimorph.model import Descriptor
 from equimorph.structures import States
 from equimorph.study import html
-from equimorph.study.names import PLANE, STABLE_PLANE, SURFACE
+from equimorph.study.names import DIAGRAM, PLANE, STABLE_PLANE, SURFACE
 from equimorph.study.outcome import Outcome
 from equimorph.study.prepare import Problem
-
-ROOM = 0.03
-"""Empty border of a sketch, so that its line is not cut."""
+from equimorph.study.tables import EXPLANATION, table_of_states
 
 
 def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
@@ -68,46 +66,27 @@ def _equilibria(
         return [heading, "<p>None within the constraints.</p>"]
     # Leading with what a reader looks for: the highest first.
     order: Int[np.ndarray, " lanes"] = np.argsort(-descriptors[0](states))
-    states = states[order]
-    shapes = states.shape()
-    box = np.stack([shapes.min(axis=(0, 1)) - ROOM, shapes.max(axis=(0, 1)) + ROOM])
-    columns = [_numbers(each(states)) for each in descriptors]
-    stability = ["stable" if index == 0 else f"index {index}" for index in states.index]
-    numbers = zip(
-        stability, *columns, _numbers(states.margin), _numbers(states.energy), strict=True
-    )
-    rows = [[html.sketch(shape, box), *cells] for shape, cells in zip(shapes, numbers, strict=True)]
-    shown = [*descriptors, states.structure.descriptor("energy")]
-    units = [f"{escape(each.name)} ({escape(each.unit)})" for each in shown]
-    head = ["shape", "", *units[:-1], "margin", units[-1]]
-    kinds = ["" if index == 0 else "unstable" for index in states.index]
     return [
         heading,
         f"<p>{len(states)} found, {len(states.stable)} of them stable.</p>",
-        html.table(head, rows, kinds),
-        "<p>Index: number of directions in which the energy falls. Margin: smallest stiffness in "
-        "any direction, negative where unstable.</p>",
+        table_of_states(states[order], descriptors),
+        EXPLANATION,
     ]
-
-
-def _numbers(values: Float[np.ndarray, " lanes"]) -> list[str]:
-    return [html.number(value) for value in values]
 
 
 def _set(outcome: Outcome, audit: Audit, folder: Path) -> list[str]:
     word = "clean" if audit.clean else "not clean: do not rely on the set where it says so"
+    captions = {
+        SURFACE: "The equilibrium set, coloured by index, with its folds.",
+        DIAGRAM: "Equilibria over the free parameter: stable ones as full lines.",
+        STABLE_PLANE: "Number of stable equilibria.",
+        PLANE: "Number of equilibria over the free parameters.",
+    }
     pictures = [
-        html.figure(
-            folder / f"{SURFACE}.png",
-            "The equilibrium set, coloured by index, with its folds.",
-            larger=f"{SURFACE}.svg",
-            wide=True,
-        ),
-        html.still(folder, STABLE_PLANE, "Number of stable equilibria."),
+        html.figure(folder / f"{name}.png", caption, larger=f"{name}.svg", wide=name == SURFACE)
+        for name, caption in captions.items()
+        if (folder / f"{name}.png").exists()
     ]
-    if not outcome.of("route"):
-        caption = "Number of equilibria over the free parameters."
-        pictures.append(html.still(folder, PLANE, caption))
     rows = [[escape(what), escape(value)] for what, value in audit.rows()]
     return [
         "<h2>Equilibrium set</h2>",

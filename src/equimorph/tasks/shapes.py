@@ -1,7 +1,7 @@
 """`solve_shape`: all equilibria of a set whose descriptors take given values."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal
@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.nearest import local_minima
-from equimorph.model import Constraint, Descriptor
+from equimorph.model import NOT_KEPT, Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.kinematics import Predictor, aimed, best_fits, family, predictor
 from equimorph.tasks.optimising.plane import Spots, spots_of
@@ -65,9 +65,9 @@ class Shapes:
     routes: tuple[Route, ...]
     closest: State
     miss: Mapping[str, float]
-    known: Predictor
     wanted: Float[np.ndarray, " k"]
     within: tuple[Constraint, ...]
+    known: Predictor | None = field(default=None, metadata=NOT_KEPT)
 
     def __repr__(self) -> str:
         """How many there are, or why there is none."""
@@ -98,12 +98,13 @@ class Shapes:
     @cached_property
     def nearest(self) -> State | None:
         """Stable state within the constraints that comes nearest to the targets."""
-        eset = self.known.eset
+        known = self._known
+        eset = known.eset
         allowed = feasible_vertices(eset, self.within)
         if not allowed.any():
             allowed = stable_vertices(eset)
         within = (*self.within, stability(eset.structure, 0.0))
-        found, _ = best_fits(self.known, self.wanted, within, allowed)
+        found, _ = best_fits(known, self.wanted, within, allowed)
         return found[0] if len(found) else None
 
     @cached_property
@@ -112,9 +113,19 @@ class Shapes:
 
         None for as many targets as free parameters, or more.
         """
-        if len(self.wanted) >= len(self.known.eset.names):
+        known = self._known
+        if len(self.wanted) >= len(known.eset.names):
             return None
-        return family(self.known, self.wanted)
+        return family(known, self.wanted)
+
+    @property
+    def _known(self) -> Predictor:
+        if self.known is None:
+            raise InputError(
+                "`Shapes` read from a file must be solved again for what its set knows; got one "
+                "without the set."
+            )
+        return self.known
 
 
 def solve_shape(
@@ -225,7 +236,7 @@ def _answer(
     order_by: tuple[Rank, list[Route]],
 ) -> Shapes:
     """Solutions in order."""
-    known, wanted, _ = question
+    known, wanted, within = question
     rank, routes = order_by
     index = states.index if len(states) else np.zeros(0, int)
     own = np.zeros(len(states))
@@ -242,7 +253,7 @@ def _answer(
     why = "" if status == "solved" else _why(known.descriptors, wanted, miss)
     return Shapes(
         status, why, states[order], index[order], misfit[order],
-        tuple(routes[k] for k in order) if routes else (), closest, miss, *question,
+        tuple(routes[k] for k in order) if routes else (), closest, miss, wanted, within, known,
     )  # fmt: skip
 
 

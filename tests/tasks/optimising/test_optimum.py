@@ -150,6 +150,22 @@ def test_the_inverted_optimum_can_be_reached_and_the_way_is_planned(arch_set, en
     assert found.schedule.margins.min() >= 0.04
 
 
+@pytest.mark.parametrize("load", [0.02, 0.03])
+def test_optima_on_several_bounds_are_reached(spring_set, load):
+    """Two bounds meet at the fold F = sin³δ under F ≥ 0.02; F itself is least all along one."""
+    spring = spring_set.structure
+    at_least = em.value_of(spring, "F") >= 0.02
+    above = spring_set.at(x_l=0.8, F=load).stable
+    start = max(above, key=spring.angle)
+    flattest = em.optimise(spring_set, spring.angle, within=[at_least], start=start)
+    np.testing.assert_allclose(flattest.best.value, np.arcsin(0.02 ** (1.0 / 3.0)), rtol=1e-7)
+    assert flattest.best.route.arrived
+    assert flattest.best.route.schedule.values[:, 1].min() >= 0.02 - 2e-9
+    lightest = em.optimise(spring_set, em.value_of(spring, "F"), within=[at_least], start=start)
+    np.testing.assert_allclose(lightest.best.value, 0.02, rtol=1e-7)
+    assert lightest.best.route.arrived
+
+
 def test_bad_questions_are_refused(level_set_of_spring, spring_set):
     eset = level_set_of_spring
     angle = eset.structure.descriptor("angle")

@@ -2,8 +2,17 @@
 
 from typing import Any
 
+from equimorph.study.kinds.estimate import EstimateKind
 from equimorph.study.kinds.kind import Kind
 from equimorph.study.kinds.map import MapKind
+from equimorph.study.kinds.optimum import OptimumKind
 from equimorph.study.kinds.route import RouteKind
+from equimorph.study.kinds.shape import ShapeKind
 
-KINDS: tuple[Kind[Any, Any, Any], ...] = (RouteKind(), MapKind())
+KINDS: tuple[Kind[Any, Any, Any], ...] = (
+    RouteKind(),
+    ShapeKind(),
+    OptimumKind(),
+    EstimateKind(),
+    MapKind(),
+)

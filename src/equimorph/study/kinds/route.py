@@ -16,7 +16,7 @@ from equimorph.storage.parts import JOURNEY_PART, Journey
 from equimorph.study import html
 from equimorph.study.choose import choose_state
 from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.lookup import Ground, at_key, check_choice, check_point, constraints_of
+from equimorph.study.lookup import Ground, at_key, check_point, check_state, constraints_of
 from equimorph.study.names import route_figures, schedule_table
 from equimorph.study.sections.tasks import RouteSection
 from equimorph.tasks import plan
@@ -40,8 +40,7 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
     def prepared(self, ground: Ground, section: RouteSection, key: str) -> RouteTask:
         """Look up ends, way-points and constraints."""
         for end, state in (("start", section.start), ("goal", section.goal)):
-            check_point(ground.box, state.at, f"{key}.{end}.at")
-            check_choice(ground.structure, state, f"{key}.{end}")
+            check_state(ground, state, f"{key}.{end}")
         for i, corner in enumerate(section.via or ()):
             check_point(ground.box, corner, f"{key}.via[{i}]", whole=False)
         constraints = constraints_of(ground.structure, section.within, f"{key}.within")
@@ -75,41 +74,36 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
     def figures(
         self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, answer: Journey
     ) -> Sequence[Figure]:
-        """Plane, shapes, margins and film; of a refused route the plane alone."""
+        """Shapes and margins; over two parameters also the plane, alone if refused, and a film."""
         assert eset is not None
         names, route = route_figures(task.section.name), answer.route
         plane = still(names.plane, partial(plotting.parameter_plane, eset, route))
-        if not route.arrived:
-            return [plane]
-        return [
-            plane,
-            still(names.shapes, partial(plotting.shapes, route)),
-            still(names.margins, partial(plotting.margins, route)),
-            Figure((names.film,), lambda folder: _draw_film(eset, answer, folder / names.film)),
-        ]
+        shapes = still(names.shapes, partial(plotting.shapes, route))
+        margins = still(names.margins, partial(plotting.margins, route))
+        if len(eset.names) != 2:
+            return [shapes, margins] if route.arrived else []
+        film = Figure((names.film,), partial(_draw_film, eset, answer, names.film))
+        return [plane, shapes, margins, film] if route.arrived else [plane]
 
     def report(self, task: RouteTask, answer: Journey, folder: Path) -> list[str]:
         """Verdict, schedule and figures."""
         name, route = task.section.name, answer.route
         names = route_figures(name)
         heading = f"<h2>Route {escape(name)}</h2>"
-        plane = html.still(folder, names.plane, "The route on the plane of the free parameters.")
+        captions = {
+            f"{names.plane}.png": "The route on the plane of the free parameters.",
+            f"{names.shapes}.png": "Shapes at equal steps along the route, start to goal.",
+            f"{names.margins}.png": "How far each state is from instability along the route.",
+        }
+        pictures = html.pictures(folder, {names.film: "The structure along the route."}, captions)
         if not route.arrived:
-            return [heading, html.refused(route.why), f'<div class="figures">{plane}</div>']
-        shapes = "Shapes at equal steps along the route, start to goal."
-        margins = "How far each state is from instability along the route."
-        pictures = [
-            html.figure(folder / names.film, "The structure along the route.", wide=True),
-            plane,
-            html.still(folder, names.shapes, shapes),
-            html.still(folder, names.margins, margins),
-        ]
+            return [heading, html.refused(route.why), pictures]
         return [
             heading,
             '<p class="verdict"><strong>Arrived.</strong> Every state on the way is stable: '
             f"smallest margin {html.number(route.margin)}, length {html.number(route.length)}.</p>",
             html.schedule_links(schedule_table(name)),
-            f'<div class="figures">{"".join(pictures)}</div>',
+            pictures,
         ]
 
     def verdict(self, task: RouteTask, answer: Journey) -> str:
@@ -123,5 +117,5 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
         )
 
 
-def _draw_film(eset: EquilibriumSet, journey: Journey, path: Path) -> None:
-    plotting.film(journey.route, path, eset=eset)
+def _draw_film(eset: EquilibriumSet, journey: Journey, name: str, folder: Path) -> None:
+    plotting.film(journey.route, folder / name, eset=eset)

@@ -1,28 +1,39 @@
 """What part of an equilibrium set a study speaks of, and which of its states."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, model_validator
 
 from equimorph.study.sections.fields import (
     ComparisonText,
+    Count,
     Interval,
-    Intervals,
     Point,
     Section,
     one,
     requirement,
-    two,
 )
+
+
+def _one_to_three(table: dict[str, Any]) -> dict[str, Any]:
+    if not 1 <= len(table) <= 3:
+        raise requirement("span one, two or three free parameters")
+    return table
 
 
 class SetSection(Section):
     """The part of the equilibrium set that is wanted."""
 
-    box: Annotated[dict[str, Interval], AfterValidator(two)]
+    box: Annotated[dict[str, Interval], AfterValidator(_one_to_three)]
     fixed: Point = Field(default_factory=dict)
     within: list[ComparisonText] = Field(default_factory=list)
-    intervals: Intervals | None = None
+    intervals: list[Count] | None = None
+
+    @model_validator(mode="after")
+    def _one_each(self) -> "SetSection":
+        if self.intervals is not None and len(self.intervals) != len(self.box):
+            raise requirement("give one number of intervals for each parameter of its box")
+        return self
 
 
 class PointSection(Section):

@@ -1,4 +1,4 @@
-"""Questions of a study file: routes and maps."""
+"""Questions of a study file."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -36,6 +36,33 @@ class RouteSection(TaskSection):
     via: list[Annotated[Point, Field(min_length=1)]] | None = Field(default=None, min_length=1)
     within: list[ComparisonText] = Field(default_factory=list)
     margin: float = Field(default=0.0, ge=0, le=LARGEST)
+
+
+class ShapeSection(TaskSection):
+    """All states whose descriptors have given values; see `equimorph.solve_shape`."""
+
+    targets: dict[str, Number] = Field(min_length=1)
+    start: StateSection | None = None
+    rank: Literal["route", "energy", "margin"] | None = None
+    within: list[ComparisonText] = Field(default_factory=list)
+
+
+class OptimumSection(TaskSection):
+    """The best stable states; see `equimorph.optimise`."""
+
+    objective: str
+    sense: Literal["min", "max"] = "min"
+    start: StateSection | None = None
+    within: list[ComparisonText] = Field(default_factory=list)
+    margin: float = Field(default=0.0, ge=0, le=LARGEST)
+
+
+class EstimateSection(TaskSection):
+    """Branch and load of a measured structure; see `equimorph.estimate_state`."""
+
+    measured: dict[str, Number] = Field(min_length=1)
+    errors: dict[str, Annotated[float, Field(gt=0, le=LARGEST)]] = Field(min_length=1)
+    confidence: float = Field(default=0.95, gt=0.5, lt=1.0)
 
 
 class MapSection(TaskSection):

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria import check_start
+from equimorph.equilibria import check_start, newton
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.nearest import local_minima
@@ -321,7 +321,7 @@ def _reached(
     """Optima from the first on to which a route leads."""
     within, margin = demands
     for number, (end, optimum) in enumerate(found):
-        goal = _before_the_edge(programme, end) or optimum.state
+        goal = _in_the_box(programme, _before_the_edge(programme, end) or optimum.state)
         route = plan(programme.eset, start, goal, within=within, margin=0.99 * margin)
         if route.arrived:
             first = Optimum(optimum.state, optimum.value, optimum.certificate, route)
@@ -330,14 +330,26 @@ def _reached(
 
 
 def _before_the_edge(programme: Programme, end: Settled) -> State | None:
-    """State a little inside the stability boundary, if the point is on it."""
-    for k, constraint in enumerate(programme.all):
-        if is_stability(constraint) and abs(end.expansion.g[0, k]) < VIOLATED:
-            slope = end.expansion.g_slope[0, k]
-            step = -STEP_BACK * slope / max(float(np.linalg.norm(slope)), 1e-300)
-            spot = Spots(end.spot.z, end.spot.p, end.spot.rows)
-            guess = stepped(programme.setting, spot, end.frames, step[None])
-            there, good = settled(programme.setting, *guess, spot.rows)
-            if good[0]:
-                return State(programme.eset.structure, there.z[0], there.p[0])
-    return None
+    """State a little inside the stability boundary, if the point is on it.
+
+    Inside all bounds that are active there, so that none is violated on the way back.
+    """
+    active = np.flatnonzero(np.abs(end.expansion.g[0]) < VIOLATED)
+    if not any(is_stability(programme.all[k]) for k in active):
+        return None
+    slopes = end.expansion.g_slope[0, active]
+    slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-300)
+    step, *_ = np.linalg.lstsq(slopes, np.full(len(active), -STEP_BACK), rcond=1e-6)
+    spot = Spots(end.spot.z, end.spot.p, end.spot.rows)
+    guess = stepped(programme.setting, spot, end.frames, step[None])
+    there, good = settled(programme.setting, *guess, spot.rows)
+    return State(programme.eset.structure, there.z[0], there.p[0]) if good[0] else None
+
+
+def _in_the_box(programme: Programme, state: State) -> State:
+    """State whose parameters do not exceed the box by rounding."""
+    box, free = programme.eset.box, programme.setting.free
+    p = state.p.copy()
+    p[free] = np.clip(p[free], box.lower, box.upper)
+    z, good = newton(state.structure, state.z[None], p[None])
+    return State(state.structure, z[0], p) if good[0] else state

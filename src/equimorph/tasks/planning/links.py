@@ -49,7 +49,7 @@ class Demands:
         count = structure.solve(states.z, states.p, nothing, shift=shift).negative
         good = np.asarray(count == structure.constraints)
         for constraint in self.constraints:
-            good[good] = constraint.excess(states.z[good], states.p[good]) <= 1e-9
+            good[good] = constraint.excess(states.z[good], states.p[good]) <= 0.0
         return good
 
 

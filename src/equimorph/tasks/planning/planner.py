@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.equilibria import check_start, way_points
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, position
+from equimorph.model import Constraint, Descriptor, eased, position
 from equimorph.structures import State, States
 from equimorph.tasks.planning.links import Demands
 from equimorph.tasks.planning.network import cheapest_path, no_route
@@ -70,7 +70,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
         raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
     demands = Demands(
         objective_of(objective, eset.structure),
-        tuple(dict.fromkeys((*eset.constraints, *within))),
+        tuple(eased(each) for each in dict.fromkeys((*eset.constraints, *within))),
         margin,
     )
     ends = {"start": start, "goal": goal}
