@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
+from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame import descriptors
 from equimorph.structures.frame.accuracy import discretisation_error
 from equimorph.structures.frame.checks import refuse_singular
@@ -18,6 +19,7 @@ from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import Network, network
 from equimorph.structures.frame.patterns import Given, Patterns, patterns
 from equimorph.structures.frame.support import support_data
+from equimorph.structures.frame.symmetry import symmetries
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.unit_system import Quantity, unit_system
 
@@ -165,6 +167,14 @@ class Frame(FrameFields):
     def natural_guess(self, p: Parameters) -> Lanes:
         """The frame as drawn."""
         return np.zeros((len(p), self.size))
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Mirror images and half turns that leave the frame as it is."""
+        return self._symmetries
+
+    @cached_property
+    def _symmetries(self) -> tuple[Symmetry, ...]:
+        return symmetries(self)
 
     @cached_property
     def refined(self) -> "Frame":

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
@@ -9,11 +10,13 @@ from jaxtyping import Float
 
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
+from equimorph.structures.contract import Symmetry
 from equimorph.structures.natural import corrected
 from equimorph.structures.truss import descriptors
 from equimorph.structures.truss.mechanics import TrussMechanics
 from equimorph.structures.truss.network import AXES, Network, network
 from equimorph.structures.truss.strain import Energies, Strain
+from equimorph.structures.truss.symmetry import symmetries
 from equimorph.structures.unit_system import Quantity, unit_system
 
 Lanes = Float[np.ndarray, "lanes size"]
@@ -210,6 +213,14 @@ class Truss(TrussMechanics):
     def natural_guess(self, p: Parameters) -> Lanes:
         """The state at rest."""
         return np.repeat(self._start[None], len(p), axis=0)
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Mirror images and half turns that leave the truss as it is."""
+        return self._symmetries
+
+    @cached_property
+    def _symmetries(self) -> tuple[Symmetry, ...]:
+        return symmetries(self)
 
     def force(self, bar: str) -> Descriptor:
         """Force in a bar, positive in tension."""

@@ -1,0 +1,73 @@
+"""Mirror images of networks of joints, and structures that are their own."""
+
+from collections.abc import Callable, Iterator
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.structures.contract import Structure
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Apply = Callable[[Lanes, Parameters], tuple[Lanes, Parameters]]
+Signs = Float[np.ndarray, " space"]
+Joints = Int[np.ndarray, " joints"]
+
+SAME = 1e-9
+"""Largest difference, relative to what is compared, of equal numbers."""
+NAMES: dict[tuple[int, ...], str] = {
+    (-1, 1): "mirror",
+    (1, -1): "reflection",
+    (-1, -1): "half turn",
+}
+
+
+def images(places: Float[np.ndarray, "joints space"]) -> Iterator[tuple[str, Signs, Joints]]:
+    """Reflections and half turns about the middle that take joints to joints.
+
+    Yields
+    ------
+    Name, signs of the axes, and the joint in the place of whose image each joint comes to be.
+    """
+    middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    near = SAME * np.ptp(places, axis=0).max()
+    for signs in product((1, -1), repeat=places.shape[1]):
+        if min(signs) == 1:
+            continue
+        moved = middle + np.array(signs) * (places - middle)
+        apart = np.abs(moved[:, None] - places).max(axis=2)
+        there = apart.argmin(axis=1)
+        if (apart.min(axis=1) <= near).all() and len(set(there.tolist())) == len(places):
+            flipped = "".join(axis for axis, sign in zip("xyz", signs, strict=False) if sign < 0)
+            yield NAMES.get(signs, f"image in {flipped}"), np.array(signs, float), there
+
+
+def sign_between(a: np.ndarray, b: np.ndarray) -> float | None:
+    """1 if two arrays are equal, −1 if one is minus the other, else None."""
+    near = SAME * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
+    for sign in (1.0, -1.0):
+        if np.abs(a - sign * b).max(initial=0.0) <= near:
+            return sign
+    return None
+
+
+def is_symmetry(structure: Structure, apply: Apply) -> bool:
+    """Whether an image of unknowns and parameters leaves the Lagrangian as it is.
+
+    Tested at random points and along random directions there: with L the same, D L at the image
+    along the image of a direction is that at the point along the direction.
+    """
+    generator = np.random.default_rng(20)
+    count, n = 6, structure.unknowns
+    z = 0.1 * generator.normal(size=(count, structure.size))
+    z[:, :n] /= np.sqrt(structure.mass * n)
+    p = 0.1 * generator.normal(size=(count, len(structure.parameters))) * structure.scales
+    dz = generator.normal(size=z.shape)
+    there, at = apply(z, p)
+    # images are affine in (z, p): their linear part is the difference of two of them
+    moved = apply(z + dz, p)[0] - there
+    here = (structure.residual(z, p) * dz).sum(axis=1)
+    image = (structure.residual(there, at) * moved).sum(axis=1)
+    size = np.abs(structure.residual(z, p) * dz).sum(axis=1)
+    return bool((np.abs(here - image) <= SAME * size).all())
