@@ -18,7 +18,15 @@ from equimorph.tasks.maps import (
     natural_states_over,
     unloaded_base,
 )
-from equimorph.tasks.optimising import Certificate, Optima, Optimum, optimise
+from equimorph.tasks.optimising import (
+    Certificate,
+    Optima,
+    Optimum,
+    Strongest,
+    StrongestSettings,
+    optimise,
+    strongest,
+)
 from equimorph.tasks.planning import Objective, SamplingOptions, plan, plan_sampled
 from equimorph.tasks.reach import Reach, attainable, reachable
 from equimorph.tasks.robustness import (
@@ -63,6 +71,8 @@ __all__ = [
     "Sensitivity",
     "Shapes",
     "StateEstimate",
+    "Strongest",
+    "StrongestSettings",
     "Tracking",
     "Trials",
     "Verification",
@@ -84,6 +94,7 @@ __all__ = [
     "solve_shape",
     "solve_shapes",
     "stable_room",
+    "strongest",
     "track",
     "unloaded_base",
     "verify",

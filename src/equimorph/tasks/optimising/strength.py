@@ -1,0 +1,311 @@
+"""`strongest`: actuator settings with the largest limit load, for sure settings and robust ones."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from equimorph.equilibria import LimitLoad
+from equimorph.errors import InputError
+from equimorph.tasks.maps import LimitLoadMap, MapCurve
+from equimorph.tasks.optimising.climbing import climb
+from equimorph.tasks.optimising.minimax import raised
+from equimorph.tasks.optimising.ridges import highest
+
+Settings = Float[np.ndarray, "lanes 2"]
+Values = Float[np.ndarray, " lanes"]
+
+BESIDE = 10.0 ** -np.arange(2.0, 7.0)
+"""Distances from a ridge, in scales, at which both sides are looked at."""
+CANDIDATES = 4
+ROBUST = 2
+"""Local maxima of the worst case over the vertices from which robust optima are searched."""
+HOPELESS = 0.9
+"""Curves whose values stay below this share of what was found are left out."""
+LEVEL = 1e-3
+"""Slope along a curve at which its top is reached."""
+SAME = 1e-4
+"""Distance in scales below which two optima are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strongest:
+    """A setting with a locally largest limit load: with the least upper bound, at a cliff.
+
+    Parameters
+    ----------
+    setting, value
+        Where, and the limit load there. On a ridge the value is that on the ridge itself.
+    kind
+        "interior" where the map is smooth, else the kind of the map's curve on which it lies, with
+        ", cliff" if its value is the limit from one side; or "edge": at a kink or jump whose cause
+        is not known; or "robust".
+    slope
+        Of the load along the curve, or largest slope of the map at an interior optimum: what is
+        left of the condition that it vanishes.
+    sides
+        On a curve: limit loads on both sides at `distances` across it.
+    limit
+        The limit load at the setting, with its path.
+    """
+
+    setting: Mapping[str, float]
+    value: float
+    kind: str
+    slope: float
+    distances: Values
+    sides: Float[np.ndarray, "2 distances"]
+    limit: LimitLoad
+
+    def __repr__(self) -> str:
+        """Value, setting and kind."""
+        at = ", ".join(f"{name} = {value:.6g}" for name, value in self.setting.items())
+        return f"Strongest({self.value:.8g} at {at}: {self.kind})"
+
+    @property
+    def one_sided(self) -> tuple[float, float]:
+        """Limits of the limit load towards the optimum from both sides across its curve.
+
+        Extrapolated from the three closest distances, which grow by equal factors, with whatever
+        power of the distance they follow: 2/3 at branch points.
+        """
+        far, middle, near = self.sides[:, -3:].T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = (near - middle) / (middle - far)
+            limits = near + np.nan_to_num((near - middle) * share / (1.0 - share))
+        return float(limits[0]), float(limits[1])
+
+
+@dataclass(frozen=True, eq=False)
+class StrongestSettings:
+    """Answer to "which setting carries most".
+
+    Parameters
+    ----------
+    status
+        "found", or "refused" with the reason in `why`.
+    all
+        Local optima, the best first.
+    offsets
+        Imperfections against which the answer is safe; empty for a sure setting.
+    guaranteed
+        Of a robust optimum: the smallest limit load over the imperfections, which was made as large
+        as possible. Else that of the best setting: its value.
+    price
+        Of a robust optimum: what is lost against the best sure setting if there is no imperfection.
+    at_risk
+        Of a robust optimum: the smallest limit load over the imperfections at the best sure
+        setting.
+    """
+
+    status: Literal["found", "refused"]
+    why: str
+    all: tuple[Strongest, ...]
+    offsets: Mapping[str, float]
+    guaranteed: float
+    price: float
+    at_risk: float
+
+    def __repr__(self) -> str:
+        """The best, and its guarantee."""
+        if self.status == "refused":
+            return f"StrongestSettings(refused: {self.why})"
+        text = f"StrongestSettings({self.best}"
+        return f"{text}; guaranteed {self.guaranteed:.6g})" if self.offsets else f"{text})"
+
+    @property
+    def best(self) -> Strongest:
+        """The best one."""
+        return self.all[0]
+
+    @property
+    def margin(self) -> float:
+        """How far the guaranteed load lies above the worst case of the best sure setting."""
+        return self.guaranteed - self.at_risk
+
+
+def strongest(
+    lmap: LimitLoadMap, *, offsets: Mapping[str, float] | None = None
+) -> StrongestSettings:
+    """Find the actuator settings with the largest limit load.
+
+    The vertices of the map that no neighbour beats, and the highest points of the curves on which
+    it bends or jumps, are candidates. On ridges (branch points, exchanges) the load is made
+    stationary along the curve of states with the tests that vanish there; elsewhere parabolas
+    through rays are climbed.
+
+    Parameters
+    ----------
+    lmap
+        Map of limit loads; rays are its functions.
+    offsets
+        Largest errors of the settings, by name: the smallest limit load over their box (its centre,
+        corners and middles of sides) is made as large as possible.
+
+    Raises
+    ------
+    InputError
+        For offsets of other names, or such that are not positive.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> arch = em.Rod()
+    >>> grid = em.Grid(Theta=(0.8, 1.2, 4), Delta=(-0.2, 0.2, 6))
+    >>> lmap = em.limit_load_map(arch, grid, "q", within=[arch.max_curvature <= 10])
+    >>> best = em.strongest(lmap).best
+    >>> round(best.value, 4), best.kind
+    (4.265, 'branch point')
+    """
+    given = dict(offsets or {})
+    for name, size in given.items():
+        if name not in lmap.grid.names or not (np.isfinite(size) and size > 0.0):
+            raise InputError(
+                f"`offsets` must be positive, of {' or '.join(lmap.grid.names)}; "
+                f"got {name}: {size!r}."
+            )
+    if not np.isfinite(lmap.value).any():
+        why = "no setting of the map has a limit load"
+        return StrongestSettings("refused", why, (), given, np.nan, np.nan, np.nan)
+    sure = _sure(lmap)
+    if not given:
+        value = sure[0].value
+        return StrongestSettings("found", "", tuple(sure), {}, value, 0.0, value)
+    return _robust(lmap, sure[0], given)
+
+
+def _sure(lmap: LimitLoadMap) -> list[Strongest]:
+    """Local optima without imperfections, the best first."""
+    found: list[Strongest] = []
+    for curve in sorted(lmap.curves, key=lambda each: -_level(each)):
+        if found and _level(curve) < HOPELESS * found[0].value:
+            continue
+        ridge = highest(lmap, curve)
+        if ridge is None or not lmap.grid.box.contains(ridge.setting, slack=1e-9):
+            continue
+        if ridge.slope > LEVEL:  # the end of a curve
+            continue
+        sides = _sides(lmap, ridge.setting, ridge.across)
+        if np.isfinite(sides).any() and np.isfinite(ridge.value):
+            kind = f"{curve.kind}, cliff" if ridge.cliff else curve.kind
+            what = (ridge.value, kind, ridge.slope)
+            found.append(_strongest(lmap, ridge.setting, what, sides))
+    vertices = _vertices(lmap, lmap.value)
+    smooth = vertices[~_near_curves(lmap, vertices)]
+    for setting in smooth if found else vertices[:1]:
+        top = climb(lmap.rays, setting, _steps(lmap), lmap.grid.box)
+        sides = _sides(lmap, top.setting, _steps(lmap) / np.linalg.norm(_steps(lmap)))
+        what = (top.value, "interior" if top.smooth else "edge", float(np.abs(top.slope).max()))
+        found.append(_strongest(lmap, top.setting, what, sides))
+    return _distinct(lmap, found)
+
+
+def _level(curve: MapCurve) -> float:
+    """Highest known value at a curve."""
+    return float(np.nan_to_num(curve.values[:, 1]).max(initial=0.0))
+
+
+def _near_curves(lmap: LimitLoadMap, settings: Settings) -> Bool[np.ndarray, " lanes"]:
+    """Settings closer than two grid steps to a curve on which the map is not smooth."""
+    places = [curve.points for curve in lmap.curves]
+    if not places:
+        return np.zeros(len(settings), bool)
+    gap = np.abs(settings[:, None] - np.concatenate(places)[None]) / _steps(lmap)
+    return np.asarray((gap.max(axis=2) < 2.0).any(axis=1))
+
+
+def _distinct(lmap: LimitLoadMap, found: list[Strongest]) -> list[Strongest]:
+    """The best first; climbs that ended beside a ridge count as the ridge."""
+    kept: list[Strongest] = []
+    order = {"edge": 1}
+    for each in sorted(found, key=lambda one: (order.get(one.kind, 0), -one.value)):
+        place = np.array(list(each.setting.values()))
+        close = [
+            other
+            for other in kept
+            if np.abs(place - list(other.setting.values())).max()
+            < (SAME if each.kind != "edge" else _steps(lmap).max())
+        ]
+        if not close:
+            kept.append(each)
+    return sorted(kept, key=lambda one: -one.value)
+
+
+def _steps(lmap: LimitLoadMap) -> Float[np.ndarray, " 2"]:
+    """Spacing of the grid."""
+    box = lmap.grid.box
+    return np.asarray((box.upper - box.lower) / np.array(lmap.grid.intervals))
+
+
+def _vertices(lmap: LimitLoadMap, value: Float[np.ndarray, "rows columns"]) -> Settings:
+    """Vertices of the grid that none of their eight neighbours beats, the best first."""
+    padded = np.pad(np.where(np.isfinite(value), value, -np.inf), 1, constant_values=-np.inf)
+    rows, columns = value.shape
+    around = [
+        padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
+        for i, j in product((-1, 0, 1), repeat=2)
+        if (i, j) != (0, 0)
+    ]
+    top = np.isfinite(value) & (np.where(np.isfinite(value), value, -np.inf) >= np.max(around, 0))
+    i, j = np.nonzero(top)
+    best = np.argsort(-value[i, j], kind="stable")[:CANDIDATES]
+    axes = lmap.grid.axes()
+    return np.stack([axes[0][i[best]], axes[1][j[best]]], axis=1)
+
+
+def _sides(
+    lmap: LimitLoadMap, setting: Float[np.ndarray, " 2"], across: Float[np.ndarray, " 2"]
+) -> Float[np.ndarray, "2 distances"]:
+    """Limit loads on both sides of a setting."""
+    steps = BESIDE[:, None] * across
+    return lmap.rays(np.concatenate([setting - steps, setting + steps])).reshape(2, -1)
+
+
+def _strongest(
+    lmap: LimitLoadMap,
+    setting: Float[np.ndarray, " 2"],
+    what: tuple[float, str, float],
+    sides: Float[np.ndarray, "2 distances"],
+) -> Strongest:
+    box = lmap.grid.box
+    place = np.clip(setting, box.lower, box.upper)
+    at = dict(zip(lmap.grid.names, place.tolist(), strict=True))
+    return Strongest(at, *what, BESIDE, sides, lmap.at(**at))
+
+
+def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -> StrongestSettings:
+    """Setting whose worst case is best."""
+    size = np.array([offsets.get(name, 0.0) for name in lmap.grid.names])
+    around = np.unique(np.array(list(product((-1.0, 0.0, 1.0), repeat=2))) * size, axis=0)
+
+    def pieces(settings: Settings) -> Float[np.ndarray, "lanes m"]:
+        many = (settings[:, None] + around).reshape(-1, 2)
+        values = np.nan_to_num(lmap.rays(many), nan=0.0)
+        return np.asarray(values.reshape(len(settings), -1))
+
+    def worst(settings: Settings) -> Values:
+        return np.asarray(pieces(settings).min(axis=1))
+
+    value = worst(_lattice(lmap)).reshape(lmap.value.shape)
+    radius, box = _steps(lmap), lmap.grid.box
+    ends = []
+    for vertex in _vertices(lmap, value)[:ROBUST]:
+        raised_to, _ = raised(pieces, vertex, radius, box)
+        # across a jump the search goes on in all directions
+        top = climb(worst, raised_to, 0.1 * radius, box)
+        ends.append(raised(pieces, top.setting, 0.1 * radius, box))
+    setting, guaranteed = max(ends, key=lambda end: end[1])
+    nominal = float(lmap.rays(setting[None])[0])
+    sides = _sides(lmap, setting, size / np.linalg.norm(size))
+    found = _strongest(lmap, setting, (nominal, "robust", np.nan), sides)
+    at_risk = float(worst(np.array([list(sure.setting.values())]))[0])
+    price = sure.value - nominal
+    return StrongestSettings("found", "", (found,), dict(offsets), guaranteed, price, at_risk)
+
+
+def _lattice(lmap: LimitLoadMap) -> Settings:
+    axes = lmap.grid.axes()
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
