@@ -37,6 +37,18 @@ objective = "angle"
 start = { at = { x_l = 0.8, F = 0.02 }, highest = "angle" }
 within = ["F >= 0.02", "F <= 0.1", "angle >= 0.1"]
 
+[[track]]
+name = "there-and-back"
+start = { at = { x_l = 0.8, F = 0.02 }, highest = "angle" }
+targets = [{ angle = 0.8 }, { angle = 0.5, F = 0.03 }, { angle = 0.8, F = 0.02 }]
+actuators = ["x_l"]
+
+[[track]]
+name = "too-far"
+start = { at = { x_l = 0.8, F = 0.02 }, highest = "angle" }
+targets = [{ angle = 0.5 }, { angle = 0.1 }]
+actuators = ["x_l"]
+
 [[estimate]]
 name = "seen"
 measured = { angle = 0.62, x_l = 0.8 }
@@ -80,6 +92,24 @@ def test_an_estimate_tells_the_load(run):
     np.testing.assert_allclose(estimate.state["F"], wanted, rtol=1e-9)
 
 
+def test_a_motion_is_followed_with_its_schedule(run):
+    """x_l = (1 − F/sin δ) cos δ at its end."""
+    motion = run[0].of("track")["there-and-back"]
+    assert motion.arrived
+    schedule = read_schedule(run[1] / "there-and-back-track-schedule.csv")
+    wanted = (1.0 - 0.02 / np.sin(0.8)) * np.cos(0.8)
+    np.testing.assert_allclose(schedule.values[-1, 0], wanted, rtol=1e-9)
+    assert (run[1] / "there-and-back-track-film.gif").exists()
+
+
+def test_a_motion_that_meets_instability_is_refused_with_the_place(run):
+    """At x_l = cos³δ, F = sin³δ: half-way through the second leg, where δ = 0.2749."""
+    motion = run[0].of("track")["too-far"]
+    assert motion.failure == "snap-through"
+    np.testing.assert_allclose(motion.values["angle"][-1], np.arcsin(0.02 ** (1 / 3)), rtol=1e-6)
+    assert "After 1.5" in (run[1] / "index.html").read_text(encoding="utf-8")
+
+
 def test_the_page_tells_every_answer(run):
     page = (run[1] / "index.html").read_text(encoding="utf-8")
     for words in ("Shape flat", "Shape never", "Refused.", "Optimum flattest", "Estimate seen"):
@@ -117,6 +147,20 @@ def test_the_answers_come_from_the_folder_when_asked_again(run, monkeypatch, tmp
 def test_an_optimum_that_means_nothing(wrong, message):
     with pytest.raises(InputError, match=message):
         prepare(parse_study(f'{SET}[[optimum]]\nname = "best"\n{wrong}', "spring.toml"))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ('targets = [{ angle = 0.5 }]\nactuators = ["k"]', r"free parameters .*got k"),
+        ('targets = [{ curl = 0.5 }]\nactuators = ["x_l"]', r"in `track\[0\]\.targets\[0\]`"),
+        ('targets = []\nactuators = ["x_l"]', r"`track\[0\]\.targets` must have at least 1"),
+    ],
+)
+def test_a_motion_that_means_nothing(wrong, message):
+    start = 'start = { at = { x_l = 0.8, F = 0.02 }, highest = "angle" }'
+    with pytest.raises(InputError, match=message):
+        prepare(parse_study(f'{SET}[[track]]\nname = "go"\n{start}\n{wrong}', "spring.toml"))
 
 
 @pytest.mark.parametrize(

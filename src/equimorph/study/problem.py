@@ -20,6 +20,7 @@ from equimorph.study.sections.tasks import (
     OptimumSection,
     RouteSection,
     ShapeSection,
+    TrackSection,
 )
 from equimorph.study.syntax import parse_toml
 
@@ -34,6 +35,7 @@ class Study(Section):
     routes: list[RouteSection] = Field(default_factory=list, alias="route")
     shapes: list[ShapeSection] = Field(default_factory=list, alias="shape")
     optima: list[OptimumSection] = Field(default_factory=list, alias="optimum")
+    tracks: list[TrackSection] = Field(default_factory=list, alias="track")
     estimates: list[EstimateSection] = Field(default_factory=list, alias="estimate")
     maps: list[MapSection] = Field(default_factory=list, alias="map")
 

@@ -2,22 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from html import escape
 from pathlib import Path
 
 from rich.markup import escape as plain
 
-from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Progress
 from equimorph.storage import write_schedule
 from equimorph.storage.parts import JOURNEY_PART, Journey
 from equimorph.study import html
 from equimorph.study.choose import choose_state
-from equimorph.study.kinds.kind import Figure, Kind, still
+from equimorph.study.kinds.kind import Figure, Kind
+from equimorph.study.kinds.way import figures_of_way, pictures_of_way
 from equimorph.study.lookup import Ground, at_key, check_point, check_state, constraints_of
-from equimorph.study.names import route_figures, schedule_table
+from equimorph.study.names import schedule_table
 from equimorph.study.sections.tasks import RouteSection
 from equimorph.tasks import plan
 
@@ -74,28 +73,14 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
     def figures(
         self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, answer: Journey
     ) -> Sequence[Figure]:
-        """Shapes and margins; over two parameters also the plane, alone if refused, and a film."""
-        assert eset is not None
-        names, route = route_figures(task.section.name), answer.route
-        plane = still(names.plane, partial(plotting.parameter_plane, eset, route))
-        shapes = still(names.shapes, partial(plotting.shapes, route))
-        margins = still(names.margins, partial(plotting.margins, route))
-        if len(eset.names) != 2:
-            return [shapes, margins] if route.arrived else []
-        film = Figure((names.film,), partial(_draw_film, eset, answer, names.film))
-        return [plane, shapes, margins, film] if route.arrived else [plane]
+        """Shapes, margins, plane and film."""
+        return figures_of_way(eset, task.section.name, answer.route)
 
     def report(self, task: RouteTask, answer: Journey, folder: Path) -> list[str]:
         """Verdict, schedule and figures."""
         name, route = task.section.name, answer.route
-        names = route_figures(name)
         heading = f"<h2>Route {escape(name)}</h2>"
-        captions = {
-            f"{names.plane}.png": "The route on the plane of the free parameters.",
-            f"{names.shapes}.png": "Shapes at equal steps along the route, start to goal.",
-            f"{names.margins}.png": "How far each state is from instability along the route.",
-        }
-        pictures = html.pictures(folder, {names.film: "The structure along the route."}, captions)
+        pictures = pictures_of_way(folder, name, "route")
         if not route.arrived:
             return [heading, html.refused(route.why), pictures]
         return [
@@ -115,7 +100,3 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
             f"{head}: [bold green]arrived[/] without a snap, smallest margin "
             f"{route.margin:.3f}, length {route.length:.3f}."
         )
-
-
-def _draw_film(eset: EquilibriumSet, journey: Journey, name: str, folder: Path) -> None:
-    plotting.film(journey.route, folder / name, eset=eset)

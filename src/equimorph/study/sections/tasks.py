@@ -57,6 +57,15 @@ class OptimumSection(TaskSection):
     margin: float = Field(default=0.0, ge=0, le=LARGEST)
 
 
+class TrackSection(TaskSection):
+    """A motion of descriptors, and of loads, that actuators follow; see `equimorph.track`."""
+
+    start: StateSection
+    targets: list[Annotated[dict[str, Number], Field(min_length=1)]] = Field(min_length=1)
+    actuators: list[str] = Field(min_length=1)
+    within: list[ComparisonText] = Field(default_factory=list)
+
+
 class EstimateSection(TaskSection):
     """Branch and load of a measured structure; see `equimorph.estimate_state`."""
 
