@@ -83,6 +83,8 @@ _HOMES = {
         "stability_distance",
     ),
     "equimorph.charts": (
+        "Atlas",
+        "AtlasPath",
         "Barrier",
         "Chart",
         "Charted",
@@ -91,6 +93,8 @@ _HOMES = {
         "Overlap",
         "Projection",
         "Reduction",
+        "Transition",
+        "dissect",
         "first_stable_on_path",
         "highest",
         "lowest",

@@ -1,26 +1,34 @@
 """Internal parameterisation: coordinates of the equilibrium set, and where they fail."""
 
+from equimorph.charts.atlas import Atlas, Leaf, Transition
 from equimorph.charts.barriers import Barrier
 from equimorph.charts.chart import STATUSES, Chart, Charted
+from equimorph.charts.dissecting import dissect
 from equimorph.charts.domain import Domain, Edge
 from equimorph.charts.path_rules import first_stable_on_path, quasi_static
 from equimorph.charts.projection import DescriptorChart, Projection
 from equimorph.charts.reducing import Reduction, reduce
 from equimorph.charts.rules import Rule, highest, lowest, nearest
 from equimorph.charts.sheets import Overlap
+from equimorph.charts.travel import AtlasPath
 
 __all__ = [
     "STATUSES",
+    "Atlas",
+    "AtlasPath",
     "Barrier",
     "Chart",
     "Charted",
     "DescriptorChart",
     "Domain",
     "Edge",
+    "Leaf",
     "Overlap",
     "Projection",
     "Reduction",
     "Rule",
+    "Transition",
+    "dissect",
     "first_stable_on_path",
     "highest",
     "lowest",

@@ -1,0 +1,246 @@
+"""An atlas: charts that together cover a set, and the transitions between them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.charts.chart import Chart
+from equimorph.charts.coordinates import Coordinates, coordinates_of
+from equimorph.charts.location import Cells, Found
+from equimorph.charts.travel import AtlasPath, travel
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.topology import Adjacency, adjacency, flags_of, pieces
+from equimorph.structures import State, States
+
+Points = Float[np.ndarray, "points d"]
+
+SAME = 1e-5
+"""Distance, in the metric and scaled parameters, within which a state is the one of a chart."""
+ON_CURVE = 1e-6
+"""Distance from a transition, in ranges of the parameters, within which points lie on it."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Leaf(Chart):
+    """A chart of an atlas: some cells of a set over the free parameters.
+
+    Parameters
+    ----------
+    numbers
+        The cells.
+    family
+        All cells of the stratum that they were cut from.
+    """
+
+    numbers: Int[np.ndarray, " own"]
+    family: Cells
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The free parameters."""
+        return self.family.coordinates
+
+    @property
+    def index(self) -> int:
+        """Index of the states; 0 is stable."""
+        return int(self.eset.cell_index[self.numbers[0]])
+
+    @cached_property
+    def cells(self) -> Cells:
+        """The chart's cells."""
+        return Cells(self.eset, self.coordinates, self.numbers)
+
+    def _found(self, points: Points) -> Found:
+        """States on the chart's cells: what lies beyond a cut belongs to another chart."""
+        found = self.family.find(points)
+        return found.take(np.isin(found.cell, self.numbers))
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """A curve along which two charts meet.
+
+    Parameters
+    ----------
+    charts
+        Numbers of both charts.
+    kind
+        "cut" inside a stratum, or "fold".
+    states
+        Exact states along it.
+    coords
+        Their coordinates in each of both charts; equal rows belong together.
+    facets
+        How the states hang together: along a polyline, or as triangles.
+    """
+
+    charts: tuple[int, int]
+    kind: str
+    states: States
+    coords: tuple[Points, Points]
+    facets: Int[np.ndarray, "..."]
+
+    def __repr__(self) -> str:
+        """Charts, kind and number of points."""
+        return f"Transition({self.charts[0]} – {self.charts[1]}: {self.kind} of {len(self.states)})"
+
+    def cross(self, coords: Points, source: int) -> Points:
+        """Coordinates in the other chart of points on the curve.
+
+        Between states the curve is a chord in either chart, and points go by their share of it.
+
+        Raises
+        ------
+        InputError
+            If `source` is none of both charts, or points do not lie on the curve.
+        """
+        if source not in self.charts:
+            raise InputError(f"`source` must be one of {self.charts}; got {source!r}.")
+        ours, theirs = self.coords if source == self.charts[0] else self.coords[::-1]
+        if ours.shape[1] != 2:
+            raise InputError("`cross` must be asked over two parameters.")
+        a, b = ours[:-1], ours[1:]
+        size = np.maximum(np.ptp(ours, axis=0).max(), 1e-300)
+        along = b - a
+        squared = np.maximum((along**2).sum(axis=1), 1e-300)
+        reach = coords[:, None] - a
+        share = np.clip((reach * along).sum(axis=2) / squared, 0.0, 1.0)
+        gap = np.linalg.norm(reach - share[:, :, None] * along, axis=2)
+        best = gap.argmin(axis=1)
+        row = np.arange(len(coords))
+        if len(coords) and gap[row, best].max() > ON_CURVE * size:
+            worst = coords[gap[row, best].argmax()].tolist()
+            raise InputError(f"`coords` must lie on the transition; got {worst}.")
+        t = share[row, best][:, None]
+        return np.asarray(theirs[best] + t * (theirs[best + 1] - theirs[best]))
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """Charts over the free parameters that cover a set, each state in one of them.
+
+    Parameters
+    ----------
+    eset
+        The set, cut exactly along the borders of the charts.
+    chart
+        Number of the chart of each cell.
+    family
+        Number of the stratum that each cell was cut from.
+    """
+
+    eset: EquilibriumSet
+    chart: Int[np.ndarray, " C"]
+    family: Int[np.ndarray, " C"]
+
+    def __repr__(self) -> str:
+        """How many charts and transitions."""
+        kinds = [transition.kind for transition in self.transitions]
+        return (
+            f"Atlas({len(self.charts)} charts, {kinds.count('cut')} cuts, "
+            f"{kinds.count('fold')} folds on {self.eset})"
+        )
+
+    def __len__(self) -> int:
+        """Number of charts."""
+        return len(self.charts)
+
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """The free parameters."""
+        return coordinates_of(self.eset, self.eset.names)
+
+    @cached_property
+    def charts(self) -> tuple[Leaf, ...]:
+        """The charts, the largest first."""
+        families = {
+            number: Cells(self.eset, self.coordinates, np.flatnonzero(self.family == number))
+            for number in np.unique(self.family).tolist()
+        }
+        out = []
+        for k in range(self.chart.max(initial=-1) + 1):
+            own = np.flatnonzero(self.chart == k)
+            out.append(Leaf(self.eset, own, families[int(self.family[own[0]])]))
+        return tuple(out)
+
+    @cached_property
+    def whole(self) -> Adjacency:
+        """How the cells hang together."""
+        return adjacency(self.eset.cells)
+
+    @cached_property
+    def transitions(self) -> tuple[Transition, ...]:
+        """Curves along which charts meet."""
+        a, b = self.chart[self.whole.links].T
+        across = np.flatnonzero(a != b)
+        pairs = np.sort(np.stack([a, b], axis=1)[across], axis=1)
+        facets = self.whole.facets[self.whole.across[across]]
+        d = facets.shape[1]
+        folds = [np.zeros((0, d), int)]
+        folds += [
+            np.stack([f[:-1], f[1:]], axis=1) if d == 2 else f.reshape(-1, d)
+            for f in self.eset.folds
+        ]
+        folded = flags_of(facets, np.concatenate(folds))
+        values = self.eset.coordinates
+        out = []
+        for i, j in np.unique(pairs, axis=0).tolist():
+            for kind, flags in (("cut", ~folded), ("fold", folded)):
+                own = facets[(pairs == (i, j)).all(axis=1) & flags]
+                for piece in pieces(own):
+                    used = piece if piece.ndim == 1 else np.unique(piece)
+                    local = (
+                        np.arange(len(used)) if piece.ndim == 1 else np.searchsorted(used, piece)
+                    )
+                    both = (values[used], values[used].copy())
+                    states = self.eset.points[used]
+                    out.append(Transition((i, j), kind, states, both, local))
+        return tuple(out)
+
+    def locate(self, states: States | State) -> tuple[Int[np.ndarray, " n"], Points]:
+        """Numbers of the charts of states, −1 for those that lie on none, and their coordinates."""
+        batch = states.batch if isinstance(states, State) else states
+        points = self.coordinates(batch.z, batch.p)
+        cell = self.cell_of(batch)
+        return np.where(cell >= 0, self.chart[cell], -1), points
+
+    def cell_of(self, batch: States) -> Int[np.ndarray, " n"]:
+        """Cell that each state lies on, −1 if none."""
+        points = self.coordinates(batch.z, batch.p)
+        everything = Cells(self.eset, self.coordinates, np.arange(len(self.eset.cells)))
+        found = everything.find(points)
+        setting = self.coordinates.setting
+        gap = np.linalg.norm(
+            embed(setting, found.states.z, found.states.p)
+            - embed(setting, batch.z, batch.p)[found.point],
+            axis=1,
+        )
+        order = np.lexsort((gap, found.point))
+        first = order[np.diff(found.point[order], prepend=-1) > 0]
+        near: Bool[np.ndarray, " n"] = gap[first] < SAME
+        cell = np.full(len(batch), -1)
+        cell[found.point[first[near]]] = found.cell[first[near]]
+        return cell
+
+    def path(self, start: State, goal: State) -> AtlasPath:
+        """Continuous way between two states, from chart to chart.
+
+        Raises
+        ------
+        InputError
+            If a state lies on no chart, or no way on the set joins both.
+        """
+        cells = [int(self.cell_of(state.batch)[0]) for state in (start, goal)]
+        for name, state, cell in zip(("start", "goal"), (start, goal), cells, strict=True):
+            if cell < 0:
+                raise InputError(f"`{name}` must be a state of the atlas; got {state}.")
+        found = travel(self.eset, self.chart, (start, cells[0]), (goal, cells[1]))
+        if found is None:
+            raise InputError(
+                "`goal` must be joined to `start` on the set; got states that are not."
+            )
+        return found

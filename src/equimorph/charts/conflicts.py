@@ -1,0 +1,195 @@
+"""Cells that lie over each other, and the groups of them that must not share a chart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
+from scipy.spatial import cKDTree
+
+from equimorph.charts.location import Cells
+from equimorph.manifold.cell_index import CellIndex
+from equimorph.manifold.topology import labels
+
+TOUCHING = 1e-7
+"""Depth of an overlap, in sizes of cells, up to which cells only touch."""
+SHARP = 10_000
+"""Capacity of the longest facet: lengths are told apart to so many parts."""
+ENDLESS = 2**30
+
+
+@dataclass(frozen=True)
+class Conflicts:
+    """Groups of cells: no two states of different colours may share a chart.
+
+    colour: of each cell, −1 for those that lie alone.
+    """
+
+    colour: Int[np.ndarray, " own"]
+
+    @property
+    def any(self) -> bool:
+        """Whether there are different colours."""
+        return bool((self.colour >= 0).any())
+
+
+def conflicts_of(cells: Cells) -> Conflicts:
+    """Colours of cells that lie over others, as few as a greedy choice finds."""
+    count = len(cells.numbers)
+    pairs = overlapping(cells)
+    colour = np.full(count, -1)
+    if len(pairs) == 0:
+        return Conflicts(colour)
+    inside = np.zeros(count, bool)
+    inside[pairs] = True
+    links = cells.whole.links[inside[cells.whole.links].all(axis=1)]
+    group = labels(count, links)
+    group = _split(cells, group, pairs, links)
+    return Conflicts(np.where(inside, _coloured(group, pairs)[group], -1))
+
+
+def overlapping(cells: Cells) -> Int[np.ndarray, "n 2"]:
+    """Pairs of cells without a common vertex that lie over each other.
+
+    Over two parameters by separating axes, over three where one holds the middle of the other. At a
+    cusp neighbours lie over each other: those around them tell the sheets apart. Cells turned over
+    by chords of curved folds cover nothing.
+    """
+    values = cells.values[cells.corners]
+    size = np.maximum(np.median(np.ptp(values, axis=1), axis=0), 1e-300)
+    plain = np.flatnonzero(cells.turn * np.sign(cells.turn.sum()) > 0.0)
+    corners, vertices = (values / size)[plain], cells.corners[plain]
+    if corners.shape[2] == 2:
+        a, b = _near_pairs(corners).T
+    else:
+        hits = CellIndex.of(corners, np.zeros(len(corners))).near(corners.mean(axis=1))
+        a, b = hits.point[hits.inside], hits.cell[hits.inside]
+    apart = np.ones(len(a), bool)
+    for one in vertices.T:
+        for other in vertices.T:
+            apart &= one[a] != other[b]
+    a, b = a[apart], b[apart]
+    for k in range(6 if corners.shape[2] == 2 else 0):
+        depth = _depth(corners, a, b, k) if k < 3 else _depth(corners, b, a, k - 3)
+        a, b = a[depth > TOUCHING], b[depth > TOUCHING]
+    return np.stack([plain[a], plain[b]], axis=1)
+
+
+def _depth(
+    corners: Float[np.ndarray, "C 3 2"],
+    a: Int[np.ndarray, " n"],
+    b: Int[np.ndarray, " n"],
+    side: int,
+) -> Float[np.ndarray, " n"]:
+    """How far triangles reach over one side of others, to which their normals point inwards."""
+    start = corners[a, side]
+    along = corners[a, (side + 1) % 3] - start
+    third = corners[a, (side + 2) % 3] - start
+    inward = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
+    inward *= np.sign(np.einsum("nd,nd->n", inward, third))[:, None]
+    reach = [np.einsum("nd,nd->n", corners[b, k] - start, inward) for k in range(3)]
+    return np.asarray(np.maximum(np.maximum(reach[0], reach[1]), reach[2]))
+
+
+def _near_pairs(corners: Float[np.ndarray, "C 3 2"]) -> Int[np.ndarray, "n 2"]:
+    """Pairs of cells whose circles around their middles meet, by classes of size."""
+    middle = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    order = np.argsort(radius, kind="stable")
+    bounds = np.searchsorted(radius[order], radius[order[-1:]] * 0.5 ** np.arange(12)[::-1])
+    groups = [g for g in np.split(order, np.unique(bounds)) if len(g)]
+    trees = [cKDTree(middle[group]) for group in groups]
+    pairs = [np.zeros((0, 2), int)]
+    for i, (own, tree) in enumerate(zip(groups, trees, strict=True)):
+        far = radius[own].max()
+        pairs.append(own[tree.query_pairs(2.0 * far, output_type="ndarray")])
+        for other, beside in zip(groups[:i], trees[:i], strict=True):
+            lists = beside.query_ball_point(middle[own], far + radius[other].max())
+            number = np.array([len(each) for each in lists])
+            if number.sum():
+                found = other[np.concatenate([each for each in lists if each]).astype(int)]
+                pairs.append(np.stack([np.repeat(own, number), found], axis=1))
+    return np.concatenate(pairs)
+
+
+def _split(
+    cells: Cells,
+    group: Int[np.ndarray, " own"],
+    pairs: Int[np.ndarray, "n 2"],
+    links: Int[np.ndarray, "m 2"],
+) -> Int[np.ndarray, " own"]:
+    """Groups that lie over themselves are parted between the ends of their longest overlap."""
+    middle = cells.values[cells.corners].mean(axis=1)
+    while True:
+        own = np.flatnonzero(group[pairs[:, 0]] == group[pairs[:, 1]])
+        if len(own) == 0:
+            return group
+        which = group[pairs[own[0], 0]]
+        mine = pairs[own[group[pairs[own, 0]] == which]]
+        inner = links[(group[links] == which).all(axis=1)]
+        length = np.linalg.norm(middle[inner[:, 0]] - middle[inner[:, 1]], axis=1) + 1e-12
+        graph = coo_array((length, inner.T), shape=(len(group), len(group))).tocsr()
+        some = mine[np.linspace(0, len(mine) - 1, min(len(mine), 16)).astype(int)]
+        far = dijkstra(graph, directed=False, indices=some[:, 0])
+        apart = far[np.arange(len(some)), some[:, 1]]
+        best = int(np.argmax(np.where(np.isfinite(apart), apart, -1.0)))
+        ends = dijkstra(graph, directed=False, indices=some[best])
+        group = np.where((group == which) & (ends[1] < ends[0]), group.max() + 1, group)
+
+
+def _coloured(group: Int[np.ndarray, " own"], pairs: Int[np.ndarray, "n 2"]) -> np.ndarray:
+    """Colour of each group: the least that no group over or under it has, the largest first."""
+    edges = np.unique(np.sort(group[pairs], axis=1), axis=0)
+    size = np.bincount(group)
+    colour = np.full(len(size), -1)
+    for own in sorted(np.unique(edges).tolist(), key=lambda k: -size[k]):
+        others = np.concatenate([edges[edges[:, 0] == own, 1], edges[edges[:, 1] == own, 0]])
+        taken = set(colour[others].tolist())
+        colour[own] = next(k for k in range(len(taken) + 1) if k not in taken)
+    return colour
+
+
+def least_cut(
+    cells: Cells, first: Bool[np.ndarray, " own"], second: Bool[np.ndarray, " own"]
+) -> Bool[np.ndarray, " own"]:
+    """Cells on the first one's side of the shortest cut between two groups of cells.
+
+    The least cut of the dual graph, with the sizes of facets in scaled parameters as capacities.
+    """
+    whole, count = cells.whole, len(cells.numbers)
+    size = facet_sizes(cells)[whole.across]
+    capacity = np.maximum(1, np.round(SHARP * size / max(size.max(), 1e-300))).astype(np.int32)
+    source, sink = count, count + 1
+    ends = [
+        (np.full(first.sum(), source), np.flatnonzero(first)),
+        (np.flatnonzero(second), np.full(second.sum(), sink)),
+    ]
+    a, b = whole.links.T
+    rows = np.concatenate([a, b, *(pair[0] for pair in ends)])
+    columns = np.concatenate([b, a, *(pair[1] for pair in ends)])
+    wall = np.full(int(first.sum() + second.sum()), ENDLESS, dtype=np.int32)
+    graph = coo_array(
+        (np.concatenate([capacity, capacity, wall]), (rows, columns)), shape=(count + 2,) * 2
+    ).tocsr()
+    graph = graph.astype(np.int32)
+    left = graph - maximum_flow(graph, source, sink).flow
+    left.data = np.maximum(left.data, 0)
+    left.eliminate_zeros()
+    reached = breadth_first_order(left, source, return_predecessors=False)
+    side = np.zeros(count + 2, bool)
+    side[reached] = True
+    return side[:count]
+
+
+def facet_sizes(cells: Cells) -> Float[np.ndarray, " F"]:
+    """Lengths or areas of facets in scaled coordinates; one for points."""
+    scales = cells.coordinates.setting.scales
+    at = cells.values[cells.whole.facets] / scales
+    sides = at[:, 1:] - at[:, :1]
+    if sides.shape[1] == 0:
+        return np.ones(len(at))
+    gram = sides @ np.swapaxes(sides, 1, 2)
+    share = 1.0 if sides.shape[1] == 1 else 0.5
+    return np.asarray(share * np.sqrt(np.maximum(np.linalg.det(gram), 0.0)))
