@@ -56,8 +56,13 @@ class EnclosedArea:
         s, c = np.sin(theta), np.cos(theta)
         out = self.matrix * (c[:, :, None] * s[:, None, :] - s[:, :, None] * c[:, None, :])
         at = np.arange(theta.shape[1])
-        out[:, at, at] = s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T)
+        out[:, at, at] = self.curvature(theta)
         return np.asarray(out)
+
+    def curvature(self, theta: Nodal) -> Nodal:
+        """∂²V/∂θᵢ²."""
+        s, c = np.sin(theta), np.cos(theta)
+        return np.asarray(s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T))
 
     def turned(self, theta: Nodal, v: Nodal) -> Nodal:
         """Derivative of the gradient along v."""

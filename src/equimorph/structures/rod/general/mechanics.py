@@ -10,12 +10,19 @@ from equimorph.linalg import BorderedSolution, CondensedLayout
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.contract import Advance, Border, Direction, Symmetry
+from equimorph.structures.contract import (
+    Advance,
+    Border,
+    Direction,
+    Symmetry,
+    solved_advance,
+)
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.general.area import EnclosedArea
 from equimorph.structures.rod.general.fields import Fields
 from equimorph.structures.rod.general.kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general.model import RodModel
+from equimorph.structures.rod.general.pressed import lower_triangle
 from equimorph.structures.rod.general.step.kernels import advance_lanes
 from equimorph.structures.rod.general.symmetry import mirrors
 from equimorph.structures.rod.interface import LARGEST_TAIL, Mechanics
@@ -27,8 +34,6 @@ Values = Float[np.ndarray, " lanes"]
 Scalars = Float[np.ndarray, "lanes scalars"]
 Points = Float[np.ndarray, "lanes points"]
 
-BLOCK = 64
-"""Full matrices put together at a time: they stay in the cache."""
 SMOOTH = 1e-6
 """Highest Legendre coefficients of θ below which nothing inside the elements can go wrong."""
 LARGEST_GAP = 1e-4
@@ -305,23 +310,34 @@ class GeneralMechanics(Mechanics):
         self, area: EnclosedArea, z: Lanes, p: Parameters, parts: tuple[np.ndarray, ...]
     ) -> Float[np.ndarray, "lanes entries"]:
         """Entries of F_z of a rod under pressure; parts: diagonal, border, trailing block."""
-        inner, n, layout = self.unknown_nodes, self.unknowns, self._full_layout
-        theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))
-        entries = np.empty((len(z), len(layout.rows)))
-        for start in range(0, len(z), BLOCK):
-            lanes = slice(start, start + BLOCK)
-            matrix = self.layout.dense(*(part[lanes] for part in parts))
-            pressed = area.hessian(theta[lanes])[:, inner, inner]
-            matrix[:, :n, :n] -= pull[lanes, None, None] * pressed
-            entries[lanes] = matrix[:, layout.rows, layout.columns]
-        return entries
+        diagonal, border, trailing = parts
+        inner = self.unknown_nodes
+        theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
+        own = (diagonal - pull * area.curvature(theta))[:, inner]
+        angles, matrices = theta[:, inner], (self.layout.assembled, area.matrix)
+        stiff, swept = (matrix[inner, inner] for matrix in matrices)
+        return lower_triangle(angles, pull, (stiff, swept), (own, border[:, :, inner], trailing))
+
+    def _pressed_advance(self, *given: np.ndarray) -> Advance:
+        """`advance` with all parts of the linearisation computed once."""
+        z, p, dp, *closing = given
+        assert self._area is not None
+        residual, column, *parts = self.linearised(z, p, dp)
+        diagonal, border, trailing = parts
+        entries = self._pressed_entries(self._area, z, p, (diagonal, border, trailing))
+
+        def solve(rhs: Float[np.ndarray, "lanes 2 bordered"], border: Border) -> BorderedSolution:
+            return self._full_layout.solve(entries, border, rhs)
+
+        row, corner, defect = closing
+        return solved_advance(solve, residual, column, (row, corner, defect), self.constraints)
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
         """Fused kernel; lanes with an unsafe pivot, and rods under pressure, solve in general."""
         if self._area is not None:
-            return self.plain_advance(z, p, dp, row, corner, defect)
+            return self._pressed_advance(z, p, dp, row, corner, defect)
         z, p, row, dp = self._checked((z, p), (row, dp))
         inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
         lanes = len(z)
