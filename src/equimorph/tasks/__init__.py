@@ -20,10 +20,13 @@ from equimorph.tasks.maps import (
 )
 from equimorph.tasks.optimising import (
     Certificate,
+    FollowedOptimum,
+    Jump,
     Optima,
     Optimum,
     Strongest,
     StrongestSettings,
+    follow_optimum,
     optimise,
     strongest,
 )
@@ -53,7 +56,9 @@ __all__ = [
     "Certificate",
     "CurvatureMap",
     "Family",
+    "FollowedOptimum",
     "ImperfectionLaw",
+    "Jump",
     "LeastSnap",
     "LimitLoadMap",
     "MapCurve",
@@ -80,6 +85,7 @@ __all__ = [
     "calibrate",
     "curvature_map",
     "estimate_state",
+    "follow_optimum",
     "imperfection_law",
     "least_snap",
     "limit_load_map",

@@ -16,6 +16,9 @@ from equimorph.tasks.known import Start, known_state
 from equimorph.tasks.motion.course import Course
 from equimorph.tasks.motion.followed import DENSE, dense_path, path_of, uniform
 from equimorph.tasks.motion.redundant import steer
+from equimorph.tasks.optimising.following import FollowedOptimum, Problem, bounds_of, followed
+from equimorph.tasks.optimising.objectives import Objective
+from equimorph.tasks.optimising.stability import stability
 from equimorph.tasks.route import FINE, place, scheduled
 
 Failure = Literal["", "snap-through", "singular Jacobian", "actuator limit", "constraint", "lost"]
@@ -44,6 +47,9 @@ class Tracking:
         Smallest stability margin on the way.
     schedule
         Parameters along the whole motion; None if it was refused.
+    compromise
+        Beyond the failure, if asked for: the stable states with the least sum of squares of what
+        is left of the targets, half of which are its values.
     """
 
     status: Literal["arrived", "refused"]
@@ -53,6 +59,7 @@ class Tracking:
     targets: tuple[Descriptor, ...]
     actuators: tuple[str, ...] = ()
     schedule: Schedule | None = None
+    compromise: FollowedOptimum | None = None
 
     def __repr__(self) -> str:
         """Margin, or why and where it fails."""
@@ -108,13 +115,14 @@ class Tracking:
         return dict(zip(self.actuators, change[free].tolist(), strict=True))
 
 
-def track(
+def track(  # the knobs of the public face, all by keyword
     start: Start,
     targets: Leg | Sequence[Leg],
     *,
     actuators: Sequence[str] | Mapping[str, tuple[float, float]],
     within: Sequence[Constraint] = (),
     monitor: Sequence[Descriptor] = (),
+    beyond: bool = False,
 ) -> Tracking:
     """Follow targets S*(t) with as many actuators or more, while loads may move.
 
@@ -138,6 +146,9 @@ def track(
         Constraints to obey on the way.
     monitor
         Further descriptors for the schedule.
+    beyond
+        Whether to follow the best compromise where the targets are beyond reach; the same
+        descriptors on all legs.
 
     Returns
     -------
@@ -171,7 +182,8 @@ def track(
     failure = _failure(path.end, bounds)
     if failure:
         why = _why(path.end, failure, names)
-        return Tracking("refused", failure, why, path, asked, names)
+        rest = _compromise(path, legs, names, (tuple(within), limits)) if beyond else None
+        return Tracking("refused", failure, why, path, asked, names, None, rest)
     monitored = tuple(dict.fromkeys((*asked, *(c.descriptor for c in within), *monitor)))
     schedule = scheduled(path, path.states.margin, monitored)
     return Tracking("arrived", "", "", path, asked, names, schedule)
@@ -202,6 +214,33 @@ def _path(
     freed = [_freed(leg, names) for leg in legs]
     path = lift(start, freed, within=every)
     return lift(start, freed, within=every, options=FINE) if path.arrived else path
+
+
+def _compromise(
+    path: Path,
+    legs: Sequence[Leg],
+    names: tuple[str, ...],
+    bounds: tuple[tuple[Constraint, ...], Mapping[str, tuple[float, float]]],
+) -> FollowedOptimum:
+    """Least squares from the end of a path on."""
+    structure, (within, limits) = path.states.structure, bounds
+    course = Course.of(path.states[0], legs, names)
+
+    def goal(columns: Float[np.ndarray, " columns"]) -> Objective:
+        wanted = columns[len(structure.parameters) :]
+
+        def miss(
+            z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
+        ) -> Float[np.ndarray, " lanes"]:
+            values = np.stack([each.function(z, p) for each in course.descriptors], axis=1)
+            return np.asarray(0.5 * ((values - wanted) ** 2).sum(axis=1))
+
+        return Objective(Descriptor("miss", "", miss), 1.0)
+
+    rules = (*within, stability(structure, 0.0))
+    problem = Problem(course, goal, rules, bounds_of(structure, limits), False)
+    # the end itself may lie on a fold, where the actuators are no coordinates
+    return followed(problem, path.states[-2 if len(path.states) > 1 else -1], float(path.at[-1]))
 
 
 def _listed(targets: Leg | Sequence[Leg]) -> list[Leg]:

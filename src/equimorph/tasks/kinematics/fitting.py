@@ -47,7 +47,7 @@ def best_fits(
     if allowed is not None:
         edges = edges[allowed[edges].all(axis=1)]
     starts = local_minima(edges, value)[:STARTS]
-    programme = Programme(eset, Objective(squares, 1.0), within)
+    programme = Programme.over(eset, Objective(squares, 1.0), within)
     ends = [
         end
         for end in descend(programme, spots_of(eset, starts))

@@ -70,6 +70,7 @@ class Course:
                 begin = _columns(structure, p, leg(0.0), descriptors)
                 _check_beginning(structure, free, here, begin)
             values = leg(1.0) if callable(leg) else leg
+            _check_free(values, actuators)
             here = _columns(structure, p, values, descriptors)
             here[free] = start.p[free]
             p = here[None, : len(start.p)]
@@ -134,6 +135,14 @@ def _columns(
     if not np.isfinite(targets).all():
         raise InputError(f"`targets` must be finite; got {targets.tolist()}.")
     return np.concatenate([changed(structure, p, values)[0], targets])
+
+
+def _check_free(values: Any, actuators: Sequence[str]) -> None:
+    for name in actuators:
+        if values.get(name) is not None:
+            raise InputError(
+                f"`targets` must leave the actuator {name} free; got {values[name]!r}."
+            )
 
 
 def _check_beginning(

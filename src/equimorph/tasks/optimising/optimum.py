@@ -16,7 +16,7 @@ from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.descent import Settled, descend
 from equimorph.tasks.optimising.objectives import Objective
-from equimorph.tasks.optimising.plane import Spots, settled, spots_of, stepped
+from equimorph.tasks.optimising.plane import Spots, plane_of, settled, spots_of, stepped
 from equimorph.tasks.optimising.programme import Programme
 from equimorph.tasks.optimising.stability import is_stability, stability
 from equimorph.tasks.planning import plan
@@ -177,13 +177,13 @@ def optimise(  # the knobs of the public face, all by keyword
     fault = "" if start is None else _violation(start, constraints, margin)
     if fault:
         return Optima("refused", fault, sense, ())
-    programme = Programme(eset, goal, (*constraints, stability(eset.structure, margin)))
-    starts = _starts(programme, _watched(programme, constraints, margin), start)
+    programme = Programme.over(eset, goal, (*constraints, stability(eset.structure, margin)))
+    starts = _starts(eset, programme, _watched(programme, constraints, margin), start)
     ends = _optima(programme, descend(programme, spots_of(eset, starts)))
     found = [_optimum(programme, end) for end in ends]
     if start is not None:
         pairs = list(zip(ends, found, strict=True))
-        found = _reached(programme, start, (within, margin), pairs)
+        found = _reached(eset, programme, start, (within, margin), pairs)
     if not found:
         return Optima("refused", _nothing(start, within), sense, ())
     return Optima("found", "", sense, tuple(found))
@@ -258,13 +258,16 @@ def _watched(
 
 
 def _starts(
-    programme: Programme, constraints: tuple[Constraint, ...], start: State | None
+    eset: EquilibriumSet,
+    programme: Programme,
+    constraints: tuple[Constraint, ...],
+    start: State | None,
 ) -> Int[np.ndarray, " n"]:
     """Allowed vertices that no allowed neighbour beats, the best first.
 
     Where no vertex is allowed, those that violate the constraints least.
     """
-    eset, goal = programme.eset, programme.objective
+    goal = programme.objective
     allowed = feasible_vertices(eset, constraints)
     value = goal.sign * vertex_values(eset, goal.descriptor)
     if start is not None:
@@ -291,7 +294,7 @@ def _optima(programme: Programme, ends: list[Settled]) -> list[Settled]:
     setting, kept = programme.setting, []
     places: list[Float[np.ndarray, " coordinates"]] = []
     for end in sorted(ends, key=lambda each: float(each.expansion.f.max())):
-        stable = programme.eset.structure.index(end.spot.z, end.spot.p)[0] == 0
+        stable = programme.setting.structure.index(end.spot.z, end.spot.p)[0] == 0
         on_edge = any(
             is_stability(c) and abs(e) < VIOLATED
             for c, e in zip(programme.all, end.expansion.g[0], strict=True)
@@ -307,12 +310,13 @@ def _optima(programme: Programme, ends: list[Settled]) -> list[Settled]:
 
 
 def _optimum(programme: Programme, end: Settled) -> Optimum:
-    state = State(programme.eset.structure, end.spot.z[0], end.spot.p[0])
+    state = State(programme.setting.structure, end.spot.z[0], end.spot.p[0])
     value = programme.objective.descriptor(state)
     return Optimum(state, value, certificate(programme, end))
 
 
 def _reached(
+    eset: EquilibriumSet,
     programme: Programme,
     start: State,
     demands: tuple[Sequence[Constraint], float],
@@ -321,8 +325,8 @@ def _reached(
     """Optima from the first on to which a route leads."""
     within, margin = demands
     for number, (end, optimum) in enumerate(found):
-        goal = _in_the_box(programme, _before_the_edge(programme, end) or optimum.state)
-        route = plan(programme.eset, start, goal, within=within, margin=0.99 * margin)
+        goal = _in_the_box(eset, _before_the_edge(programme, end) or optimum.state)
+        route = plan(eset, start, goal, within=within, margin=0.99 * margin)
         if route.arrived:
             first = Optimum(optimum.state, optimum.value, optimum.certificate, route)
             return [first, *(other for _, other in found[number + 1 :])]
@@ -343,12 +347,12 @@ def _before_the_edge(programme: Programme, end: Settled) -> State | None:
     spot = Spots(end.spot.z, end.spot.p, end.spot.rows)
     guess = stepped(programme.setting, spot, end.frames, step[None])
     there, good = settled(programme.setting, *guess, spot.rows)
-    return State(programme.eset.structure, there.z[0], there.p[0]) if good[0] else None
+    return State(programme.setting.structure, there.z[0], there.p[0]) if good[0] else None
 
 
-def _in_the_box(programme: Programme, state: State) -> State:
+def _in_the_box(eset: EquilibriumSet, state: State) -> State:
     """State whose parameters do not exceed the box by rounding."""
-    box, free = programme.eset.box, programme.setting.free
+    box, free = eset.box, plane_of(eset).free
     p = state.p.copy()
     p[free] = np.clip(p[free], box.lower, box.upper)
     z, good = newton(state.structure, state.z[None], p[None])

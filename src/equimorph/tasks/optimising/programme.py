@@ -46,32 +46,32 @@ class Programme:
 
     Parameters
     ----------
-    eset
-        The set.
+    setting
+        Structure and free parameters.
+    bounds
+        Limits of the free parameters.
     objective
         What is made small.
     constraints
         Those that count, stability among them.
     """
 
-    eset: EquilibriumSet
+    setting: Setting
+    bounds: tuple[Constraint, ...]
     objective: Objective
     constraints: tuple[Constraint, ...]
 
-    @cached_property
-    def setting(self) -> Setting:
-        """Structure and free parameters."""
-        return plane_of(self.eset)
-
-    @cached_property
-    def bounds(self) -> tuple[Constraint, ...]:
-        """Sides of the box."""
-        names, box = self.eset.names, self.eset.box
-        sides: list[Constraint] = []
-        for name, low, high in zip(names, box.lower.tolist(), box.upper.tolist(), strict=True):
-            itself = value_of(self.eset.structure, name)
-            sides += [itself >= low, itself <= high]
-        return tuple(sides)
+    @classmethod
+    def over(
+        cls, eset: EquilibriumSet, objective: Objective, constraints: tuple[Constraint, ...]
+    ) -> "Programme":
+        """Return the problem within the box of a set."""
+        bounds: list[Constraint] = []
+        sides = zip(eset.names, eset.box.lower.tolist(), eset.box.upper.tolist(), strict=True)
+        for name, low, high in sides:
+            itself = value_of(eset.structure, name)
+            bounds += [itself >= low, itself <= high]
+        return cls(plane_of(eset), tuple(bounds), objective, constraints)
 
     @cached_property
     def all(self) -> tuple[Constraint, ...]:

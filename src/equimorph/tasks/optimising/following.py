@@ -1,0 +1,387 @@
+"""`follow_optimum`: a local optimum while loads and targets vary, and where it jumps."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria import Leg
+from equimorph.equilibria.steering import answers
+from equimorph.errors import InputError
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.pairing import Setting
+from equimorph.model import Constraint, Descriptor
+from equimorph.structures import State, States, Structure, value_of
+from equimorph.tasks.known import Start, known_state
+from equimorph.tasks.motion.course import Course
+from equimorph.tasks.optimising.certificates import Certificate, certificate
+from equimorph.tasks.optimising.descent import Settled, descend
+from equimorph.tasks.optimising.objectives import Objective
+from equimorph.tasks.optimising.plane import Spots, settled, stepped
+from equimorph.tasks.optimising.programme import Programme
+from equimorph.tasks.optimising.stability import stability
+
+FIRST, LARGEST = 0.02, 0.1
+"""Share of a leg of the first step, and of the longest."""
+CLOSEST = 1e-9
+"""Share of a leg to which a jump is located."""
+SURE = 0.5
+"""Way from its prediction, relative to that of the prediction, of an optimum that goes on."""
+NEAR = 4e-3
+"""Way, in the metric and scaled parameters, that no jump is as short as."""
+FAR = 0.15
+"""Longest way between successive optima."""
+LATER = (0.0, 1e-4, 1e-3, 1e-2)
+"""Shares of a leg after which a first optimum is tried: it is flat where targets get lost."""
+FLAT = -1e-6
+"""Least curvature of a minimum."""
+NUDGE = 1e-3
+FEASIBLE = 1e-7
+
+Where = Callable[[Float[np.ndarray, " columns"]], Objective]
+"""Objective at given parameters and targets."""
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """Where an optimum ceases to be one, and where the descent from there ends.
+
+    Parameters
+    ----------
+    at
+        Number of the leg + share of it.
+    before, after
+        States on both sides; `after` is None if there is no optimum beyond.
+    values
+        Objective on both sides; nan where there is none.
+    """
+
+    at: float
+    before: State
+    after: State | None
+    values: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedOptimum:
+    """Answer to "how does the best state move".
+
+    Parameters
+    ----------
+    status
+        "arrived", or "refused" with the reason in `why` where no optimum is left.
+    states
+        Optima along the way, the first for the start's parameters.
+    at
+        Number of the leg + share of it, of each; twice at jumps.
+    values
+        The objective.
+    certificates
+        Where each sits: interior, constraint, box or stability boundary; see `Certificate`.
+    jumps
+        Where the optimum moves at once.
+    """
+
+    status: Literal["arrived", "refused"]
+    why: str
+    states: States
+    at: Float[np.ndarray, " points"]
+    values: Float[np.ndarray, " points"]
+    certificates: tuple[Certificate, ...]
+    jumps: tuple[Jump, ...]
+
+    def __repr__(self) -> str:
+        """Values at both ends, and how many jumps."""
+        if self.status == "refused":
+            return f"FollowedOptimum(refused at {self.at[-1]:.6g}: {self.why})"
+        ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}"
+        return f"FollowedOptimum({ends}; {len(self.jumps)} jumps)"
+
+    @property
+    def arrived(self) -> bool:
+        """Whether there is an optimum all the way."""
+        return self.status == "arrived"
+
+    @property
+    def margin(self) -> Float[np.ndarray, " points"]:
+        """Stability margin of each."""
+        return self.states.margin
+
+
+def follow_optimum(  # noqa: PLR0913  # the knobs of the public face, all by keyword
+    start: Start,
+    objective: Descriptor,
+    to: Leg | Sequence[Leg],
+    *,
+    actuators: Sequence[str] | Mapping[str, tuple[float, float]],
+    within: Sequence[Constraint] = (),
+    sense: Literal["min", "max"] = "min",
+    margin: float = 0.0,
+) -> FollowedOptimum:
+    """Follow the optimum of an objective while loads and targets of descriptors vary.
+
+    At every step a sequential quadratic programme on the set ends at the optimum near the last one,
+    with constraints that become active or idle on the way. Steps are shortened until the optimum
+    moves as predicted; where it does not, however short the step, it jumps: a descent from there
+    leads to the other side. With targets among `to` it is the choice of spare actuators.
+
+    Parameters
+    ----------
+    start
+        Stable state, in the basin of the optimum to follow.
+    objective
+        A descriptor of the structure.
+    to
+        Legs of loads, by name, and targets, by descriptor, as for `track`; none prescribes an
+        actuator.
+    actuators
+        Parameters to choose, more than targets; with limits if given as a mapping.
+    within
+        Constraints.
+    sense
+        "min" or "max".
+    margin
+        Smallest stability margin allowed.
+
+    Returns
+    -------
+    The optima along the way with their certificates, and all jumps with both sides.
+
+    Raises
+    ------
+    InputError
+        If `start` is not stable or not known, for an unknown sense, a negative margin, or legs and
+        actuators without meaning.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> spring = em.Spring()
+    >>> start = em.lift(spring.natural_state(x_l=0.8), {"F": 0.01}).end.state
+    >>> angle = spring.angle
+    >>> flattest = em.follow_optimum(
+    ...     start, angle, {"F": 0.02}, actuators=["x_l"], within=[angle >= 0.1]
+    ... )
+    >>> flattest.certificates[-1].kind, round(float(flattest.values[-1] ** 3), 3)
+    ('stability boundary', 0.021)
+    """
+    state, names = known_state(start), tuple(actuators)
+    if sense not in ("min", "max") or not margin >= 0.0:
+        raise InputError(
+            f"`sense` must be min or max and `margin` at least 0; got {sense!r}, {margin!r}."
+        )
+    if not state.stable:
+        raise InputError(f"`start` must be stable; got a state of index {state.index}.")
+    legs = [to] if isinstance(to, Mapping) or callable(to) else list(to)
+    course = Course.of(state, legs, names)
+    if len(course.descriptors) >= len(names):
+        raise InputError(
+            f"`to` must prescribe fewer descriptors than there are actuators ({len(names)}), so "
+            f"that there is a choice; got {len(course.descriptors)}."
+        )
+    limits = dict(actuators) if isinstance(actuators, Mapping) else {}
+    goal = Objective(objective, 1.0 if sense == "min" else -1.0)
+    rules = (*within, stability(state.structure, margin))
+    problem = Problem(course, lambda _: goal, rules, bounds_of(state.structure, limits), True)
+    return followed(problem, state, 0.0)
+
+
+def bounds_of(
+    structure: Structure, limits: Mapping[str, tuple[float, float]]
+) -> tuple[Constraint, ...]:
+    """Limits of actuators as constraints."""
+    bounds: list[Constraint] = []
+    for name, (low, high) in limits.items():
+        if not low < high:
+            raise InputError(f"`actuators` must give limits in order; got {name} = {low, high}.")
+        itself = value_of(structure, name)
+        bounds += [itself >= float(low), itself <= float(high)]
+    return tuple(bounds)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Optima along a course.
+
+    Parameters
+    ----------
+    course
+        Loads and targets.
+    goal
+        Objective at the columns of a time.
+    rules
+        Constraints, stability among them.
+    bounds
+        Limits of the actuators.
+    held
+        Whether the targets hold exactly; else the objective deals with them.
+    """
+
+    course: Course
+    goal: Where
+    rules: tuple[Constraint, ...]
+    bounds: tuple[Constraint, ...]
+    held: bool
+
+    def programme(self, time: float) -> Programme:
+        """Programme at a time."""
+        course = self.course
+        columns = course.at(np.array([time]))[0]
+        targets = course.split(columns[None])[1][0] if self.held else np.zeros(0)
+        equal: list[Constraint] = []
+        for each, value in zip(course.descriptors, targets.tolist(), strict=False):
+            equal += [each <= value, each >= value]
+        setting = Setting(course.structure, columns[: len(course.structure.parameters)],
+                          course.free, ())  # fmt: skip
+        return Programme(setting, self.bounds, self.goal(columns), (*self.rules, *equal))
+
+
+@dataclass(frozen=True)
+class _Found:
+    """An optimum at a time."""
+
+    time: float
+    programme: Programme
+    end: Settled
+    certificate: Certificate
+
+    @property
+    def place(self) -> Float[np.ndarray, " coordinates"]:
+        """Where it is, in the metric and scaled actuators."""
+        return np.asarray(embed(self.programme.setting, self.end.spot.z, self.end.spot.p)[0])
+
+
+def followed(problem: Problem, start: State, time: float) -> FollowedOptimum:
+    """Follow the optimum near a state from a time on."""
+    legs = problem.course.legs
+    begin = Spots(start.z[None], start.p[None], _rows(problem, start))
+    first = None
+    for later in LATER:
+        first = first or _solved(problem, begin, min(time + later, legs))
+    if first is None:
+        why = "the descent from the start ends at no optimum"
+        return _result(problem, [], [], why, start)
+    track, jumps, step = [first], list[Jump](), FIRST
+    while track[-1].time < legs:
+        here = track[-1]
+        corner = min(np.floor(here.time) + 1.0, legs)
+        ahead = min(here.time + step, corner)
+        guess = _predicted(problem, track, ahead, jumps)
+        there = None if guess is None else _solved(problem, guess, ahead)
+        if there is not None and guess is not None and _goes_on(here, there, guess):
+            track.append(there)
+            step = min(1.5 * step, LARGEST)
+        elif ahead - here.time > CLOSEST * (1.0 + here.time):
+            step = 0.4 * (ahead - here.time)
+        else:
+            after = _beyond(problem, here, ahead)
+            if after is None or np.linalg.norm(after.place - here.place) > NEAR:
+                jumps.append(_jump(here, after))
+            if after is None:
+                return _result(problem, track, jumps, "no optimum is left", start)
+            track.append(after)
+            step = FIRST
+    return _result(problem, track, jumps, "", start)
+
+
+def _rows(problem: Problem, start: State) -> Float[np.ndarray, "1 d coordinates"]:
+    """Plane near the tangent space of a state."""
+    structure, free = problem.course.structure, problem.course.free
+    dz, dp = answers(structure, start.z[None], start.p[None], free)
+    u = dz[0][:, : structure.unknowns] * np.sqrt(structure.mass)
+    both = np.concatenate([u, dp[0][:, free] / structure.scales[free]], axis=1)
+    return np.ascontiguousarray(np.linalg.qr(both.T)[0].T[None])
+
+
+def _predicted(
+    problem: Problem, track: list[_Found], ahead: float, jumps: list[Jump]
+) -> Spots | None:
+    """State of the set at a time ahead, on the line through the last two optima."""
+    here, course = track[-1], problem.course
+    z, p = here.end.spot.z.copy(), here.end.spot.p.copy()
+    smooth = len(track) > 1 and not (jumps and jumps[-1].at >= track[-2].time)
+    if smooth and track[-2].time >= np.floor(here.time - 1e-12):
+        share = (ahead - here.time) / (here.time - track[-2].time)
+        z += share * (z - track[-2].end.spot.z)
+        p += share * (p - track[-2].end.spot.p)
+    given = course.split(course.at(np.array([ahead])))[0]
+    given[:, course.free] = p[:, course.free]
+    found, good = settled(problem.programme(ahead).setting, z, given, here.end.spot.rows)
+    return found if good[0] else None
+
+
+def _solved(problem: Problem, guess: Spots, time: float) -> _Found | None:
+    """Optimum near a guess; None where the descent does not end at one."""
+    programme = problem.programme(time)
+    ends = descend(programme, guess)
+    if not ends or not ends[0].converged or ends[0].expansion.g.max() > FEASIBLE:
+        return None
+    end = ends[0]
+    found = certificate(programme, end)
+    index = programme.setting.structure.index(end.spot.z, end.spot.p)[0]
+    if found.curvature < FLAT or (index != 0 and found.kind != "stability boundary"):
+        return None
+    return _Found(time, programme, end, found)
+
+
+def _goes_on(here: _Found, there: _Found, guess: Spots) -> bool:
+    """Whether an optimum is where the one before leads to."""
+    aim = embed(there.programme.setting, guess.z, guess.p)[0]
+    way = float(np.linalg.norm(there.place - here.place))
+    off = float(np.linalg.norm(there.place - aim))
+    return way <= NEAR or (way <= FAR and off <= SURE * float(np.linalg.norm(aim - here.place)))
+
+
+def _beyond(problem: Problem, here: _Found, ahead: float) -> _Found | None:
+    """Optimum on the other side of a jump, by descents from beside the last one."""
+    frames, d = here.end.frames, len(problem.course.free)
+    setting = problem.programme(ahead).setting
+    given = problem.course.split(problem.course.at(np.array([ahead])))[0]
+    for step in NUDGE * np.concatenate([np.eye(d), -np.eye(d)]):
+        z, p = stepped(setting, here.end.spot, frames, step[None])
+        free = problem.course.free
+        at = given.copy()
+        at[:, free] = p[:, free]
+        guess, good = settled(setting, z, at, here.end.spot.rows)
+        found = _solved(problem, guess, ahead) if good[0] else None
+        if found is not None:
+            return found
+    return None
+
+
+def _jump(here: _Found, after: _Found | None) -> Jump:
+    structure = here.programme.setting.structure
+    sides = [
+        None if each is None else State(structure, each.end.spot.z[0], each.end.spot.p[0])
+        for each in (here, after)
+    ]
+    values = [
+        np.nan if side is None or each is None else each.programme.objective.descriptor(side)
+        for side, each in zip(sides, (here, after), strict=True)
+    ]
+    assert sides[0] is not None
+    return Jump(here.time, sides[0], sides[1], (float(values[0]), float(values[1])))
+
+
+def _result(
+    problem: Problem, track: list[_Found], jumps: list[Jump], why: str, start: State
+) -> FollowedOptimum:
+    structure = problem.course.structure
+    none = np.zeros((0, len(start.z))), np.zeros((0, len(start.p)))
+    z = np.concatenate([none[0], *(each.end.spot.z for each in track)])
+    p = np.concatenate([none[1], *(each.end.spot.p for each in track)])
+    values = [
+        float(each.programme.objective.descriptor.function(each.end.spot.z, each.end.spot.p)[0])
+        for each in track
+    ]
+    return FollowedOptimum(
+        "refused" if why else "arrived",
+        why,
+        States(structure, z, p),
+        np.array([each.time for each in track]),
+        np.array(values),
+        tuple(each.certificate for each in track),
+        tuple(jumps),
+    )
