@@ -13,7 +13,7 @@ from equimorph.study.problem import parse_study
 from typecheck import unchecked
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-NAMES = ("strip", "arm", "beam", "deep_arch", "stack")
+NAMES = ("arch", "strip", "arm", "beam", "deep_arch", "stack", "truss")
 
 
 def study(name):
