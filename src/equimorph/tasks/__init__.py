@@ -19,14 +19,17 @@ from equimorph.tasks.maps import (
     unloaded_base,
 )
 from equimorph.tasks.optimising import (
+    Barriers,
     Certificate,
     FollowedOptimum,
     Jump,
+    Landscape,
     Optima,
     Optimum,
     Strongest,
     StrongestSettings,
     follow_optimum,
+    landscape,
     optimise,
     strongest,
 )
@@ -52,6 +55,7 @@ from equimorph.tasks.verification import Proof, Verification, verify
 
 __all__ = [
     "ActuatorMap",
+    "Barriers",
     "Calibration",
     "Certificate",
     "CurvatureMap",
@@ -59,6 +63,7 @@ __all__ = [
     "FollowedOptimum",
     "ImperfectionLaw",
     "Jump",
+    "Landscape",
     "LeastSnap",
     "LimitLoadMap",
     "MapCurve",
@@ -87,6 +92,7 @@ __all__ = [
     "estimate_state",
     "follow_optimum",
     "imperfection_law",
+    "landscape",
     "least_snap",
     "limit_load_map",
     "limit_sensitivity",

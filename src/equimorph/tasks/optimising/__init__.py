@@ -2,18 +2,22 @@
 
 from equimorph.tasks.optimising.certificates import Certificate
 from equimorph.tasks.optimising.following import FollowedOptimum, Jump, follow_optimum
+from equimorph.tasks.optimising.landscapes import Barriers, Landscape, landscape
 from equimorph.tasks.optimising.optimum import Optima, Optimum, optimise
 from equimorph.tasks.optimising.strength import Strongest, StrongestSettings, strongest
 
 __all__ = [
+    "Barriers",
     "Certificate",
     "FollowedOptimum",
     "Jump",
+    "Landscape",
     "Optima",
     "Optimum",
     "Strongest",
     "StrongestSettings",
     "follow_optimum",
+    "landscape",
     "optimise",
     "strongest",
 ]

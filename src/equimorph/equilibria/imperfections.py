@@ -1,0 +1,93 @@
+"""Worst values of descriptors over a box of imperfections."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria.curves import ParameterLine
+from equimorph.equilibria.newton import newton
+from equimorph.equilibria.outcome import follow
+from equimorph.equilibria.tracing import ARRIVAL, TraceOptions
+from equimorph.errors import InputError
+from equimorph.model import Descriptor, position
+from equimorph.structures import Structure
+
+Lanes = Float[np.ndarray, "lanes size"]
+Parameters = Float[np.ndarray, "lanes parameters"]
+Values = Float[np.ndarray, " lanes"]
+
+
+def worst_over(
+    structure: Structure, descriptor: Descriptor, offsets: Mapping[str, float]
+) -> Descriptor:
+    """Largest value of a descriptor over a box of imperfections around a state.
+
+    The state is led straight to the corners of the box; the largest value there and in the state
+    itself counts, ∞ where stability is lost on the way. The values are its branches, so that its
+    minima, kinks among them, are found exactly: a robust optimum.
+
+    Parameters
+    ----------
+    offsets
+        Largest errors of parameters, by name: actuators, loads, any others.
+
+    Raises
+    ------
+    InputError
+        For unknown names, none, or sizes that are not positive.
+    """
+    if not offsets:
+        raise InputError("`offsets` must name at least one parameter; got none.")
+    for name, size in offsets.items():
+        if not (np.isfinite(size) and size > 0.0):
+            raise InputError(f"`offsets` must be positive; got {name}: {size!r}.")
+    places = [position(structure.parameters, name) for name in offsets]
+    corners = np.zeros((1 + 2 ** len(places), len(structure.parameters)))
+    signs = np.array(list(product((-1.0, 1.0), repeat=len(places))))
+    corners[1:, places] = signs * np.array(list(offsets.values()))
+    box = _Corners(structure, descriptor, corners)
+    sizes = ", ".join(f"{name} ± {size:.9g}" for name, size in offsets.items())
+    name = f"worst({descriptor.name} for {sizes})"
+    symbol = f"worst {descriptor.symbol or descriptor.name}"
+    unit, origin = descriptor.unit, structure.signature
+    return Descriptor(name, unit, box.worst, symbol, origin, branches=box.branches)
+
+
+@dataclass(frozen=True)
+class _Corners:
+    """A descriptor, and offsets of all parameters at which it is looked at; the first is zero."""
+
+    structure: Structure
+    descriptor: Descriptor
+    corners: Float[np.ndarray, "corners parameters"]
+
+    def worst(self, z: Lanes, p: Parameters) -> Values:
+        """Largest value."""
+        return np.asarray(self._values(z, p).max(axis=1))
+
+    def branches(
+        self, z: Lanes, p: Parameters
+    ) -> tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]]:
+        """Values at the corners, and their numbers."""
+        return self._values(z, p), np.tile(np.arange(float(len(self.corners))), (len(z), 1))
+
+    def _values(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes m"]:
+        out = np.full((len(z), len(self.corners)), np.inf)
+        here, known = newton(self.structure, z, p)
+        known &= self.structure.index(here, p) == 0
+        lanes = np.flatnonzero(known)
+        if len(lanes) == 0:
+            return out
+        out[lanes, 0] = self.descriptor.function(here[lanes], p[lanes])
+        many = np.repeat(lanes, len(self.corners) - 1)
+        velocity = np.tile(self.corners[1:], (len(lanes), 1))
+        line = ParameterLine(self.structure, p[many], velocity)
+        ended = follow(line, here[many], (), TraceOptions(record=False))
+        good = np.flatnonzero(ended.code == ARRIVAL)
+        values = np.full(len(many), np.inf)
+        values[good] = self.descriptor.function(ended.z[good], p[many[good]] + velocity[good])
+        out[lanes, 1:] = values.reshape(len(lanes), -1)
+        return out

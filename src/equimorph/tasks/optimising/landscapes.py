@@ -1,0 +1,183 @@
+"""`landscape`: the best stable state at every setting, with barriers and gaps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria import ParameterLine, TraceOptions, follow
+from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet, StatesOver
+from equimorph.manifold.locate import pieces_of
+from equimorph.model import Constraint, Descriptor, Grid
+from equimorph.structures import State, States
+
+SAME = 1e-5
+"""Distance in the metric below which two states are the same."""
+OVER = 1e-9
+
+BarrierKind = Literal["stability", "preference"]
+
+
+@dataclass(frozen=True, eq=False)
+class Barriers:
+    """Edges of a grid whose ends carry states that are not neighbours on the set.
+
+    Parameters
+    ----------
+    ends
+        Settings of both ends of each edge.
+    values
+        Objective at both ends: its one-sided limits across the barrier, up to a grid step.
+    kind
+        "stability": the state of one end loses its stability on the way to the other; "preference":
+        it goes on, but another one is better there.
+    """
+
+    ends: Float[np.ndarray, "edges 2 2"]
+    values: Float[np.ndarray, "edges 2"]
+    kind: tuple[BarrierKind, ...]
+
+    def __len__(self) -> int:
+        """Number of edges."""
+        return len(self.ends)
+
+
+@dataclass(frozen=True, eq=False)
+class Landscape:
+    """An objective over two parameters: that of the best allowed stable state at each setting.
+
+    Parameters
+    ----------
+    grid
+        Settings.
+    value
+        Objective at every vertex of the grid, row by row; not a number in gaps.
+    states
+        The best states, in the order of the vertices that have one.
+    gaps
+        Vertices without an allowed stable state.
+    barriers
+        Where the best state is not connected to that of the neighbouring setting.
+    """
+
+    grid: Grid
+    value: Float[np.ndarray, "rows columns"]
+    states: States
+    gaps: Bool[np.ndarray, "rows columns"]
+    barriers: Barriers
+
+    def __repr__(self) -> str:
+        """Size, gaps, barriers."""
+        shape = " × ".join(map(str, self.value.shape))
+        return (
+            f"Landscape({shape} settings; {int(self.gaps.sum())} in gaps; "
+            f"{len(self.barriers)} edges on barriers)"
+        )
+
+
+def landscape(  # the knobs of the public face, most by keyword
+    eset: EquilibriumSet,
+    objective: Descriptor,
+    grid: Grid,
+    *,
+    sense: Literal["min", "max"] = "min",
+    within: Sequence[Constraint] = (),
+    start: State | None = None,
+) -> Landscape:
+    """Reduce a set to its best stable states over a grid, with barriers and gaps between them.
+
+    Parameters
+    ----------
+    objective, sense
+        What makes a state better than the others over the same setting.
+    grid
+        Settings in the box of the set.
+    within
+        Constraints, beside those of the set.
+    start
+        Only states on the stable piece of the set that it lies on count.
+
+    Raises
+    ------
+    InputError
+        For a grid over other parameters than the two of the set, or an unknown sense.
+    """
+    if tuple(grid.names) != tuple(eset.names) or len(grid.names) != 2:
+        raise InputError(
+            f"`grid` must be over the two free parameters of the set ({', '.join(eset.names)}); "
+            f"got {', '.join(grid.names)}."
+        )
+    if sense not in ("min", "max"):
+        raise InputError(f"`sense` must be min or max; got {sense!r}.")
+    axes = grid.axes()
+    settings = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    over = eset.over(**dict(zip(grid.names, settings.T, strict=True)))
+    allowed = _allowed(eset, over, within, start)
+    value = objective(over.states) * (1.0 if sense == "min" else -1.0)
+    best = _best(np.where(allowed, value, np.inf), over.point, len(settings))
+    known = best >= 0
+    states = over.states[best[known]]
+    out = np.full(len(settings), np.nan)
+    out[known] = objective(states)
+    shape = (len(axes[0]), len(axes[1]))
+    place = np.where(known, np.cumsum(known) - 1, -1)
+    barriers = _barriers(states, place.reshape(shape), out, settings)
+    return Landscape(grid, out.reshape(shape), states, ~known.reshape(shape), barriers)
+
+
+def _allowed(
+    eset: EquilibriumSet, over: StatesOver, within: Sequence[Constraint], start: State | None
+) -> Bool[np.ndarray, " lanes"]:
+    """Stable states that obey the constraints, on the piece of the start."""
+    good = over.index == 0
+    for constraint in within:
+        room = OVER * max(1.0, abs(constraint.bound))
+        good &= constraint.excess(over.states.z, over.states.p) <= room
+    if start is not None:
+        good &= over.stratum == pieces_of(eset, start)[0]
+    return np.asarray(good)
+
+
+def _best(
+    value: Float[np.ndarray, " lanes"], point: Int[np.ndarray, " lanes"], count: int
+) -> Int[np.ndarray, " points"]:
+    """Number of the state with the least value over each point, −1 without one."""
+    best = np.full(count, -1)
+    order = np.lexsort((value, point))
+    order = order[np.isfinite(value[order])]
+    first = order[np.diff(point[order], prepend=-1) > 0]
+    best[point[first]] = first
+    return best
+
+
+def _barriers(
+    states: States,
+    place: Int[np.ndarray, "rows columns"],
+    value: Float[np.ndarray, " vertices"],
+    settings: Float[np.ndarray, "vertices 2"],
+) -> Barriers:
+    """Edges between known neighbours that a straight lift on stable states does not connect."""
+    number = np.arange(place.size).reshape(place.shape)
+    pairs = np.concatenate(
+        [
+            np.stack([number[:-1].ravel(), number[1:].ravel()], axis=1),
+            np.stack([number[:, :-1].ravel(), number[:, 1:].ravel()], axis=1),
+        ]
+    )
+    pairs = pairs[(place.ravel()[pairs] >= 0).all(axis=1)]
+    ends = place.ravel()[pairs]
+    structure, n = states.structure, states.structure.unknowns
+    a, b = states[ends[:, 0]], states[ends[:, 1]]
+    line = ParameterLine(structure, a.p.copy(), b.p - a.p)
+    ended = follow(line, a.z.copy(), (), TraceOptions(record=False))
+    arrived = ended.code == ARRIVAL
+    gap = np.sqrt((ended.z - b.z)[:, :n] ** 2 @ structure.mass)
+    apart = np.flatnonzero(~(arrived & (gap < SAME)))
+    kind: tuple[BarrierKind, ...] = tuple(
+        "preference" if arrived[k] else "stability" for k in apart
+    )
+    return Barriers(settings[pairs[apart]], value[pairs[apart]], kind)
