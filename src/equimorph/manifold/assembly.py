@@ -20,7 +20,7 @@ from equimorph.manifold.embedding import embed
 from equimorph.manifold.meetings import join_crossings, pin_ends, put_hubs, split_crossings
 from equimorph.manifold.normals import existence_normals
 from equimorph.manifold.pairing import Pairing
-from equimorph.manifold.pins import lower_index, pin
+from equimorph.manifold.pins import pin
 from equimorph.manifold.plans import SINGULAR, Plan, chord_of, planes
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.polygons import Loops, Polygon
@@ -249,10 +249,6 @@ def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int
         pinned = pin(pairing.setting, pairing.points, pairs, kind, span)
         good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
         lows = pairing.points.index[np.array(pairs)].min(axis=1)
-        if kind in {FOLD, CORNER}:
-            # where two eigenvalues nearly vanish, the other fold may be met
-            own_low = lower_index(pairing.setting, pinned.z[good], pinned.p[good])
-            good[good] = own_low == lows[good]
         for lane, low in zip(np.flatnonzero(good).tolist(), lows[good].tolist(), strict=True):
             out[own[lane]] = pairing.points.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
 from equimorph.manifold.assembly import Discs
 from equimorph.manifold.mesh import SLACK
@@ -27,11 +27,13 @@ Tetrahedron = tuple[int, int, int, int]
 class Balls:
     """Tetrahedra with their index, and their facets on folds and on constraints.
 
-    doubtful: grid tetrahedra over which a ball could not be closed and cut without doubt.
+    owner: grid tetrahedra below them; doubtful: those over which a ball could not be closed and cut
+    without doubt.
     """
 
     corners: Int[np.ndarray, "n 4"]
     index: Int[np.ndarray, " n"]
+    owner: Int[np.ndarray, " n"]
     folds: Int[np.ndarray, "f 3"]
     caps: Int[np.ndarray, "c 3"]
     doubtful: Int[np.ndarray, " k"]
@@ -43,6 +45,7 @@ class _Found:
 
     corners: list[Tetrahedron] = field(default_factory=list)
     index: list[int] = field(default_factory=list)
+    owner: list[int] = field(default_factory=list)
     folds: list[Facet] = field(default_factory=list)
     caps: list[Facet] = field(default_factory=list)
     doubtful: set[int] = field(default_factory=set)
@@ -74,9 +77,9 @@ class _Ball:
     """Fold point inside each curve."""
 
 
-def fill(pairing: Pairing, discs: Discs) -> Balls:
-    """Fill all spheres with tetrahedra."""
-    spheres = find_spheres(pairing.mesh, discs)
+def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Balls:
+    """Fill all spheres over wanted grid tetrahedra."""
+    spheres = find_spheres(pairing.mesh, discs, wanted)
     found = _Found(doubtful=set(spheres.doubtful.tolist()))
     balls = []
     for sphere, cap in zip(spheres.others, _caps(pairing, spheres, found), strict=True):
@@ -95,6 +98,7 @@ def fill(pairing: Pairing, discs: Discs) -> Balls:
     return Balls(
         np.concatenate([spheres.plain, np.array(found.corners, int).reshape(-1, 4)]),
         np.concatenate([spheres.plain_index, np.array(found.index, int)]),
+        np.concatenate([spheres.plain_owner, np.array(found.owner, int)]),
         np.array(found.folds, int).reshape(-1, 3),
         np.array(found.caps, int).reshape(-1, 3),
         np.array(sorted(found.doubtful), int),
@@ -237,11 +241,11 @@ def _pinned(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int) -> lis
         return out
     setting, store = pairing.setting, pairing.points
     pinned = _pin_inside(pairing, groups, kind)
-    lanes = np.flatnonzero(pinned.found)
+    lanes, folded = np.flatnonzero(pinned.found), kind in {FOLD, CORNER}
     index = setting.structure.index(pinned.z[lanes], pinned.p[lanes]).tolist()
     for lane, own in zip(lanes.tolist(), index, strict=True):
         # at folds the count is round-off
-        low = int(store.index[list(groups[lane])].min()) if kind in {FOLD, CORNER} else own
+        low = int(store.index[list(groups[lane])].min()) if folded else own
         out[lane] = store.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out
 
@@ -281,6 +285,7 @@ def _cone(ball: _Ball, found: _Found) -> None:
         own = [(a, b, c, region.apex) for a, b, c in facets]
         found.corners.extend(own)
         found.index.extend([region.index] * len(own))
+        found.owner.extend([ball.owner] * len(own))
 
 
 def _sides(triangle: Facet) -> tuple[frozenset[int], ...]:

@@ -9,7 +9,7 @@ from jaxtyping import Int
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import account
 from equimorph.manifold.bisection import bisect
-from equimorph.manifold.cells import Cells, find_cells
+from equimorph.manifold.cells import CellFinder, Cells
 from equimorph.manifold.completeness import check, seeds_from
 from equimorph.manifold.crossing_curves import flood_crossings
 from equimorph.manifold.equilibrium_set import EquilibriumSet
@@ -129,9 +129,10 @@ def _of_grid(
     pairing.points.over_vertices(*_spread(setting, lines, seed, progress))
     generator = np.random.default_rng([seed, 1])
     recovered = 0
+    finder = CellFinder()
     for number in range(SEARCHES):
         pairing.fit()
-        cells, bisected = _lifted(pairing, progress)
+        cells, bisected = _lifted(pairing, finder, progress)
         eset = account(pairing, cells, given, bisected)
         found = check(eset, generator, checks, progress)
         if found.lacking == 0 or number == SEARCHES - 1:
@@ -178,13 +179,13 @@ def _mirrored(setting: Setting) -> tuple[bool, ...]:
     return tuple(any(bool(sign[k] < 0) for sign in signs) for k in range(len(setting.free)))
 
 
-def _lifted(pairing: Pairing, progress: Progress) -> tuple[Cells, int]:
+def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[Cells, int]:
     """Flood, close, assemble; bisect what is not certain and go on."""
     bisected = first = 0
     for number in range(BISECTIONS):
         flood_crossings(pairing, progress)
         progress.report("closing loops", 0, 1)
-        cells = find_cells(pairing)
+        cells = finder.find(pairing)
         doubtful = cells.doubtful
         first = doubtful if number == 0 else first
         # along a line where the set is singular doubt only multiplies; elsewhere it vanishes

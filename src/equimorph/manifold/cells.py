@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph.manifold.assembly import assemble
-from equimorph.manifold.balls import fill
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.points import CAP, CROSSING, FOLD
 from equimorph.manifold.polygons import find_loops
+from equimorph.manifold.volumes import Volumes, volumes_over
 
 
 def _nothing() -> Int[np.ndarray, " 0"]:
@@ -40,17 +40,24 @@ class Cells:
         return len(self.doubtful_triangles) + len(self.doubtful_tetrahedra)
 
 
-def find_cells(pairing: Pairing) -> Cells:
-    """Cells of the set over a mesh whose edges are all lifted."""
-    if pairing.mesh.dimension == 1:
-        return _segments(pairing)
-    discs = assemble(pairing, find_loops(pairing))
-    if pairing.mesh.dimension == 2:
-        marked = (discs.folds, discs.caps, discs.crossings)
-        return Cells(discs.corners, discs.index, *marked, discs.doubtful)
-    balls = fill(pairing, discs)
-    marked = (balls.folds, balls.caps, np.zeros((0, 3), int))
-    return Cells(balls.corners, balls.index, *marked, discs.doubtful, balls.doubtful)
+class CellFinder:
+    """Finds the cells of the set over a mesh that is being bisected."""
+
+    def __init__(self) -> None:
+        self._known: Volumes | None = None
+
+    def find(self, pairing: Pairing) -> Cells:
+        """Cells of the set over a mesh whose edges are all lifted."""
+        if pairing.mesh.dimension == 1:
+            return _segments(pairing)
+        if pairing.mesh.dimension == 2:
+            discs = assemble(pairing, find_loops(pairing))
+            marked = (discs.folds, discs.caps, discs.crossings)
+            return Cells(discs.corners, discs.index, *marked, discs.doubtful)
+        self._known = volumes_over(pairing, self._known)
+        discs, balls = self._known.discs, self._known.balls
+        marked = (balls.folds, balls.caps, np.zeros((0, 3), int))
+        return Cells(balls.corners, balls.index, *marked, discs.doubtful, balls.doubtful)
 
 
 def _segments(pairing: Pairing) -> Cells:

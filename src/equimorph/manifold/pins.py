@@ -1,7 +1,7 @@
 """Exact points amid others: on a fold, on a constraint, on both, or just on the set."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -20,6 +20,8 @@ NEWTON_STEPS = 15
 DIFFERENCE = 1e-6
 VANISHING = 1e-6
 """Size below which an eigenvalue at a fold is the one that vanishes."""
+LED = 12
+"""Steps from a known fold to the middle between several."""
 REACH = 3.0
 """How far a point may lie from the middle, relative to the farthest one around it."""
 
@@ -96,7 +98,43 @@ def pin(
     fold, cap = kind in {FOLD, CORNER}, kind in {CAP, CORNER}
     rows = principal_directions(deviations, span.shape[1] - fold - cap)
     around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
-    return corrected(Aim(setting, fold, cap, span, embed(setting, z, p), rows), z, p, around)
+    aim = Aim(setting, fold, cap, span, embed(setting, z, p), rows)
+    if not fold:
+        return corrected(aim, z, p, around)
+    low = np.array([points.index[list(group)].min() for group in groups], int)
+    pinned = _rightly(corrected(aim, z, p, around), setting, low)
+    for end in (0, -1) if not cap else ():
+        lanes = np.flatnonzero(~pinned.found)
+        if len(lanes) == 0:
+            break
+        start = np.array([groups[lane][end] for lane in lanes.tolist()], int)
+        states = (points.z[start], points.p[start])
+        led = _rightly(_led(aim.take(lanes), *states, around[lanes]), setting, low[lanes])
+        pinned.z[lanes], pinned.p[lanes], pinned.found[lanes] = led.z, led.p, led.found
+    return pinned
+
+
+def _rightly(pinned: Pinned, setting: Setting, low: Int[np.ndarray, " lanes"]) -> Pinned:
+    """Only those folds below which there are so many negative eigenvalues.
+
+    Where two eigenvalues nearly vanish, the other fold may be met.
+    """
+    found = pinned.found.copy()
+    found[found] = lower_index(setting, pinned.z[found], pinned.p[found]) == low[found]
+    return Pinned(pinned.z, pinned.p, found)
+
+
+def _led(aim: Aim, z: Lanes, p: Parameters, around: Values) -> Pinned:
+    """Pin folds in small steps from known ones to the middle, where one step goes astray."""
+    z, p, found = z.copy(), p.copy(), np.ones(len(z), bool)
+    start = embed(aim.setting, z, p)
+    for share in np.linspace(0.0, 1.0, LED + 1)[1:]:
+        lanes = np.flatnonzero(found)
+        middle = (1.0 - share) * start + share * aim.middle
+        own = replace(aim, middle=middle).take(lanes)
+        pinned = corrected(own, z[lanes], p[lanes], 2.0 * around[lanes] / LED)
+        z[lanes], p[lanes], found[lanes] = pinned.z, pinned.p, pinned.found
+    return Pinned(z, p, found)
 
 
 def corrected(aim: Aim, z: Lanes, p: Parameters, around: Values) -> Pinned:

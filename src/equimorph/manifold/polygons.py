@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Pairing
@@ -44,9 +44,10 @@ class Loops:
     """Triangles whose curves do not close, or close only after going around twice."""
 
 
-def find_loops(pairing: Pairing) -> Loops:
-    """Close the curves around every triangle."""
+def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -> Loops:
+    """Close the curves around every triangle; other than plain ones around wanted triangles."""
     plain, owner, special = _plain(pairing)
+    special = special if wanted is None else special[wanted[special]]
     polygons: list[Polygon] = []
     ambiguous: list[int] = []
     broken: list[int] = []

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -31,6 +31,7 @@ class Spheres:
 
     plain: Int[np.ndarray, "P 4"]
     plain_index: Int[np.ndarray, " P"]
+    plain_owner: Int[np.ndarray, " P"]
     others: list[Sphere]
     doubtful: Int[np.ndarray, " k"]
 
@@ -48,9 +49,9 @@ class _Copies:
     sizes: Int[np.ndarray, " pieces"]
 
 
-def find_spheres(mesh: BaseMesh, discs: Discs) -> Spheres:
-    """Join the discs around all grid tetrahedra but those beside doubtful triangles."""
-    copies = _copies(mesh, discs)
+def find_spheres(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Spheres:
+    """Join the discs around wanted grid tetrahedra but those beside doubtful triangles."""
+    copies = _copies(mesh, discs, wanted)
     starts, sizes = copies.starts, copies.sizes
     lowest, highest = (f.reduceat(copies.index, starts) for f in (np.minimum, np.maximum))
     closed = np.logical_and.reduceat((copies.shares == 2).all(axis=1), starts)
@@ -70,19 +71,20 @@ def find_spheres(mesh: BaseMesh, discs: Discs) -> Spheres:
     return Spheres(
         points[four, :, 0],
         copies.index[starts[candidates[four]]],
+        copies.owner[starts[candidates[four]]],
         others,
         np.array(sorted(set(doubtful)), int),
     )
 
 
-def _copies(mesh: BaseMesh, discs: Discs) -> _Copies:
-    """Every triangle of a disc once for each grid tetrahedron beside it."""
+def _copies(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> _Copies:
+    """Every triangle of a disc once for each wanted grid tetrahedron beside it."""
     amount = np.bincount(discs.owner, minlength=len(mesh.triangles))
     first = np.concatenate([[0], np.cumsum(amount)])
     by_owner = np.argsort(discs.owner, kind="stable")
     unclear = np.zeros(len(mesh.triangles), bool)
     unclear[discs.doubtful] = True
-    clear = np.flatnonzero(~unclear[mesh.faces].any(axis=1))
+    clear = np.flatnonzero(wanted & ~unclear[mesh.faces].any(axis=1))
     faces = mesh.faces[clear].ravel()
     count = amount[faces]
     offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
