@@ -3,9 +3,17 @@
 import numpy as np
 import pytest
 
-from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.manifold import (
+    EquilibriumSet,
+    build,
+    cells,
+    equilibrium_set,
+    refine,
+    stability_distance,
+)
 from equimorph.manifold.simplices import volumes
 from equimorph.manifold.topology import euler_characteristic
+from equimorph.manifold.volumes import volumes_over
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
 from oracles.complexes import assert_faithful, assert_folds_are_singular
@@ -133,3 +141,73 @@ def test_arch_over_both_actuators_and_the_load():
     assert len(eset.components) == 1
     around = np.concatenate([piece.vertices for piece in eset.boundaries])
     assert euler_characteristic(around) == 2 * eset.audit.euler_characteristic
+
+
+@pytest.mark.slow
+def test_what_a_bisection_leaves_is_found_only_once(monkeypatch):
+    """Doubtful tetrahedra are divided several times; to find everything anew gives the same set."""
+    monkeypatch.setitem(build.BISECTIONS, 3, 3)
+    swallowtail = Polynomial(
+        lambda x, a, b, c: integral(x**4 + a * x**2 + b * x + c), 1, ("a", "b", "c")
+    )
+    box, grid = Box(a=(-1.1, 0.6), b=(-0.7, 0.8), c=(-0.9, 1.0)), (3, 3, 3)
+    at_once = lifted(swallowtail, box, grid)
+    assert at_once.audit.bisected > 0
+    monkeypatch.setattr(cells, "volumes_over", lambda pairing, _: volumes_over(pairing, None))
+    anew = lifted(swallowtail, box, grid)
+    assert at_once.audit == anew.audit
+    one, other = (projected_volume(eset, 0) for eset in (at_once, anew))
+    assert one == pytest.approx(other, rel=1e-12)
+    one, other = (eset.coordinates[np.lexsort(eset.coordinates.T)] for eset in (at_once, anew))
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+
+
+def test_refined_three_sphere_is_within_the_accuracy():
+    """| |x| − 1 | inside the tetrahedra; the volume below each half tends to 4π/3."""
+    eset = lifted(ball(), BOX, (5, 6, 5))
+    with unchecked():
+        fine = refine(eset, 0.03)
+    assert_faithful(fine)
+    assert topology(fine) == topology(eset)
+    place = np.concatenate([fine.points.z, fine.coordinates], axis=1)
+    inside = np.random.default_rng(0).dirichlet(np.ones(4), len(fine.cells))
+    middle = np.einsum("ck,ckd->cd", inside, place[fine.cells])
+    assert np.abs(np.linalg.norm(middle, axis=1) - 1.0).max() <= 0.03
+    assert fine.audit.deviation <= 0.03
+    for index in (0, 1):
+        assert projected_volume(fine, index) == pytest.approx(4 * np.pi / 3, rel=0.03)
+
+
+def test_volume_of_the_bistable_region_of_the_spring():
+    """Where |F|/k < (1 − x_l^(2/3))^(3/2), by quadrature: that of the unstable sheet, refined."""
+    box = Box(x_l=(0.5, 1.2), F=(-0.3, 0.3), k=(1.0, 1.2))
+    with unchecked():
+        eset = refine(lifted(Spring(), box, (10, 9, 2)), 0.01)
+    assert eset.audit.clean, eset.audit
+    x = np.linspace(0.5, 1.0, 20001)
+    area = np.trapezoid(2 * (1 - np.cbrt(x) ** 2) ** 1.5, x)
+    wanted = area * (1.2**2 - 1) / 2
+    assert projected_volume(eset, 1) == pytest.approx(wanted, rel=5e-3)
+    # stable states count twice there, and once elsewhere
+    whole = 0.7 * 0.6 * 0.2
+    assert projected_volume(eset, 0) == pytest.approx(whole + wanted, rel=1e-3)
+
+
+def test_distances_from_the_edge_of_stability_in_three_parameters():
+    """F = k (1 − x_l^(2/3))^(3/2) ends the upper branch: nearest point by a scan."""
+    box = Box(x_l=(0.5, 1.2), F=(-0.3, 0.3), k=(1.0, 1.2))
+    eset = lifted(Spring(), box, (10, 9, 2))
+    with unchecked():
+        fine = refine(eset, 0.02)
+    upper = max(eset.at(x_l=0.8, F=0.0, k=1.1).stable, key=eset.structure.angle)
+    x, k = np.meshgrid(np.linspace(0.75, 0.9, 1501), np.linspace(1.0, 1.2, 401))
+    limit = k * (1.0 - np.cbrt(x) ** 2) ** 1.5
+    scales = eset.structure.scales[[parameter_at(eset, name) for name in ("x_l", "F", "k")]]
+    moves = np.stack([x - 0.8, limit, k - 1.1]) / scales[:, None, None]
+    nearest = np.sqrt((moves**2).sum(axis=0)).min()
+    for each in (eset, fine):
+        assert stability_distance(each, upper).in_parameters == pytest.approx(nearest, rel=1e-4)
+
+
+def parameter_at(eset: EquilibriumSet, name: str) -> int:
+    return [parameter.name for parameter in eset.structure.parameters].index(name)

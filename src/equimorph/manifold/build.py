@@ -30,7 +30,8 @@ from equimorph.structures import Structure
 
 COARSE = 12
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
-BISECTIONS = 12
+BISECTIONS = {1: 12, 2: 12, 3: 30}
+"""Rounds by the number of free parameters: each cuts the longest edges of doubtful cells."""
 GRIDS = 3
 """Grids that are tried, each with twice the intervals, until refinement succeeds everywhere."""
 SEARCHES = 4
@@ -182,7 +183,8 @@ def _mirrored(setting: Setting) -> tuple[bool, ...]:
 def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[Cells, int]:
     """Flood, close, assemble; bisect what is not certain and go on."""
     bisected = first = 0
-    for number in range(BISECTIONS):
+    rounds = BISECTIONS[pairing.mesh.dimension]
+    for number in range(rounds):
         flood_crossings(pairing, progress)
         progress.report("closing loops", 0, 1)
         cells = finder.find(pairing)
@@ -190,7 +192,7 @@ def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[C
         first = doubtful if number == 0 else first
         # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
         hopeless = doubtful > max(HOPELESS, 4 * first)
-        if doubtful == 0 or hopeless or number == BISECTIONS - 1:
+        if doubtful == 0 or hopeless or number == rounds - 1:
             break
         bisected += doubtful
         longest = _longest_edges(pairing, cells)
