@@ -64,7 +64,8 @@ def test_lowering_the_angle_at_fixed_load_ends_on_the_stability_boundary(spring_
 
 def test_mirror_image_is_reached_around_the_cusp_with_the_load_free(spring_set, start, below):
     for goal in (below, state(-0.62, 0.80)):
-        route = plan(spring_set, start, goal)
+        with unchecked():
+            route = plan(spring_set, start, goal)
         assert route.arrived
         x, force = route.schedule.values[:, :2].T
         # only above x_l = 1, or beyond the fold load there, do the two sides hang together

@@ -33,7 +33,14 @@ from equimorph.tasks.optimising import (
     optimise,
     strongest,
 )
-from equimorph.tasks.planning import Objective, SamplingOptions, plan, plan_sampled
+from equimorph.tasks.planning import (
+    Objective,
+    SamplingOptions,
+    alternatives,
+    plan,
+    plan_sampled,
+    smoothed,
+)
 from equimorph.tasks.reach import Reach, attainable, reachable
 from equimorph.tasks.robustness import (
     ImperfectionLaw,
@@ -86,6 +93,7 @@ __all__ = [
     "Tracking",
     "Trials",
     "Verification",
+    "alternatives",
     "attainable",
     "calibrate",
     "curvature_map",
@@ -103,6 +111,7 @@ __all__ = [
     "random_trials",
     "reachable",
     "sensitivity",
+    "smoothed",
     "solve_shape",
     "solve_shapes",
     "stable_room",

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.equilibria import Event, Path, TraceOptions, lift
+from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, Structure
@@ -25,7 +25,8 @@ class Route:
     status: "arrived", or "refused" with the reason in `why`. A route that arrived was lifted again
     at a finer step: `path`, its smallest stability `margin`, its `length` in the structure's metric
     and scaled parameters, what it was planned for (`objective`) and its `cost`, and the `schedule`
-    for the actuators. A refused one carries the path as far as it went, if there is one.
+    for the actuators. Where snaps were allowed, `snaps` has their landings, in order. A refused
+    route carries the path as far as it went, if there is one.
     """
 
     status: Literal["arrived", "refused"]
@@ -37,12 +38,14 @@ class Route:
     schedule: Schedule | None = None
     objective: str = "length"
     cost: float = np.nan
+    snaps: tuple[Landing, ...] = ()
 
     def __repr__(self) -> str:
         """Length and margin, or why there is no route."""
         if not self.arrived:
             return f"Route(refused: {self.why})"
-        return f"Route(arrived: length {self.length:.4g}, margin {self.margin:.4g})"
+        snaps = f", snaps {len(self.snaps)}" if self.snaps else ""
+        return f"Route(arrived: length {self.length:.4g}, margin {self.margin:.4g}{snaps})"
 
     @property
     def arrived(self) -> bool:

@@ -5,19 +5,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.equilibria import check_start, way_points
+from equimorph.equilibria import way_points
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, eased, position
-from equimorph.structures import State, States
+from equimorph.model import Constraint, Descriptor, eased
+from equimorph.structures import State
+from equimorph.tasks.planning.admission import check_ends, checked_route, corners_of, violation
 from equimorph.tasks.planning.links import Demands
-from equimorph.tasks.planning.network import cheapest_path, no_route
+from equimorph.tasks.planning.network import Ends, cheapest_path, no_route
 from equimorph.tasks.planning.objectives import Wish, objective_of
-from equimorph.tasks.planning.straightening import relaxed, straightened
-from equimorph.tasks.route import Corners, Route, refused, verified
+from equimorph.tasks.planning.snapping import with_snaps
+from equimorph.tasks.route import Corners, Route, refused
 
-RESERVES = (1.0, 1.02, 1.1)
-"""Factors on the demanded margin: dips between the points that are watched need a reserve."""
+RESERVES = ((1.0, 0.0), (1.02, 1e-3), (1.1, 1e-2))
+"""Factors on the demanded margin, and shares of that of the ends that are added to it.
+
+Dips between the points that are watched need a reserve.
+"""
 
 
 def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
@@ -29,6 +33,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
     within: Sequence[Constraint] = (),
     margin: float = 0.0,
     objective: Wish = "length",
+    snap_price: float | None = None,
     monitor: Sequence[Descriptor] = (),
 ) -> Route:
     """Plan a route from `start` to `goal` on which every state is stable.
@@ -53,6 +58,10 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
         (actuators that get nothing back), "clearance" (``∫ ds/margin``), `Rates` (time), or a sum
         ``[(1, "length"), (0.2, "work")]``; see `Objective`. A local minimum near the best path over
         the mesh.
+    snap_price
+        What a snap costs, in units of the objective, if snaps are allowed. Then the route may leave
+        its stable stratum over a fold and go on where the snap lands: `route.snaps` has the
+        landings, with the energy that is freed; before a snap no margin is kept.
     monitor
         Descriptors to record in the schedule, beside those of the constraints.
 
@@ -73,77 +82,44 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
         tuple(eased(each) for each in dict.fromkeys((*eset.constraints, *within))),
         margin,
     )
-    ends = {"start": start, "goal": goal}
-    for name, state in ends.items():
-        _check_belongs(eset, name, state)
+    ends = (start, goal)
+    check_ends(eset, ends)
     corners = None if via is None else _checked_corners(eset, start, goal, via)
-    faults = [_violation(name, state, demands) for name, state in ends.items()]
-    why = next((fault for fault in faults if fault), None)
+    _check_price(snap_price, via)
+    why = violation(ends, demands)
     if why:
         return refused(why, corners)
     if corners is not None:
-        return _kept(verified(start, goal, corners, demands.constraints, monitor), demands)
-    return _free(eset, (start, goal), demands, monitor)
+        return checked_route(ends, corners, demands, monitor)
+    if snap_price is not None:
+        return with_snaps(eset, ends, demands, snap_price, monitor)
+    return _free(eset, ends, demands, monitor)
+
+
+def _check_price(snap_price: float | None, via: Sequence[Mapping[str, float]] | None) -> None:
+    if snap_price is None:
+        return
+    if not (np.isfinite(snap_price) and snap_price > 0.0):
+        raise InputError(f"`snap_price` must be a positive number; got {snap_price!r}.")
+    if via is not None:
+        raise InputError("`via` must not be given with `snap_price`; got both.")
 
 
 def _free(
-    eset: EquilibriumSet,
-    ends: tuple[State, State],
-    demands: Demands,
-    monitor: Sequence[Descriptor],
+    eset: EquilibriumSet, ends: Ends, demands: Demands, monitor: Sequence[Descriptor]
 ) -> Route:
     """Return the cheapest route found, searched with a growing reserve of margin."""
-    for reserve in RESERVES:
-        tightened = replace(demands, margin=demands.margin * reserve)
+    least = min(end.margin for end in ends)
+    for factor, share in RESERVES:
+        reserved = min(demands.margin * factor + least * share, least)
+        tightened = replace(demands, margin=reserved)
         path = cheapest_path(eset, ends, tightened)
         if path is None:
             return refused(no_route(eset, ends, tightened))
-        route = _kept(
-            verified(*ends, corners_of(eset, path, tightened), demands.constraints, monitor),
-            demands,
-        )
+        route = checked_route(ends, corners_of(eset, path, tightened), demands, monitor)
         if route.arrived:
             break
     return route
-
-
-def corners_of(
-    eset: EquilibriumSet, path: States, demands: Demands, same_class: bool = False
-) -> Corners:
-    """Way-points of a straightened path."""
-    corners = straightened(path, demands, same_class)
-    free = np.array([position(eset.structure.parameters, name) for name in eset.names])
-    corners = relaxed(corners, demands, eset.box, free)
-    return [{name: corner[name] for name in eset.names} for corner in list(corners)[1:]]
-
-
-def _kept(route: Route, demands: Demands) -> Route:
-    """Return the route with its cost, refused if its margin falls below what is demanded."""
-    if not route.arrived:
-        return route
-    if route.margin >= demands.margin:
-        assert route.path is not None
-        cost = demands.objective.along(route.path.states)
-        return replace(route, objective=str(demands.objective), cost=cost)
-    return refused(
-        f"the stability margin falls to {route.margin:.4g} on the way, below {demands.margin:g}",
-        route.way_points,
-        route.path,
-    )
-
-
-def _check_belongs(eset: EquilibriumSet, name: str, state: State) -> None:
-    try:
-        check_start(state)
-    except InputError as error:
-        raise InputError(str(error).replace("`state`", f"`{name}`")) from None
-    here = {free: state[free] for free in eset.names}
-    wanted = eset.parameters_at(here)
-    if not np.allclose(wanted, state.p, rtol=0, atol=1e-9):
-        raise InputError(
-            f"`{name}` must have the fixed parameters of the set ({dict(eset.fixed)}); "
-            f"got {state.parameters}."
-        )
 
 
 def _checked_corners(
@@ -168,16 +144,3 @@ def _checked_corners(
     if not np.allclose(points[-1], goal.p, rtol=0, atol=1e-12):
         corners.append({name: goal[name] for name in eset.names})
     return corners
-
-
-def _violation(name: str, state: State, demands: Demands) -> str | None:
-    """Why a state is no admissible end of a route, if it is not."""
-    for constraint in demands.constraints:
-        if not constraint.holds(state.batch)[0]:
-            value = constraint.descriptor(state)
-            return f"the {name} violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
-    if not state.stable:
-        return f"the {name} is unstable (index {state.index})"
-    if state.margin < demands.margin:
-        return f"the {name} has a stability margin of {state.margin:.4g}, below {demands.margin:g}"
-    return None

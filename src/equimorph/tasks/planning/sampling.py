@@ -270,7 +270,7 @@ def _corners(
         inside = np.flatnonzero((s >= leg) & (s <= leg + 1)) if course.legs else np.arange(len(s))
         section = states[inside]
         if course.legs == 0:
-            section = relaxed(straightened(section, demands), demands, course.box, course.free)
+            section = relaxed(straightened(section, demands), demands, (course.box, course.free))
         else:
             section = straightened(section, demands)
         moving = np.ptp(np.concatenate([states.p, course.corners]), axis=0) > 0.0

@@ -58,7 +58,12 @@ def _swept(
     return np.asarray(second < first_miss[first])
 
 
-def relaxed(corners: States, demands: Demands, box: Box, free: Int[np.ndarray, " d"]) -> States:
+def relaxed(
+    corners: States,
+    demands: Demands,
+    room: tuple[Box, Int[np.ndarray, " d"]],
+    same_class: bool = False,
+) -> States:
     """Corners moved to where the chain of straight lifts costs least.
 
     Every other corner is tried at once in several directions and the best admissible move is made;
@@ -69,10 +74,10 @@ def relaxed(corners: States, demands: Demands, box: Box, free: Int[np.ndarray, "
         for _ in range(ROUNDS):
             before = corners
             for odd in (1, 2):
-                corners = _moved(corners, odd, size, demands, (box, free))
+                corners = _moved(corners, odd, size, demands, room)
             if corners is before:
                 break
-    return _thinned(corners, demands)
+    return _thinned(corners, demands, same_class)
 
 
 def _divided(corners: States, demands: Demands) -> States:
@@ -171,12 +176,14 @@ def _taken(
     return States(corners.structure, z, p)
 
 
-def _thinned(corners: States, demands: Demands) -> States:
+def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
     """Fewest corners whose chain costs hardly more."""
     first, second = np.triu_indices(len(corners), 1)
     near = second - first <= (3 if demands.objective.needs_margins else len(corners))
     first, second = first[near], second[near]
     linked, cost = links(corners[first], corners[second], demands)
+    if same_class:
+        linked &= _swept(first, second, linked)
     consecutive = cost[second - first == 1].sum()
     pairs = np.stack([first[linked], second[linked]], axis=1)
     each = cost[linked] + GAIN * consecutive

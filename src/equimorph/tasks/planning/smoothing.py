@@ -1,0 +1,147 @@
+"""Routes with round corners: twice continuously differentiable, near the old ones."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria import lift
+from equimorph.errors import InputError
+from equimorph.model import Constraint, Descriptor, Spline, names_of
+from equimorph.structures import State
+from equimorph.tasks.route import FINE, Route, distance, refused, scheduled
+
+Places = Float[np.ndarray, "points parameters"]
+
+DENSE = 2000
+KNOTS = 120
+HALVINGS = 6
+SAME = 1e-6
+
+
+def smoothed(
+    route: Route,
+    tolerance: float,
+    *,
+    within: Sequence[Constraint] = (),
+    margin: float = 0.0,
+    monitor: Sequence[Descriptor] = (),
+) -> Route:
+    """Round the corners of a route, and verify it again.
+
+    The polygon of the way-points is averaged twice over a window along its length, which gives a
+    cubic curve with continuous second derivatives that cuts each corner; a cubic `Spline` through
+    its points is lifted finely. If it is refused, the corners are rounded half as much.
+
+    Parameters
+    ----------
+    route
+        A route that arrived.
+    tolerance
+        Largest distance from the polygon, in scaled parameters.
+    within, margin, monitor
+        As of `plan`: the demands that the smooth route has to obey.
+
+    Returns
+    -------
+    The smooth route; its way-points are those of the polygon, and its cost is known for lengths
+    only. Refused if even small roundings are.
+
+    Raises
+    ------
+    InputError
+        If the route did not arrive, or the tolerance is not positive.
+    """
+    if route.path is None or not route.arrived or route.snaps:
+        raise InputError(f"`route` must have arrived without a snap; got {route!r}.")
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError(f"`tolerance` must be a positive number; got {tolerance!r}.")
+    states = route.path.states
+    structure = states.structure
+    corners = states.p[_corners(route)] / structure.scales
+    why = ""
+    for _ in range(HALVINGS):
+        curve = _rounded(corners, tolerance) * structure.scales
+        found = _verified(route, states[0], curve, (tuple(within), margin, tuple(monitor)))
+        if found.arrived:
+            return found
+        why, tolerance = found.why, 0.5 * tolerance
+    return refused(f"no rounding of the corners can be lifted: {why}", route.way_points)
+
+
+def _corners(route: Route) -> list[int]:
+    assert route.schedule is not None
+    return list(
+        dict.fromkeys([0, *route.schedule.way_points.tolist(), len(route.schedule.values) - 1])
+    )
+
+
+def _rounded(corners: Places, tolerance: float) -> Places:
+    """Points of the rounded polygon, as far from it as allowed."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    window = 0.5 * np.diff(length).min()
+    while True:
+        curve = _averaged(corners, length, window)
+        if _off(curve, corners) <= tolerance or window < 1e-6 * length[-1]:
+            return curve
+        window *= 0.7
+
+
+def _averaged(corners: Places, length: Float[np.ndarray, " corners"], window: float) -> Places:
+    """Polygon averaged with the weights of a parabolic spline of half-width `window`."""
+    at = np.linspace(0.0, length[-1], KNOTS)
+    # Gauss points of the convolution of three boxes, which is a parabola in pieces
+    nodes = np.linspace(-1.0, 1.0, 241)
+    x = np.abs(nodes) * 1.5
+    weights = np.where(x < 0.5, 0.75 - x**2, 0.5 * np.maximum(1.5 - x, 0.0) ** 2)
+    weights /= weights.sum()
+    places = at[:, None] + window * nodes
+    out = np.empty((KNOTS, corners.shape[1]))
+    for k in range(corners.shape[1]):
+        inner = np.interp(places, length, corners[:, k])
+        first = (corners[1, k] - corners[0, k]) / length[1]
+        last = (corners[-1, k] - corners[-2, k]) / (length[-1] - length[-2])
+        inner += np.minimum(places, 0.0) * first + np.maximum(places - length[-1], 0.0) * last
+        out[:, k] = inner @ weights
+    out[0], out[-1] = corners[0], corners[-1]
+    return out
+
+
+def _off(curve: Places, corners: Places) -> float:
+    """Largest distance of points from a polygon."""
+    gaps = []
+    for a, b in pairwise(corners):
+        side = b - a
+        share = np.clip((curve - a) @ side / (side @ side), 0.0, 1.0)
+        gaps.append(np.linalg.norm(curve - a - share[:, None] * side, axis=1))
+    return float(np.min(gaps, axis=0).max())
+
+
+def _verified(
+    route: Route,
+    start: State,
+    curve: Places,
+    demands: tuple[tuple[Constraint, ...], float, tuple[Descriptor, ...]],
+) -> Route:
+    within, margin, monitor = demands
+    names = names_of(start.structure.parameters)
+    moving = np.ptp(curve, axis=0) > 0.0
+    samples = {name: curve[:, k] for k, name in enumerate(names) if moving[k]}
+    path = lift(start, Spline(**samples), within=within, options=FINE)
+    if not path.arrived:
+        return refused(f"it meets a {path.end.kind}", route.way_points, path)
+    assert route.path is not None
+    if distance(path.end.state, route.path.end.state) > SAME:
+        return refused("it leads to another equilibrium", route.way_points, path)
+    margins = path.states.margin
+    if margins.min() < margin or not (margins > 0.0).all():
+        return refused(f"the margin falls to {margins.min():.4g}", route.way_points, path)
+    told = dict.fromkeys((*(c.descriptor for c in within), *monitor))
+    schedule = scheduled(path, margins, tuple(told))
+    length = float(path.length[-1])
+    return replace(
+        route, path=path, margin=float(margins.min()), length=length, schedule=schedule,
+        cost=float("nan") if route.objective != "length" else length,
+    )  # fmt: skip
