@@ -1,13 +1,16 @@
 """Projection to the free parameters, and descriptors as coordinates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
+from equimorph.charts.location import Cells
+from equimorph.charts.sheets import sheet_labels
+from equimorph.charts.untangling import untangled
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.model import Descriptor
@@ -80,6 +83,21 @@ class DescriptorChart(Chart):
     def coordinates(self) -> Coordinates:
         """What was chosen."""
         return coordinates_of(self.eset, self.chosen)
+
+    @cached_property
+    def cells(self) -> Cells:
+        """Cells of the set; those that chords of folds have turned over are flipped."""
+        numbers = np.arange(len(self.eset.cells))
+        plain = Cells(self.eset, self.coordinates, numbers)
+        if len(self.names) != 2:
+            return plain
+        folds = [np.stack([fold[:-1], fold[1:]], axis=1) for fold in self.eset.folds]
+        fixed = np.concatenate([np.zeros((0, 2), int), *folds])
+        flipped, sheet = self.eset.cells.copy(), sheet_labels(plain)
+        for label in range(sheet.max() + 1):
+            own = sheet == label
+            flipped[own] = untangled(flipped[own], plain.values, fixed)
+        return Cells(replace(self.eset, cells=flipped), self.coordinates, numbers)
 
     @cached_property
     def singular(self) -> Level:

@@ -14,7 +14,8 @@ from equimorph.manifold.cell_index import CellIndex
 from equimorph.manifold.topology import keys_of, labels, pieces
 
 FLAT = 0.5
-"""Sheets smaller than so many typical cells are cells turned over by chords of curved folds."""
+FEW = 3
+"""Sheets smaller than so many typical cells, or of so few cells, are turned over by chords."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,8 @@ def sheet_labels(cells: Cells) -> Int[np.ndarray, " own"]:
     label = labels(len(cells.numbers), whole.links[~cells.turning[whole.across]])
     size = np.bincount(label, np.abs(cells.turn))
     small = size < FLAT * np.median(np.abs(cells.turn))
+    small |= np.bincount(label) <= FEW
+    small &= np.arange(len(size)) != size.argmax()
     a, b = label[whole.links].T
     for one, other in ((a, b), (b, a)):
         # a sliver goes to a neighbour that is none

@@ -1,5 +1,6 @@
 """Figures and films of results; nothing else in the package draws."""
 
+from equimorph.plotting.charts import chart_domain, parameterisation
 from equimorph.plotting.curvature_map import curvature_map
 from equimorph.plotting.diagram import diagram
 from equimorph.plotting.film import film
@@ -12,6 +13,7 @@ from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 
 __all__ = [
+    "chart_domain",
     "curvature_map",
     "diagram",
     "film",
@@ -19,6 +21,7 @@ __all__ = [
     "load_map",
     "margins",
     "parameter_plane",
+    "parameterisation",
     "save",
     "shapes",
     "solutions",

@@ -1,0 +1,185 @@
+"""Internal parameterisations: the set above, the domains of its charts below."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.ticker import MaxNLocator
+
+from equimorph.charts import Atlas, Chart, Domain, Edge, Reduction
+from equimorph.errors import InputError
+from equimorph.model import Descriptor
+from equimorph.plotting import style
+from equimorph.plotting.surface import surface
+from equimorph.plotting.symbols import descriptor_label, parameter_label
+
+_FILL = "#bdd3e8"
+_TWICE: dict[str, Any] = {"facecolor": "#ececec", "edgecolor": "#8c8c8c", "hatch": "xxxx"}
+_GAP: dict[str, Any] = {"facecolor": "white", "edgecolor": "#8c8c8c", "hatch": "////"}
+_EDGES: dict[str, dict[str, Any]] = {
+    "fold": {"color": style.INK, "linewidth": 1.2},
+    "cut": {"color": style.ROUTE_COLOUR, "linewidth": 1.2, "linestyle": (0, (4, 1.5))},
+    "singular": {"color": style.INK, "linewidth": 0.9, "linestyle": (0, (1, 1))},
+    "cap": {"color": style.INK, "linewidth": 0.7, "linestyle": (0, (3, 2))},
+    "box": {"color": style.INK, "linewidth": style.HAIRLINE},
+}
+_BARRIER: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 2.6, "zorder": 5}
+_LABELS = {
+    "fold": "fold", "cut": "cut", "singular": "coordinates fold", "cap": "constraint",
+    "barrier": "barrier", "gap": "gap", "twice": "not single-valued", "inside": "one state",
+}  # fmt: skip
+_ROOM = 0.04
+_ZOOM = 0.82
+"""Of the pictures above: their labels stay inside."""
+_WIDTH, _ABOVE, _BELOW, _LEGEND = 2.0, 1.8, 1.6, 0.3  # inches
+
+
+def chart_domain(chart: Chart, ax: Axes | None = None) -> Axes:
+    """Domain of a chart over two coordinates: barriers thick, gaps hatched.
+
+    Parameters
+    ----------
+    chart
+        A projection, descriptor chart, reduction, or chart of an atlas.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        For a chart of other than two coordinates.
+    """
+    if len(chart.names) != 2:
+        raise InputError(f"`chart` must have two coordinates; got {len(chart.names)}.")
+    with style.house_style({"hatch.linewidth": 0.4}):
+        if ax is None:
+            ax = style.new_axes(style.SINGLE_COLUMN, 2.6, (0.55, 0.4, 0.15, 0.1))
+        _fill(ax, chart.domain, {"facecolor": _FILL, "edgecolor": "none"})
+        for overlap in chart.overlaps if not isinstance(chart, Reduction) else ():
+            _fill(ax, overlap.domain, _TWICE)
+        if isinstance(chart, Reduction):
+            _fill(ax, chart.gaps, _GAP)
+        for edge in _drawn(chart):
+            if edge.kind in _EDGES:
+                ax.plot(*edge.points.T, zorder=4, **_EDGES[edge.kind])
+        for barrier in chart.barriers if isinstance(chart, Reduction) else ():
+            ax.plot(*barrier.points.T, **_BARRIER)
+        _frame(ax, chart)
+    return ax
+
+
+def parameterisation(charts: Sequence[Chart | Atlas], height: Descriptor) -> Figure:
+    """Panels with the set above and its internal parameterisation below, one for each of `charts`.
+
+    Above, the part of the set that the charts cover, over the free parameters, with a descriptor as
+    height. Charts of an atlas lie beside each other.
+
+    Parameters
+    ----------
+    charts
+        Charts over two coordinates, or atlases of such.
+    height
+        Third axis of the pictures above.
+    """
+    leaves = [each.charts if isinstance(each, Atlas) else (each,) for each in charts]
+    columns = sum(len(each) for each in leaves)
+    size = (_WIDTH * columns + 0.2, _ABOVE + _BELOW + _LEGEND + 0.2)
+    figure = style.attach_canvas(Figure(figsize=size))
+    with style.house_style({"hatch.linewidth": 0.4}):
+        column = 0
+        for number, (each, own) in enumerate(zip(charts, leaves, strict=True)):
+            left, wide = _WIDTH * column, _WIDTH * len(own)
+            above: Any = figure.add_axes(
+                _place(size, (left + 0.5 * (wide - _WIDTH), _BELOW + _LEGEND, _WIDTH, _ABOVE)),
+                projection="3d",
+            )
+            surface(each.eset, height, ax=above)
+            above.set_box_aspect((1.2, 1.3, 1.0), zoom=_ZOOM)
+            for axis in (above.xaxis, above.yaxis, above.zaxis):
+                axis.set_major_locator(MaxNLocator(3))
+            if above.get_legend() is not None:
+                above.get_legend().remove()
+            figure.text(
+                (left + 0.08) / size[0], 1.0 - 0.16 / size[1], f"({chr(97 + number)})", size=8
+            )
+            for k, chart in enumerate(own):
+                below = figure.add_axes(
+                    _place(size, (left + k * _WIDTH + 0.55, _LEGEND + 0.42, _WIDTH - 0.65, 1.1))
+                )
+                chart_domain(chart, below)
+            column += len(own)
+        entries = _legend([chart for own in leaves for chart in own])
+        figure.legend(handles=entries, loc="lower center", ncols=len(entries), frameon=False)
+    return figure
+
+
+def _place(
+    size: tuple[float, float], inches: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    left, bottom, width, height = inches
+    return (left / size[0], bottom / size[1], width / size[0], height / size[1])
+
+
+def _fill(ax: Axes, domain: Domain, look: dict[str, Any]) -> None:
+    if domain.loops:
+        outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in domain.loops))
+        ax.add_patch(PathPatch(outline, linewidth=0.0, zorder=1, **look))
+
+
+def _drawn(chart: Chart) -> list[Edge]:
+    """Edges of the domain; chords of folds that parameters cross are not worth a line."""
+    skipped = "singular" if chart.coordinates.projecting else ""
+    return [edge for edge in chart.domain.edges if edge.kind != skipped]
+
+
+def _frame(ax: Axes, chart: Chart) -> None:
+    """Limits around the cells of the chart, and labels of the coordinates."""
+    places: Float[np.ndarray, "n 2"] = chart.cells.values[chart.cells.corners].reshape(-1, 2)
+    low, high = places.min(axis=0), places.max(axis=0)
+    if chart.coordinates.projecting:
+        low, high = chart.eset.box.lower, chart.eset.box.upper
+    room = _ROOM * (high - low)
+    ax.set_xlim(low[0] - room[0], high[0] + room[0])
+    ax.set_ylim(low[1] - room[1], high[1] + room[1])
+    labels = [
+        parameter_label(chart.eset.structure, scalar.name)
+        if place >= 0
+        else descriptor_label(scalar)
+        for scalar, place in zip(
+            chart.coordinates.scalars, chart.coordinates.places.tolist(), strict=True
+        )
+    ]
+    ax.set_xlabel(labels[0])
+    ax.set_ylabel(labels[1])
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(style.few_ticks())
+
+
+def _legend(charts: Sequence[Chart]) -> list[Patch | Line2D]:
+    """Entries for what occurs."""
+    kinds = {edge.kind for chart in charts for edge in _drawn(chart)}
+    reduced = [chart for chart in charts if isinstance(chart, Reduction)]
+    entries: list[Patch | Line2D] = [Patch(facecolor=_FILL, label=_LABELS["inside"])]
+    if any(chart.overlaps for chart in charts if not isinstance(chart, Reduction)):
+        entries.append(Patch(label=_LABELS["twice"], linewidth=0.0, **_TWICE))
+    if any(chart.gaps.loops for chart in reduced):
+        entries.append(Patch(label=_LABELS["gap"], linewidth=0.3, **_GAP))
+    entries += [
+        Line2D([], [], label=_LABELS[kind], **look)
+        for kind, look in _EDGES.items()
+        if kind in kinds and kind in _LABELS
+    ]
+    if any(chart.barriers for chart in reduced):
+        look = {name: value for name, value in _BARRIER.items() if name != "zorder"}
+        entries.append(Line2D([], [], label=_LABELS["barrier"], **look))
+    return entries

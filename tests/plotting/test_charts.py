@@ -1,0 +1,45 @@
+"""Figures of charts: what is drawn is what the charts say."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.errors import InputError
+from equimorph.plotting import chart_domain, parameterisation
+from oracles.charted import lifted
+from oracles.polynomial import fold_form
+from typecheck import unchecked
+
+
+@pytest.fixture(scope="module")
+def spring_set():
+    return lifted(em.Spring(), em.Box(x_l=(0.3, 1.3), F=(-0.5, 0.5)), (12, 12))
+
+
+def test_barriers_are_thick_and_gaps_hatched(spring_set):
+    with unchecked():
+        tie = em.reduce(spring_set, prefer=em.lowest(spring_set.structure.descriptor("energy")))
+        loaded = em.reduce(spring_set, prefer=em.quasi_static("F"))
+    widths = [line.get_linewidth() for line in chart_domain(tie).lines]
+    assert max(widths) == 2.6
+    hatches = [patch.get_hatch() for patch in chart_domain(loaded).patches]
+    assert "////" in hatches
+
+
+def test_panels_show_the_set_above_and_every_chart_below(spring_set):
+    angle = spring_set.structure.angle
+    with unchecked():
+        panels = [em.DescriptorChart(spring_set, [angle, "x_l"]), em.dissect(spring_set)]
+        figure = parameterisation(panels, angle)
+    flat = [ax for ax in figure.axes if ax.name != "3d"]
+    assert len(figure.axes) - len(flat) == 2
+    assert len(flat) == 1 + 3
+    assert flat[0].get_xlabel().startswith("$δ$") or "δ" in flat[0].get_xlabel()
+    shares = [ax.get_position().bounds for ax in flat]
+    assert np.all(np.diff([left for left, *_ in shares]) > 0)
+
+
+def test_only_charts_over_two_coordinates_are_drawn():
+    curve = em.Projection(lifted(fold_form(), em.Box(a=(-1, 1)), (7,)))
+    with pytest.raises(InputError, match="`chart` must have two coordinates; got 1"):
+        chart_domain(curve)
