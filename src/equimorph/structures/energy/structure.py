@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Descriptor, position
-from equimorph.structures.contract import Direction
+from equimorph.structures.contract import Direction, Majorant
 from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.energy.declared import (
     Formulas,
@@ -21,6 +21,7 @@ from equimorph.structures.energy.declared import (
     unknowns_of,
 )
 from equimorph.structures.energy.derivatives import Derivatives
+from equimorph.structures.energy.enclosures import can_enclose, enclosed
 from equimorph.structures.energy.tape import Tape, casadi, tape
 
 Lanes = Float[np.ndarray, "lanes size"]
@@ -154,6 +155,25 @@ class EnergyStructure(DiscreteStructure):
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
         return self._graphs.second(z, p, *v, *w)
+
+    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
+        """Bound of |D²F| over boxes by interval arithmetic; None for unusual functions."""
+        second = self._graphs.second
+        if not can_enclose(second):
+            return None
+        low = np.concatenate([z - reach[0], p - reach[1]], axis=1)
+        high = np.concatenate([z + reach[0], p + reach[1]], axis=1)
+
+        def bound(v: Direction, w: Direction) -> Lanes:
+            around = np.concatenate([*v, *w], axis=1)
+            least, most = enclosed(
+                second,
+                np.concatenate([low, -around], axis=1),
+                np.concatenate([high, around], axis=1),
+            )
+            return np.asarray(np.maximum(np.abs(least), np.abs(most)))
+
+        return bound
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p."""
