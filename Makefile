@@ -6,10 +6,13 @@ INSTALLED := .venv/.installed
 # One thread per worker in the linear algebra library: two workers share the machine.
 QUIET_THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: run test test-slow lint bench clean
+.PHONY: run paper test test-slow lint bench clean
 
 run: $(INSTALLED)
 	$(BIN)/equimorph run examples/arch.toml
+
+paper: $(INSTALLED)
+	$(BIN)/equimorph paper
 
 test: $(INSTALLED)
 	$(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"

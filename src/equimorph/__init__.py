@@ -160,7 +160,7 @@ _HOMES = {
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 _LAYERS = ("errors", "linalg", "model", "structures", "equilibria", "manifold", "charts",
-           "tasks", "plotting", "storage", "study", "cli")  # fmt: skip
+           "tasks", "plotting", "storage", "study", "paper", "cli")  # fmt: skip
 
 __all__ = [  # noqa: PLE0604  # names are listed with their homes above
     "__version__",

@@ -141,3 +141,15 @@ def run(
             err=True,
         )
         raise typer.Exit(INTERRUPTED) from None
+
+
+@app.command()
+def paper(
+    out: Annotated[Path, typer.Option(help="Folder for figures and the report.")] = Path(
+        "results/paper"
+    ),
+) -> None:
+    """Compute the article's figures and tables anew, ours beside theirs."""
+    from equimorph.cli.show import reproduce_and_show
+
+    reproduce_and_show(out)

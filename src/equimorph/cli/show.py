@@ -60,6 +60,29 @@ def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
     screen.print(f"Report: {out / 'index.html'}", soft_wrap=True)
 
 
+def reproduce_and_show(out: Path) -> None:
+    """Compute the article anew with progress on stderr, then print where the report is.
+
+    Parameters
+    ----------
+    out
+        Folder for figures and the report.
+    """
+    from equimorph.paper import reproduce  # noqa: PLC0415  # studies do not need it
+
+    screen = Console(highlight=False)
+    with ScreenProgress() as progress:
+        found = reproduce(out, progress=progress)
+    rows = [row for example in found.numbers for row in found.rows(example)]
+    table = Table(box=None, header_style="bold")
+    for title in ("what", "theirs", "ours"):
+        table.add_column(title, justify="left" if title == "what" else "right")
+    for quoted, ours in rows:
+        table.add_row(quoted.what, f"{quoted.theirs:g}", f"{ours:.6g}")
+    screen.print(table)
+    screen.print(f"Report: {out / 'index.html'}", soft_wrap=True)
+
+
 def _extents(problem: Problem) -> list[str]:
     """Every parameter of the set and of each map with its values, also those at defaults."""
     wanted, structure = problem.ground.extent, problem.structure

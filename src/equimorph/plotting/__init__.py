@@ -7,6 +7,7 @@ from equimorph.plotting.film import film
 from equimorph.plotting.load_map import load_map
 from equimorph.plotting.margins import margins
 from equimorph.plotting.plane import parameter_plane
+from equimorph.plotting.portraits import portraits
 from equimorph.plotting.shapes import shapes
 from equimorph.plotting.solutions import solutions
 from equimorph.plotting.style import house_style, save
@@ -22,6 +23,7 @@ __all__ = [
     "margins",
     "parameter_plane",
     "parameterisation",
+    "portraits",
     "save",
     "shapes",
     "solutions",

@@ -86,6 +86,12 @@ def _name_ends(
     """Write "start" and "goal" on the outer sides of both shapes, where they are far apart."""
     apart = np.linalg.norm(last - first, axis=1)
     middle = len(apart) // 2
+    if apart.max() < 1e-6:
+        ax.annotate(
+            "start = goal", first[middle], (0, -4), textcoords="offset points", ha="center",
+            va="top", weight="bold",
+        )  # fmt: skip
+        return
     at = middle if apart[middle] > 0.9 * apart.max() else int(apart.argmax())
     start, goal = first[at], last[at]
     above = 1 if start[1] >= goal[1] else -1

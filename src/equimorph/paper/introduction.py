@@ -1,0 +1,43 @@
+"""The introduction's figure: two stable states under one load, and a shape that adapts to a load.
+
+A rod of length 1, clamped at both ends in rotary actuators a span sin 1 apart, under a force at its
+middle. The article gives no numbers for it; angles and force here are ours.
+"""
+
+from pathlib import Path
+
+import equimorph as em
+
+FORCE = 1.0
+"""In units of 4π²B/L²."""
+
+
+def main(folder: Path) -> dict[str, float]:
+    """Find both states under the force, and turn the ends until the loaded shape is as high."""
+    rod = em.Rod(loads={"F": em.PointForce(0.5)})
+    crown = rod.height(0.5)
+    box = em.Box(Theta=(0.4, 1.6), Delta=(-0.9, 0.9))
+    eset = em.equilibrium_set(
+        rod, box, fixed={"F": FORCE}, within=[rod.max_curvature <= 20], intervals=(16, 25)
+    )
+    both = eset.at(Theta=1.0, Delta=0.1).stable
+    up, down = max(both, key=crown), min(both, key=crown)
+    rest = rod.natural_state(Theta=0.9, Delta=0.0)
+    loaded = em.lift(rest, {"F": FORCE}).end.state
+    wanted = {
+        rod.height(1 / 3): rod.height(1 / 3)(rest),
+        rod.height(2 / 3): rod.height(2 / 3)(rest),
+    }
+    adapted = em.track(loaded, wanted, actuators=["Theta", "Delta"])
+    em.plotting.save(em.plotting.portraits(both), folder, "two-states")
+    em.plotting.save(em.plotting.shapes(adapted.path, count=5), folder, "adaptation")
+    return {
+        "crown of the upper state": crown(up),
+        "crown of the lower state": crown(down),
+        "margin of the upper state": up.margin,
+        "margin of the lower state": down.margin,
+        "crown at rest": crown(rest),
+        "crown under the force": crown(loaded),
+        "crown adapted": crown(adapted.path.states[-1]),
+        "Theta adapted": adapted.path.states[-1]["Theta"],
+    }

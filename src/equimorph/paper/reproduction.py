@@ -1,0 +1,118 @@
+"""`reproduce`: every figure and number of the article, ours beside theirs, as one report."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from time import perf_counter
+
+from equimorph.model import Progress, Silent
+from equimorph.paper.examples import EXAMPLES, Example
+from equimorph.paper.quoted import QUOTED, Quoted
+from equimorph.storage.files import write_text
+from equimorph.study import html
+
+TITLE = "Quasi-static shape control of soft, morphing structures, computed anew"
+SOURCE = (
+    "E. Fehér, A. Á. Sipos, P. L. Várkonyi: Quasi-static shape control of soft, morphing "
+    "structures, arXiv:2509.12916."
+)
+HEAD = ("what", "theirs", "ours", "difference", "")
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """Key numbers of every example, by its name, and how long each took in seconds."""
+
+    numbers: Mapping[str, Mapping[str, float]]
+    seconds: Mapping[str, float]
+
+    def rows(self, example: str) -> list[tuple[Quoted, float]]:
+        """What the article quotes of an example, with our numbers."""
+        return [
+            (each, self.numbers[example][each.key]) for each in QUOTED if each.example == example
+        ]
+
+
+def reproduce(
+    folder: Path, *, examples: Sequence[Example] = EXAMPLES, progress: Progress | None = None
+) -> Reproduction:
+    """Compute all examples; write their figures, and the report as HTML and as Markdown.
+
+    Parameters
+    ----------
+    folder
+        Where everything goes; made if it does not exist.
+    examples
+        Which to compute.
+    progress
+        Told how far it is.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    sink = progress or Silent()
+    write_text(folder / "index.html", "")  # says at once if the folder cannot be written
+    numbers: dict[str, dict[str, float]] = {}
+    seconds: dict[str, float] = {}
+    for done, example in enumerate(examples):
+        sink.report("examples", done, len(examples))
+        start = perf_counter()
+        numbers[example.name] = example.main(folder)
+        seconds[example.name] = perf_counter() - start
+    sink.report("examples", len(examples), len(examples))
+    found = Reproduction(numbers, seconds)
+    write_text(folder / "report.md", markdown(found, examples))
+    write_text(folder / "index.html", page(found, examples, folder))
+    return found
+
+
+def markdown(found: Reproduction, examples: Sequence[Example]) -> str:
+    """Return the report as Markdown."""
+    lines = [f"# {TITLE}", "", SOURCE, ""]
+    for example in examples:
+        lines += [f"## {example.title}", ""]
+        for name, caption in example.captions.items():
+            lines += [f"![{caption}]({name}.png)", "", f"*{caption}*", ""]
+        rows = found.rows(example.name)
+        if rows:
+            lines += [f"| {' | '.join(HEAD)} |", "|---|---|---|---|---|"]
+            for row in rows:
+                cells = [cell.replace("|", "\\|") for cell in _cells(*row)]
+                lines.append(f"| {' | '.join(cells)} |")
+            lines.append("")
+        ours = found.numbers[example.name].items()
+        lines += [*(f"- {key}: {html.number(value, 8)}" for key, value in ours), ""]
+    return "\n".join(lines)
+
+
+def page(found: Reproduction, examples: Sequence[Example], folder: Path) -> str:
+    """Return the report as one page; the figures are in the folder."""
+    body = [f"<h1>{escape(TITLE)}</h1>", f'<p class="lead">{escape(SOURCE)}</p>']
+    for example in examples:
+        body.append(f"<h2>{escape(example.title)}</h2>")
+        captions = {f"{name}.png": text for name, text in example.captions.items()}
+        body.append(html.pictures(folder, {}, captions))
+        rows = [[escape(cell) for cell in _cells(*row)] for row in found.rows(example.name)]
+        if rows:
+            body.append(html.table(HEAD, rows))
+        ours = found.numbers[example.name].items()
+        listed = [[escape(key), html.number(value, 8)] for key, value in ours]
+        body += ["<h3>Our numbers</h3>", html.table([], listed, "words")]
+    times = ", ".join(f"{name} {value:.1f} s" for name, value in found.seconds.items())
+    body.append(f'<p class="faint">Wall time: {escape(times)}.</p>')
+    return html.page(TITLE, body)
+
+
+def _cells(quoted: Quoted, ours: float) -> list[str]:
+    """Theirs, ours, the difference, and the sentence."""
+    difference = html.number(ours - quoted.theirs, 2)
+    return [
+        quoted.what,
+        html.number(quoted.theirs, 6),
+        html.number(ours, 7),
+        difference,
+        quoted.note,
+    ]

@@ -1,0 +1,85 @@
+"""Shapes of single states, side by side in one frame."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+from matplotlib.axes import Axes
+
+from equimorph.errors import InputError
+from equimorph.plotting import style
+from equimorph.plotting.furniture import draw_supports, frame_shapes
+from equimorph.plotting.symbols import with_unit
+from equimorph.structures import States
+
+_ROOM = 0.1
+_MARGINS = (0.54, 0.36, 0.14, 0.06)  # inches around the frame: left, bottom, right, top
+_DASHES = ("solid", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
+
+
+def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None) -> Axes:
+    """Shapes of states, each with its label where it is farthest from the others.
+
+    Parameters
+    ----------
+    states
+        At least one.
+    labels
+        One for each; numbers from 1 if there are none.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        Without states, or for another number of labels.
+    """
+    names = list(labels) or [str(k) for k in range(1, len(states) + 1)]
+    if not len(states) or len(names) != len(states):
+        raise InputError(
+            f"`labels` must be one for each of one or more states; got {len(names)} for "
+            f"{len(states)}."
+        )
+    outlines = states.shape()
+    with style.house_style():
+        if ax is None:
+            ax = style.new_axes(style.SINGLE_COLUMN, _height(outlines), _MARGINS)
+        frame_shapes(ax, outlines, room=_ROOM)
+        unit = states.structure.length_unit
+        ax.set_xlabel(with_unit("$x$", unit))
+        ax.set_ylabel(with_unit("$y$", unit))
+        ax.xaxis.set_major_locator(style.few_ticks())
+        ax.yaxis.set_major_locator(style.few_ticks())
+        draw_supports(ax, states)
+        colours = style.progress_map()(np.linspace(0.0, 0.8, len(states)))
+        for k, (outline, at) in enumerate(zip(outlines, _places(outlines), strict=True)):
+            look = {"color": colours[k], "linestyle": _DASHES[k % len(_DASHES)]}
+            ax.plot(*outline.T, linewidth=1.6, zorder=3, **look)
+            above = outline[at, 1] >= np.median(outlines[:, at, 1])
+            ax.annotate(
+                names[k], tuple(outline[at].tolist()), (0, 3 if above else -3), ha="center",
+                va="bottom" if above else "top", textcoords="offset points", zorder=5,
+            )  # fmt: skip
+    return ax
+
+
+def _places(outlines: Float[np.ndarray, "states points 2"]) -> list[Int[np.ndarray, ""]]:
+    """Where each outline is farthest from its nearest neighbour at the same share of its way."""
+    if len(outlines) == 1:
+        return [np.array(outlines.shape[1] // 2)]
+    gaps = np.linalg.norm(outlines[:, None] - outlines[None], axis=3)
+    gaps[np.arange(len(outlines)), np.arange(len(outlines))] = np.inf
+    return list(gaps.min(axis=1).argmax(axis=1))
+
+
+def _height(outlines: Float[np.ndarray, "states points 2"]) -> float:
+    """Height of a figure one column wide whose drawing keeps its aspect without empty bands."""
+    low, high = outlines.min(axis=(0, 1)), outlines.max(axis=(0, 1))
+    width, height = high - low + 2 * _ROOM * float(max(high - low))
+    left, bottom, right, top = _MARGINS
+    drawing = (style.SINGLE_COLUMN - left - right) * float(height / width)
+    return bottom + top + min(drawing, 1.4 * style.SINGLE_COLUMN)

@@ -1,0 +1,131 @@
+"""The article computed anew: key numbers against PHYSICS section 5 and closed forms."""
+
+import inspect
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.paper import reproduction
+from equimorph.paper.examples import EXAMPLES, Example
+from equimorph.paper.quoted import QUOTED
+from typecheck import unchecked
+
+COARSE = em.Grid(Theta=(0.2, 2.5, 23), Delta=(-2.0, 2.0, 30))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("paper")
+
+
+def numbers_of(name, folder, **how):
+    with unchecked():
+        return import_module(f"equimorph.paper.{name}").main(folder, **how)
+
+
+def test_spring(folder):
+    """PHYSICS section 2."""
+    found = numbers_of("spring", folder)
+    np.testing.assert_allclose(found["load of C_s"], 0.009908, atol=5e-7)
+    np.testing.assert_allclose(found["load of (0.40, 0.90)"], 0.008904, atol=5e-7)
+    np.testing.assert_allclose(found["x_l of delta = 0.40 at the load of C_s"], 0.89763, atol=5e-6)
+    sine = np.cbrt(found["load of C_s"])
+    np.testing.assert_allclose(found["delta of C_t2"], np.arcsin(sine), rtol=1e-7)
+    np.testing.assert_allclose(found["x_l of C_t2"], np.cos(np.arcsin(sine)) ** 3, rtol=1e-7)
+    np.testing.assert_allclose(found["x_l of C_t3 at the load of C_s"], 0.82776, atol=5e-6)
+    assert found["routes to C_t3 at fixed load"] == 0.0
+    assert found["routes to C_t3 with the load free"] == 1.0
+    assert found["largest x_l on that route"] > 1.0
+
+
+def test_limit_loads(folder):
+    """PHYSICS section 5; Q_a's optimum within a few per cent of the article's 4.0."""
+    found = numbers_of("limit_loads", folder, grid=COARSE)
+    np.testing.assert_allclose(found["uniform: limit load at (0.9, 0)"], 4.2439977594, rtol=1e-10)
+    np.testing.assert_allclose(found["left-half: limit load at (0.9, 0)"], 2.3638940346, rtol=1e-10)
+    np.testing.assert_allclose(found["left-half: largest limit load"], 4.0, rtol=0.05)
+    np.testing.assert_allclose(found["left-half: its Theta"], 0.94, atol=0.02)
+    np.testing.assert_allclose(found["left-half: its Delta"], 0.60, atol=0.02)
+
+
+def test_curvatures(folder):
+    """PHYSICS section 5: 2.132 and 14.17 at (0.96, 0); the optimum of Q_a near (0.65, 0.52)."""
+    found = numbers_of("curvatures", folder, grid=COARSE)
+    np.testing.assert_allclose(found["uniform: max |kappa| at (0.96, 0)"], 2.132, atol=1e-3)
+    key = "left-half: max |kappa| at (0.96, 0)"
+    np.testing.assert_allclose(found[key], 14.17, atol=0.01)
+    assert found[f"{key}: snaps on the way"] == 1.0
+    np.testing.assert_allclose(found["left-half: least max |kappa|"], 3.02, atol=0.01)
+    np.testing.assert_allclose(found["left-half: its Theta"], 0.65, atol=0.005)
+    np.testing.assert_allclose(found["left-half: its Delta"], 0.52, atol=0.005)
+
+
+def test_inside_out(folder):
+    """PHYSICS sections 4.9 and 5."""
+    found = numbers_of("inside_out", folder)
+    assert found["equilibria at (1, 0)"] == 5.0
+    np.testing.assert_allclose(found["crown of the upright arch"], 0.2258, atol=5e-5)
+    np.testing.assert_allclose(found["crown of the inverted arch"], -0.1496, atol=5e-5)
+    np.testing.assert_allclose(found["smallest margin of the route"], 0.462, atol=5e-4)
+    np.testing.assert_allclose(found["largest max |kappa| of the route"], 16.4, atol=0.06)
+    np.testing.assert_allclose(found["max |kappa| of the goal"], 10.55, atol=5e-3)
+    assert found["routes within max |kappa| <= 6"] == 0.0
+
+
+def test_tracking(folder):
+    """PHYSICS section 5: Θ = 1.621098, Δ = 0; the square is stable all around and closes."""
+    found = numbers_of("tracking", folder)
+    np.testing.assert_allclose(found["Theta at (0.15, 0.15)"], 1.621098, atol=5e-7)
+    np.testing.assert_allclose(found["Delta at (0.15, 0.15)"], 0.0, atol=1e-9)
+    assert found["square tracked"] == 1.0
+    assert found["largest change of an actuator around it"] < 1e-9
+
+
+def test_introduction(folder):
+    """Heights at s = 1/3 and 2/3 are those at rest, so that the crown is nearly so."""
+    found = numbers_of("introduction", folder)
+    assert found["margin of the upper state"] > 0.0
+    assert found["margin of the lower state"] > 0.0
+    assert found["crown of the upper state"] > 0.0 > found["crown of the lower state"]
+    sag = found["crown at rest"] - found["crown under the force"]
+    assert abs(found["crown at rest"] - found["crown adapted"]) < sag
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda each: each.name)
+def test_examples_are_short_and_use_the_public_face(example):
+    """At most 80 lines; nothing imported from within."""
+    source = inspect.getsource(inspect.getmodule(example.main))
+    assert len(source.splitlines()) <= 80
+    assert "from equimorph" not in source
+
+
+def test_every_quoted_number_has_an_example():
+    names = {example.name for example in EXAMPLES}
+    assert {each.example for each in QUOTED} <= names
+
+
+def test_the_report_shows_theirs_beside_ours(tmp_path):
+    """With stand-ins for the computation."""
+
+    def stand_in(example):
+        keys = [each.key for each in QUOTED if each.example == example.name]
+        return Example(
+            example.name, example.title, lambda _: dict.fromkeys(keys, 1.5), example.captions
+        )
+
+    reproduction.reproduce(tmp_path, examples=[stand_in(each) for each in EXAMPLES])
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    plain = text.replace("\\|", "|")
+    for each in QUOTED:
+        assert each.note in plain
+        assert f"| {each.what} |" in plain
+    assert page.count("<h2>") == len(EXAMPLES)
+
+
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(em.InputError):
+        reproduction.reproduce(tmp_path / "file" / "paper")
