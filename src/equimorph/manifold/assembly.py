@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from equimorph.manifold.crossing_curves import lonely
 from equimorph.manifold.cutting import (
@@ -193,8 +193,7 @@ def _continuous(
     if not at:
         return [ways for _, ways in choices]
     normals = existence_normals(pairing.setting, pairing.points, np.array([fold for _, fold in at]))
-    bases = planes(pairing, [choices[number][0].polygon.triangle for number, _ in at])
-    flat = np.einsum("nkd,nd->nk", bases, normals)
+    flat = _along_sides(pairing, [choices[number][0].polygon.triangle for number, _ in at], normals)
     flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
     normal = dict(zip(at, flat, strict=True))
     return [
@@ -209,6 +208,20 @@ def _continuous(
         ]
         for number, (plan, ways) in enumerate(choices)
     ]
+
+
+def _along_sides(
+    pairing: Pairing, triangles: list[int], normals: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n 2"]:
+    """Components of normals to curves in coordinates in which their grid triangles are equilateral.
+
+    So angles between them do not depend on the scales of the parameters.
+    """
+    mesh = pairing.mesh
+    corners = mesh.vertices[mesh.triangles[triangles]] / pairing.setting.scales
+    sides = corners[:, 1:] - corners[:, :1]
+    first, second = np.einsum("nkd,nd->kn", sides, normals)
+    return np.stack([first, (2.0 * second - first) / np.sqrt(3.0)], axis=1)
 
 
 def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:

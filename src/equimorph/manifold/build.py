@@ -17,7 +17,7 @@ from equimorph.manifold.flooding import flood
 from equimorph.manifold.mesh import Lines, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.pairing import Pairing, Setting, start_pairing
 from equimorph.manifold.refinement import check_accuracy, refine
-from equimorph.manifold.seeds import Seeds, seeds
+from equimorph.manifold.seeds import Seeds, is_symmetric, seeds
 from equimorph.model import (
     Box,
     Constraint,
@@ -30,10 +30,12 @@ from equimorph.structures import Structure
 
 COARSE = 12
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
-BISECTIONS = {1: 12, 2: 12, 3: 30}
+BISECTIONS = {1: 12, 2: 24, 3: 30}
 """Rounds by the number of free parameters: each cuts the longest edges of doubtful cells."""
 GRIDS = 3
 """Grids that are tried, each with twice the intervals, until refinement succeeds everywhere."""
+CHEAP = 4
+"""Times the independent checks in diagrams over one parameter, and in symmetric slices."""
 SEARCHES = 4
 """Rounds of independent checks; what one round finds missing is lifted before the next."""
 HOPELESS = 50
@@ -77,7 +79,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     checks
         Random points, half of them below the set, half anywhere in the box, at which an independent
         search looks for equilibria that the set lacks. They are added and lifted like seeds, and
-        other points are checked, until nothing is missing or four rounds are over.
+        other points are checked, until nothing is missing or four rounds are over. Four times as
+        many in diagrams over one parameter and in symmetric slices.
     accuracy
         Largest distance of the straight cells from the set, in the metric, to which the set is
         refined (see `refine`); it is left as it was lifted if not given. If some edges cannot be
@@ -124,7 +127,7 @@ def _of_grid(
     """
     box, _, intervals = given
     seed, checks = effort
-    lines = grid_lines(box, intervals, _mirrored(setting))
+    lines = grid_lines(box, intervals, _off_zero(setting))
     progress.report("seeds", 0, 1)
     pairing = start_pairing(setting, grid_mesh(lines))
     pairing.points.over_vertices(*_spread(setting, lines, seed, progress))
@@ -135,13 +138,18 @@ def _of_grid(
         pairing.fit()
         cells, bisected = _lifted(pairing, finder, progress)
         eset = account(pairing, cells, given, bisected)
-        found = check(eset, generator, checks, progress)
+        found = check(eset, generator, _checks(checks, setting), progress)
         if found.lacking == 0 or number == SEARCHES - 1:
             break
         recovered += found.lacking
         pairing.points.over_vertices(*seeds_from(setting, pairing.mesh, found.missing))
     audit = replace(eset.audit, checked=found.found, missing=found.lacking, recovered=recovered)
     return replace(eset, audit=audit)
+
+
+def _checks(checks: int, setting: Setting) -> int:
+    """Points at which is checked: more where that is cheap, and where pieces hang together less."""
+    return checks * (CHEAP if len(setting.free) == 1 or is_symmetric(setting) else 1)
 
 
 def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:
@@ -174,10 +182,12 @@ def _setting(
     return Setting(structure, base, free, within)
 
 
-def _mirrored(setting: Setting) -> tuple[bool, ...]:
-    """Whether a symmetry of the structure reverses each free parameter."""
-    signs = [symmetry.signs[setting.free] for symmetry in setting.structure.symmetries()]
-    return tuple(any(bool(sign[k] < 0) for sign in signs) for k in range(len(setting.free)))
+def _off_zero(setting: Setting) -> tuple[bool, ...]:
+    """Free parameters whose zero no line of the grid may hold: all.
+
+    There much is symmetric, declared or not: a structure whose load is none may be its own image.
+    """
+    return (True,) * len(setting.free)
 
 
 def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[Cells, int]:
@@ -196,7 +206,7 @@ def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[C
             break
         bisected += doubtful
         longest = _longest_edges(pairing, cells)
-        pairing.use_mesh(bisect(pairing.mesh, longest, _mirrored(pairing.setting)))
+        pairing.use_mesh(bisect(pairing.mesh, longest, _off_zero(pairing.setting)))
     return cells, bisected
 
 
@@ -217,8 +227,9 @@ def _spread(setting: Setting, lines: Lines, seed: int, progress: Progress) -> Se
 
 
 def _longest_edges(pairing: Pairing, cells: Cells) -> Int[np.ndarray, " n"]:
-    """Longest edge of each doubtful grid cell."""
+    """Longest edge of each doubtful grid cell, relative to the box."""
     mesh = pairing.mesh
+    size = np.ptp(mesh.vertices, axis=0)
     around = mesh.faces[cells.doubtful_tetrahedra]
     groups = [
         mesh.sides[cells.doubtful_triangles],
@@ -226,7 +237,7 @@ def _longest_edges(pairing: Pairing, cells: Cells) -> Int[np.ndarray, " n"]:
     ]
     longest = []
     for sides in groups:
-        ends = mesh.vertices[mesh.edges[sides]] / pairing.setting.scales
+        ends = mesh.vertices[mesh.edges[sides]] / size
         length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
         longest.append(sides[np.arange(len(sides)), length.argmax(axis=1)])
     return np.unique(np.concatenate(longest))

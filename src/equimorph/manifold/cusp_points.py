@@ -5,18 +5,27 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.locus import Locus, settle
 from equimorph.errors import InputError
+from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.fabric import ON_FOLD, Vertices, fabric_of
-from equimorph.manifold.levels import fabric_setting, roots
+from equimorph.manifold.fabric import ON_FOLD, Fabric, Vertices, fabric_of
+from equimorph.manifold.levels import fabric_setting
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.pins import lower_index
 from equimorph.structures import States
+
+REACH = 1.5
+"""How far a cusp may lie from the ends of the edge beside which it is sought, in its lengths."""
+SAME = 1e-6
 
 
 @dataclass(frozen=True)
 class Cusps:
     """Cusps as states, and the index on the lower side of each; 0 on the boundary of stability.
 
-    lost: edges of folds that turn back at a cusp which was not found; refine the set there.
+    lost: edges of folds with a cusp which was not found; refine the set there.
     """
 
     states: States
@@ -27,9 +36,8 @@ class Cusps:
 def cusps(eset: EquilibriumSet) -> Cusps:
     """Cusps on the folds of a set over two parameters, polished.
 
-    Beyond a fold, its two sheets exist on one side. Along the fold curve the vector that points
-    there is continuous, and vanishes and turns round at cusps only, where
-    ``φᵀF_zz[φ, φ] = 0``.
+    There ``φᵀF_zz[φ, φ] = 0``, which changes its sign with a null vector φ that is continuous along
+    the fold.
 
     Raises
     ------
@@ -40,33 +48,60 @@ def cusps(eset: EquilibriumSet) -> Cusps:
         raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
     fabric = fabric_of(fabric_setting(eset), eset)
     ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    turning = ends[_turning(fabric, ends)]
+    lowest = fabric.vertices.index[turning].min(axis=1)
+    states: list[tuple[np.ndarray, np.ndarray, int]] = []
+    for edge, low in zip(turning, lowest.tolist(), strict=True):
+        found = _between(fabric, edge, low)
+        # a cusp that two edges lead to leaves another one lost
+        if found and all(np.abs(found[0] - z).max() > SAME for z, _, _ in states):
+            states.append((*found, low))
+    lost = len(turning) - len(states)
     store = fabric.vertices
-    side = sides_of_existence(store.take(ends[:, 0]))
-    known = np.stack(
-        [np.einsum("ni,ni->n", side, sides_of_existence(store.take(ends[:, k]))) for k in range(2)],
-        axis=1,
+    z, p = (
+        np.array([each[k] for each in states]).reshape(len(states), column.shape[1])
+        for k, column in enumerate((store.z, store.p))
     )
-    turning = np.flatnonzero(known[:, 0] * known[:, 1] < 0.0)
-    lowest = store.index[ends[turning]].min(axis=1)
-
-    def value(at: Vertices, lanes: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
-
-    if len(turning) == 0:
-        return Cusps(States(eset.structure, store.z[:0], store.p[:0]), store.index[:0], 0)
-    done, found = roots(fabric, ends[turning], (ON_FOLD, lowest), known[turning], value)
-    lost = int((~done).sum())
-    return Cusps(States(eset.structure, found.z, found.p), found.index, lost)
+    index = np.array([low for *_, low in states], int)
+    return Cusps(States(eset.structure, z, p), index, lost)
 
 
-def sides_of_existence(at: Vertices) -> Float[np.ndarray, "n 2"]:
-    """Vectors, in scaled parameters, across folds: ``∇g·adj P`` with P the projection to them.
+def _turning(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " m"]:
+    """Edges of folds at whose ends φᵀF_zz[φ, φ] has different signs."""
+    folded, at = np.unique(ends, return_inverse=True)
+    at = at.reshape(ends.shape)
+    null, bend = null_vectors(fabric.setting, fabric.vertices.take(folded))
+    sense = np.einsum("ni,ni->n", null[at[:, 0]], null[at[:, 1]])
+    return np.flatnonzero(bend[at[:, 0]] * bend[at[:, 1]] * np.sign(sense) < 0.0)
 
-    On a fold ``adj P = φψᵀ`` with the null vectors of P, and g is the function that vanishes there:
-    the vector is a multiple of ψ, which is normal to the fold's image, and vanishes with ∇g·φ.
-    """
-    along = at.frame[:, :, -2:]
-    a, b = along[:, 0].T
-    c, d = along[:, 1].T
-    g = at.fold_slope
-    return np.stack([g[:, 0] * d - g[:, 1] * b, g[:, 1] * a - g[:, 0] * c], axis=1)
+
+def _between(
+    fabric: Fabric, edge: Int[np.ndarray, " 2"], low: int
+) -> tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"]] | None:
+    """Cusp beside an edge of a fold, by Newton from its middle or its ends."""
+    store, setting = fabric.vertices, fabric.setting
+    tests = (lambda at: at.g, lambda at: at.quadratic)
+    locus = Locus(setting.structure, store.p[edge[0]], setting.free, tests)
+    x = np.stack([locus.joined(store.z[end], store.p[end]) for end in edge])
+    length = np.linalg.norm(store.place[edge[1]] - store.place[edge[0]])
+    for start in (x.mean(axis=0), *x):
+        spot = settle(locus, start)
+        if spot is None:
+            continue
+        z, p = locus.split(spot.x[None])
+        away = np.linalg.norm(embed(setting, z, p) - store.place[edge], axis=1)
+        if away.max() <= REACH * length and lower_index(setting, z, p)[0] == low:
+            return z[0], p[0]
+    return None
+
+
+def null_vectors(
+    setting: Setting, at: Vertices
+) -> tuple[Float[np.ndarray, "n unknowns"], Float[np.ndarray, " n"]]:
+    """Null vectors on folds, as displacements of unit length in the metric, and φᵀF_zz[φ, φ]."""
+    structure = setting.structure
+    n, root = structure.unknowns, np.sqrt(structure.mass)
+    b = null_border(structure, at.z, at.p)
+    norm = np.linalg.norm(b[:, :n] * root, axis=1)
+    critical = Critical(structure, at.z, at.p, np.ascontiguousarray(b * norm[:, None]))
+    return critical.v[:, :n] * root, critical.quadratic

@@ -20,6 +20,8 @@ from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
 
 TRIALS = 60
+ELSEWHERE = (0.5, 0.25, 0.75, 0.1, 0.9)
+"""Where between the bounds of a root a vertex is tried if there is none where it is expected."""
 ROUND_OFF = 1e-12
 """Part of the range of a function below which its values count as zero."""
 DIFFERENCE = 1e-3
@@ -284,7 +286,9 @@ def roots(
     lanes, found, last = [], [], np.full(len(ends), np.inf)
     for _ in range(TRIALS):
         t = low[todo] - at_low[todo] * (high - low)[todo] / (at_high - at_low)[todo]
-        good, at = on_edges(fabric, ends[todo], about[0], about[1][todo], t)
+        good, at, t = _somewhere(
+            fabric, ends[todo], (about[0], about[1][todo]), (low[todo], high[todo]), t
+        )
         todo, t = todo[good], t[good]
         value = value_of(at, todo)
         ended = (np.abs(value) <= small[todo]) | (np.abs(t - last[todo]) < STILL)
@@ -306,6 +310,28 @@ def roots(
     for more in found[1:]:
         whole = whole.joined(more)
     return done, whole.take(np.argsort(np.concatenate(lanes)))
+
+
+def _somewhere(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    about: tuple[int, Int[np.ndarray, " n"]],
+    bounds: tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]],
+    t: Float[np.ndarray, " n"],
+) -> tuple[Bool[np.ndarray, " n"], Vertices, Float[np.ndarray, " n"]]:
+    """Vertices on edges at the places that are proposed, or elsewhere between the bounds."""
+    (low, high), t = bounds, t.copy()
+    good, at = on_edges(fabric, ends, *about, t)
+    order = np.flatnonzero(good)
+    for share in ELSEWHERE:
+        left = np.flatnonzero(~good)
+        if len(left) == 0:
+            break
+        t[left] = low[left] + share * (high - low)[left]
+        more, vertices = on_edges(fabric, ends[left], about[0], about[1][left], t[left])
+        good[left[more]] = True
+        at, order = at.joined(vertices), np.concatenate([order, left[more]])
+    return good, at.take(np.argsort(order)), t
 
 
 def part_of(

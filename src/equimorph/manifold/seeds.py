@@ -16,6 +16,9 @@ COARSE = 5
 SEARCHED = 3
 """Vertices, beside the middle one, at which a random search looks for equilibria that no natural
 path reaches."""
+MORE = 12
+"""The same in diagrams over one parameter and in slices that are their own mirror images: there
+fewer of the pieces hang together."""
 STARTS = 100
 """Random guesses over each of them."""
 
@@ -98,7 +101,8 @@ def _from_search(
     generator = np.random.default_rng(seed)
     away = (mesh.vertices[searchable] - mesh.vertices[searchable].mean(axis=0)) / setting.scales
     middle = searchable[(away**2).sum(axis=1).argmin()]
-    chosen = np.unique([middle, *generator.choice(searchable, SEARCHED)])
+    many = len(setting.free) == 1 or is_symmetric(setting)
+    chosen = np.unique([middle, *generator.choice(searchable, MORE if many else SEARCHED)])
     found = search_points(
         setting.structure,
         setting.parameters(mesh.vertices[chosen]),
@@ -108,3 +112,13 @@ def _from_search(
     )
     vertices = np.repeat(chosen, [len(states) for states in found])
     return vertices, np.concatenate([states.z for states in found])
+
+
+def is_symmetric(setting: Setting) -> bool:
+    """Whether a symmetry of the structure leaves all parameters in the box where they are."""
+    kept = np.delete(setting.base, setting.free)
+    return any(
+        bool((symmetry.signs[setting.free] > 0).all())
+        and np.array_equal(np.delete(symmetry.signs, setting.free) * kept, kept)
+        for symmetry in setting.structure.symmetries()
+    )
