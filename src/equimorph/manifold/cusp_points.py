@@ -105,3 +105,16 @@ def null_vectors(
     norm = np.linalg.norm(b[:, :n] * root, axis=1)
     critical = Critical(structure, at.z, at.p, np.ascontiguousarray(b * norm[:, None]))
     return critical.v[:, :n] * root, critical.quadratic
+
+
+def sides_of_existence(at: Vertices) -> Float[np.ndarray, "n 2"]:
+    """Vectors, in scaled parameters, across folds: ``∇g·adj P`` with P the projection to them.
+
+    On a fold ``adj P = φψᵀ`` with the null vectors of P, and g is the function that vanishes there:
+    the vector is a multiple of ψ, which is normal to the fold's image, and vanishes with ∇g·φ.
+    """
+    along = at.frame[:, :, -2:]
+    a, b = along[:, 0].T
+    c, d = along[:, 1].T
+    g = at.fold_slope
+    return np.stack([g[:, 0] * d - g[:, 1] * b, g[:, 1] * a - g[:, 0] * c], axis=1)
