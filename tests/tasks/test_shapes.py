@@ -262,6 +262,30 @@ def test_an_arm_reaches_five_hundred_random_tips(arm_set):
     reached(arm_set, 500)
 
 
+def test_three_segments_leave_a_curve_of_ways_to_one_tip(arm_set):
+    """The curve is closed; the gentlest way to the tip, by optimisation, lies on it."""
+    arm = arm_set.structure
+    x, y = arm.position(1.0)
+    bends = [em.value_of(arm, f"k{i}") for i in (1, 2, 3)]
+    effort = em.combined("effort", lambda a, b, c: a**2 + b**2 + c**2, *bends)
+    there = arm_set.at(k1=-0.6, k2=0.3, k3=-0.9)[0]
+    goal = {x: x(there), y: y(there)}
+    with unchecked():
+        family = em.solve_shape(arm_set, goal).family
+        on_it = [bound for each, v in goal.items() for bound in (each <= v, each >= v)]
+        best = em.optimise(arm_set, effort, within=on_it).best
+    assert family.lost == 0
+    [curve] = family.pieces
+    assert curve[0] == curve[-1]
+    for each, value in goal.items():
+        assert each(family.states) == pytest.approx(value, abs=1e-10)
+        assert each(best.state) == pytest.approx(value, abs=1e-8)
+    lengths = np.linalg.norm(np.diff(family.states.p[curve, 1:4], axis=0), axis=1)
+    assert best.value <= effort(family.states).min()
+    assert best.value >= effort(family.states).min() - 2 * lengths.max()
+    assert best.certificate.residual < 1e-7
+
+
 def test_what_an_arm_cannot_reach_is_refused_with_the_nearest_tip(arm_set):
     """A tip beyond the length of the arm; the nearest one lies on a side of the box."""
     arm = arm_set.structure

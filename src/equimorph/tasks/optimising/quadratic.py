@@ -54,7 +54,10 @@ def solve(problem: Quadratic, reach: float) -> Answer | None:
         Bound of each coordinate of the step.
     """
     d = problem.a.shape[1]
-    functions = _binding(problem.f - problem.f.max(), problem.a, reach)
+    # functions become the largest relative to the one that is so now
+    highest = int(problem.f.argmax())
+    functions = _binding(problem.f - problem.f.max(), problem.a - problem.a[highest], reach)
+    functions = np.union1d(functions, highest)
     functions = functions[_different(problem.f[functions], problem.a[functions])]
     constraints = _binding(problem.g, problem.b, reach)
     small = Quadratic(
