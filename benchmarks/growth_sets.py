@@ -120,7 +120,7 @@ def table(rows: dict[str, list[Growth]]) -> str:
         f"{machine()}; warm; one run each, in a process of its own. Written by",
         "`benchmarks/growth_sets.py`. The arch up to max |κ| = 20 without random checks: over Θ at",
         "(Δ, q) = (0.3, 2.5); over (Θ, Δ) at q = 2.5, also refined from 24 × 41 intervals to an",
-        "accuracy; over (Θ, Δ, q) up to q = 3. Memory: peak less that of the program, and for refined",
+        "accuracy; over (Θ, Δ, q) up to q = 3. Memory: peak less that of the program, of refined",
         "sets less that of the unrefined one.",
         "", "![Time and memory against vertices](growth_sets.png)", "",
         "| set | intervals or accuracy | vertices | cells | clean | time, s | memory, MB |",

@@ -211,3 +211,22 @@ def test_distances_from_the_edge_of_stability_in_three_parameters():
 
 def parameter_at(eset: EquilibriumSet, name: str) -> int:
     return [parameter.name for parameter in eset.structure.parameters].index(name)
+
+
+@pytest.mark.slow
+def test_slice_of_the_arch_at_a_load_is_its_set_at_that_load():
+    """States over 40 random points with q = 2.5, from both sets: the same, to round-off."""
+    arch = Rod()
+    sides = {"Theta": (0.6, 1.4), "Delta": (-0.6, 0.6)}
+    within = [arch.max_curvature <= 20]
+    volume = lifted(arch, Box(**sides, q=(0, 3)), (10, 13, 8), within=within)
+    plane = lifted(arch, Box(**sides), (16, 25), within=within, fixed={"q": 2.5})
+    assert_faithful(volume)
+    points = np.random.default_rng(3).uniform([0.6, -0.6], [1.4, 0.6], (40, 2))
+    at = {"Theta": points[:, 0], "Delta": points[:, 1]}
+    sliced, flat = volume.over(**at, q=np.full(40, 2.5)), plane.over(**at)
+    for one, other in zip(sliced, flat, strict=True):
+        assert len(one.states) == len(other.states)
+        np.testing.assert_array_equal(np.sort(one.index), np.sort(other.index))
+        gap = np.abs(one.states.z[:, None] - other.states.z[None]).max(axis=2)
+        assert gap.min(axis=1).max() < 1e-9
