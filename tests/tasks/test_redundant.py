@@ -163,6 +163,11 @@ def test_a_measured_state_is_a_start(spring_set):
         found = em.track(start, {ANGLE: 0.7}, actuators=["x_l"])
         assert found.arrived
         assert found.states["F"] == pytest.approx(0.1, abs=1e-8)
+    goal = max(spring_set.at(x_l=0.7, F=0.05).stable, key=ANGLE)
+    with unchecked():
+        route = em.plan(spring_set, told, goal)
+    assert route.arrived
+    assert route.path.states.z[0] == pytest.approx(state.z, abs=1e-8)
     doubtful = em.estimate_state(spring_set, {"x_l": 0.8, "F": 0}, {"x_l": 0.01, "F": 0.01})
     with pytest.raises(InputError, match="must be known; got an estimate that is ambiguous"):
         em.track(doubtful, {ANGLE: 0.7}, actuators=["x_l"])

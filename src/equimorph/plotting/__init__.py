@@ -8,6 +8,7 @@ from equimorph.plotting.load_map import load_map
 from equimorph.plotting.margins import margins
 from equimorph.plotting.plane import parameter_plane
 from equimorph.plotting.portraits import portraits
+from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
 from equimorph.plotting.shapes import shapes
 from equimorph.plotting.solutions import solutions
 from equimorph.plotting.style import house_style, save
@@ -24,6 +25,9 @@ __all__ = [
     "parameter_plane",
     "parameterisation",
     "portraits",
+    "reach_panels",
+    "reach_parameters",
+    "reach_plane",
     "save",
     "shapes",
     "solutions",

@@ -20,7 +20,7 @@ from equimorph.plotting.curves import boundary_pieces, fold_pieces, states_along
 from equimorph.plotting.scene import Curve, Scene
 from equimorph.plotting.shading import Paint, corner_normals
 from equimorph.plotting.symbols import constraint_label, descriptor_label, parameter_label
-from equimorph.tasks import Route
+from equimorph.tasks import Route, Tracking
 
 Points = Float[np.ndarray, "vertices 3"]
 Cells = Float[np.ndarray, "cells 3 3"]
@@ -67,7 +67,7 @@ def surface(
     eset: EquilibriumSet,
     height_descriptor: Descriptor,
     ax: Axes | None = None,
-    route: Route | None = None,
+    route: Route | Tracking | None = None,
 ) -> Axes:
     """Equilibrium surface in three dimensions: two free parameters and a descriptor.
 
@@ -83,7 +83,7 @@ def surface(
     ax
         Three-dimensional axes to draw on; None makes a figure one and a half columns wide.
     route
-        Drawn with its start and goal; one without a path is left out.
+        Route or motion, drawn with its start and goal; one without a path is left out.
 
     Returns
     -------

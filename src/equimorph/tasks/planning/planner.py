@@ -10,6 +10,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, eased
 from equimorph.structures import State
+from equimorph.tasks.known import Start, known_state
 from equimorph.tasks.planning.admission import check_ends, checked_route, corners_of, violation
 from equimorph.tasks.planning.links import Demands
 from equimorph.tasks.planning.network import Ends, cheapest_path, no_route
@@ -26,7 +27,7 @@ Dips between the points that are watched need a reserve.
 
 def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
     eset: EquilibriumSet,
-    start: State,
+    start: Start,
     goal: State,
     *,
     via: Sequence[Mapping[str, float]] | None = None,
@@ -46,7 +47,8 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
     Parameters
     ----------
     start, goal
-        Equilibria in the box of the set, with its fixed parameters.
+        Equilibria in the box of the set, with its fixed parameters; for the start, what `locate` or
+        `estimate_state` says of a measured one will do.
     via
         Way-points {name: value}, each changing some of the free parameters.
     within
@@ -77,6 +79,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
     """
     if not margin >= 0.0:
         raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
+    start = known_state(start)
     demands = Demands(
         objective_of(objective, eset.structure),
         tuple(eased(each) for each in dict.fromkeys((*eset.constraints, *within))),

@@ -1,0 +1,241 @@
+"""What a structure can reach: descriptor plane, set, parameter plane and shapes side by side."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+
+from equimorph.charts.regions import count_regions
+from equimorph.errors import InputError
+from equimorph.plotting import style
+from equimorph.plotting.badges import number_way_points
+from equimorph.plotting.furniture import draw_supports, frame_shapes
+from equimorph.plotting.surface import surface
+from equimorph.plotting.symbols import descriptor_label, parameter_label, with_unit
+from equimorph.tasks import Reach, Tracking
+
+_HEIGHT = 148 * style.MILLIMETRE
+# told apart in black and white, too
+_LOOKS: dict[str, dict[str, Any]] = {
+    "snap-through": {"color": style.INK, "linewidth": 1.7, "linestyle": "-"},
+    "singular Jacobian": {"color": "#1f5f99", "linewidth": 1.5, "linestyle": (0, (5, 1.3))},
+    "actuator limit": {"color": "#b36200", "linewidth": 1.3, "linestyle": (0, (1, 1))},
+    "constraint": {"color": style.FAINT, "linewidth": 1.3, "linestyle": "-"},
+    "open": {"color": style.FAINT, "linewidth": 0.8, "linestyle": (0, (1, 3))},
+}
+_MOTION: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.4, "zorder": 6}
+_RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.6, foreground="white")]
+_VISIBLE = 2e-3  # of the image: smaller pieces that are covered again are traces of chords
+
+Line = Float[np.ndarray, "_ 2"]
+
+
+def reach_plane(reach: Reach, motion: Tracking | None = None, ax: Axes | None = None) -> Axes:
+    """Image of the start's region in the plane of two descriptors, with its boundary by kinds.
+
+    Darker where the region covers the plane more than once.
+
+    Parameters
+    ----------
+    reach
+        Reachable or attainable set over two parameters, of two descriptors.
+    motion
+        Drawn by the values that it takes, with its corners numbered.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        If there are not two parameters and two descriptors.
+    """
+    _check(reach)
+    with style.house_style():
+        ax = _axes(ax)
+        levels = count_regions(reach.home.values, reach.home.eset.cells)
+        whole, areas = reach.home.image_size, levels.areas()
+        last = max((k for k, area in areas.items() if area > _VISIBLE * whole), default=0)
+        shades = style.count_shades(last + 2)
+        for level, shade in zip(levels.levels[:last], shades[1:], strict=False):
+            outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in level))
+            ax.add_patch(PathPatch(outline, facecolor=shade, edgecolor="none", zorder=1))
+        _boundary(ax, reach, [piece.values for piece in reach.boundary])
+        start = np.array([each(reach.start) for each in reach.descriptors])
+        _motion(ax, start, None if motion is None else _values(motion))
+        first, second = reach.descriptors
+        ax.set_xlabel(descriptor_label(first))
+        ax.set_ylabel(descriptor_label(second))
+        ax.set_aspect("equal" if first.unit == second.unit else "auto", adjustable="datalim")
+        if motion is not None:
+            number_way_points(ax, _corners(motion, _values(motion)))
+    return ax
+
+
+def reach_parameters(reach: Reach, motion: Tracking | None = None, ax: Axes | None = None) -> Axes:
+    """Region of the start in the plane of two parameters, with its boundary by kinds.
+
+    Parameters
+    ----------
+    reach
+        Reachable or attainable set over two parameters.
+    motion
+        Drawn with its corners numbered.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        If there are not two parameters and two descriptors.
+    """
+    _check(reach)
+    with style.house_style():
+        ax, eset = _axes(ax), reach.home.eset
+        shade = style.count_shades(3)[1]
+        cells = PolyCollection(
+            list(eset.coordinates[eset.cells]), facecolor=shade, edgecolor=shade,
+            linewidth=0.3, zorder=1,
+        )  # fmt: skip
+        ax.add_collection(cells)
+        names = eset.names
+        lines = [_columns(piece.states, names) for piece in reach.boundary]
+        _boundary(ax, reach, lines)
+        start = np.array([reach.start[name] for name in names])
+        track = None if motion is None else _columns(motion.states, names)
+        _motion(ax, start, track)
+        ax.set_xlabel(parameter_label(eset.structure, names[0]))
+        ax.set_ylabel(parameter_label(eset.structure, names[1]))
+        if motion is not None and track is not None:
+            number_way_points(ax, _corners(motion, track))
+    return ax
+
+
+def reach_panels(reach: Reach, motion: Tracking) -> Figure:
+    """Reachable set and a motion in it: image, set, parameter plane and shapes.
+
+    Parameters
+    ----------
+    reach
+        Reachable or attainable set over two parameters, of two descriptors.
+    motion
+        A motion that was followed.
+
+    Returns
+    -------
+    The figure, two columns wide.
+
+    Raises
+    ------
+    InputError
+        If there are not two parameters and two descriptors.
+    """
+    _check(reach)
+    width = style.DOUBLE_COLUMN
+    figure = style.attach_canvas(Figure(figsize=(width, _HEIGHT)))
+    with style.house_style():
+        places = [(0.075, 0.58, 0.385, 0.385), (0.075, 0.115, 0.385, 0.385)]
+        image, plane = (figure.add_axes(place) for place in places)
+        shapes = figure.add_axes((0.575, 0.115, 0.405, 0.385))
+        solid = figure.add_axes((0.475, 0.525, 0.47, 0.475), projection="3d")
+        reach_plane(reach, motion, image)
+        surface(reach.whole, reach.start.structure.elevation, solid, motion)
+        legend = solid.get_legend()
+        assert legend is not None
+        legend.remove()  # below are all kinds of lines
+        reach_parameters(reach, motion, plane)
+        _shapes(shapes, motion)
+        shapes.set_anchor("C")
+        for letter, ax in zip("acd", (image, plane, shapes), strict=True):
+            ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
+        figure.text(0.515, 0.968, "(b)", weight="bold", size=8)
+        kinds = list(dict.fromkeys(piece.kind for piece in reach.boundary))
+        entries = [Line2D([], [], label=kind, **_LOOKS[kind]) for kind in _LOOKS if kind in kinds]
+        entries.append(Line2D([], [], label="motion", **_MOTION))
+        figure.legend(handles=entries, loc="lower center", ncols=5, bbox_to_anchor=(0.5, 0.0))
+    return figure
+
+
+def _check(reach: Reach) -> None:
+    count, free = len(reach.descriptors), len(reach.whole.names)
+    if (count, free) != (2, 2):
+        raise InputError(
+            f"`reach` must be over two parameters, of two descriptors; got {free} and {count}."
+        )
+
+
+def _axes(ax: Axes | None) -> Axes:
+    if ax is not None:
+        return ax
+    room = (0.5, 0.4, 0.1, 0.1)
+    return style.new_axes(style.SINGLE_COLUMN, 0.9 * style.SINGLE_COLUMN, room)
+
+
+def _boundary(ax: Axes, reach: Reach, lines: list[Line]) -> None:
+    for piece, line in zip(reach.boundary, lines, strict=True):
+        ax.plot(*line.T, **_LOOKS[piece.kind], zorder=4)
+
+
+def _motion(ax: Axes, start: Float[np.ndarray, " 2"], line: Line | None) -> None:
+    if line is not None:
+        (drawn,) = ax.plot(*line.T, **_MOTION)
+        drawn.set_path_effects(_RIM)
+    (mark,) = ax.plot(*start[:, None], "o", color=style.ROUTE_COLOUR, ms=4, mfc="white", zorder=7)
+    mark.set_path_effects(_RIM)
+
+
+def _values(motion: Tracking) -> Line:
+    return np.stack(list(motion.values.values()), axis=1)
+
+
+def _columns(states: Any, names: tuple[str, ...]) -> Line:
+    return np.stack([states[name] for name in names], axis=1)
+
+
+def _steps(motion: Tracking) -> list[int]:
+    """Corners of a motion but for its start."""
+    at = motion.path.at
+    corners = np.flatnonzero(np.isclose(at, np.round(at), rtol=0, atol=1e-12))
+    return [int(k) for k in corners[1:]]
+
+
+def _corners(motion: Tracking, line: Line) -> Float[np.ndarray, "corners 2"]:
+    return line[_steps(motion)]
+
+
+def _shapes(ax: Axes, motion: Tracking) -> None:
+    """Shapes at the corners, each number at its highest point."""
+    steps = _steps(motion)
+    states = motion.states[np.array(steps)]
+    outlines = states.shape()
+    frame_shapes(ax, outlines, room=0.09)
+    draw_supports(ax, states)
+    seen: list[Float[np.ndarray, "points 2"]] = []
+    colours = style.progress_map()(np.linspace(0.0, 1.0, len(steps)))
+    for number, (outline, colour) in enumerate(zip(outlines, colours, strict=True), start=1):
+        if any(np.abs(outline - other).max() < 1e-6 for other in seen):
+            continue
+        seen.append(outline)
+        ax.plot(*outline.T, color=colour, linewidth=1.3, zorder=2)
+        top = outline[int(outline[:, 1].argmax())]
+        ax.annotate(
+            str(number), top, (0, 2.5), textcoords="offset points", ha="center", va="bottom",
+            color=colour, weight="bold",
+        )  # fmt: skip
+    unit = states.structure.length_unit
+    ax.set_xlabel(with_unit("$x$", unit))
+    ax.set_ylabel(with_unit("$y$", unit))
