@@ -33,6 +33,18 @@ def test_each_route_is_the_best_of_all_in_its_own_objective(arch_set, routes):
         assert min(costs.values()) >= 0.999 * costs[name]
 
 
+@pytest.mark.parametrize("wish", ["length", "work", "clearance"])
+def test_inside_out_under_a_limit_on_curvature(arch_set, ends, wish):
+    """The goal itself has max |κ| = 10.55: 11 is kept on the way, 6 excludes the goal."""
+    arch = arch_set.structure
+    with unchecked():
+        route = plan(arch_set, *ends, objective=wish, within=[arch.max_curvature <= 11])
+        refused = plan(arch_set, *ends, objective=wish, within=[arch.max_curvature <= 6])
+    assert route.arrived
+    assert route.schedule.descriptors["max_curvature"].max() <= 11
+    assert refused.why.startswith("the goal violates max_curvature <= 6: max_curvature = 10.549")
+
+
 def test_routes_say_what_they_are_for(routes):
     assert all(route.arrived for route in routes.values())
     assert {name: route.objective for name, route in routes.items()} == {n: n for n in WISHES}
