@@ -106,11 +106,9 @@ def _near_pairs(corners: Float[np.ndarray, "C 3 2"]) -> Int[np.ndarray, "n 2"]:
         far = radius[own].max()
         pairs.append(own[tree.query_pairs(2.0 * far, output_type="ndarray")])
         for other, beside in zip(groups[:i], trees[:i], strict=True):
-            lists = beside.query_ball_point(middle[own], far + radius[other].max())
-            number = np.array([len(each) for each in lists])
-            if number.sum():
-                found = other[np.concatenate([each for each in lists if each]).astype(int)]
-                pairs.append(np.stack([np.repeat(own, number), found], axis=1))
+            reach = far + radius[other].max()
+            near = tree.sparse_distance_matrix(beside, reach, output_type="ndarray")
+            pairs.append(np.stack([own[near["i"]], other[near["j"]]], axis=1))
     return np.concatenate(pairs)
 
 
