@@ -51,10 +51,9 @@ def bench_limit_load_map(benchmark, load):
 
 @pytest.mark.parametrize("load", LOADS)
 def bench_curvature_map(benchmark, load):
-    """Over 47 × 80 intervals."""
     arch = Rod(load=load)
 
-    def run(intervals=(47, 80)):
+    def run(intervals=INTERVALS):
         return curvature_map(arch, over(intervals), "q", 2.5, within=[arch.max_curvature <= 20])
 
     run((10, 16))

@@ -22,7 +22,7 @@ from bench_sets import lifted
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.plotting.style import DOUBLE_COLUMN, INDEX_COLOURS, INK, house_style
 from equimorph.structures import Rod
-from equimorph.tasks import limit_load_map
+from equimorph.tasks import curvature_map, limit_load_map
 
 DOCS = Path(__file__).parent.parent / "docs"
 LANES = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000)
@@ -109,6 +109,17 @@ def load_map(intervals: tuple[int, int], load: str) -> Timing:
 
     lanes = (intervals[0] + 1) * (intervals[1] + 1)
     return Timing(f"map, {load}", lanes, least(run, lanes))
+
+
+def curvatures(intervals: tuple[int, int], load: str) -> Timing:
+    """Curvatures at q = 2.5 over a grid, with the curves where the map changes."""
+    arch = Rod(load=load)
+
+    def run() -> object:
+        return curvature_map(arch, over(intervals), "q", 2.5, within=[arch.max_curvature <= 20])
+
+    lanes = (intervals[0] + 1) * (intervals[1] + 1)
+    return Timing(f"curvature map with its curves, {load}", lanes, least(run, lanes))
 
 
 def whole_set(intervals: tuple[int, int]) -> Timing:
@@ -251,6 +262,7 @@ def main() -> None:
     grids.append([whole_set((i, j + 1)) for i, j in GRIDS])
     steps = [[newton_step(BATCH, n, degree) for n in ELEMENTS] for degree in DEGREES]
     totals = [equilibria_along_paths(), limit_loads(10_000), natural(10_000)]
+    totals += [curvatures(GRIDS[-1], load) for load in LOADS]
     figure(rows, grids, steps)
     (DOCS / "performance.md").write_text(table(rows, grids, steps, totals), encoding="utf-8")
 

@@ -170,22 +170,23 @@ def test_bad_batches_are_refused():
 # --- long queues ---------------------------------------------------------------------------------
 
 
-def test_memory_beyond_states_and_results_does_not_grow_with_the_lanes(arch):
+@pytest.mark.parametrize("times", [40, pytest.param(400, marks=pytest.mark.slow)])
+def test_memory_beyond_states_and_results_does_not_grow_with_the_lanes(arch, times):
     """Bound: four times the states (start, results, work) and 24 MB for what is under way.
 
     Each lane takes about 12 steps of 60 work arrays; keeping them would take 40 times the states.
     """
     seed = rest_states(arch, 250)
-    states = States(arch, np.tile(seed.z, (40, 1)), np.tile(seed.p, (40, 1)))
+    states = States(arch, np.tile(seed.z, (times, 1)), np.tile(seed.p, (times, 1)))
     with unchecked():
         em.limit_load(seed, "q")
         tracemalloc.start()
         found = em.limit_load(states, "q")
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
-    assert len(found) == 10_000
+    assert len(found) == 250 * times
     assert peak < 4 * (states.z.nbytes + states.p.nbytes) + 24e6
-    assert np.array_equal(found.value, np.tile(found.value[:250], 40))
+    assert np.array_equal(found.value, np.tile(found.value[:250], times))
 
 
 class StopAfter:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Shaped
 
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.normal_form import criticality
@@ -22,6 +22,22 @@ FOLLOWED = ("supercritical", "transcritical")
 """Branch points at which a real structure goes over to another branch without a snap."""
 PASSAGES = 20
 """How often a path may pass the given load, or none, before it is given up."""
+
+
+@dataclass(frozen=True)
+class Passed:
+    """A critical state that a path passes: index before and behind, state and all parameters."""
+
+    index: tuple[int, int]
+    z: Float[np.ndarray, " size"]
+    p: Float[np.ndarray, " parameters"]
+
+
+def none_passed(lanes: int) -> Shaped[np.ndarray, " lanes"]:
+    """No critical states on any path."""
+    out = np.empty(lanes, dtype=object)
+    out[:] = [()] * lanes
+    return out
 
 
 @dataclass(frozen=True)
@@ -67,9 +83,16 @@ class FirstStable:
     options: TraceOptions
 
     def __call__(
-        self, z: Lanes, p: Parameters, at: Float[np.ndarray, " lanes"]
+        self,
+        z: Lanes,
+        p: Parameters,
+        at: Float[np.ndarray, " lanes"],
+        passed: Shaped[np.ndarray, " lanes"] | None = None,
     ) -> tuple[Lanes, Parameters, Int[np.ndarray, " lanes"]]:
-        """States at loads `at` (other than the unloaded one), and numbers in `WAYS`."""
+        """States at loads `at` (other than the unloaded one), and numbers in `WAYS`.
+
+        Critical states on the way are added to those `passed`, if these are asked for.
+        """
         z, p, way = z.copy(), p.copy(), np.full(len(z), LOST)
         still = np.zeros(len(z), bool)
         stable = np.full(len(z), STABLE)
@@ -77,13 +100,15 @@ class FirstStable:
         for _ in range(PASSAGES):
             if not len(walk.lane):
                 break
-            here, end = self._passed(walk)
+            here, end = self._to_next_level(walk, passed)
             z[here.lane], p[here.lane], way[here.lane] = here.z, here.p, end
             walk = here.take(end == LOST).take(np.isfinite(here.z[end == LOST, 0]))
         way[walk.lane] = NONE
         return z, p, way
 
-    def _passed(self, walk: _Walk) -> tuple[_Walk, Int[np.ndarray, " lanes"]]:
+    def _to_next_level(
+        self, walk: _Walk, passed: Shaped[np.ndarray, " all"] | None
+    ) -> tuple[_Walk, Int[np.ndarray, " lanes"]]:
         """Paths at the next level that they meet, and how they end there: `LOST` if they go on.
 
         The levels are the unloaded structure and the given load. Lost paths have no state.
@@ -102,9 +127,25 @@ class FirstStable:
         p[inside, self.load] = np.where(high, walk.at, self.low)[inside]
         z = np.where((inside | outside | (ended.code == CONSTRAINT))[:, None], ended.z, np.nan)
         way = np.where(walk.way == STABLE, _first_loss(line, ended), walk.way)
+        if passed is not None:
+            _note(passed, walk.lane, line, ended)
         met = inside & high & (ended.index == 0)
         kind = np.select([met, outside, ended.code == CONSTRAINT], [way, NONE, BOUND], LOST)
         return _Walk(walk.lane, z, p, walk.at, way, high, up), kind
+
+
+def _note(
+    passed: Shaped[np.ndarray, " all"],
+    lanes: Int[np.ndarray, " lanes"],
+    line: ParameterLine,
+    ended: Outcome,
+) -> None:
+    """Add the critical states that paths met to those known."""
+    events = ended.passed
+    p = line.take(events.lanes).parameters(events.t)
+    for k, lane in enumerate(lanes[events.lanes]):
+        before, behind = events.index[k].tolist()
+        passed[lane] = (*passed[lane], Passed((before, behind), events.z[k], p[k]))
 
 
 def _first_loss(line: ParameterLine, ended: Outcome) -> Int[np.ndarray, " lanes"]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.equilibria.first_stable import none_passed
 from equimorph.tasks.maps.brackets import (
     Brackets,
     cells_beside,
@@ -25,7 +26,13 @@ def sampler(function):
         value = function(*setting.T)
         p = np.zeros((len(setting), 3))
         return Samples(
-            setting, value, np.zeros(len(value), int), np.zeros(len(value)), value[:, None], p
+            setting,
+            value,
+            np.zeros(len(value), int),
+            np.zeros(len(value)),
+            value[:, None],
+            p,
+            none_passed(len(p)),
         )
 
     return sample

@@ -116,9 +116,50 @@ def test_snapping_begins_where_two_folds_merge(cmap):
     (cusp,) = [event.state for event in followed.events if event.kind == "cusp"]
     edge = max(curves(cmap, "snap"), key=lambda curve: curve.points[:, 1].max())
     place = int(np.argmin(np.abs(edge.points[:, 0] - 0.6)))
-    # grid edges of 0.2 are divided by 8⁴
-    assert edge.points[place] == pytest.approx([0.6, cusp["Delta"]], abs=0.2 / 8**4)
+    assert edge.points[place] == pytest.approx([0.6, cusp["Delta"]], abs=1e-9)
+    assert edge.states["q"][place] == pytest.approx(cusp["q"], abs=1e-9)
     np.testing.assert_allclose(edge.values[:, 0], edge.values[:, 1], rtol=1e-2)
+
+
+def test_every_curve_has_a_cause(cmap, loops):
+    """Also where paths through many folds reconnect: each place is exact.
+
+    One point is not on a curve: at (0.9145, 0) the extremum at the crown splits into two.
+    """
+    for found in (cmap, loops):
+        assert {curve.kind for curve in found.curves} <= {"fold", "snap", "gap", "place", "edge"}
+        for curve in found.curves:
+            assert (curve.errors <= 1e-10).all() or len(curve.points) == 1, curve.kind
+
+
+@pytest.fixture(scope="module")
+def loops():
+    """Left half loaded: around (0.5, 0) paths pass six folds up to the bound, or come back."""
+    return curvatures("left-half", Theta=(0.45, 0.7, 3), Delta=(-0.16, 0.24, 5))
+
+
+def test_states_end_where_paths_reconnect_at_a_branch_point(loops):
+    """1e-8 beside the gap, across it in Δ, there is a stable state on one side only.
+
+    Below Δ = 0: above, a path as close as that to its branch point may be taken for the other.
+    """
+    tried = 0
+    for curve in curves(loops, "gap"):
+        for point in curve.points:
+            if point[1] > 0.0 or np.abs(point[0] - loops.grid.axes()[0]).min() > 1e-12:
+                continue
+            beside = {"Theta": (point[0], point[0] + 1e-3, 1)}
+            beside["Delta"] = (point[1] - 1e-8, point[1] + 1e-8, 1)
+            value = curvatures("left-half", **beside).value[0]
+            assert np.isfinite(value).sum() == 1
+            tried += 1
+    assert tried == 3
+
+
+def test_extrema_are_equal_where_the_place_of_the_largest_changes(cmap):
+    """Where Δ = 0 the arch is symmetric and its two largest curvatures mirror each other."""
+    (curve,) = curves(cmap, "place")
+    np.testing.assert_allclose(curve.points[:, 1], 0.0, atol=1e-10)
 
 
 # --- other structures, wrong input ---------------------------------------------------------------

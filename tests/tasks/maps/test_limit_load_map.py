@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 import equimorph as em
 from equimorph.errors import InputError
@@ -95,8 +96,8 @@ def test_curves_say_how_well_they_are_known(uniform, half):
         edge = max(axis[1] - axis[0] for axis in lmap.grid.axes())
         for curve in lmap.curves:
             assert curve.errors.shape == curve.points.shape[:1]
-            exact = curve.kind in ("cusp", "branch point", "grazing", "exchange")
-            bound = 1e-10 if exact or curve.kind == "edge" else 0.5 * edge * 8.0**-4
+            exact = curve.kind not in ("jump", "kink")
+            bound = 1e-10 if exact else 0.5 * edge * 8.0**-4
             assert (curve.errors <= 1.01 * bound).all(), curve.kind
 
 
@@ -171,14 +172,27 @@ def test_fold_and_constraint_coincide_where_they_exchange(half):
 
 
 def test_two_extrema_reach_the_bound_together_where_its_place_changes(half):
-    """At the place, |κ| = 10 at two arclengths; the limit load is continuous."""
+    """At the place, |κ| = 10 at two arclengths, by Brent's method; the limit load is continuous.
+
+    Both sides lie 1/32 of an edge of 0.1 to 0.19 apart.
+    """
     (curve,) = curves(half, "place")
-    states = curve.states
-    kappa = half.structure.fields(states.z, states.p, np.linspace(0.0, 1.0, 401))[..., 1]
-    # sampled at 401 arclengths, and the place known to 1e-5: 0.1 %
-    np.testing.assert_allclose(np.abs(kappa[:, :100]).max(axis=1), 10.0, rtol=1e-3)
-    np.testing.assert_allclose(np.abs(kappa[:, -100:]).max(axis=1), 10.0, rtol=1e-3)
-    assert np.ptp(curve.values, axis=1).max() < 1e-3
+    for state in curve.states:
+        for part in ((0.0, 0.25), (0.75, 1.0)):
+            assert largest(half.structure, state, *part) == pytest.approx(10.0, rel=1e-10)
+    assert np.ptp(curve.values, axis=1).max() < 0.02
+
+
+def largest(rod, state, start, stop):
+    """Largest |κ| between two arclengths, where there is at most one maximum inside."""
+
+    def size(s):
+        return -abs(rod.fields(state.z[None], state.p[None], np.array([s]))[0, 0, 1])
+
+    inside = optimize.minimize_scalar(
+        size, bounds=(start, stop), method="bounded", options={"xatol": 1e-9}
+    )
+    return -min(inside.fun, size(start), size(stop))
 
 
 def test_at_the_edge_the_unloaded_arch_has_the_largest_curvature_allowed(uniform):

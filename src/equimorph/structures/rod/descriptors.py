@@ -9,6 +9,7 @@ from jaxtyping import Float
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
 from equimorph.structures.peaks import peaks, stations
+from equimorph.structures.rod.extrema import extreme_curvatures
 from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.validity import clearance
@@ -99,11 +100,8 @@ def max_curvature(rod: Measured) -> Descriptor:
     def branches(z: Lanes, p: Parameters) -> tuple[Extrema, Extrema]:
         at = stations(rod.mesh.breaks)
         found, places = peaks(np.abs(rod.mechanics.fields(z, p, at)[:, :, 1]), at)
-        exact, where = rod.mechanics.largest_curvature(z, p)
-        gap = np.where(np.isfinite(found), np.abs(places - where[:, None]), np.inf)
-        largest = gap.argmin(axis=1)
-        found[np.arange(len(z)), largest] = exact
-        return unit * found, places
+        exact = extreme_curvatures(rod.mechanics, z, p, places)
+        return unit * np.where(np.isfinite(found), exact, found), places
 
     label = rod.units.label("curvature")
     return Descriptor("max_curvature", label, value, "max |κ|", rod.signature, place, branches)

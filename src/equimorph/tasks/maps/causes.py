@@ -9,25 +9,34 @@ from jaxtyping import Bool, Int
 from equimorph.equilibria.locus import Test
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.tasks.maps.brackets import Brackets, Edges
+from equimorph.tasks.maps.polish import TestsOf
 from equimorph.tasks.maps.samples import Samples, Settings
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A reason why a map is not smooth at a place: two tests that vanish, tried from one side."""
+    """A reason why a map is not smooth at a place: two tests that vanish, tried from one side.
+
+    `tests` of some of its lanes, by their numbers in `lanes`: they may differ from lane to lane.
+    """
 
     kind: str
-    tests: tuple[Test, Test]
+    tests: TestsOf
     lanes: Int[np.ndarray, " some"]
     start: Samples
 
     @classmethod
     def of(
-        cls, kind: str, tests: tuple[Test, Test], where: Bool[np.ndarray, " all"], side: Samples
+        cls,
+        kind: str,
+        tests: tuple[Test, Test] | TestsOf,
+        where: Bool[np.ndarray, " all"],
+        side: Samples,
     ) -> "Cause":
         """Cause for some of the lanes, tried from their states on one side."""
         lanes = np.flatnonzero(where)
-        return cls(kind, tests, lanes, side.take(lanes))
+        own = tests if callable(tests) else lambda some: tests
+        return cls(kind, own, lanes, side.take(lanes))
 
 
 @runtime_checkable

@@ -27,10 +27,13 @@ class CurvatureMap(ActuatorMap):
     off": it leaves the path without a snap; "constraint": it met one; "none": the path leads to no
     stable state at this load.
 
-    Kinds of curves: "fold": the state is a fold, and the map jumps (exact); "jump": it jumps for
-    another reason; "snap": the status changes and the value does not; "gap": there is a state on
-    one side only; "place": the extremum is elsewhere on the structure; "edge": beyond it no
-    unloaded state obeys the constraints.
+    Kinds of curves: "fold": the state is a fold, and the map jumps; "jump": the path to it meets a
+    branch point, and leads elsewhere; "snap": two folds of the path merge, the status changes and
+    the value does not; "gap": there is a state on one side only, because the path meets a branch
+    point, two folds of it merge, it touches a constraint, or reaches one with the load; "place":
+    two extrema on the structure are equal; "edge": beyond it no unloaded state obeys the
+    constraints. States of the curves are those where this happens, on the way to those of the map.
+    All are exact where a cause is found: see `MapCurve.errors`.
 
     Attributes
     ----------

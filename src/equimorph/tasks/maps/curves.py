@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.equilibria.locus import Test
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.structures import States
 from equimorph.tasks.maps.brackets import (
@@ -20,7 +22,7 @@ from equimorph.tasks.maps.brackets import (
 )
 from equimorph.tasks.maps.causes import Paths
 from equimorph.tasks.maps.chains import chains
-from equimorph.tasks.maps.polish import polished
+from equimorph.tasks.maps.polish import TestsOf, polished
 from equimorph.tasks.maps.samples import Samples, difference
 
 ROUNDS = 3
@@ -108,17 +110,26 @@ def explained(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets
     moving = np.argmax(np.abs(pairs.b.setting - pairs.a.setting), axis=1)
     for cause in paths.causes(pairs):
         open_ = ~found[cause.lanes]
-        at, start = cause.lanes[open_], cause.start.take(np.flatnonzero(open_))
+        some = np.flatnonzero(open_)
+        at, start = cause.lanes[some], cause.start.take(some)
         if not len(at):
             continue
         free = np.stack([paths.sheet.places[moving[at]], np.full(len(at), paths.load)], axis=1)
-        new_z, new_p, good = polished(structure, start.z, start.p, free, cause.tests)
+        tests = partial(_of_some, cause.tests, some)
+        new_z, new_p, good = polished(structure, start.z, start.p, free, tests)
         good &= _within(pairs.take(at), new_p[:, paths.sheet.places])
         hit = at[good]
         found[hit], kind[hit], z[hit], p[hit] = True, cause.kind, new_z[good], new_p[good]
     error = EXACT * structure.scales[paths.sheet.places[moving]]
     place = p[:, paths.sheet.places]
     return _confirmed(paths, pairs, Places(pairs, kind, error, place, z, p), found)
+
+
+def _of_some(
+    tests: TestsOf, some: Int[np.ndarray, " some"], lanes: Int[np.ndarray, " fewer"]
+) -> tuple[Test, Test]:
+    """Tests of lanes that are numbered among some of all."""
+    return tests(some[lanes])
 
 
 def _confirmed(

@@ -26,9 +26,9 @@ class LimitLoadMap(ActuatorMap):
     Kinds of curves: "cusp": two folds of the path merge, and the limit load jumps; "branch point":
     the path meets one; "grazing": the path touches a constraint, and the limit load jumps;
     "exchange": loss of stability and a constraint, or two constraints, exchange their roles;
-    "place": the extremum that meets a constraint is elsewhere on the structure; "edge": beyond it
-    no unloaded state obeys the constraints; "jump" and "kink": none of these was found to be the
-    reason. Places of the first four kinds are exact.
+    "place": two extrema on the structure meet a constraint together; "edge": beyond it no unloaded
+    state obeys the constraints; "jump" and "kink": none of these was found to be the reason. All
+    but these two are exact: see `MapCurve.errors`.
     """
 
     kinds: ClassVar[tuple[str, ...]] = KINDS

@@ -1,18 +1,19 @@
 """Paths in the load, through unstable parts too, to the first stable state at a given load."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.equilibria import TraceOptions
-from equimorph.equilibria.conditions import gap
+from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.first_stable import WAYS, FirstStable
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.model import Constraint, Descriptor
 from equimorph.tasks.maps.brackets import Brackets, Edges
 from equimorph.tasks.maps.causes import Cause
+from equimorph.tasks.maps.extrema import at_two_places
 from equimorph.tasks.maps.samples import Samples, Settings
 from equimorph.tasks.maps.unloaded import LOST, START_KINDS, unloaded
 
@@ -55,27 +56,51 @@ class Passages:
         z, p, kind = start.z, start.p, start.kind
         value, place = start.value, start.place
         ready = np.flatnonzero(kind == LOST)
+        passed = start.passed[ready]
         walked = FirstStable(
             self.sheet.structure, self.load, float(self.sheet.base[self.load]), self.bound,
             self.within, self.options,
-        )(z[ready], p[ready], np.full(len(ready), self.at))  # fmt: skip
+        )(z[ready], p[ready], np.full(len(ready), self.at), passed)  # fmt: skip
         z[ready], p[ready], kind[ready] = walked[0], walked[1], LOST + walked[2]
+        start.passed[ready] = passed
         z[kind <= LOST] = np.nan
+        met = np.flatnonzero(kind == BOUND)
+        if len(met):
+            place[met] = np.array([c.excess(z[met], p[met]) for c in self.within]).argmax(axis=0)
         some = np.flatnonzero((kind >= STABLE) & (kind <= OFF))
         value[some] = self.descriptor.function(z[some], p[some])
         if self.descriptor.place is not None and len(some):
             place[some] = self.descriptor.place(z[some], p[some])
-        return Samples(settings, value, kind, place, z, p)
+        return Samples(settings, value, kind, place, z, p, start.passed)
 
     def causes(self, pairs: Brackets) -> list[Cause]:
-        """The state at the given load is a fold."""
+        """What changes where a state at the given load, or a path that leads to it, ends.
 
-        def level(critical: Critical) -> Float[np.ndarray, " lanes"]:
-            scale = self.sheet.structure.scales[self.load]
-            return np.asarray((critical.p[:, self.load] - self.at) / scale)
+        The state is a fold, or its extremum moves elsewhere; on the way two folds merge, the path
+        branches, or it touches a bound, or reaches it with the load.
+        """
+        structure, sides = self.sheet.structure, (pairs.a, pairs.b)
+        branches = branching(structure, structure.parameters[self.load].name)
+        found = [Cause.of("fold", (gap, self._level), _reached(side), side) for side in sides]
+        both, differs = _reached(pairs.a) & _reached(pairs.b), pairs.a.kind != pairs.b.kind
+        found += at_two_places(self.descriptor, pairs, both, self._level)
+        for side, there in (*_forks(pairs, 0), *_forks(pairs, 1)):
+            for kind, test, may in (("snap", quadratic, differs), ("jump", branches, both)):
+                found.append(Cause.of(kind, (gap, test), there & both & may, side))
+                found.append(Cause.of("gap", (gap, test), there & ~both, side))
+        for k, constraint in enumerate(self.within):
+            limit = bound(constraint)
+            touches = grazing(structure, constraint, structure.parameters[self.load].name)
+            for side in sides:
+                met = differs & (side.kind == BOUND) & (side.place == k)
+                for test in (touches, self._level):
+                    found.append(Cause.of("gap", (limit, test), met, side))
+        return found
 
-        sides = (pairs.a, pairs.b)
-        return [Cause.of("fold", (gap, level), _reached(side), side) for side in sides]
+    def _level(self, critical: Critical) -> Float[np.ndarray, " lanes"]:
+        """Load less the given one, in its scale."""
+        scale = self.sheet.structure.scales[self.load]
+        return np.asarray((critical.p[:, self.load] - self.at) / scale)
 
     def suspects(self, vertices: Samples, edges: Edges) -> Bool[np.ndarray, " edges"]:
         """No others than those over which the map changes much."""
@@ -94,6 +119,24 @@ class Passages:
         both = _reached(a) & _reached(b)
         cases = [~known, ~both, jump, a.kind != b.kind]
         return np.select(cases, ["", "gap", "jump", "snap"], "place").astype(object)
+
+
+def _forks(pairs: Brackets, back: int) -> list[tuple[Samples, Bool[np.ndarray, " pairs"]]]:
+    """Critical states of each side behind which its path may be another than that of the other.
+
+    The first one that differs in its indices, or so many before. Where a side has none, its flag is
+    not set.
+    """
+    found = []
+    for one, other in ((pairs.a, pairs.b), (pairs.b, pairs.a)):
+        z, p, there = one.z.copy(), one.p.copy(), np.zeros(len(pairs), bool)
+        for i, (mine, others) in enumerate(zip(one.passed, other.passed, strict=True)):
+            alike = [a.index == b.index for a, b in zip(mine, others, strict=False)]
+            first = (alike.index(False) if False in alike else len(alike)) - back
+            if 0 <= first < len(mine):
+                z[i], p[i], there[i] = mine[first].z, mine[first].p, True
+        found.append((replace(one, z=z, p=p), there))
+    return found
 
 
 def _reached(side: Samples) -> Bool[np.ndarray, " lanes"]:

@@ -1,6 +1,6 @@
 """Exact places of singular states, many at a time, each in two parameters of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Pairs = Float[np.ndarray, "lanes 2 extended"]
 Values = Float[np.ndarray, " lanes"]
+TestsOf = Callable[[Int[np.ndarray, " some"]], tuple[Test, Test]]
 
 ITERATIONS = 10
 CONVERGED = 1e-9
@@ -89,7 +90,7 @@ def polished(
     z: Lanes,
     p: Parameters,
     free: Int[np.ndarray, "lanes 2"],
-    tests: tuple[Test, Test],
+    tests: TestsOf,
 ) -> tuple[Lanes, Parameters, Bool[np.ndarray, " lanes"]]:
     """States near guesses at which two tests vanish, in two parameters; and whether they are found.
 
@@ -105,7 +106,8 @@ def polished(
     free
         Places of the two parameters that vary, for each lane its own.
     tests
-        What vanishes, see `equimorph.equilibria.conditions`.
+        What vanishes on some of the lanes, by their numbers; see
+        `equimorph.equilibria.conditions`.
     """
     space = _Space(structure, z, p, free, null_border(structure, z, p))
     waves = np.cos(np.outer([1, 2], 1.7 * np.arange(structure.size + 2)) + 0.4)
@@ -113,7 +115,7 @@ def polished(
     end_z, end_p, found = z.copy(), p.copy(), np.zeros(len(z), bool)
     lanes = np.arange(len(z))
     for _ in range(ITERATIONS):
-        space, kernel, size = _newton_step(space, kernel, tests)
+        space, kernel, size = _newton_step(space, kernel, tests(lanes))
         done, open_ = size <= CONVERGED, (size > CONVERGED) & (size < FARTHEST)
         end_z[lanes[done]], end_p[lanes[done]] = space.z[done], space.p[done]
         found[lanes[done]] = True

@@ -13,6 +13,7 @@ from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD
 from equimorph.model import Constraint
 from equimorph.tasks.maps.brackets import Brackets, Edges
 from equimorph.tasks.maps.causes import Cause
+from equimorph.tasks.maps.extrema import at_two_places
 from equimorph.tasks.maps.samples import Samples, Settings
 from equimorph.tasks.maps.unloaded import LOST, START_KINDS, unloaded
 
@@ -56,7 +57,7 @@ class Rays:
             if len(met):
                 place[met] = _places(self.within, z[met], p[met])
         z[kind <= LOST] = np.nan
-        return Samples(settings, value, kind, place, z, p)
+        return Samples(settings, value, kind, place, z, p, start.passed)
 
     def causes(self, pairs: Brackets) -> list[Cause]:
         """Merging folds, branch points, and bounds that take over or are touched."""
@@ -75,6 +76,8 @@ class Rays:
         for kind, test in (("branch point", branching(structure, load)), ("cusp", quadratic)):
             found += [Cause.of(kind, (gap, test), _is_critical(one), one) for one, _ in sides]
         for k, constraint in enumerate(self.within):
+            moved = _meets(pairs.a, k) & _meets(pairs.b, k)
+            found += at_two_places(constraint.descriptor, pairs, moved, limits[k])
             touching = (limits[k], grazing(structure, constraint, load))
             found += [Cause.of("grazing", touching, _meets(one, k), one) for one, _ in sides]
         return found

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Shaped
 
 from equimorph.structures import Structure
 
@@ -28,6 +28,8 @@ class Samples:
         Which constraint, and where on the structure it is met; zero where it says nothing.
     z, p
         State and all parameters; not numbers where there is no state.
+    passed
+        Critical states on the way, a tuple of `Passed` for each lane; none in maps that do not ask.
     """
 
     setting: Settings
@@ -36,6 +38,7 @@ class Samples:
     place: Values
     z: Float[np.ndarray, "lanes size"]
     p: Float[np.ndarray, "lanes parameters"]
+    passed: Shaped[np.ndarray, " lanes"]
 
     def take(self, lanes: Int[np.ndarray, " some"]) -> "Samples":
         """Return some of the lanes."""
@@ -59,9 +62,10 @@ def joined(parts: Sequence[Samples]) -> Samples:
 def difference(structure: Structure, a: Samples, b: Samples) -> Values:
     """Distance of states, values and places of two settings per lane; ∞ where kinds differ.
 
-    Zero where both have no state.
+    Zero where kinds are the same and the map shows nothing on both sides.
     """
     n, columns = structure.unknowns, structure.scales
     gap = np.sqrt((a.z - b.z)[:, :n] ** 2 @ structure.mass) + np.abs(a.place - b.place)
     gap = gap + np.linalg.norm((a.p - b.p) / columns, axis=1)
-    return np.where(a.kind != b.kind, np.inf, np.where(np.isfinite(gap), gap, 0.0))
+    shown = np.isfinite(gap) & (np.isfinite(a.value) | np.isfinite(b.value))
+    return np.where(a.kind != b.kind, np.inf, np.where(shown, gap, 0.0))

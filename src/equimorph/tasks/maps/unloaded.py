@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from equimorph.equilibria.first_stable import none_passed
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.model import Constraint
 from equimorph.tasks.maps.samples import Samples, Settings
@@ -22,4 +23,4 @@ def unloaded(sheet: NaturalSheet, within: Sequence[Constraint], settings: Settin
     for constraint in within:
         kind[at[constraint.excess(z[at], p[at]) > 0.0]] = UNDEFINED
     none = np.full(len(settings), np.nan)
-    return Samples(settings, none, kind, np.zeros(len(settings)), z, p)
+    return Samples(settings, none, kind, np.zeros(len(p)), z, p, none_passed(len(p)))
