@@ -131,11 +131,12 @@ def _number(name: str, bound: Any) -> float:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A descriptor held on one side of a bound."""
+    """A descriptor held on one side of a bound, which it may exceed by `ease`."""
 
     descriptor: Descriptor
     sense: Literal["<=", ">="]
     bound: float
+    ease: float = 0.0
 
     def __str__(self) -> str:
         """Return it as it is written."""
@@ -146,7 +147,7 @@ class Constraint:
     ) -> Float[np.ndarray, " lanes"]:
         """Amount by which states exceed the bound: positive where violated."""
         sign = 1.0 if self.sense == "<=" else -1.0
-        return sign * (self.descriptor.function(z, p) - self.bound)
+        return sign * (self.descriptor.function(z, p) - self.bound) - self.ease
 
     def holds(self, states: ManyStates) -> Bool[np.ndarray, " lanes"]:
         """Whether states obey the constraint."""
@@ -209,8 +210,5 @@ def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
 
 
 def eased(constraint: Constraint) -> Constraint:
-    """Constraint with a bound that rounding does not violate: optima lie on bounds."""
-    room = EASE * max(1.0, abs(constraint.bound))
-    return replace(
-        constraint, bound=constraint.bound + (room if constraint.sense == "<=" else -room)
-    )
+    """Constraint that rounding does not violate: optima lie on bounds."""
+    return replace(constraint, ease=EASE * max(1.0, abs(constraint.bound)))
