@@ -159,7 +159,7 @@ def test_the_page_without_a_set_says_what_was_asked(maps_alone):
     ("text", "message"),
     [
         ("", r"must ask for something: a \[set\] or a \[\[map\]\]"),
-        (LIMIT + "[[equilibria]]\nat = { x_l = 1.0 }\n", r"must have a \[set\] in which its"),
+        (LIMIT + "[[equilibria]]\nat = { x_l = 1.0 }\n", r"must have a \[set\] to which its"),
     ],
 )
 def test_what_needs_a_set_is_not_asked_for_without_one(text, message):

@@ -23,11 +23,11 @@ def extreme_curvatures(
 ) -> Float[np.ndarray, "lanes places"]:
     """|κ| at its local extrema nearest to some arclengths of each lane, ends included."""
     mesh = Mesh(mechanics.mesh.breaks, reference_element(DEGREE))
-    sizes = np.abs(mechanics.fields(z, p, mesh.nodes)[:, :, 1])
-    tops = _nearest_peaks(mesh, sizes, near)
+    kappa = mechanics.fields(z, p, mesh.nodes)[:, :, 1]
+    tops = _nearest_peaks(mesh, np.abs(kappa), near)
     # a vertex belongs to two elements, and the extremum lies in one of them
     sides = [np.clip((tops - back) // DEGREE, 0, mesh.elements - 1) for back in (1, 0)]
-    left, right = (_refined(mesh, sizes, tops, element) for element in sides)
+    left, right = (_refined(mesh, kappa, tops, element) for element in sides)
     return np.asarray(np.maximum(left, right))
 
 
@@ -42,14 +42,18 @@ def _nearest_peaks(mesh: Mesh, sizes: Sizes, near: Float[np.ndarray, "lanes plac
 
 def _refined(
     mesh: Mesh,
-    sizes: Sizes,
+    kappa: Sizes,
     tops: Nodes,
     element: Nodes,
 ) -> Float[np.ndarray, "lanes places"]:
-    """Extrema of the interpolants in some elements next to their nodes; else values there."""
+    """Extrema of the interpolants in some elements next to their nodes; else values there.
+
+    Of κ with the sign that it has at the node: |κ| is not smooth where κ vanishes.
+    """
     nodes = 2.0 * mesh.reference.nodes - 1.0
-    rows = np.arange(len(sizes))[:, None, None]
-    local = sizes[rows, mesh.element_nodes[element]]
+    rows = np.arange(len(kappa))[:, None, None]
+    at_top = kappa[rows[:, 0], tops]
+    local = np.sign(at_top)[:, :, None] * kappa[rows, mesh.element_nodes[element]]
     series = np.moveaxis(local @ mesh.reference.to_legendre.T, -1, 0)
     slope, bend = legendre.legder(series), legendre.legder(series, 2)
     own = tops - mesh.degree * element
@@ -61,4 +65,4 @@ def _refined(
         with np.errstate(divide="ignore", invalid="ignore"):
             moved = x - turn / rate
         x = np.where((moved >= low) & (moved <= high), moved, x)
-    return np.asarray(np.maximum(legendre.legval(x, series, tensor=False), sizes[rows[:, 0], tops]))
+    return np.asarray(np.maximum(legendre.legval(x, series, tensor=False), np.abs(at_top)))
