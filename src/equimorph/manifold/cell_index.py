@@ -1,5 +1,6 @@
 """Which cells lie over points: uniform bins over the space of the free parameters."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,16 @@ class Hits:
     def take(self, some: Bool[np.ndarray, " hits"] | Int[np.ndarray, " some"]) -> "Hits":
         """Some of the pairs."""
         return Hits(*(column[some] for column in vars(self).values()))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Hits"]) -> "Hits":
+        """All pairs of some parts, at least one."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
+
+    def __len__(self) -> int:
+        """Return the number of pairs."""
+        return len(self.point)
 
 
 @dataclass(frozen=True)

@@ -80,9 +80,8 @@ def seeds_from(setting: Setting, mesh: BaseMesh, missing: tuple[States, ...]) ->
     for states in missing:
         for image in (states, *_images(setting, states)):
             for vertex in mesh.cells[mesh.locate(image.p[0, setting.free])]:
-                lifted = lift_to(
-                    image, setting.parameters(mesh.vertices[[vertex]])[0], setting.constraints
-                )
+                there = setting.parameters(mesh.vertices[[vertex]])
+                lifted, _ = lift_to(image, there.repeat(len(image), axis=0), setting.constraints)
                 vertices.append(np.full(len(lifted), vertex))
                 z.append(lifted)
     return polished(setting, mesh, np.concatenate(vertices), np.concatenate(z))

@@ -1,7 +1,7 @@
 """The states of an equilibrium set over points: the cells above them, polished by Newton."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +29,8 @@ CHUNK = 2048
 
 Points = Float[np.ndarray, "points P"]
 Lanes = Float[np.ndarray, "lanes size"]
+Found = tuple[Float[np.ndarray, "n size"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]]
+"""States, the points that they lie over, and their cells."""
 Guesses = Float[np.ndarray, "hits size"]
 
 
@@ -146,7 +148,11 @@ class Sheets:
         parity: where the sum of (−1)^index is not that of the cells above, or a cell gives no
         state, all known equilibria nearby are lifted to the point instead.
         """
-        parts = [self._some(p[at : at + CHUNK], at) for at in range(0, len(p), CHUNK)]
+        chunks = [self._some(p[at : at + CHUNK], at) for at in range(0, len(p), CHUNK)]
+        parts = [found for found, _ in chunks]
+        doubtful = [near for _, near in chunks if len(near)]
+        if doubtful:
+            parts.extend(self._searched(p, Hits.joined(doubtful)))
         if not parts:
             return (
                 States(self.structure, np.zeros((0, self.structure.size)), p),
@@ -158,9 +164,8 @@ class Sheets:
         point = point[order]
         return States(self.structure, z[order], p[point]), point, cell[order]
 
-    def _some(
-        self, p: Points, first: int
-    ) -> tuple[Lanes, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    def _some(self, p: Points, first: int) -> tuple[Found, Hits]:
+        """States over points that are sure, and the cells near the others; `first` is added."""
         near = self.above.near(p[:, self.free])
         hits = near.take(near.inside | self._at_an_edge[near.cell])
         z, good = self._polished(self._guess(hits), p, hits)
@@ -169,10 +174,9 @@ class Sheets:
         kept = kept[self._allowed(z[kept], p[hits.point[kept]])]
         sure = self._sure(hits, good, kept, len(p))
         kept = kept[sure[hits.point[kept]]]
-        parts = [(z[kept], hits.point[kept], hits.cell[kept])]
-        parts.extend(self._searched(p, near, number) for number in np.flatnonzero(~sure))
-        z, point, cell = (np.concatenate(column) for column in zip(*parts, strict=True))
-        return z, first + point, cell
+        doubtful = near.take(~sure[near.point])
+        found = z[kept], first + hits.point[kept], hits.cell[kept]
+        return found, replace(doubtful, point=first + doubtful.point)
 
     def _guess(self, hits: Hits) -> Lanes:
         """Interpolation between the corners, at the nearest point of the cell.
@@ -234,25 +238,37 @@ class Sheets:
             good &= constraint.excess(z, p) <= 0.0
         return good
 
-    def _searched(
-        self, p: Points, near: Hits, number: np.int64
-    ) -> tuple[Lanes, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
-        """States over one point by lifts and Newton from all regular vertices near it."""
-        mine = near.take(near.point == number)
-        corners = np.unique(self.cells[mine.cell])
-        corners = corners[~self.folded[corners]]
-        target = p[number]
-        guess = self._guess(mine)
-        starts = np.concatenate([guess, self.points.z[corners]])
-        solved, good, _ = exact_states(self.structure, starts, np.tile(target, (len(starts), 1)))
-        solved = solved[good]
-        everywhere = np.tile(target, (len(solved), 1))
-        good = self.structure.resolved(solved, everywhere) & self._allowed(solved, everywhere)
-        lifted = lift_to(self.points[corners], target, self.constraints)
-        z = np.concatenate([solved[good], lifted])
-        z = z[distinct(self.structure, z)]
-        index = self.structure.index(z, np.tile(target, (len(z), 1)))
-        return z, np.full(len(z), number), self._nearest(z, index, guess, mine)
+    def _searched(self, p: Points, near: Hits) -> Iterator[Found]:
+        """States over points by lifts and Newton from all regular vertices near each of them."""
+        guess = self._guess(near)
+        pairs = np.stack(
+            [np.repeat(near.point, self.cells.shape[1]), self.cells[near.cell].ravel()]
+        )
+        owner, corner = np.unique(pairs[:, ~self.folded[pairs[1]]], axis=1)
+        solved, of_solved = self._exact(
+            np.concatenate([guess, self.points.z[corner]]),
+            p,
+            np.concatenate([near.point, owner]),
+        )
+        lifted, which = lift_to(self.points[corner], p[owner], self.constraints)
+        z = np.concatenate([solved, lifted])
+        point = np.concatenate([of_solved, owner[which]])
+        for number in np.unique(near.point):
+            own = z[point == number]
+            own = own[distinct(self.structure, own)]
+            index = self.structure.index(own, np.tile(p[number], (len(own), 1)))
+            mine = near.point == number
+            cell = self._nearest(own, index, guess[mine], near.take(mine))
+            yield own, np.full(len(own), number), cell
+
+    def _exact(
+        self, starts: Lanes, p: Points, owner: Int[np.ndarray, " lanes"]
+    ) -> tuple[Float[np.ndarray, "some size"], Int[np.ndarray, " some"]]:
+        """Admissible states to which Newton leads over the points of the starts; which points."""
+        z, good, _ = exact_states(self.structure, starts, p[owner])
+        z, owner = z[good], owner[good]
+        good = self.structure.resolved(z, p[owner]) & self._allowed(z, p[owner])
+        return z[good], owner[good]
 
     def _nearest(
         self, z: Lanes, index: Int[np.ndarray, " lanes"], guess: Guesses, mine: Hits
@@ -281,9 +297,9 @@ def rooted(
 
 
 def lift_to(
-    states: States, p: Float[np.ndarray, " P"], constraints: tuple[Constraint, ...]
-) -> Lanes:
-    """Unknowns of all equilibria at p that straight lifts from `states` reach."""
+    states: States, p: Points, constraints: tuple[Constraint, ...]
+) -> tuple[Float[np.ndarray, "arrived size"], Int[np.ndarray, " arrived"]]:
+    """Equilibria that straight lifts from `states` to p, one for each, reach; which they are."""
     velocity = p - states.p
     still = np.abs(velocity).max(axis=1, initial=0.0) == 0.0
     moving = np.flatnonzero(~still)
@@ -293,7 +309,8 @@ def lift_to(
     )
     outcome = follow(line, states.z[moving].copy(), constraints, options)
     arrived = outcome.code == ARRIVAL
-    return np.concatenate([states.z[still], outcome.z[arrived]])
+    which = np.concatenate([np.flatnonzero(still), moving[arrived]])
+    return np.concatenate([states.z[still], outcome.z[arrived]]), which
 
 
 def exact_states(
