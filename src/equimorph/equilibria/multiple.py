@@ -7,25 +7,26 @@ from jaxtyping import Float, Int
 
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.outcome import LOST, MULTIPLE, Outcome
+from equimorph.equilibria.tracing import FOLD
 from equimorph.structures import Structure
-from equimorph.structures.margin import stability_margin
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Counts = Int[np.ndarray, " lanes"]
 
 VANISHED = 1e-4
-"""Eigenvalue, relative to the smallest one at the start of the path, that counts as zero."""
+"""Eigenvalue, relative to the small ones at the start of the path, that counts as zero."""
 
 
 def with_multiple_points(
     curve: Curve, start: Float[np.ndarray, "lanes extended"], outcome: Outcome
 ) -> Outcome:
-    """The outcome with lanes that were lost at points of multiplicity two or more named so.
+    """The outcome with lanes that ended at points of multiplicity two or more named so.
 
     One border row removes one null vector: where two eigenvalues vanish together, as symmetry or
-    equal parts make them do, steps shrink until the lane is lost, within round-off of the point.
-    The inertia of F_z ∓ εM counts the eigenvalues within ±ε.
+    equal parts make them do, steps shrink until the lane is lost, within round-off of the point,
+    or it ends as at a fold if their number is odd. The inertia of F_z ∓ εM counts the eigenvalues
+    within ±ε.
 
     Parameters
     ----------
@@ -34,16 +35,15 @@ def with_multiple_points(
     outcome
         How the lanes ended.
     """
-    lost = np.flatnonzero(outcome.code == LOST)
-    if len(lost) == 0 or not curve.folds_change_index:
+    ended = np.flatnonzero(np.isin(outcome.code, (LOST, FOLD)))
+    if len(ended) == 0 or not curve.folds_change_index:
         return outcome
-    here, structure = curve.take(lost), curve.structure
-    begun = here.states(start[lost], np.zeros(len(lost)))
-    ended = here.states(outcome.z[lost], outcome.t[lost])
-    size = np.abs(stability_margin(structure, *begun))
-    count = multiplicity(structure, *ended, VANISHED * size)
+    here, structure = curve.take(ended), curve.structure
+    begun = here.states(start[ended], np.zeros(len(ended)))
+    there = here.states(outcome.z[ended], outcome.t[ended])
+    count = multiplicity(structure, *there, VANISHED * _small_eigenvalue(structure, *begun))
     code, why = outcome.code.copy(), dict(outcome.why)
-    for lane, several in zip(lost.tolist(), count.tolist(), strict=True):
+    for lane, several in zip(ended.tolist(), count.tolist(), strict=True):
         if several > 1:
             code[lane] = MULTIPLE
             why[lane] = (
@@ -60,3 +60,13 @@ def multiplicity(
     nothing = np.zeros((len(z), 0, structure.size))
     above, below = (structure.solve(z, p, nothing, shift=sign * near) for sign in (1.0, -1.0))
     return np.asarray(above.negative - below.negative)
+
+
+def _small_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    """Harmonic mean of the eigenvalues, of the size of the smallest one: by a single solution."""
+    n, mass = structure.unknowns, structure.mass
+    vector = np.cos(1.7 * np.arange(n)) + 1.3
+    rhs = np.zeros((len(z), 1, structure.size))
+    rhs[:, 0, :n] = mass * vector
+    yielding = structure.solve(z, p, rhs).x[:, 0, :n] @ (mass * vector)
+    return np.asarray(np.abs(mass @ vector**2 / np.where(yielding == 0.0, np.inf, yielding)))
