@@ -54,7 +54,7 @@ WRONG = {
     "rod without a bound": (
         'within = ["max_curvature <= 20"]\nintervals',
         'within = ["height(0.5) >= -0.1"]\nintervals',
-        r"`set\.within` must bound the curvature of a rod, .*; got height\(0\.5\) >= -0\.1\. Add",
+        r"`set\.within` must bound the max_curvature of .*, .*; got height\(0\.5\) >= -0\.1",
     ),
     "degrees fixed": (
         "{ Theta = [0.2, 2.5], Delta = [-2.0, 2.0] }\nfixed = { q = 2.5 }",

@@ -71,6 +71,8 @@ class Structure(ABC):
     """Diagonal of the mass matrix: the metric of margins, distances and lengths."""
     length_unit: str = "1"
     """Unit of the coordinates to draw."""
+    endless_in: ClassVar[str] = ""
+    """Descriptor without a bound on which there are equilibria without end, if there are."""
     energy_scale: float = 1.0
     """What one unit of `energy` is in the units of the parameters: E in joules, say."""
 

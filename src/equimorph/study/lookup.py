@@ -160,12 +160,13 @@ def _intervals(wanted: SetSection) -> tuple[int, ...]:
 
 
 def _bounds(structure: Structure, texts: Sequence[str]) -> tuple[Constraint, ...]:
-    """Constraints of the set; a rod has equilibria of any curvature, so that it needs a bound."""
+    """Constraints of the set; structures with equilibria without end need a bound."""
     constraints = constraints_of(structure, texts, "set.within")
     bounded = {each.descriptor.name for each in constraints if each.sense == "<="}
-    if structure.kind == "rod" and "max_curvature" not in bounded:
+    needed = structure.endless_in
+    if needed and needed not in bounded:
         raise InputError(
-            "`set.within` must bound the curvature of a rod, which has equilibria without end; "
-            f'got {", ".join(texts) or "nothing"}. Add "max_curvature <= 20".'
+            f"`set.within` must bound the {needed} of this structure, which has equilibria without "
+            f'end; got {", ".join(texts) or "nothing"}. Add "{needed} <= 20".'
         )
     return constraints

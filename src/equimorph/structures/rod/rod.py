@@ -136,6 +136,7 @@ class Rod(Described):
     """
 
     kind: ClassVar[str] = "rod"
+    endless_in: ClassVar[str] = "max_curvature"
 
     def __init__(  # noqa: PLR0913  # a default for everything
         self,
