@@ -53,3 +53,18 @@ def test_states_are_numbered_and_filled_where_stable(plane):
 def test_states_over_one_parameter_have_no_plane(branch):
     with pytest.raises(em.InputError, match="must have two free parameters; got F"):
         plotting.solutions(branch, branch.at(F=0.0))
+
+
+def test_portraits_carry_their_labels(plane):
+    both = plane.at(x_l=0.7, F=0.01).stable
+    ax = plotting.portraits(both, labels=["up", "down"])
+    assert [text.get_text() for text in ax.texts] == ["up", "down"]
+    drawn = [
+        line.get_xydata() for line in ax.lines if len(line.get_xdata()) == both.shape().shape[1]
+    ]
+    np.testing.assert_array_equal(drawn[-2:], both.shape())
+
+
+def test_portraits_need_a_label_for_each(plane):
+    with pytest.raises(em.InputError, match="got 1 for 3"):
+        plotting.portraits(plane.at(x_l=0.7, F=0.01), labels=["one"])

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.tangents import placed_frames, split_step
+from equimorph.manifold.tangents import border_of, placed_frames, split_step
 from equimorph.model import Descriptor
 
 Lanes = Float[np.ndarray, "lanes size"]
@@ -131,20 +131,11 @@ def full_frames(
 
     ``[F_z F_p; R] (x_0, t_1 … t_d) = ((r, 0), (0, e_1) … (0, e_d))`` with r given as `first`.
     """
-    structure, free = setting.structure, setting.free
-    lanes, size, d, n = len(z), z.shape[1], len(free), structure.unknowns
-    columns = np.empty((lanes, d, size))
-    for k in range(d):
-        dp = np.zeros_like(p)
-        dp[:, free[k]] = setting.scales[k]
-        columns[:, k] = structure.parameter_derivative(z, p, dp)
-    by_z = np.zeros((lanes, d, size))
-    by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(structure.mass)
+    lanes, size, d = len(z), z.shape[1], len(setting.free)
     rhs = np.zeros((lanes, d + 1, size + d))
     rhs[:, 0, :size] = first
     rhs[:, 1:, size:] = np.eye(d)
-    border = (columns, by_z, np.ascontiguousarray(rows[:, :, n:]))
-    solved = structure.solve(z, p, rhs, border).x
+    solved = setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
     return solved[:, 0], np.ascontiguousarray(solved[:, 1:])
 
 

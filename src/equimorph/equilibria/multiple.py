@@ -14,8 +14,9 @@ Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Counts = Int[np.ndarray, " lanes"]
 
-VANISHED = 1e-4
-"""Eigenvalue, relative to the small ones at the start of the path, that counts as zero."""
+VANISHED, LOCATED = 1e-4, 1e-8
+"""Eigenvalue, relative to the small ones at the start of the path, that counts as zero; that of a
+simple fold where it is located."""
 
 
 def with_multiple_points(
@@ -26,7 +27,7 @@ def with_multiple_points(
     One border row removes one null vector: where two eigenvalues vanish together, as symmetry or
     equal parts make them do, steps shrink until the lane is lost, within round-off of the point,
     or it ends as at a fold if their number is odd. The inertia of F_z ∓ εM counts the eigenvalues
-    within ±ε.
+    within ±ε. A fold with another small eigenvalue is located to round-off: one vanishes alone.
 
     Parameters
     ----------
@@ -41,9 +42,11 @@ def with_multiple_points(
     here, structure = curve.take(ended), curve.structure
     begun = here.states(start[ended], np.zeros(len(ended)))
     there = here.states(outcome.z[ended], outcome.t[ended])
-    count = multiplicity(structure, *there, VANISHED * _small_eigenvalue(structure, *begun))
+    small = _small_eigenvalue(structure, *begun)
+    count = multiplicity(structure, *there, VANISHED * small)
+    simple = (outcome.code[ended] == FOLD) & (multiplicity(structure, *there, LOCATED * small) == 1)
     code, why = outcome.code.copy(), dict(outcome.why)
-    for lane, several in zip(ended.tolist(), count.tolist(), strict=True):
+    for lane, several in zip(ended.tolist(), np.where(simple, 1, count).tolist(), strict=True):
         if several > 1:
             code[lane] = MULTIPLE
             why[lane] = (

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Setting
+from equimorph.structures.contract import Border
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -36,7 +37,8 @@ def tangent_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Fra
     return out
 
 
-def _frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
+def border_of(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Border:
+    """Border ``[F_z F_p; R]`` of F_z by the free parameters, in their scales, and by planes R."""
     structure, free = setting.structure, setting.free
     lanes, size, d, n = len(z), z.shape[1], len(free), structure.unknowns
     columns = np.empty((lanes, d, size))
@@ -46,10 +48,14 @@ def _frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
         columns[:, k] = structure.parameter_derivative(z, p, dp)
     by_z = np.zeros((lanes, d, size))
     by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(structure.mass)
+    return columns, by_z, np.ascontiguousarray(rows[:, :, n:])
+
+
+def _frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
+    lanes, size, d = len(z), z.shape[1], len(setting.free)
     rhs = np.zeros((lanes, d, size + d))
     rhs[:, :, size:] = np.eye(d)
-    border = (columns, by_z, np.ascontiguousarray(rows[:, :, n:]))
-    raw = structure.solve(z, p, rhs, border).x
+    raw = setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
     placed = placed_frames(setting, raw)
     gram = placed @ np.swapaxes(placed, 1, 2)
     return np.asarray(np.linalg.solve(np.linalg.cholesky(gram), raw))

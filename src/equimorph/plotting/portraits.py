@@ -3,17 +3,15 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from equimorph.errors import InputError
 from equimorph.plotting import style
-from equimorph.plotting.furniture import draw_supports, frame_shapes
-from equimorph.plotting.symbols import with_unit
+from equimorph.plotting.outlines import framed
 from equimorph.structures import States
 
 _ROOM = 0.1
-_MARGINS = (0.54, 0.36, 0.14, 0.06)  # inches around the frame: left, bottom, right, top
 _DASHES = ("solid", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
 
 
@@ -46,15 +44,7 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
         )
     outlines = states.shape()
     with style.house_style():
-        if ax is None:
-            ax = style.new_axes(style.SINGLE_COLUMN, _height(outlines), _MARGINS)
-        frame_shapes(ax, outlines, room=_ROOM)
-        unit = states.structure.length_unit
-        ax.set_xlabel(with_unit("$x$", unit))
-        ax.set_ylabel(with_unit("$y$", unit))
-        ax.xaxis.set_major_locator(style.few_ticks())
-        ax.yaxis.set_major_locator(style.few_ticks())
-        draw_supports(ax, states)
+        ax = framed(states, ax, room=_ROOM)
         colours = style.progress_map()(np.linspace(0.0, 0.8, len(states)))
         for k, (outline, at) in enumerate(zip(outlines, _places(outlines), strict=True)):
             look = {"color": colours[k], "linestyle": _DASHES[k % len(_DASHES)]}
@@ -67,19 +57,10 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
     return ax
 
 
-def _places(outlines: Float[np.ndarray, "states points 2"]) -> list[Int[np.ndarray, ""]]:
+def _places(outlines: Float[np.ndarray, "states points 2"]) -> list[int]:
     """Where each outline is farthest from its nearest neighbour at the same share of its way."""
     if len(outlines) == 1:
-        return [np.array(outlines.shape[1] // 2)]
+        return [outlines.shape[1] // 2]
     gaps = np.linalg.norm(outlines[:, None] - outlines[None], axis=3)
     gaps[np.arange(len(outlines)), np.arange(len(outlines))] = np.inf
-    return list(gaps.min(axis=1).argmax(axis=1))
-
-
-def _height(outlines: Float[np.ndarray, "states points 2"]) -> float:
-    """Height of a figure one column wide whose drawing keeps its aspect without empty bands."""
-    low, high = outlines.min(axis=(0, 1)), outlines.max(axis=(0, 1))
-    width, height = high - low + 2 * _ROOM * float(max(high - low))
-    left, bottom, right, top = _MARGINS
-    drawing = (style.SINGLE_COLUMN - left - right) * float(height / width)
-    return bottom + top + min(drawing, 1.4 * style.SINGLE_COLUMN)
+    return [int(at) for at in gaps.min(axis=1).argmax(axis=1)]

@@ -12,12 +12,10 @@ from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along
-from equimorph.plotting.furniture import draw_supports, frame_shapes
-from equimorph.plotting.symbols import with_unit
+from equimorph.plotting.outlines import framed
 from equimorph.tasks import Route
 
 _ROOM = 0.085
-_MARGINS = (0.54, 0.36, 0.14, 0.06)  # inches around the frame: left, bottom, right, top
 _BAR = 0.5  # inches for the colour bar and the labels above it
 
 
@@ -47,15 +45,7 @@ def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None)
     states = states_along(path_of(path_or_route), count)
     outlines = states.shape()
     with style.house_style():
-        if ax is None:
-            ax = style.new_axes(style.SINGLE_COLUMN, _height(outlines), _MARGINS)
-        frame_shapes(ax, outlines, room=_ROOM)
-        unit = states.structure.length_unit
-        ax.set_xlabel(with_unit("$x$", unit))
-        ax.set_ylabel(with_unit("$y$", unit))
-        ax.xaxis.set_major_locator(style.few_ticks())
-        ax.yaxis.set_major_locator(style.few_ticks())
-        draw_supports(ax, states)
+        ax = framed(states, ax, room=_ROOM, below=_BAR)
         progress = np.linspace(0.0, 1.0, count)
         colours = style.progress_map()(progress)
         widths = np.full(count, 0.9)
@@ -69,15 +59,6 @@ def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None)
         bar = ax.figure.colorbar(scale, cax=below, orientation="horizontal")
         bar.set_label("progress along the route")
     return ax
-
-
-def _height(outlines: Float[np.ndarray, "shapes points 2"]) -> float:
-    """Height of a figure one column wide whose drawing keeps its aspect without empty bands."""
-    low, high = outlines.min(axis=(0, 1)), outlines.max(axis=(0, 1))
-    width, height = high - low + 2 * _ROOM * float(max(high - low))
-    left, bottom, right, top = _MARGINS
-    drawing = (style.SINGLE_COLUMN - left - right) * float(height / width)
-    return bottom + top + _BAR + min(drawing, 1.4 * style.SINGLE_COLUMN)
 
 
 def _name_ends(

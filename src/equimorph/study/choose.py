@@ -53,6 +53,11 @@ def choose_state(eset: EquilibriumSet, section: StateSection, key: str) -> State
     return stable[0]
 
 
+def chosen_start(eset: EquilibriumSet, section: StateSection | None, key: str) -> State | None:
+    """Return the state to start from, if a section asks for one; see `choose_state`."""
+    return None if section is None else choose_state(eset, section, key)
+
+
 def _nearest(here: States, near: dict[str, float], key: str) -> State:
     ((text, wanted),) = near.items()
     values: Float[np.ndarray, " lanes"] = descriptor_named(here.structure, text)(here)

@@ -11,7 +11,7 @@ from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.storage import write_schedule
 from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
-from equimorph.study.choose import choose_state
+from equimorph.study.choose import chosen_start
 from equimorph.study.kinds.found import (
     figures_of_states,
     free_columns,
@@ -55,9 +55,8 @@ class OptimumKind(Kind[OptimumSection, OptimumTask, Optima]):
     ) -> Optima:
         """Find the local optima."""
         assert eset is not None
-        section, start = task.section, None
-        if section.start is not None:
-            start = choose_state(eset, section.start, f"{task.key}.start")
+        section = task.section
+        start = chosen_start(eset, section.start, f"{task.key}.start")
         with at_key(task.key):
             return optimise(
                 eset,

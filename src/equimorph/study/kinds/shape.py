@@ -11,7 +11,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
-from equimorph.study.choose import choose_state
+from equimorph.study.choose import chosen_start
 from equimorph.study.kinds.found import (
     figures_of_states,
     free_columns,
@@ -60,9 +60,8 @@ class ShapeKind(Kind[ShapeSection, ShapeTask, Shapes]):
     ) -> Shapes:
         """Find all of them."""
         assert eset is not None
-        section, start = task.section, None
-        if section.start is not None:
-            start = choose_state(eset, section.start, f"{task.key}.start")
+        section = task.section
+        start = chosen_start(eset, section.start, f"{task.key}.start")
         with at_key(task.key):
             return solve_shape(
                 eset, task.targets, within=task.constraints, start=start, rank=section.rank
