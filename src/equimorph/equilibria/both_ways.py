@@ -1,5 +1,6 @@
 """Both sides of a curve of critical states, as one result."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ NEAR = 1e-3
 """Distance in the metric by which a start may miss its curve."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CriticalCurve:
     """A curve of critical states.
 
@@ -60,6 +61,14 @@ class CriticalCurve:
     index: Int[np.ndarray, " points"]
     events: tuple[Event, ...]
     ends: tuple[Event, Event]
+
+    def __repr__(self) -> str:
+        """Kind, size, special points and ends."""
+        kinds = Counter(event.kind for event in self.events)
+        passed = "".join(f"{count} {kind}, " for kind, count in kinds.items())
+        ends = " to ".join(end.kind for end in self.ends)
+        over = ", ".join(self.parameters)
+        return f"CriticalCurve({self.kind} over {over}: {len(self.states)} states, {passed}{ends})"
 
     @property
     def closed(self) -> bool:

@@ -30,6 +30,11 @@ class LimitLoad:
     criticality: str | None = None
     detail: str = ""
 
+    def __repr__(self) -> str:
+        """Kind, value and state."""
+        kind = f"{self.criticality} {self.kind}" if self.criticality else self.kind
+        return f"LimitLoad({kind} at {self.value:.10g}: {self.state})"
+
 
 @dataclass(frozen=True, eq=False)
 class LimitLoads:

@@ -19,7 +19,7 @@ REPEATS = 3
 """Times that the runs at a point are made, at most: again while an equilibrium was found once."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FoundStates(States):
     """What a search found: equilibria over one point, sorted by energy.
 
@@ -33,6 +33,11 @@ class FoundStates(States):
 
     completeness: Completeness
     failures: Mapping[str, int]
+
+    def __repr__(self) -> str:
+        """How many, how many of them are stable, and how many there may be."""
+        stable, kind = int((self.index == 0).sum()), self.structure.kind
+        return f"FoundStates({kind}: {len(self)}, {stable} of them stable; {self.completeness})"
 
 
 def find_equilibria(

@@ -56,7 +56,7 @@ class ActuatorMap(ABC):
         shape = " × ".join(map(str, self.value.shape))
         counts = ", ".join(f"{n} {kind}" for kind, n in self.counts.items() if n)
         name = type(self).__name__
-        return f"{name}({shape} settings: {counts}; {len(self.curves)} curves)"
+        return f"{name}({shape} settings: {counts}; curves: {len(self.curves)})"
 
     @property
     def counts(self) -> dict[str, int]:

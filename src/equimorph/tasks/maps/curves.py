@@ -40,7 +40,7 @@ SAME = 1e-7
 """Places closer than this, in units of the parameters' scales, are one."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MapCurve:
     """A curve on which a map is not smooth.
 
@@ -65,6 +65,11 @@ class MapCurve:
     points: Float[np.ndarray, "points 2"]
     values: Float[np.ndarray, "points 2"]
     errors: Float[np.ndarray, " points"]
+
+    def __repr__(self) -> str:
+        """Kind, size, and the largest error."""
+        points = len(self.points)
+        return f"MapCurve({self.kind}: {points} points, within {self.errors.max(initial=0.0):.1g})"
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ FLAT = 1e-6
 Vector = Float[np.ndarray, " k"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity:
     """How a state changes with parameters, by the implicit function theorem.
 
@@ -38,6 +38,10 @@ class Sensitivity:
     names: tuple[str, ...]
     unknowns: Float[np.ndarray, "parameters size"]
     descriptors: Mapping[str, Vector]
+
+    def __repr__(self) -> str:
+        """Of what by what."""
+        return f"Sensitivity(of {', '.join(self.descriptors) or 'z'} by {', '.join(self.names)})"
 
     def __getitem__(self, key: tuple[str, str]) -> float:
         """Derivative of a descriptor by a parameter: ``found["height(0.5)", "Theta"]``."""
