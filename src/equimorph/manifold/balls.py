@@ -27,15 +27,17 @@ Tetrahedron = tuple[int, int, int, int]
 class Balls:
     """Tetrahedra with their index, and their facets on folds and on constraints.
 
-    owner: grid tetrahedra below them; doubtful: those over which a ball could not be closed and cut
-    without doubt.
+    owner, fold_owner, cap_owner: grid tetrahedra below them; doubtful: those over which a ball
+    could not be closed and cut without doubt.
     """
 
     corners: Int[np.ndarray, "n 4"]
     index: Int[np.ndarray, " n"]
     owner: Int[np.ndarray, " n"]
     folds: Int[np.ndarray, "f 3"]
+    fold_owner: Int[np.ndarray, " f"]
     caps: Int[np.ndarray, "c 3"]
+    cap_owner: Int[np.ndarray, " c"]
     doubtful: Int[np.ndarray, " k"]
 
 
@@ -47,7 +49,9 @@ class _Found:
     index: list[int] = field(default_factory=list)
     owner: list[int] = field(default_factory=list)
     folds: list[Facet] = field(default_factory=list)
+    fold_owner: list[int] = field(default_factory=list)
     caps: list[Facet] = field(default_factory=list)
+    cap_owner: list[int] = field(default_factory=list)
     doubtful: set[int] = field(default_factory=set)
 
 
@@ -100,7 +104,9 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
         np.concatenate([spheres.plain_index, np.array(found.index, int)]),
         np.concatenate([spheres.plain_owner, np.array(found.owner, int)]),
         np.array(found.folds, int).reshape(-1, 3),
+        np.array(found.fold_owner, int),
         np.array(found.caps, int).reshape(-1, 3),
+        np.array(found.cap_owner, int),
         np.array(sorted(found.doubtful), int),
     )
 
@@ -278,7 +284,9 @@ def _cone(ball: _Ball, found: _Found) -> None:
     ]
     for fan in fans:
         found.folds.extend(fan)
+        found.fold_owner.extend([ball.owner] * len(fan))
     found.caps.extend(ball.lid)
+    found.cap_owner.extend([ball.owner] * len(ball.lid))
     for region in ball.regions:
         around = [facet for k in region.curves for facet in fans[k]]
         facets = [facet for facet in (*region.triangles, *around) if region.apex not in facet]

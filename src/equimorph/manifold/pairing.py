@@ -209,12 +209,10 @@ class Pairing:
 
     def use_mesh(self, mesh: BaseMesh) -> None:
         """Take over a mesh with more vertices and edges; curves on removed edges are forgotten."""
-        removed = np.setdiff1d(np.unique(self.mesh.sides), np.unique(mesh.sides))
-        gone = set(removed.tolist())
-        for curve, edge in enumerate(self.curves.edge):
-            if edge in gone:
-                self.forget(curve, ABANDONED)
-        for edge in removed:  # untraced rays of removed edges need no tracing any more
+        gone = self.mesh.edges_in_use & ~mesh.edges_in_use[: len(self.mesh.edges)]
+        for curve in np.flatnonzero(gone[self.curves.edge]).tolist():
+            self.forget(curve, ABANDONED)
+        for edge in np.flatnonzero(gone):  # untraced rays of removed edges need no tracing any more
             for side in range(2):
                 for point in self.points.over(int(self.mesh.edges[edge, side])):
                     self.rays[point, self.slots[edge, side]] = ABANDONED

@@ -45,9 +45,9 @@ class Loops:
 
 
 def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -> Loops:
-    """Close the curves around every triangle; other than plain ones around wanted triangles."""
-    plain, owner, special = _plain(pairing)
-    special = special if wanted is None else special[wanted[special]]
+    """Close the curves around every triangle, or around the wanted ones."""
+    triangles = np.arange(len(pairing.mesh.triangles))
+    plain, owner, special = _plain(pairing, triangles if wanted is None else triangles[wanted])
     polygons: list[Polygon] = []
     ambiguous: list[int] = []
     broken: list[int] = []
@@ -90,7 +90,7 @@ def _close_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:
 
 
 def _plain(
-    pairing: Pairing,
+    pairing: Pairing, triangles: Int[np.ndarray, " some"]
 ) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " P"], Int[np.ndarray, " S"]]:
     """Loops of three curves that go straight across; triangles over which there are others."""
     mesh, points = pairing.mesh, pairing.points
@@ -100,8 +100,8 @@ def _plain(
     order = order[vertex[order] >= 0]
     amount = np.bincount(vertex[order], minlength=len(mesh.vertices))
     first = np.concatenate([[0], np.cumsum(amount)])
-    here = amount[mesh.triangles[:, 0]]
-    owner = np.repeat(np.arange(len(mesh.triangles)), here)
+    here = amount[mesh.triangles[triangles, 0]]
+    owner = np.repeat(triangles, here)
     offset = np.arange(len(owner)) - np.repeat(np.cumsum(here) - here, here)
     a = order[first[mesh.triangles[owner, 0]] + offset]
     b = _across(pairing, partner, a, mesh.sides[owner, 0])
@@ -109,8 +109,8 @@ def _plain(
     closed = (b >= 0) & (c >= 0)
     closed[closed] = _across(pairing, partner, b[closed], mesh.sides[owner[closed], 1]) == c[closed]
     loops = np.bincount(owner[closed], minlength=len(mesh.triangles))
-    special = (amount[mesh.triangles] > loops[:, None]).any(axis=1)
-    return np.stack([a, b, c], axis=1)[closed], owner[closed], np.flatnonzero(special)
+    special = (amount[mesh.triangles[triangles]] > loops[triangles, None]).any(axis=1)
+    return np.stack([a, b, c], axis=1)[closed], owner[closed], triangles[special]
 
 
 def _partners(pairing: Pairing) -> Int[np.ndarray, "count slots"]:

@@ -13,16 +13,14 @@ from equimorph.manifold.assembly import Discs, assemble
 from equimorph.manifold.balls import Balls, fill
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.polygons import find_loops
-from equimorph.manifold.topology import flags_of
-
-Rows = Int[np.ndarray, "n k"]
 
 
 @dataclass(frozen=True)
 class Volumes:
-    """Discs that are not plain triangles, and balls, with what they depend on.
+    """Discs and balls, with what they depend on.
 
-    doubtful: triangles of `discs`, and tetrahedra of `balls`, that need division.
+    doubtful: triangles of `discs`, and tetrahedra of `balls`, that need division. What discs say of
+    folds and constraints is not kept: balls say it of their facets.
     """
 
     triangles: Int[np.ndarray, "T 3"]
@@ -42,9 +40,7 @@ def volumes_over(pairing: Pairing, known: Volumes | None) -> Volumes:
         same[:count] = (mesh.triangles[:count] == known.triangles).all(axis=1)
         same[:count] &= (around[:count] == known.around).all(axis=1)
         same[known.discs.doubtful] = False
-    loops = find_loops(pairing, ~same)
-    discs = assemble(pairing, loops)
-    plain = np.arange(len(loops.plain))
+    discs = assemble(pairing, find_loops(pairing, ~same))
     discs = discs if known is None else _with_discs(discs, known.discs, same)
     same[discs.doubtful] = False
     kept = np.zeros(len(mesh.tetrahedra), bool)
@@ -56,20 +52,16 @@ def volumes_over(pairing: Pairing, known: Volumes | None) -> Volumes:
         kept[known.balls.doubtful] = False
     balls = fill(pairing, discs, ~kept)
     balls = balls if known is None else _with_balls(balls, known.balls, kept)
-    special = replace(
-        discs,
-        corners=np.delete(discs.corners, plain, axis=0),
-        index=np.delete(discs.index, plain),
-        owner=np.delete(discs.owner, plain),
-    )
-    return Volumes(mesh.triangles, mesh.tetrahedra, mesh.faces, around, special, balls)
+    return Volumes(mesh.triangles, mesh.tetrahedra, mesh.faces, around, discs, balls)
 
 
 def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
     """What tells whether something changed around each triangle: its curves and its points."""
     mesh, points, curves = pairing.mesh, pairing.points, pairing.curves
-    live = np.unique(pairing.rays[: points.count])
-    live = live[live >= 0]
+    rays = pairing.rays[: points.count]
+    in_use = np.zeros(len(curves.edge), bool)
+    in_use[rays[rays >= 0]] = True
+    live = np.flatnonzero(in_use)
     edge = np.array(curves.edge, int)[live]
     # sums of irrational shares differ for different sets of curves
     share = np.modf((live + 1) * np.sqrt(2.0))[0]
@@ -82,35 +74,24 @@ def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
 def _with_discs(new: Discs, known: Discs, same: Bool[np.ndarray, " T"]) -> Discs:
     """New discs, and known ones over triangles that are the same."""
     kept = same[known.owner]
-    corners = known.corners[kept]
     return replace(
         new,
-        corners=np.concatenate([new.corners, corners]),
+        corners=np.concatenate([new.corners, known.corners[kept]]),
         index=np.concatenate([new.index, known.index[kept]]),
         owner=np.concatenate([new.owner, known.owner[kept]]),
-        folds=_joined(new.folds, known.folds, corners),
-        caps=_joined(new.caps, known.caps, corners),
-        crossings=_joined(new.crossings, known.crossings, corners),
     )
 
 
 def _with_balls(new: Balls, known: Balls, kept: Bool[np.ndarray, " N"]) -> Balls:
     """New balls, and known ones over tetrahedra that are the same."""
-    old = kept[known.owner]
-    corners = known.corners[old]
+
+    def joined(name: str, owner: str) -> Int[np.ndarray, "..."]:
+        own = kept[getattr(known, owner)]
+        return np.concatenate([getattr(new, name), getattr(known, name)[own]])
+
     return replace(
         new,
-        corners=np.concatenate([new.corners, corners]),
-        index=np.concatenate([new.index, known.index[old]]),
-        owner=np.concatenate([new.owner, known.owner[old]]),
-        folds=_joined(new.folds, known.folds, corners),
-        caps=_joined(new.caps, known.caps, corners),
+        **{name: joined(name, "owner") for name in ("corners", "index", "owner")},
+        **{name: joined(name, "fold_owner") for name in ("folds", "fold_owner")},
+        **{name: joined(name, "cap_owner") for name in ("caps", "cap_owner")},
     )
-
-
-def _joined(new: Rows, known: Rows, corners: Rows) -> Rows:
-    """New facets, and those known ones that belong to some cells."""
-    size = corners.shape[1]
-    facets = np.concatenate([np.delete(corners, k, axis=1) for k in range(size)])
-    kept = known[flags_of(known, facets)] if len(known) else known
-    return np.unique(np.sort(np.concatenate([new, kept]), axis=1), axis=0)
