@@ -6,7 +6,7 @@ amid all its vertices. Several closed fold curves on a sphere each bound a disc 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -14,13 +14,10 @@ from jaxtyping import Bool, Int
 from equimorph.manifold.assembly import Discs
 from equimorph.manifold.mesh import SLACK
 from equimorph.manifold.pairing import Pairing
+from equimorph.manifold.parting import Parts, closed_surfaces, part
 from equimorph.manifold.pins import Pinned, pin
 from equimorph.manifold.points import AMID, CAP, CORNER, FOLD
-from equimorph.manifold.spheres import Sphere, Spheres, find_spheres
-from equimorph.manifold.topology import chains
-
-Facet = tuple[int, int, int]
-Tetrahedron = tuple[int, int, int, int]
+from equimorph.manifold.spheres import Surfaces, find_spheres
 
 
 @dataclass(frozen=True)
@@ -41,203 +38,145 @@ class Balls:
     doubtful: Int[np.ndarray, " k"]
 
 
-@dataclass
-class _Found:
-    """What is known of the balls that are not plain tetrahedra."""
-
-    corners: list[Tetrahedron] = field(default_factory=list)
-    index: list[int] = field(default_factory=list)
-    owner: list[int] = field(default_factory=list)
-    folds: list[Facet] = field(default_factory=list)
-    fold_owner: list[int] = field(default_factory=list)
-    caps: list[Facet] = field(default_factory=list)
-    cap_owner: list[int] = field(default_factory=list)
-    doubtful: set[int] = field(default_factory=set)
-
-
-@dataclass
-class _Region:
-    """Connected triangles of one index on a sphere, and the fold curves around them."""
-
-    triangles: list[Facet]
-    index: int
-    curves: list[int]
-    apex: int = -1
-
-
-@dataclass
-class _Ball:
-    """How a sphere will be filled."""
-
-    owner: int
-    cap: int
-    """Point on the constraint from which the sphere was closed; −1 if there is none."""
-    lid: list[Facet]
-    """Triangles on the constraint that close it."""
-    regions: list[_Region]
-    curves: list[list[int]]
-    """Points along closed fold curves, each once."""
-    middles: list[int]
-    """Fold point inside each curve."""
-
-
 def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Balls:
     """Fill all spheres over wanted grid tetrahedra."""
     spheres = find_spheres(pairing.mesh, discs, wanted)
-    found = _Found(doubtful=set(spheres.doubtful.tolist()))
-    balls = []
-    for sphere, cap in zip(spheres.others, _caps(pairing, spheres, found), strict=True):
-        if sphere.owner in found.doubtful:
-            continue
-        ball = _regions(sphere, cap)
-        if ball is None:
-            found.doubtful.add(sphere.owner)
-        else:
-            balls.append(ball)
-    _pin_folds(pairing, balls, found)
-    _pin_amid(pairing, balls, found)
-    for ball in balls:
-        if ball.owner not in found.doubtful:
-            _cone(ball, found)
+    doubtful = np.zeros(len(pairing.mesh.tetrahedra), bool)
+    doubtful[spheres.doubtful] = True
+    caps, lost = _caps(pairing, spheres.others)
+    doubtful[spheres.others.owner[lost]] = True
+    closed = closed_surfaces(spheres.others, caps, ~doubtful[spheres.others.owner])
+    parts = part(closed)
+    doubtful[closed.owner[~parts.whole]] = True
+    middles = _middles(pairing, parts, doubtful)
+    apexes = _apexes(pairing, parts, middles, doubtful)
+    filled = _coned(parts, middles, apexes, ~doubtful[closed.owner])
     return Balls(
-        np.concatenate([spheres.plain, np.array(found.corners, int).reshape(-1, 4)]),
-        np.concatenate([spheres.plain_index, np.array(found.index, int)]),
-        np.concatenate([spheres.plain_owner, np.array(found.owner, int)]),
-        np.array(found.folds, int).reshape(-1, 3),
-        np.array(found.fold_owner, int),
-        np.array(found.caps, int).reshape(-1, 3),
-        np.array(found.cap_owner, int),
-        np.array(sorted(found.doubtful), int),
+        np.concatenate([spheres.plain, filled.corners]),
+        np.concatenate([spheres.plain_index, filled.index]),
+        np.concatenate([spheres.plain_owner, filled.owner]),
+        filled.folds,
+        filled.fold_owner,
+        filled.caps,
+        filled.cap_owner,
+        np.flatnonzero(doubtful),
     )
 
 
-def _caps(pairing: Pairing, spheres: Spheres, found: _Found) -> list[int]:
-    """Points on the constraint from which open spheres are closed; −1 where none is needed.
+def _caps(
+    pairing: Pairing, surfaces: Surfaces
+) -> tuple[Int[np.ndarray, " S"], Bool[np.ndarray, " S"]]:
+    """Points on the constraint from which open surfaces are closed, and where one is missing.
 
-    A rim of three points can be closed by their triangle.
+    −1 where none is needed: a rim of three points can be closed by their triangle.
     """
-    caps = [-1] * len(spheres.others)
-    groups: dict[int, list[tuple[int, list[int]]]] = {CAP: [], CORNER: []}
-    for k, sphere in enumerate(spheres.others):
-        ends = [p for p in sphere.rim if int(pairing.points.kind[p]) == CORNER]
-        if len(ends) == 2:
-            # the fold runs from corner to corner, maybe far from the middle of the rim
-            groups[CORNER].append((k, ends))
-        elif ends:
-            found.doubtful.add(sphere.owner)
-        elif sphere.rim and len(sphere.triangles) > 3:
-            groups[CAP].append((k, sphere.rim))
-    for kind, wanted in groups.items():
-        points = _pinned(pairing, [group for _, group in wanted], kind)
-        for (k, _), point in zip(wanted, points, strict=True):
-            caps[k] = point
-            if point < 0 and (kind == CORNER or len(spheres.others[k].rim) > 3):
-                found.doubtful.add(spheres.others[k].owner)
-    return caps
+    count = len(surfaces.owner)
+    amount = np.bincount(surfaces.surface, minlength=count)
+    around = np.bincount(surfaces.rim_surface, minlength=count)
+    at, points = _grouped(surfaces.rim_surface, surfaces.rims, count)
+    ends = pairing.points.kind[points] == CORNER
+    ended = np.bincount(at[ends], minlength=count)
+    # a fold runs from corner to corner, maybe far from the middle of the rim
+    folded, plain = ended == 2, (ended == 0) & (around > 0) & (amount > 3)
+    caps, lost = np.full(count, -1), (ended > 0) & (ended != 2)
+    for kind, own in ((CORNER, folded), (CAP, plain)):
+        used = own[at] & (ends | (kind == CAP))
+        groups = _groups(at[used], points[used], np.flatnonzero(own))
+        caps[own] = _pinned(pairing, groups, kind)
+        lost |= own & (caps < 0) & ((kind == CORNER) | (around > 3))
+    return caps, lost
 
 
-def _lid(rim: list[int], cap: int) -> list[Facet]:
-    """Triangles that close a sphere along its rim."""
-    if cap >= 0:
-        return [(a, b, cap) for a, b in map(sorted, _links(rim))]
-    return [(rim[0], rim[1], rim[2])] if rim else []
+def _grouped(
+    group: Int[np.ndarray, " n"], points: Int[np.ndarray, "n k"], groups: int
+) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+    """Distinct points of each group, in order: their groups and their numbers."""
+    base = int(points.max(initial=0)) + 1
+    keys = np.sort((group[:, None] * base + points).ravel())
+    at, own = np.divmod(keys[np.diff(keys, prepend=-1) > 0], base)
+    return at, own
 
 
-def _regions(sphere: Sphere, cap: int) -> _Ball | None:
-    """Part a closed sphere along its folds; None if that contradicts itself."""
-    lid = _lid(sphere.rim, cap)
-    triangles, index = [*sphere.triangles, *lid], list(sphere.index)
-    by_edge: dict[frozenset[int], list[int]] = {}
-    for number, triangle in enumerate(triangles):
-        for pair in _sides(triangle):
-            by_edge.setdefault(pair, []).append(number)
-    # the lid takes the index of what it closes
-    index += [index[by_edge[_sides(facet)[0]][0]] for facet in lid]
-    vertices = {point for triangle in triangles for point in triangle}
-    if len(vertices) - len(by_edge) + len(triangles) != 2:
-        return None
-    folded = {pair for pair, (a, b) in by_edge.items() if index[a] != index[b]}
-    curves = _closed_curves(folded)
-    if curves is None:
-        return None
-    curve_of = {pair: k for k, curve in enumerate(curves) for pair in _links(curve)}
-    regions = _flood(triangles, index, by_edge, curve_of)
-    jumps = all(abs(index[a] - index[b]) == 1 for a, b in (by_edge[pair] for pair in folded))
-    if len(regions) != len(curves) + 1 or not jumps:
-        return None
-    return _Ball(sphere.owner, cap, lid, regions, curves, [-1] * len(curves))
+def _groups(
+    at: Int[np.ndarray, " m"], points: Int[np.ndarray, " m"], numbers: Int[np.ndarray, " k"]
+) -> list[list[int]]:
+    """Points of the groups with these numbers."""
+    first, last = np.searchsorted(at, numbers), np.searchsorted(at, numbers, side="right")
+    every = points.tolist()
+    return [every[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True)]
 
 
-def _closed_curves(folded: set[frozenset[int]]) -> list[list[int]] | None:
-    pairs = np.array(sorted(sorted(pair) for pair in folded), int).reshape(-1, 2)
-    lines = [line.tolist() for line in chains(pairs)]
-    closed = all(line[0] == line[-1] for line in lines)
-    once = len({point for line in lines for point in line}) == sum(len(k) - 1 for k in lines)
-    return [line[:-1] for line in lines] if closed and once else None
+def _middles(
+    pairing: Pairing, parts: Parts, doubtful: Bool[np.ndarray, " N"]
+) -> Int[np.ndarray, " curves"]:
+    """Fold point inside every fold curve; it can be the one on the constraint."""
+    count = len(parts.curve_surface)
+    at, points = _grouped(parts.curve, parts.folds, count)
+    cap = parts.closed.cap[parts.curve_surface]
+    middles = np.full(count, -1)
+    own = points == cap[at]
+    middles[at[own]] = points[own]
+    wanted = np.flatnonzero((middles < 0) & parts.whole[parts.curve_surface])
+    middles[wanted] = _pinned(pairing, _groups(at, points, wanted), FOLD)
+    owner = parts.closed.owner[parts.curve_surface[wanted]]
+    doubtful[owner[middles[wanted] < 0]] = True
+    return middles
 
 
-def _flood(
-    triangles: list[Facet],
-    index: list[int],
-    by_edge: dict[frozenset[int], list[int]],
-    curve_of: dict[frozenset[int], int],
-) -> list[_Region]:
-    """Connected pieces of the sphere between fold curves."""
-    regions, seen = [], [False] * len(triangles)
-    for seed in range(len(triangles)):
-        if seen[seed]:
-            continue
-        seen[seed], todo, own, curves = True, [seed], [], set()
-        while todo:
-            number = todo.pop()
-            own.append(triangles[number])
-            for pair in _sides(triangles[number]):
-                if pair in curve_of:
-                    curves.add(curve_of[pair])
-                    continue
-                for other in by_edge[pair]:
-                    if not seen[other]:
-                        seen[other] = True
-                        todo.append(other)
-        regions.append(_Region(own, index[seed], sorted(curves)))
-    return regions
+def _apexes(
+    pairing: Pairing,
+    parts: Parts,
+    middles: Int[np.ndarray, " curves"],
+    doubtful: Bool[np.ndarray, " N"],
+) -> Int[np.ndarray, " regions"]:
+    """Apex of every region: on a fold, on the constraint, else amid its vertices."""
+    count = len(parts.region_surface)
+    folded = parts.first_curve >= 0
+    apexes: Int[np.ndarray, " regions"] = parts.closed.cap[parts.region_surface]
+    apexes[folded] = middles[parts.first_curve[folded]]
+    size = np.bincount(parts.region, minlength=count)
+    four = np.flatnonzero(~folded & (apexes < 0) & (size == 4))
+    by_region = np.argsort(parts.region, kind="stable")
+    first = np.cumsum(size) - size
+    apexes[four] = parts.closed.corners[by_region[first[four]], 0]
+    whole = parts.whole[parts.region_surface]
+    wanted = np.flatnonzero(~folded & (apexes < 0) & whole)
+    at, points = _grouped(parts.region, parts.closed.corners, count)
+    found = np.array(_pinned(pairing, _groups(at, points, wanted), AMID), int)
+    apexes[wanted] = found
+    wrong = (found < 0) | (pairing.points.index[found] != parts.region_index[wanted])
+    doubtful[parts.closed.owner[parts.region_surface[wanted[wrong]]]] = True
+    return apexes
 
 
-def _pin_folds(pairing: Pairing, balls: list[_Ball], found: _Found) -> None:
-    """Find a fold point inside every fold curve; it can be the one on the constraint."""
-    wanted = []
-    for ball in balls:
-        for k, curve in enumerate(ball.curves):
-            if ball.cap in curve:
-                ball.middles[k] = ball.cap
-            else:
-                wanted.append((ball, k))
-    points = _pinned(pairing, [ball.curves[k] for ball, k in wanted], FOLD)
-    for (ball, k), point in zip(wanted, points, strict=True):
-        ball.middles[k] = point
-        if point < 0:
-            found.doubtful.add(ball.owner)
-
-
-def _pin_amid(pairing: Pairing, balls: list[_Ball], found: _Found) -> None:
-    """Choose the apex of every region: on a fold, on the constraint, else amid its vertices."""
-    wanted = []
-    for ball in balls:
-        for region in ball.regions:
-            if region.curves:
-                region.apex = ball.middles[region.curves[0]]
-            elif not region.curves and ball.cap >= 0:
-                region.apex = ball.cap
-            elif len(region.triangles) == 4:
-                region.apex = region.triangles[0][0]
-            else:
-                wanted.append((ball, region))
-    groups = [sorted({p for facet in region.triangles for p in facet}) for _, region in wanted]
-    points = _pinned(pairing, groups, AMID)
-    for (ball, region), point in zip(wanted, points, strict=True):
-        region.apex = point
-        if point < 0 or pairing.points.index[point] != region.index:
-            found.doubtful.add(ball.owner)
+def _coned(
+    parts: Parts,
+    middles: Int[np.ndarray, " curves"],
+    apexes: Int[np.ndarray, " regions"],
+    wanted: Bool[np.ndarray, " S"],
+) -> Balls:
+    """Tetrahedra from the apex of each region to its triangles and to the folds around it."""
+    closed = parts.closed
+    middle = middles[parts.curve]
+    fans = np.concatenate([np.sort(parts.folds, axis=1), middle[:, None]], axis=1)
+    fan_surface = parts.curve_surface[parts.curve]
+    proper = wanted[fan_surface] & (fans[:, :2] != middle[:, None]).all(axis=1)
+    fans, fan_surface, beside = fans[proper], fan_surface[proper], parts.beside[proper]
+    facets = np.concatenate([closed.corners, fans, fans])
+    region = np.concatenate([parts.region, beside[:, 0], beside[:, 1]])
+    apex, surface = apexes[region], parts.region_surface[region]
+    kept = wanted[surface] & (facets != apex[:, None]).all(axis=1)
+    lids = closed.lid & wanted[closed.surface]
+    return Balls(
+        np.concatenate([facets, apex[:, None]], axis=1)[kept],
+        parts.region_index[region[kept]],
+        closed.owner[surface[kept]],
+        fans,
+        closed.owner[fan_surface],
+        closed.corners[lids],
+        closed.owner[closed.surface[lids]],
+        np.zeros(0, int),
+    )
 
 
 def _pinned(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int) -> list[int]:
@@ -274,32 +213,3 @@ def _pin_inside(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int) ->
         pinned.z[lanes], pinned.p[lanes], pinned.found[lanes] = again.z, again.p, again.found
     inside = pairing.mesh.covers(pinned.p[:, setting.free])
     return Pinned(pinned.z, pinned.p, pinned.found & inside)
-
-
-def _cone(ball: _Ball, found: _Found) -> None:
-    """Tetrahedra from the apex of each region to its triangles and to the folds around it."""
-    fans = [
-        [(a, b, middle) for a, b in map(sorted, _links(curve)) if middle not in {a, b}]
-        for curve, middle in zip(ball.curves, ball.middles, strict=True)
-    ]
-    for fan in fans:
-        found.folds.extend(fan)
-        found.fold_owner.extend([ball.owner] * len(fan))
-    found.caps.extend(ball.lid)
-    found.cap_owner.extend([ball.owner] * len(ball.lid))
-    for region in ball.regions:
-        around = [facet for k in region.curves for facet in fans[k]]
-        facets = [facet for facet in (*region.triangles, *around) if region.apex not in facet]
-        own = [(a, b, c, region.apex) for a, b, c in facets]
-        found.corners.extend(own)
-        found.index.extend([region.index] * len(own))
-        found.owner.extend([ball.owner] * len(own))
-
-
-def _sides(triangle: Facet) -> tuple[frozenset[int], ...]:
-    a, b, c = triangle
-    return frozenset((a, b)), frozenset((b, c)), frozenset((c, a))
-
-
-def _links(curve: list[int]) -> list[frozenset[int]]:
-    return [frozenset((curve[k - 1], curve[k])) for k in range(len(curve))]

@@ -28,7 +28,7 @@ from equimorph.model import (
 )
 from equimorph.structures import Structure
 
-COARSE = 12
+COARSE = {1: 12, 2: 12, 3: 7}
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
 BISECTIONS = {1: 12, 2: 24, 3: 30}
 """Rounds by the number of free parameters: each cuts the longest edges of doubtful cells."""
@@ -216,7 +216,7 @@ def _spread(setting: Setting, lines: Lines, seed: int, progress: Progress) -> Se
     So the flood of the fine grid starts everywhere at once, with many edges at a time, and on
     pieces, too, that hang together only beyond the box.
     """
-    mesh, number = coarse_grid(lines, COARSE, setting.limits)
+    mesh, number = coarse_grid(lines, COARSE[len(lines)], setting.limits)
     pairing = start_pairing(setting, mesh)
     pairing.points.over_vertices(*seeds(setting, mesh, np.flatnonzero(number >= 0), seed))
     flood(pairing, progress)

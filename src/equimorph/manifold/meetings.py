@@ -81,6 +81,7 @@ def _agree(plans: list[Plan], ways: Iterable[list[Chord]]) -> bool:
 def put_hubs(pairing: Pairing, plans: list[Plan]) -> set[int]:
     """Lead folds that cross a chord of a crossing through a hub; return triangles without one."""
     lost: set[int] = set()
+    plans = [plan for plan in plans if CROSSING in plan.kinds.values()]
     for hub in [plan for plan in plans if plan.those(TURN) and _joined(plan) < _singular(plan)]:
         triangle, chord = hub.polygon.triangle, hub.chords[0]
         point = _hub(pairing, triangle, chord)

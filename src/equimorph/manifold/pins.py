@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -20,8 +21,8 @@ NEWTON_STEPS = 15
 DIFFERENCE = 1e-6
 VANISHING = 1e-6
 """Size below which an eigenvalue at a fold is the one that vanishes."""
-LED = 12
-"""Steps from a known fold to the middle between several."""
+LED = (3, 12)
+"""Steps from a known fold to the middle between several: few, else many."""
 REACH = 3.0
 """How far a point may lie from the middle, relative to the farthest one around it."""
 
@@ -103,13 +104,13 @@ def pin(
         return corrected(aim, z, p, around)
     low = np.array([points.index[list(group)].min() for group in groups], int)
     pinned = _rightly(corrected(aim, z, p, around), setting, low)
-    for end in (0, -1) if not cap else ():
+    for steps, end in product(LED, (0, -1)) if not cap else ():
         lanes = np.flatnonzero(~pinned.found)
         if len(lanes) == 0:
             break
         start = np.array([groups[lane][end] for lane in lanes.tolist()], int)
         states = (points.z[start], points.p[start])
-        led = _rightly(_led(aim.take(lanes), *states, around[lanes]), setting, low[lanes])
+        led = _rightly(_led(aim.take(lanes), steps, states, around[lanes]), setting, low[lanes])
         pinned.z[lanes], pinned.p[lanes], pinned.found[lanes] = led.z, led.p, led.found
     return pinned
 
@@ -124,15 +125,18 @@ def _rightly(pinned: Pinned, setting: Setting, low: Int[np.ndarray, " lanes"]) -
     return Pinned(pinned.z, pinned.p, found)
 
 
-def _led(aim: Aim, z: Lanes, p: Parameters, around: Values) -> Pinned:
+def _led(aim: Aim, steps: int, states: tuple[Lanes, Parameters], around: Values) -> Pinned:
     """Pin folds in small steps from known ones to the middle, where one step goes astray."""
-    z, p, found = z.copy(), p.copy(), np.ones(len(z), bool)
+    z, p = (each.copy() for each in states)
+    found = np.ones(len(z), bool)
     start = embed(aim.setting, z, p)
-    for share in np.linspace(0.0, 1.0, LED + 1)[1:]:
+    for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
         lanes = np.flatnonzero(found)
+        if len(lanes) == 0:
+            break
         middle = (1.0 - share) * start + share * aim.middle
         own = replace(aim, middle=middle).take(lanes)
-        pinned = corrected(own, z[lanes], p[lanes], 2.0 * around[lanes] / LED)
+        pinned = corrected(own, z[lanes], p[lanes], 2.0 * around[lanes] / steps)
         z[lanes], p[lanes], found[lanes] = pinned.z, pinned.p, pinned.found
     return Pinned(z, p, found)
 

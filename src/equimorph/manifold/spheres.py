@@ -9,20 +9,24 @@ from scipy.sparse.csgraph import connected_components
 
 from equimorph.manifold.assembly import Discs
 from equimorph.manifold.mesh import BaseMesh
-from equimorph.manifold.topology import chains, keys_of
+from equimorph.manifold.topology import keys_of, labels
 
 
 @dataclass(frozen=True)
-class Sphere:
-    """Triangles of a closed surface over one grid tetrahedron, or of one open at a constraint.
+class Surfaces:
+    """Triangles of surfaces over grid tetrahedra, closed or open along one loop at a constraint.
 
-    rim: points along the open edge, in order; empty for closed ones.
+    corners, index, surface: of the triangles, those of one surface in a row; owner: grid
+    tetrahedron of each surface; rims: open sides, with their surface and the index beside them.
     """
 
-    owner: int
-    triangles: list[tuple[int, int, int]]
-    index: list[int]
-    rim: list[int]
+    corners: Int[np.ndarray, "n 3"]
+    index: Int[np.ndarray, " n"]
+    surface: Int[np.ndarray, " n"]
+    owner: Int[np.ndarray, " S"]
+    rims: Int[np.ndarray, "r 2"]
+    rim_surface: Int[np.ndarray, " r"]
+    rim_index: Int[np.ndarray, " r"]
 
 
 @dataclass(frozen=True)
@@ -32,8 +36,21 @@ class Spheres:
     plain: Int[np.ndarray, "P 4"]
     plain_index: Int[np.ndarray, " P"]
     plain_owner: Int[np.ndarray, " P"]
-    others: list[Sphere]
+    others: Surfaces
     doubtful: Int[np.ndarray, " k"]
+
+
+@dataclass(frozen=True)
+class Rings:
+    """Closed curves that edges form, group by group.
+
+    label: curve of each edge; amount: of curves of each group; closed: groups in which two edges
+    meet at every point.
+    """
+
+    label: Int[np.ndarray, " n"]
+    amount: Int[np.ndarray, " groups"]
+    closed: Bool[np.ndarray, " groups"]
 
 
 @dataclass(frozen=True)
@@ -61,20 +78,53 @@ def find_spheres(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -
     four = (points == points[:, :, :1]).all(axis=(1, 2))
     plain = np.zeros(len(starts), bool)
     plain[candidates[four]] = True
-    others, doubtful = [], []
-    for piece in np.flatnonzero(~plain).tolist():
-        sphere = _sphere(copies, slice(starts[piece], starts[piece] + sizes[piece]))
-        if sphere is None:
-            doubtful.append(int(copies.owner[starts[piece]]))
-        else:
-            others.append(sphere)
+    others, doubtful = _surfaces(copies, plain)
     return Spheres(
         points[four, :, 0],
         copies.index[starts[candidates[four]]],
         copies.owner[starts[candidates[four]]],
         others,
-        np.array(sorted(set(doubtful)), int),
+        doubtful,
     )
+
+
+def _surfaces(
+    copies: _Copies, plain: Bool[np.ndarray, " pieces"]
+) -> tuple[Surfaces, Int[np.ndarray, " k"]]:
+    """Pieces that are not plain, and the owners of those with several rims or crowded sides."""
+    piece = np.repeat(np.arange(len(copies.sizes)), copies.sizes)
+    sides = np.stack([copies.corners, np.roll(copies.corners, -1, axis=1)], axis=2)
+    open_ = (copies.shares == 1) & ~plain[piece, None]
+    row, side = np.nonzero(open_)
+    rims = rings(sides[row, side], piece[row], len(plain))
+    crowded = np.logical_or.reduceat((copies.shares > 2).any(axis=1), copies.starts)
+    bad = ~plain & (crowded | ~rims.closed | (rims.amount > 1))
+    good = ~plain & ~bad
+    number = np.cumsum(good) - 1
+    own, rim = good[piece], good[piece[row]]
+    surfaces = Surfaces(
+        copies.corners[own],
+        copies.index[own],
+        number[piece[own]],
+        copies.owner[copies.starts[good]],
+        sides[row[rim], side[rim]],
+        number[piece[row[rim]]],
+        copies.index[row[rim]],
+    )
+    return surfaces, np.unique(copies.owner[copies.starts[bad]])
+
+
+def rings(edges: Int[np.ndarray, "n 2"], group: Int[np.ndarray, " n"], groups: int) -> Rings:
+    """Curves of edges that hang together within their group."""
+    base = int(edges.max(initial=0)) + 1
+    _, ends = np.unique((group[:, None] * base + edges).ravel(), return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    degree = np.bincount(ends.ravel())
+    of_point = labels(len(degree), ends)
+    _, first, label = np.unique(of_point[ends[:, 0]], return_index=True, return_inverse=True)
+    closed = np.ones(groups, bool)
+    closed[group[(degree[ends] != 2).any(axis=1)]] = False
+    return Rings(label, np.bincount(group[first], minlength=groups), closed)
 
 
 def _copies(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> _Copies:
@@ -113,17 +163,3 @@ def _pieces(
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(owner), len(owner)))
     _, piece = connected_components(graph, directed=False)
     return counts[inverse].reshape(-1, 3), piece
-
-
-def _sphere(copies: _Copies, own: slice) -> Sphere | None:
-    """One piece, if it is closed, or open along one loop."""
-    corners, shares = copies.corners[own], copies.shares[own]
-    if shares.max() > 2:
-        return None
-    sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2)
-    loops = [line.tolist() for line in chains(sides[shares == 1])]
-    if len(loops) > 1 or any(line[0] != line[-1] for line in loops):
-        return None
-    triangles = [(int(a), int(b), int(c)) for a, b, c in corners]
-    rim = loops[0][:-1] if loops else []
-    return Sphere(int(copies.owner[own][0]), triangles, copies.index[own].tolist(), rim)

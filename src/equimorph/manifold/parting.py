@@ -1,0 +1,125 @@
+"""Closed surfaces parted along their folds: regions of one index, and the curves between them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.manifold.spheres import Surfaces, rings
+from equimorph.manifold.topology import keys_of, labels
+
+
+@dataclass(frozen=True)
+class Closed:
+    """Triangles of closed surfaces: some with a lid on the constraint.
+
+    corners, index, surface, lid: of the triangles; owner, cap: of the surfaces, their grid
+    tetrahedron, and the point from which the lid was drawn (−1 if there is none).
+    """
+
+    corners: Int[np.ndarray, "n 3"]
+    index: Int[np.ndarray, " n"]
+    surface: Int[np.ndarray, " n"]
+    lid: Bool[np.ndarray, " n"]
+    owner: Int[np.ndarray, " S"]
+    cap: Int[np.ndarray, " S"]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """How closed surfaces are parted.
+
+    region: of each triangle; region_surface, region_index, first_curve: of the regions, one of the
+    curves around it (−1 if there is none); folds, curve, beside: sides between two indices, the
+    closed curve that they belong to, and the regions on both sides; curve_surface: of the curves;
+    whole: surfaces that are spheres, parted without contradiction.
+    """
+
+    closed: Closed
+    region: Int[np.ndarray, " n"]
+    region_surface: Int[np.ndarray, " regions"]
+    region_index: Int[np.ndarray, " regions"]
+    first_curve: Int[np.ndarray, " regions"]
+    folds: Int[np.ndarray, "f 2"]
+    curve: Int[np.ndarray, " f"]
+    beside: Int[np.ndarray, "f 2"]
+    curve_surface: Int[np.ndarray, " curves"]
+    whole: Bool[np.ndarray, " S"]
+
+
+def closed_surfaces(
+    surfaces: Surfaces, caps: Int[np.ndarray, " S"], wanted: Bool[np.ndarray, " S"]
+) -> Closed:
+    """Close wanted surfaces along their rims: from a cap, or by one triangle."""
+    number = np.cumsum(wanted) - 1
+    own, rim = wanted[surfaces.surface], wanted[surfaces.rim_surface]
+    at, sides, index = surfaces.rim_surface[rim], surfaces.rims[rim], surfaces.rim_index[rim]
+    capped = caps[at] >= 0
+    fans = np.concatenate([np.sort(sides[capped], axis=1), caps[at[capped], None]], axis=1)
+    # rims without a cap have three sides, one after the other
+    order = np.flatnonzero(~capped)[np.argsort(at[~capped], kind="stable")]
+    first, second = order[::3], order[1::3]
+    third = np.where(
+        (sides[second] == sides[first, :1]) | (sides[second] == sides[first, 1:]), -1, sides[second]
+    ).max(axis=1)
+    triangles = np.concatenate([sides[first], third[:, None]], axis=1)
+    lids = np.concatenate([fans, triangles])
+    return Closed(
+        np.concatenate([surfaces.corners[own], lids]),
+        np.concatenate([surfaces.index[own], index[capped], index[first]]),
+        number[np.concatenate([surfaces.surface[own], at[capped], at[first]])],
+        np.arange(own.sum() + len(lids)) >= own.sum(),
+        surfaces.owner[wanted],
+        caps[wanted],
+    )
+
+
+def part(closed: Closed) -> Parts:
+    """Part closed surfaces along the sides at which the index jumps."""
+    corners, index, surface = closed.corners, closed.index, closed.surface
+    count = len(closed.owner)
+    base = int(corners.max(initial=0)) + 1
+    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    triangle = np.tile(np.arange(len(corners)), 3)
+    order = np.lexsort([keys_of(sides, base), surface[triangle]])
+    # on a closed surface every side has two triangles, one after the other
+    first, second = order[::2], order[1::2]
+    pairs = triangle[np.stack([first, second], axis=1)]
+    folded = index[pairs[:, 0]] != index[pairs[:, 1]]
+    region = labels(len(corners), pairs[~folded])
+    region_surface, region_index = _of_regions(region, surface, index)
+    folds, beside = sides[first[folded]], region[pairs[folded]]
+    fold_surface = surface[pairs[folded, 0]]
+    curves = rings(folds, fold_surface, count)
+    curve_surface = np.zeros(int(curves.amount.sum()), int)
+    curve_surface[curves.label] = fold_surface
+    first_curve = np.full(len(region_index), len(curve_surface))
+    for side in range(2):
+        np.minimum.at(first_curve, beside[:, side], curves.label)
+    first_curve[first_curve == len(curve_surface)] = -1
+    jumps = np.abs(index[pairs[folded, 0]] - index[pairs[folded, 1]]) == 1
+    whole = curves.closed & (_characteristics(closed, base) == 2)
+    whole &= np.bincount(region_surface, minlength=count) == curves.amount + 1
+    whole[fold_surface[~jumps]] = False
+    return Parts(
+        closed, region, region_surface, region_index, first_curve,
+        folds, curves.label, beside, curve_surface, whole,
+    )  # fmt: skip
+
+
+def _of_regions(
+    region: Int[np.ndarray, " n"], surface: Int[np.ndarray, " n"], index: Int[np.ndarray, " n"]
+) -> tuple[Int[np.ndarray, " regions"], Int[np.ndarray, " regions"]]:
+    """Surface and index of each region."""
+    some = np.zeros(int(region.max(initial=-1)) + 1, int)
+    some[region] = np.arange(len(region))
+    return surface[some], index[some]
+
+
+def _characteristics(closed: Closed, base: int) -> Int[np.ndarray, " S"]:
+    """Euler characteristic of each closed surface: vertices less half the triangles."""
+    count = len(closed.owner)
+    keys = np.sort((closed.surface[:, None] * base + closed.corners).ravel())
+    own = keys[np.diff(keys, prepend=-1) > 0] // base
+    triangles = np.bincount(closed.surface, minlength=count)
+    return np.asarray(np.bincount(own, minlength=count) - triangles // 2)
