@@ -66,9 +66,11 @@ def over_lanes(
         kernel(*shared, *inputs, *outputs)
         return
     cuts = [(lanes * i // shares + 7) // 8 * 8 for i in range(shares)] + [lanes]
-    jobs = [
-        _pool().submit(kernel, *shared, *[batch[a:b] for batch in (*inputs, *outputs)])
-        for a, b in pairwise(cuts)
-    ]
-    for job in jobs:
-        job.result()
+    parts = [(*shared, *[batch[a:b] for batch in (*inputs, *outputs)]) for a, b in pairwise(cuts)]
+    jobs = [_pool().submit(kernel, *part) for part in parts[1:]]
+    kernel(*parts[0])
+    for job, part in zip(jobs, parts[1:], strict=True):
+        if job.cancel():  # no processor was free: the other threads have not begun
+            kernel(*part)
+        else:
+            job.result()

@@ -1,13 +1,24 @@
 """Compiled kernels of the general rod, eight lanes at a time.
 
-The Lagrangian is that of `model.RodModel`; tables have one row per scalar (multipliers, parameters,
-1) and one column per node of every element (`points`) or per node of the rod. At least eight lanes;
-where these are not a multiple of eight the last block overlaps the one before.
+The Lagrangian is that of `model.RodModel`, its tables those of `packed.Packed`; `points` are the
+nodes of every element, `nodes` those of the rod. At least eight lanes; where these are not a
+multiple of eight the last block overlaps the one before.
 """
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes
-from equimorph.linalg.simd import LANES, load, sincos, spread, store, work_rows
+from equimorph.linalg.simd import (
+    LANES,
+    entry,
+    load,
+    load2,
+    repeat2,
+    row_of,
+    sincos,
+    spread,
+    store,
+    work_rows,
+)
 
 
 @njit(**INNER)
@@ -19,12 +30,9 @@ def read_state(z, p, start, first, n, m, one, turned, theta, scalars):
     size, count = n + m, p.shape[1]
     last = theta.shape[0] - 1
     read_lanes(z, start * size, size, n, theta, first, 1)
-    for k in range(LANES):
-        for c in range(m):
-            scalars[c, k] = z[start + k, n + c]
-        for j in range(count):
-            scalars[m + j, k] = p[start + k, j]
-        scalars[m + count, k] = one
+    read_lanes(z, start * size + n, size, m, scalars, 0, 1)
+    read_lanes(p, start * count, count, count, scalars, m, 1)
+    store(scalars, m + count, spread(one))
     if first > 0:
         store(theta, 0, _mixed(turned, 0, scalars))
     if first + n <= last:
@@ -41,11 +49,27 @@ def _mixed(table, row, scalars):
 
 
 @njit(**INNER)
-def _combined(table, rows, at, scalars):
-    """Column of a table times the scalars; other rows than `rows` are zero."""
+def _pick(scalars, picks, picked, place, step):
+    """Write the scalars that tables have coefficients of, `step` rows apart from `place` on."""
+    for r in range(len(picks)):
+        store(picked, place + r * step, load(scalars, picks[r]))
+
+
+@njit(**INNER)
+def _combined(table, at, count, picked, row):
+    """Entries of a table from flat position `at` on, times picked scalars from `row` on."""
     total = spread(0.0)
-    for r in range(len(rows)):
-        total = total + spread(table[rows[r], at]) * load(scalars, rows[r])
+    for r in range(count):
+        total = total + spread(entry(table, at + r)) * load(picked, row + r)
+    return total
+
+
+@njit(**INNER)
+def _combined_pair(table, at, count, picked, row):
+    """As `_combined`, for a state and a velocity whose scalars alternate in `picked`."""
+    total = repeat2(spread(0.0))
+    for r in range(count):
+        total = total + repeat2(spread(entry(table, at + r))) * load2(picked, 2 * (row + r))
     return total
 
 
@@ -93,29 +117,32 @@ def _write(rows, first, n, m, constraints, target, start):
 
 @njit(**INNER)
 def assemble_block(
-    stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
-    slope_rows, quadratic, turned, first, z, p, dp, start, theta, scalars, velocity, ends,
-    force, turn, curved, edges, closure, moved, corner,
+    stiffness, points, softness, slope, picks, splits, quadratic, turned, first, z, p, dp, start,
+    theta, scalars, velocity, picked, own, ends, force, turn, curved, edges, closure, moved, corner,
 ):  # fmt: skip
     """F, F_p·dp and F_z of a block of lanes from `start` on.
 
     force, turn (nodes + m): forces and their change by dp; curved (nodes): diagonal beside the
     stiffness; edges (m · nodes): gradients of the constraints; closure, moved (m): constraints and
-    their change; corner (m · m): the trailing block.
+    their change; corner (m · m): the trailing block. picked (2 · picks) and own (2 m) are work.
     """
     elements, order = stiffness.shape[0], stiffness.shape[1]
     nodes, m, count = theta.shape[0], closure.shape[0], len(quadratic)
     n, zero = z.shape[1] - m, spread(0.0)
     read_state(z, p, start, first, n, m, 1.0, turned, theta, scalars)
-    for k in range(LANES):
-        for j in range(count):
-            inside = m <= j < count - 1
-            velocity[j, k] = dp[start + k, j - m] if inside else 0.0
+    for j in range(m):
+        store(velocity, j, zero)
+    read_lanes(dp, start * (count - 1 - m), count - 1 - m, count - 1 - m, velocity, m, 1)
+    store(velocity, count - 1, zero)
     store(ends, 0, _mixed(turned, 0, velocity))
     store(ends, 1, _mixed(turned, 1, velocity))
+    _pick(scalars, picks, picked, 0, 2)
+    _pick(velocity, picks, picked, 1, 2)
+    bends = slope.shape[1]
     for i in range(nodes):
-        store(force, i, zero - _combined(slope, slope_rows, i, scalars))
-        store(turn, i, zero - _combined(slope, slope_rows, i, velocity))
+        pair = _combined_pair(slope, i * bends, bends, picked, splits[2])
+        store(force, i, zero - row_of(pair, 0))
+        store(turn, i, zero - row_of(pair, 1))
         store(curved, i, zero)
     edges[:] = 0.0
     for c in range(m):
@@ -123,43 +150,53 @@ def assemble_block(
         store(moved, c, _mixed(quadratic, c, velocity))
         for d in range(m):
             store(corner, c * m + d, spread(quadratic[c, d]))
+    across, along, pulled, width = splits[0], splits[1], splits[2], points.shape[1]
     for e in range(elements):
         for i in range(order):
-            node, at = e * (order - 1) + i, e * order + i
+            node, point = e * (order - 1) + i, e * order + i
+            at = point * width
             s, c = sincos(load(theta, node))
-            k = spread(softness[at])
-            a = _combined(sine, sine_rows, at, scalars)
-            b = _combined(cosine, cosine_rows, at, scalars)
-            normal, shear = a * s + b * c, a * c - b * s
-            stretch = spread(1.0) - k * (normal + _combined(tension, tension_rows, at, scalars))
+            k = spread(entry(softness, point))
+            # of the loads; forces of the supports, which a velocity has none of, follow
+            a = _combined_pair(points, at + m, across - m, picked, m)
+            b = _combined_pair(points, at + across + m, along - across - m, picked, across + m)
+            pull = _combined_pair(points, at + along, pulled - along, picked, along)
+            rate = row_of(a, 1) * s + row_of(b, 1) * c + row_of(pull, 1)
+            normal = row_of(a, 0) * s + row_of(b, 0) * c
+            shear = row_of(a, 0) * c - row_of(b, 0) * s
+            for j in range(m):
+                sj, cj = spread(entry(points, at + j)), spread(entry(points, at + across + j))
+                force_j, straight, turned_j = load(scalars, j), sj * s + cj * c, sj * c - cj * s
+                normal, shear = normal + force_j * straight, shear + force_j * turned_j
+                store(own, 2 * j, straight)
+                store(own, 2 * j + 1, turned_j)
+            stretch = spread(1.0) - k * (normal + row_of(pull, 0))
             soft = k * shear
-            a = _combined(sine, sine_rows, at, velocity)
-            b = _combined(cosine, cosine_rows, at, velocity)
-            change = a * s + b * c + _combined(tension, tension_rows, at, velocity)
             _add(force, node, stretch * shear)
             _add(curved, node, zero - normal * stretch - soft * shear)
-            _add(turn, node, stretch * (a * c - b * s) - soft * change)
+            _add(turn, node, stretch * (row_of(a, 1) * c - row_of(b, 1) * s) - soft * rate)
             for j in range(m):
-                sj, cj = spread(sine[j, at]), spread(cosine[j, at])
-                own = sj * s + cj * c
-                _add(edges, j * nodes + node, stretch * (sj * c - cj * s) - soft * own)
-                _add(closure, j, stretch * own)
-                _add(moved, j, zero - k * change * own)
-                for d in range(m):
-                    other = spread(sine[d, at]) * s + spread(cosine[d, at]) * c
-                    _add(corner, j * m + d, zero - k * own * other)
+                straight = load(own, 2 * j)
+                _add(edges, j * nodes + node, stretch * load(own, 2 * j + 1) - soft * straight)
+                _add(closure, j, stretch * straight)
+                straight = k * straight
+                _add(moved, j, zero - rate * straight)
+                for d in range(j + 1):
+                    _add(corner, j * m + d, zero - straight * load(own, 2 * d))
     for j in range(m):
         change = load(edges, j * nodes) * load(ends, 0)
         change = change + load(edges, j * nodes + nodes - 1) * load(ends, 1)
         _add(moved, j, change)
+        for d in range(j):
+            store(corner, d * m + j, load(corner, j * m + d))
     _bend(stiffness, theta, force)
     _turn_ends(stiffness, ends, turn)
 
 
 @njit(**FLAGS)
 def linearise_lanes(
-    stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
-    slope_rows, quadratic, turned, first, z, p, dp, residual, column, diagonal, border, trailing,
+    stiffness, points, softness, slope, picks, splits, quadratic, turned, first, z, p, dp,
+    residual, column, diagonal, border, trailing,
 ):  # fmt: skip
     """F, F_p·dp and the parts of F_z of every lane.
 
@@ -169,15 +206,16 @@ def linearise_lanes(
     nodes, m = diagonal.shape[1], border.shape[1]
     n, count = z.shape[1] - m, len(quadratic)
     theta, scalars, velocity = work_rows(nodes), work_rows(count), work_rows(count)
+    picked, own = work_rows(2 * len(picks)), work_rows(2 * m)
     ends, corner = work_rows(2), work_rows(m * m)
     force, turn, curved = work_rows(nodes + m), work_rows(nodes + m), work_rows(nodes)
     edges, closure, moved = work_rows(m * nodes), work_rows(m), work_rows(m)
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         assemble_block(
-            stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
-            slope_rows, quadratic, turned, first, z, p, dp, start, theta, scalars, velocity, ends,
-            force, turn, curved, edges, closure, moved, corner,
+            stiffness, points, softness, slope, picks, splits, quadratic, turned, first, z, p, dp,
+            start, theta, scalars, velocity, picked, own, ends, force, turn, curved, edges, closure,
+            moved, corner,
         )  # fmt: skip
         write_lanes(curved, 0, 1, diagonal, start * nodes, nodes, nodes)
         write_lanes(edges, 0, 1, border, start * m * nodes, m * nodes, m * nodes)
@@ -189,56 +227,59 @@ def linearise_lanes(
                     trailing[start + k, j, d] = corner[j * m + d, k]
 
 
+@njit(**INNER)
+def _acting(points, splits, at, picked, row):
+    """Forces of a point along its sine and its cosine, and the pull of cables."""
+    across, along, pulled = splits[0], splits[1], splits[2]
+    a = _combined(points, at, across, picked, row)
+    b = _combined(points, at + across, along - across, picked, row + across)
+    return a, b, _combined(points, at + along, pulled - along, picked, row + along)
+
+
 @njit(**FLAGS)
 def second_lanes(
-    sine, cosine, tension, softness, sine_rows, cosine_rows, tension_rows, turned, elements, m,
-    first, z, p, v_z, v_p, w_z, w_p, out,
-):  # fmt: skip
+    points, softness, picks, splits, turned, elements, m, first, z, p, v_z, v_p, w_z, w_p, out
+):
     """D²F[v, w] of every lane."""
-    order = len(softness) // elements
+    order, width = len(softness) // elements, points.shape[1]
     nodes, n = elements * (order - 1) + 1, z.shape[1] - m
-    count = turned.shape[1]
-    theta, scalars = work_rows(nodes), work_rows(count)
-    v, v_scalars, w, w_scalars = (
-        work_rows(nodes),
-        work_rows(count),
-        work_rows(nodes),
-        work_rows(count),
-    )
+    count, picks_each = turned.shape[1], len(picks)
+    theta, scalars, picked = work_rows(nodes), work_rows(count), work_rows(3 * picks_each)
+    v, w = work_rows(nodes), work_rows(nodes)
     force, closure, zero = work_rows(nodes + m), work_rows(m), spread(0.0)
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         read_state(z, p, start, first, n, m, 1.0, turned, theta, scalars)
-        read_state(v_z, v_p, start, first, n, m, 0.0, turned, v, v_scalars)
-        read_state(w_z, w_p, start, first, n, m, 0.0, turned, w, w_scalars)
+        _pick(scalars, picks, picked, 0, 1)
+        read_state(v_z, v_p, start, first, n, m, 0.0, turned, v, scalars)
+        _pick(scalars, picks, picked, picks_each, 1)
+        read_state(w_z, w_p, start, first, n, m, 0.0, turned, w, scalars)
+        _pick(scalars, picks, picked, 2 * picks_each, 1)
         force[:] = 0.0
         closure[:] = 0.0
         for e in range(elements):
             for i in range(order):
-                node, at = e * (order - 1) + i, e * order + i
+                node, point = e * (order - 1) + i, e * order + i
+                at = point * width
                 s, c = sincos(load(theta, node))
-                k, dv, dw = spread(softness[at]), load(v, node), load(w, node)
-                a = _combined(sine, sine_rows, at, scalars)
-                b = _combined(cosine, cosine_rows, at, scalars)
+                k, dv, dw = spread(softness[point]), load(v, node), load(w, node)
+                a, b, pull = _acting(points, splits, at, picked, 0)
                 normal, shear = a * s + b * c, a * c - b * s
-                a = _combined(sine, sine_rows, at, v_scalars)
-                b = _combined(cosine, cosine_rows, at, v_scalars)
+                a, b, v_pull = _acting(points, splits, at, picked, picks_each)
                 v_normal, v_shear = a * s + b * c, a * c - b * s
-                a = _combined(sine, sine_rows, at, w_scalars)
-                b = _combined(cosine, cosine_rows, at, w_scalars)
+                a, b, w_pull = _acting(points, splits, at, picked, 2 * picks_each)
                 w_normal, w_shear = a * s + b * c, a * c - b * s
                 # second change of N and of N', then first changes of N + T and N'
                 normal_vw = v_shear * dw + w_shear * dv - normal * dv * dw
                 shear_vw = zero - shear * dv * dw - v_normal * dw - w_normal * dv
                 shear_v, shear_w = v_shear - normal * dv, w_shear - normal * dw
-                normal_v = v_normal + shear * dv + _combined(tension, tension_rows, at, v_scalars)
-                normal_w = w_normal + shear * dw + _combined(tension, tension_rows, at, w_scalars)
-                pull = _combined(tension, tension_rows, at, scalars)
+                normal_v, normal_w = v_normal + shear * dv + v_pull, w_normal + shear * dw + w_pull
                 stretch = spread(1.0) - k * (normal + pull)
                 mixed = normal_v * shear_w + normal_w * shear_v + shear * normal_vw
                 _add(force, node, stretch * shear_vw - k * mixed)
                 for j in range(m):
-                    sj, cj = spread(sine[j, at]), spread(cosine[j, at])
+                    sj = spread(entry(points, at + j))
+                    cj = spread(entry(points, at + splits[0] + j))
                     own, across = sj * s + cj * c, sj * c - cj * s
                     mixed = across * (normal_v * dw + normal_w * dv) + own * normal_vw
                     _add(closure, j, zero - stretch * own * dv * dw - k * mixed)

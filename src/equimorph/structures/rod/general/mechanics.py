@@ -22,6 +22,7 @@ from equimorph.structures.rod.general.area import EnclosedArea
 from equimorph.structures.rod.general.fields import Fields
 from equimorph.structures.rod.general.kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general.model import RodModel
+from equimorph.structures.rod.general.packed import packed
 from equimorph.structures.rod.general.pressed import lower_triangle
 from equimorph.structures.rod.general.step.kernels import advance_lanes
 from equimorph.structures.rod.general.symmetry import mirrors
@@ -61,17 +62,12 @@ class GeneralMechanics(Mechanics):
         return self.layout.unknown
 
     @cached_property
-    def _tables(self) -> tuple[np.ndarray, ...]:
-        model = self.model
-        slope = np.ascontiguousarray(model.slope)
-        return model.sine, model.cosine, model.tension, model.softness, slope, *model.rows
-
-    @cached_property
     def _step_data(self) -> tuple[object, ...]:
-        model = self.model
+        model, parts = self.model, packed(self.model)
         squared, turned = (np.ascontiguousarray(a) for a in (model.quadratic, model.turned))
+        tables = parts.points, model.softness, parts.slope, parts.picks, parts.splits
         first = np.int64(self.unknown_nodes.start)
-        return self.layout.stiffness, *self._tables, squared, turned, first
+        return self.layout.stiffness, *tables, squared, turned, first
 
     def _checked(self, *pairs: Direction) -> list[np.ndarray]:
         """States and directions as contiguous arrays of the right widths, for the kernels."""
@@ -265,10 +261,9 @@ class GeneralMechanics(Mechanics):
         """D²F[v, w]."""
         arrays = self._checked((z, p), v, w)
         out = np.empty_like(arrays[0])
-        sine, cosine, tension, softness, _, *rows, _ = self._tables
-        _, _, turned, first = self._step_data[-4:]
+        _, points, softness, _, picks, splits, _, turned, first = self._step_data
         sizes = np.int64(self.mesh.elements), np.int64(self.constraints), first
-        shared = (sine, cosine, tension, softness, *rows, turned, *sizes)
+        shared = (points, softness, picks, splits, turned, *sizes)
         over_lanes(second_lanes, shared, arrays, [out])
         if self._area is not None:
             theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
@@ -341,13 +336,12 @@ class GeneralMechanics(Mechanics):
         z, p, row, dp = self._checked((z, p), (row, dp))
         inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
         lanes = len(z)
-        dz, tangent_z = np.empty((2, *z.shape))
-        dt, tangent_t, residual, determinant, ratio = np.empty((5, lanes))
-        index = np.empty(lanes, dtype=np.int64)
+        dz, tangent_z, index = np.empty(z.shape), np.empty(z.shape), np.empty(lanes, np.int64)
+        dt, tangent_t, residual, determinant, ratio = (np.empty(lanes) for _ in range(5))
         outputs = [dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio]
         over_lanes(advance_lanes, (self.layout.ends, *self._step_data), inputs, outputs)
         out = Advance(dz, dt, tangent_z, tangent_t, residual, index, determinant)
-        if not ratio.min(initial=1.0) >= PIVOT_GUARD:
+        if not np.minimum.reduce(ratio, initial=1.0) >= PIVOT_GUARD:
             unsafe = ~(ratio >= PIVOT_GUARD)
             again = self.plain_advance(*(x[unsafe] for x in inputs))
             for name, column in vars(again).items():

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.general.ends import FREE, HELD, End, compliance
@@ -135,12 +135,6 @@ class RodModel:
     def softness(self) -> Float[np.ndarray, " points"]:
         """γ: axial compliance over the quadrature weight."""
         return np.ascontiguousarray((self.nodal.softness / self.mesh.element_weights).ravel())
-
-    @cached_property
-    def rows(self) -> tuple[Int[np.ndarray, " some"], ...]:
-        """Scalars with coefficients of sin θ, cos θ, tension and θ that are not all zero."""
-        tables = (self.sine, self.cosine, self.tension, self.slope)
-        return tuple(np.flatnonzero(a.any(axis=1)) for a in tables)
 
     def mapped(
         self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]

@@ -86,8 +86,8 @@ def _determinant(small, m, width):
 
 @njit(**FLAGS)
 def advance_lanes(
-    ends, stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
-    slope_rows, quadratic, turned, first, z, p, dp, row, corner, defect,
+    ends, stiffness, points, softness, slope, picks, splits, quadratic, turned, first,
+    z, p, dp, row, corner, defect,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Newton step, tangent and inertia of every lane; see `structures.contract.Advance`."""
@@ -97,7 +97,8 @@ def advance_lanes(
     size, n = z.shape[1], z.shape[1] - m
     border, width, tiles = m + COLUMNS, m + COLUMNS + SIDES, tiles_of(m, COLUMNS, SIDES)
     theta, scalars, velocity = work_rows(nodes), work_rows(count), work_rows(count)
-    moving, own = work_rows(2), work_rows(m * m)
+    moving, trailing = work_rows(2), work_rows(m * m)
+    picked, own = work_rows(2 * len(picks)), work_rows(2 * m)
     force, turn, curved = work_rows(nodes + m), work_rows(nodes + m), work_rows(nodes)
     edges, closure, moved = work_rows(m * nodes), work_rows(m), work_rows(m)
     lower, vertices, work, extremes = work_arrays(elements, inner, tiles)
@@ -111,9 +112,9 @@ def advance_lanes(
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         assemble_block(
-            stiffness, sine, cosine, tension, softness, slope, sine_rows, cosine_rows, tension_rows,
-            slope_rows, quadratic, turned, first, z, p, dp, start, theta, scalars, velocity, moving,
-            force, turn, curved, edges, closure, moved, own,
+            stiffness, points, softness, slope, picks, splits, quadratic, turned, first, z, p, dp,
+            start, theta, scalars, velocity, picked, own, moving, force, turn, curved, edges,
+            closure, moved, trailing,
         )  # fmt: skip
         store(worst, 0, _largest(force, closure, first, n, m))
         _fill_columns(m, first, n, nodes, force, turn, edges, work)
@@ -123,7 +124,7 @@ def advance_lanes(
             stiffness, ends, curved, m, COLUMNS, SIDES, lower, vertices, work, extremes, left,
             products,
         )  # fmt: skip
-        _fill_small(m, closure, moved, own, row, corner, defect, start, n, small)
+        _fill_small(m, closure, moved, trailing, row, corner, defect, start, n, small)
         subtract_products(products, tiles, border, width, small)
         count_border(small, m, width, square, extremes)
         store(extremes, 4, _determinant(small, m, width) / load(extremes, 4))
