@@ -29,12 +29,12 @@ def test_barriers_are_thick_and_gaps_hatched(spring_set):
 def test_panels_show_the_set_above_and_every_chart_below(spring_set):
     angle = spring_set.structure.angle
     with unchecked():
-        panels = [em.DescriptorChart(spring_set, [angle, "x_l"]), em.dissect(spring_set)]
-        figure = parameterisation(panels, angle)
+        failing, angles = em.Projection(spring_set), em.DescriptorChart(spring_set, [angle, "x_l"])
+        figure = parameterisation([(failing, angles), em.dissect(spring_set)], angle)
     flat = [ax for ax in figure.axes if ax.name != "3d"]
     assert len(figure.axes) - len(flat) == 2
-    assert len(flat) == 1 + 3
-    assert flat[0].get_xlabel().startswith("$δ$") or "δ" in flat[0].get_xlabel()
+    assert len(flat) == 2 + 3
+    assert "δ" in flat[1].get_xlabel()
     shares = [ax.get_position().bounds for ax in flat]
     assert np.all(np.diff([left for left, *_ in shares]) > 0)
 

@@ -120,7 +120,7 @@ def _across(
     """Preferred states just across vertices of the boundary, and how far they are; ∞ if none."""
     eset, structure = cells.eset, cells.eset.structure
     size = eset.box.upper - eset.box.lower
-    outward = _outward(cells, facets, used, size)
+    outward = _within(eset.box, cells.values[used], _outward(cells, facets, used, size))
     there = preference.over(cells.values[used] + ASIDE * size * outward)
     own = eset.points[used]
     z, p = np.full(own.z.shape, np.nan), np.full(own.p.shape, np.nan)
@@ -158,6 +158,16 @@ def _outward(
         known = (place < len(used)) & (used[np.minimum(place, len(used) - 1)] == vertex)
         np.add.at(out, place[known], away[known])
     return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300))
+
+
+def _within(
+    box: Box, points: Points, directions: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n d"]:
+    """Directions from points that do not lead out of the box."""
+    size = box.upper - box.lower
+    low, high = points <= box.lower + ASIDE * size, points >= box.upper - ASIDE * size
+    inner = np.where((low & (directions < 0.0)) | (high & (directions > 0.0)), 0.0, directions)
+    return np.asarray(inner / np.maximum(np.linalg.norm(inner, axis=1, keepdims=True), 1e-300))
 
 
 def _each_once(found: list[Barrier], cells: Cells) -> tuple[Barrier, ...]:

@@ -9,21 +9,20 @@ from jaxtyping import Bool, Float, Int
 from equimorph.charts.atlas import Atlas
 from equimorph.charts.conflicts import conflicts_of, least_cut
 from equimorph.charts.coordinates import Coordinates, coordinates_of
+from equimorph.charts.cusped import with_cusps
 from equimorph.charts.location import Cells
 from equimorph.charts.projection import check_cells
 from equimorph.charts.untangling import untangled
 from equimorph.charts.walking import Walker, Way, straightened
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.cusp_points import sides_of_existence
 from equimorph.manifold.fabric import (
-    ON_FOLD,
     Fabric,
     Vertices,
     fabric_of,
     squared_sides,
     vertices_of,
 )
-from equimorph.manifold.levels import fabric_setting, part_of, roots
+from equimorph.manifold.levels import fabric_setting, part_of
 from equimorph.manifold.over import exact_states
 from equimorph.manifold.points import REFINED
 from equimorph.manifold.topology import chains, flags_of, keys_of, labels
@@ -160,14 +159,8 @@ class _Work:
         """The same with vertices at the cusps, where sheets part that a cut has to part."""
         if self.cusps is not None or self.fabric.dimension != 2:
             return self
-        fabric, count = self.fabric, len(self.fabric.vertices)
-        index = np.array([stratum.index for stratum in self.eset.strata])
-        plain = replace(fabric, cell_index=index[self.origin[fabric.cell_index]])
-        ends, found = _cusps(plain)
-        if len(ends):
-            fabric = fabric.bisected(ends, found)
-        cusps = tuple(range(count, len(fabric.vertices)))
-        return replace(self, fabric=fabric, cusps=cusps)._untangled()
+        fabric, cusps = with_cusps(self.fabric)
+        return replace(self, fabric=fabric, cusps=tuple(cusps.tolist()))._untangled()
 
     def _untangled(self) -> "_Work":
         """The same with fewer triangles that chords of curved folds have turned over."""
@@ -212,29 +205,6 @@ class _Work:
         numbers = np.concatenate([[chart], len(self.origin) + np.arange(piece.max())])
         label[own] = numbers[piece]
         return work._labelled(label, chart), numbers.tolist()
-
-
-def _cusps(fabric: Fabric) -> tuple[Int[np.ndarray, "n 2"], Vertices]:
-    """Fold edges with cusps, and the cusps."""
-    ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
-    store = fabric.vertices
-    if len(ends) == 0:
-        return ends, store.take(np.zeros(0, int))
-    side = sides_of_existence(store.take(ends[:, 0]))
-    other = sides_of_existence(store.take(ends[:, 1]))
-    known = np.stack(
-        [np.einsum("ni,ni->n", side, side), np.einsum("ni,ni->n", side, other)], axis=1
-    )
-    turning = np.flatnonzero(known[:, 1] < 0.0)
-    if len(turning) == 0:
-        return ends[:0], store.take(turning)
-    lowest = store.index[ends[turning]].min(axis=1)
-
-    def value(at: Vertices, lanes: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
-
-    done, found = roots(fabric, ends[turning], (ON_FOLD, lowest), known[turning], value)
-    return ends[turning[done]], found
 
 
 def _paths(cells: Cells, side: Bool[np.ndarray, " own"]) -> list[list[int]]:

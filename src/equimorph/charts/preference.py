@@ -15,6 +15,7 @@ from equimorph.manifold.fabric import (
     ON_FOLD,
     Fabric,
     Vertices,
+    edges_of,
     fabric_of,
     vertices_of,
 )
@@ -22,7 +23,7 @@ from equimorph.manifold.levels import About, Ends, cut_between, fabric_setting, 
 from equimorph.manifold.on_edges import on_edges
 from equimorph.manifold.over import exact_states, rooted
 from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
-from equimorph.manifold.topology import adjacency, flags_of
+from equimorph.manifold.topology import adjacency, flags_of, keys_of
 from equimorph.structures import States
 
 Lanes = Float[np.ndarray, "lanes size"]
@@ -31,10 +32,11 @@ Points = Float[np.ndarray, "points d"]
 
 DIFFERENT = 1e-4
 """Distance in the metric from which on two states over a point are different ones."""
-BESIDE = 0.02
-"""How far beside a fold, in lengths of edges, the preference is looked at."""
-PARTS, ROUNDS = 3, 17
-"""Edges are divided in so many parts so often: the preference changes within 1e-8 of them."""
+BESIDE, MOVED = 0.02, 0.3
+"""How far beside a fold, in lengths of edges, the preference is looked at, and how far its state
+may be away there: at a cusp it is the cube root of that."""
+PARTS, ROUNDS = 12, 8
+"""Edges are divided in so many parts so often: the preference changes within 3e-9 of them."""
 
 Solved = tuple[Lanes, Parameters, Bool[np.ndarray, " n"]]
 Way = Callable[[Int[np.ndarray, " n"], Float[np.ndarray, " n"]], Solved]
@@ -87,17 +89,49 @@ def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndar
     values = _signs(preference)
     # only candidates are cut: of their neighbours beyond folds nothing is asked
     fabric = _only(fabric, among)
-
-    def between(
-        fabric: Fabric, ends: Ends, about: About, known: Float[np.ndarray, "n 2"]
-    ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
-        return _narrowed(preference, fabric, ends, about, known)
-
-    cut = cut_between(fabric, values, between)
+    crossings = _Crossings(preference, fabric, values)
+    cut = cut_between(fabric, values, crossings.between)
     inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
     used = np.unique(cut.fabric.cells[inside])
     chosen = part_of(eset, cut.fabric, inside, (cut.on_level, cut.lost))
     return chosen, cut.on_level[used], cut.lost
+
+
+class _Crossings:
+    """Vertices at which the preference changes on edges, all found at once.
+
+    Cuts lead from new vertices, on which the preference is neither, so that no edge is crossed that
+    is not crossed before anything is cut.
+    """
+
+    def __init__(
+        self, preference: Preference, fabric: Fabric, values: Float[np.ndarray, " V"]
+    ) -> None:
+        ends, of_cells = edges_of(fabric.cells, len(fabric.vertices))
+        crossed = values[ends[:, 0]] * values[ends[:, 1]] < 0.0
+        marks = fabric.edge_marks(ends)
+        lowest = np.full(len(ends), np.iinfo(int).max)
+        for side in of_cells.T:
+            np.minimum.at(lowest, side, fabric.cell_index)
+        self._base = len(fabric.vertices)
+        keys, found = [np.zeros(0, int)], fabric.vertices.take(np.zeros(0, int))
+        for mark in np.unique(marks[crossed]).tolist():
+            own = np.flatnonzero(crossed & (marks == mark))
+            about = (mark, lowest[own])
+            done, new = _narrowed(preference, fabric, ends[own], about, values[ends[own]])
+            keys.append(keys_of(ends[own[done]], self._base))
+            found = found.joined(new)
+        self._keys, self._found = np.concatenate(keys), found
+
+    def between(
+        self, fabric: Fabric, ends: Ends, about: About, known: Float[np.ndarray, "n 2"]
+    ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+        """Those on some edges; see `cut_between`."""
+        del fabric, about, known
+        wanted = keys_of(ends, self._base)
+        done = np.isin(wanted, self._keys) & (ends < self._base).all(axis=1)
+        order = np.argsort(self._keys)
+        return done, self._found.take(order[np.searchsorted(self._keys[order], wanted[done])])
 
 
 def _only(fabric: Fabric, cells: Bool[np.ndarray, " C"]) -> Fabric:
@@ -134,7 +168,7 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     n, mass = eset.structure.unknowns, eset.structure.mass
     z = eset.points.z[:, :n]
     far = (there.states.z[:, :n] - z[fold[there.point]]) ** 2 @ mass
-    own = far < (z[other[there.point]] - z[fold[there.point]]) ** 2 @ mass
+    own = far < MOVED**2 * ((z[other[there.point]] - z[fold[there.point]]) ** 2 @ mass)
     values[fold[there.point[own]]] = -1.0
     return values
 
@@ -144,12 +178,12 @@ def _narrowed(
     fabric: Fabric,
     ends: Ends,
     about: About,
-    known: Float[np.ndarray, "n 2"],
+    values: Float[np.ndarray, "n 2"],
 ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
     """Vertices on edges where the preference changes first on the way from their first ends."""
     way = _straight(fabric, ends, about)
     low, high = np.zeros(len(ends)), np.ones(len(ends))
-    first: Bool[np.ndarray, " n"] = known[:, 0] < 0.0
+    first: Bool[np.ndarray, " n"] = values[:, 0] < 0.0
     todo: Int[np.ndarray, " n"] = np.arange(len(ends))
     shares = np.arange(1, PARTS) / PARTS
     for _ in range(ROUNDS):
@@ -162,10 +196,12 @@ def _narrowed(
         same = np.zeros(len(lanes), bool)
         same[good] = preference.prefers(z[good], p[good]) == first[lanes[good]]
         good, same = good.reshape(at.shape), same.reshape(at.shape)
-        todo, step, same = todo[good.all(axis=1)], step[good.all(axis=1)], same[good.all(axis=1)]
         passed = np.where(same.all(axis=1), PARTS - 1, same.argmin(axis=1))
+        last = np.minimum(passed, PARTS - 2)
+        known = good[np.arange(len(todo)), last]
         low[todo] += passed * step / PARTS
         high[todo] = low[todo] + step / PARTS
+        todo = todo[known]
     done = np.zeros(len(ends), bool)
     z, p, good = way(todo, 0.5 * (low + high)[todo])
     done[todo[good]] = True

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
 from equimorph.charts.chart import BARRIER, BEYOND, GAP, INSIDE, Chart, Charted
 from equimorph.charts.coordinates import Coordinates, coordinates_of
+from equimorph.charts.cusped import cusped
 from equimorph.charts.domain import Domain
 from equimorph.charts.location import Cells
 from equimorph.charts.preference import Preference, preferred_part
@@ -39,7 +40,7 @@ class Reduction(Chart):
         The preferred part of the set, cut exactly along barriers and gaps; a set of its own, which
         every task takes.
     whole
-        The set that was reduced.
+        The set that was reduced, with vertices at its cusps.
     rule
         What is preferred.
     among
@@ -150,6 +151,7 @@ def reduce(
         prefers no state at all.
     """
     check_cells(eset)
+    eset = cusped(eset)
     rule = rule_of(prefer)
     among = np.flatnonzero((eset.cell_index == 0) | (not stable))
     if len(among) == 0:

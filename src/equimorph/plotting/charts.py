@@ -37,6 +37,7 @@ _LABELS = {
 _ROOM = 0.04
 _ZOOM = 0.82
 """Of the pictures above: their labels stay inside."""
+_PAD = 1  # of the label beside up to five digits, in points
 _WIDTH, _ABOVE, _BELOW, _LEGEND = 2.0, 1.8, 1.6, 0.3  # inches
 
 
@@ -78,35 +79,38 @@ def chart_domain(chart: Chart, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def parameterisation(charts: Sequence[Chart | Atlas], height: Descriptor) -> Figure:
+def parameterisation(
+    charts: Sequence[Chart | Atlas | Sequence[Chart]], height: Descriptor
+) -> Figure:
     """Panels with the set above and its internal parameterisation below, one for each of `charts`.
 
     Above, the part of the set that the charts cover, over the free parameters, with a descriptor as
-    height. Charts of an atlas lie beside each other.
+    height. Charts of an atlas, and several of one set, lie beside each other.
 
     Parameters
     ----------
     charts
-        Charts over two coordinates, or atlases of such.
+        Charts over two coordinates, several of one set, or atlases of such.
     height
         Third axis of the pictures above.
     """
-    leaves = [each.charts if isinstance(each, Atlas) else (each,) for each in charts]
+    leaves = [_leaves(each) for each in charts]
     columns = sum(len(each) for each in leaves)
     size = (_WIDTH * columns + 0.2, _ABOVE + _BELOW + _LEGEND + 0.2)
     figure = style.attach_canvas(Figure(figsize=size))
     with style.house_style({"hatch.linewidth": 0.4}):
         column = 0
-        for number, (each, own) in enumerate(zip(charts, leaves, strict=True)):
+        for number, own in enumerate(leaves):
             left, wide = _WIDTH * column, _WIDTH * len(own)
             above: Any = figure.add_axes(
                 _place(size, (left + 0.5 * (wide - _WIDTH), _BELOW + _LEGEND, _WIDTH, _ABOVE)),
                 projection="3d",
             )
-            surface(each.eset, height, ax=above)
+            surface(own[0].eset, height, ax=above)
             above.set_box_aspect((1.2, 1.3, 1.0), zoom=_ZOOM)
             for axis in (above.xaxis, above.yaxis, above.zaxis):
                 axis.set_major_locator(MaxNLocator(3))
+            above.zaxis.labelpad = _PAD
             if above.get_legend() is not None:
                 above.get_legend().remove()
             figure.text(
@@ -121,6 +125,13 @@ def parameterisation(charts: Sequence[Chart | Atlas], height: Descriptor) -> Fig
         entries = _legend([chart for own in leaves for chart in own])
         figure.legend(handles=entries, loc="lower center", ncols=len(entries), frameon=False)
     return figure
+
+
+def _leaves(panel: Chart | Atlas | Sequence[Chart]) -> tuple[Chart, ...]:
+    """Charts of a panel."""
+    if isinstance(panel, Atlas):
+        return panel.charts
+    return (panel,) if isinstance(panel, Chart) else tuple(panel)
 
 
 def _place(
