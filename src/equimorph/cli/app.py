@@ -100,7 +100,8 @@ def new(
         Kind,
         typer.Option(
             help="What to begin with: a rod (arch, arm, beam, deep_arch, strip), a frame (lee, "
-            "network), a truss (bridge, stack, truss), an energy (column), maps, the spring."
+            "network), a truss (bridge, stack, truss), an energy (column), maps, the spring, "
+            "or every question that there is (tasks)."
         ),
     ] = Kind.arch,
 ) -> None:

@@ -11,7 +11,7 @@ from equimorph.equilibria.critical_curves import (
 )
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
 from equimorph.equilibria.deflation import deflated_newton
-from equimorph.equilibria.imperfections import worst_over
+from equimorph.equilibria.imperfections import worst_named, worst_over
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
 from equimorph.equilibria.lifting.legs import Leg, Waypoint
 from equimorph.equilibria.limit import LimitLoad, LimitLoads, limit_load
@@ -59,5 +59,6 @@ __all__ = [
     "search_points",
     "snap_landing",
     "way_points",
+    "worst_named",
     "worst_over",
 ]

@@ -1,5 +1,6 @@
 """Worst values of descriptors over a box of imperfections."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -14,10 +15,14 @@ from equimorph.equilibria.tracing import ARRIVAL, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, position
 from equimorph.structures import Structure
+from equimorph.structures.naming import descriptor_named
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
+
+_WORST = re.compile(r"\s*worst\((.*) for (.*)\)\s*", re.DOTALL)
+_OFFSET = re.compile(r"\s*(\w+)\s*(?:±|\+-)\s*([\d.eE+-]+)\s*")
 
 
 def worst_over(
@@ -49,11 +54,37 @@ def worst_over(
     signs = np.array(list(product((-1.0, 1.0), repeat=len(places))))
     corners[1:, places] = signs * np.array(list(offsets.values()))
     box = _Corners(structure, descriptor, corners)
-    sizes = ", ".join(f"{name} ± {size:.9g}" for name, size in offsets.items())
+    sizes = ", ".join(f"{name} ± {float(size)!r}" for name, size in offsets.items())
     name = f"worst({descriptor.name} for {sizes})"
     symbol = f"worst {descriptor.symbol or descriptor.name}"
     unit, origin = descriptor.unit, structure.signature
     return Descriptor(name, unit, box.worst, symbol, origin, branches=box.branches)
+
+
+def worst_named(structure: Structure, text: str) -> Descriptor:
+    """Descriptor that a text means: as `descriptor_named`, or the worst of one over a box.
+
+    ``worst(max_curvature for Theta ± 0.01, Delta ± 0.02)``, with ``+-`` for ``±`` where that cannot
+    be typed; see `worst_over`.
+
+    Raises
+    ------
+    InputError
+        If it means nothing here.
+    """
+    found = _WORST.fullmatch(text)
+    if found is None:
+        return descriptor_named(structure, text)
+    parts = [_OFFSET.fullmatch(part) for part in found[2].split(",")]
+    try:
+        offsets = {each[1]: float(each[2]) for each in parts if each}
+    except ValueError:
+        offsets = {}
+    if len(offsets) < len(parts):
+        raise InputError(
+            f"`worst` must read like worst(energy for Theta ± 0.01, Delta ± 0.02); got {text!r}."
+        )
+    return worst_over(structure, worst_named(structure, found[1]), offsets)
 
 
 @dataclass(frozen=True)

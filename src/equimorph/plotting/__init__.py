@@ -9,6 +9,7 @@ from equimorph.plotting.margins import margins
 from equimorph.plotting.plane import parameter_plane
 from equimorph.plotting.portraits import portraits
 from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
+from equimorph.plotting.robustness import imperfection_laws, room, sensitivities, trials
 from equimorph.plotting.shapes import shapes
 from equimorph.plotting.solutions import solutions
 from equimorph.plotting.style import house_style, save
@@ -20,6 +21,7 @@ __all__ = [
     "diagram",
     "film",
     "house_style",
+    "imperfection_laws",
     "load_map",
     "margins",
     "parameter_plane",
@@ -28,8 +30,11 @@ __all__ = [
     "reach_panels",
     "reach_parameters",
     "reach_plane",
+    "room",
     "save",
+    "sensitivities",
     "shapes",
     "solutions",
     "surface",
+    "trials",
 ]

@@ -1,5 +1,6 @@
 """What a structure can reach: descriptor plane, set, parameter plane and shapes side by side."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -32,12 +33,19 @@ _LOOKS: dict[str, dict[str, Any]] = {
 }
 _MOTION: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.4, "zorder": 6}
 _RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.6, foreground="white")]
+_COLUMNS, _LINE = 2, 0.16  # of legends; inches
 _VISIBLE = 2e-3  # of the image: smaller pieces that are covered again are traces of chords
 
 Line = Float[np.ndarray, "_ 2"]
 
 
-def reach_plane(reach: Reach, motion: Tracking | None = None, ax: Axes | None = None) -> Axes:
+def reach_plane(
+    reach: Reach,
+    motion: Tracking | None = None,
+    ax: Axes | None = None,
+    *,
+    targets: Sequence[Sequence[float]] = (),
+) -> Axes:
     """Image of the start's region in the plane of two descriptors, with its boundary by kinds.
 
     Darker where the region covers the plane more than once.
@@ -50,6 +58,8 @@ def reach_plane(reach: Reach, motion: Tracking | None = None, ax: Axes | None = 
         Drawn by the values that it takes, with its corners numbered.
     ax
         Where to draw; None makes a figure one column wide.
+    targets
+        Values that were asked for: numbered from 1.
 
     Returns
     -------
@@ -62,7 +72,7 @@ def reach_plane(reach: Reach, motion: Tracking | None = None, ax: Axes | None = 
     """
     _check(reach)
     with style.house_style():
-        ax = _axes(ax)
+        own, ax = ax is None, _axes(ax)
         levels = count_regions(reach.home.values, reach.home.eset.cells)
         whole, areas = reach.home.image_size, levels.areas()
         last = max((k for k, area in areas.items() if area > _VISIBLE * whole), default=0)
@@ -79,6 +89,11 @@ def reach_plane(reach: Reach, motion: Tracking | None = None, ax: Axes | None = 
         ax.set_aspect("equal" if first.unit == second.unit else "auto", adjustable="datalim")
         if motion is not None:
             number_way_points(ax, _corners(motion, _values(motion)))
+        if len(targets):
+            ax.autoscale_view()
+            number_way_points(ax, np.array(targets, dtype=float))
+        if own:
+            _legend(ax, reach)
     return ax
 
 
@@ -105,7 +120,7 @@ def reach_parameters(reach: Reach, motion: Tracking | None = None, ax: Axes | No
     """
     _check(reach)
     with style.house_style():
-        ax, eset = _axes(ax), reach.home.eset
+        own, ax, eset = ax is None, _axes(ax), reach.home.eset
         shade = style.count_shades(3)[1]
         cells = PolyCollection(
             list(eset.coordinates[eset.cells]), facecolor=shade, edgecolor=shade,
@@ -122,6 +137,8 @@ def reach_parameters(reach: Reach, motion: Tracking | None = None, ax: Axes | No
         ax.set_ylabel(parameter_label(eset.structure, names[1]))
         if motion is not None and track is not None:
             number_way_points(ax, _corners(motion, track))
+        if own:
+            _legend(ax, reach)
     return ax
 
 
@@ -163,8 +180,7 @@ def reach_panels(reach: Reach, motion: Tracking) -> Figure:
         for letter, ax in zip("acd", (image, plane, shapes), strict=True):
             ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
         figure.text(0.515, 0.968, "(b)", weight="bold", size=8)
-        kinds = list(dict.fromkeys(piece.kind for piece in reach.boundary))
-        entries = [Line2D([], [], label=kind, **_LOOKS[kind]) for kind in _LOOKS if kind in kinds]
+        entries = _entries(reach)
         entries.append(Line2D([], [], label="motion", **_MOTION))
         figure.legend(handles=entries, loc="lower center", ncols=5, bbox_to_anchor=(0.5, 0.0))
     return figure
@@ -181,13 +197,31 @@ def _check(reach: Reach) -> None:
 def _axes(ax: Axes | None) -> Axes:
     if ax is not None:
         return ax
-    room = (0.5, 0.4, 0.1, 0.1)
+    room = (0.62, 0.4, 0.1, 0.1)
     return style.new_axes(style.SINGLE_COLUMN, 0.9 * style.SINGLE_COLUMN, room)
 
 
 def _boundary(ax: Axes, reach: Reach, lines: list[Line]) -> None:
     for piece, line in zip(reach.boundary, lines, strict=True):
         ax.plot(*line.T, **_LOOKS[piece.kind], zorder=4)
+
+
+def _entries(reach: Reach) -> list[Line2D]:
+    """Lines for a legend of the kinds of the boundary."""
+    kinds = {piece.kind for piece in reach.boundary}
+    return [Line2D([], [], label=kind, **_LOOKS[kind]) for kind in _LOOKS if kind in kinds]
+
+
+def _legend(ax: Axes, reach: Reach) -> None:
+    """Kinds of the boundary, below the frame of a figure of its own."""
+    entries = _entries(reach)
+    rows = -(-len(entries) // _COLUMNS)
+    height = 0.9 * style.SINGLE_COLUMN - 0.5
+    style.grow_below(ax, rows * _LINE)
+    ax.legend(
+        handles=entries, loc="upper center", bbox_to_anchor=(0.45, -0.4 / height), ncols=_COLUMNS,
+        borderaxespad=0.0, borderpad=0.0,
+    )  # fmt: skip
 
 
 def _motion(ax: Axes, start: Float[np.ndarray, " 2"], line: Line | None) -> None:

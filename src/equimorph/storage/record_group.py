@@ -13,14 +13,14 @@ import h5py
 import numpy as np
 
 from equimorph import tasks
-from equimorph.equilibria import Event, Path
+from equimorph.equilibria import Event, Landing, Path, worst_named
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, Schedule
+from equimorph.manifold import EquilibriumSet, StabilityDistance
+from equimorph.model import Box, Constraint, Descriptor, Schedule
 from equimorph.storage import set_group, states_group
 from equimorph.storage.hdf import get, get_json, put, put_json
 from equimorph.structures import State, States, Structure
-from equimorph.structures.naming import descriptor_named
+from equimorph.tasks.reach import Answer, Region
 
 ABOUT = "about"
 Inner = Callable[[Any], Any]
@@ -30,7 +30,8 @@ def _known_records() -> dict[str, type]:
     """Dataclasses that are written field by field, by name."""
     ours = [getattr(tasks, name) for name in tasks.__all__]
     records = [each for each in ours if isinstance(each, type) and is_dataclass(each)]
-    return {each.__name__: each for each in (Event, Path, Schedule, *records)}
+    others = (Answer, Event, Landing, Path, Region, Schedule, StabilityDistance)
+    return {each.__name__: each for each in (*others, *records)}
 
 
 RECORDS = _known_records()
@@ -100,6 +101,9 @@ def _put(group: h5py.Group, value: Any, place: str) -> Any:
             set_group.write(group.create_group(place), value, value.structure.elevation)
         case Descriptor():
             return {"descriptor": value.name}
+        case Box():
+            sides = zip(value.lower.tolist(), value.upper.tolist(), strict=True)
+            return {"box": dict(zip(value.names, sides, strict=True))}
         case Constraint():
             return {"constraint": [value.descriptor.name, value.sense, value.bound]}
         case _:
@@ -124,13 +128,14 @@ def _read_record(inner: Inner, group: h5py.Group, structure: Structure, content:
 
 def _read_constraint(inner: Inner, group: h5py.Group, structure: Structure, content: Any) -> Any:
     name, sense, bound = content
-    return Constraint(descriptor_named(structure, name), sense, bound)
+    return Constraint(worst_named(structure, name), sense, bound)
 
 
 _READERS: dict[str, Callable[[Inner, h5py.Group, Structure, Any], Any]] = {
     "record": _read_record,
     "constraint": _read_constraint,
-    "descriptor": lambda _, __, structure, name: descriptor_named(structure, name),
+    "box": lambda _, __, ___, sides: Box(**sides),
+    "descriptor": lambda _, __, structure, name: worst_named(structure, name),
     "mapping": lambda inner, _, __, pairs: {inner(key): inner(each) for key, each in pairs},
     "tuple": lambda inner, _, __, entries: tuple(inner(each) for each in entries),
     "list": lambda inner, _, __, entries: [inner(each) for each in entries],

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import Audit, Boundary, Component, EquilibriumSet, Stratum
 from equimorph.manifold.mesh import BaseMesh
@@ -36,10 +37,12 @@ def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
         Coordinate of the embedding after the free parameters.
     """
     points, parameters = eset.points, names_of(eset.structure.parameters)
-    # At the top, so that the arrays keep their dimensions where the grid links to them.
+    # At the top, so that the arrays keep their dimensions where the grid links to them; further
+    # sets of a file, as regions have them, keep theirs to themselves.
+    top = group if "vertex" in group.file else group.file
     for name, size in (("vertex", len(points)), ("cell", len(eset.cells)), ("space", 3)):
-        add_dimension(group.file, name, size)
-    add_dimension(group.file, "corner", eset.cells.size)
+        add_dimension(top, name, size)
+    add_dimension(top, "corner", eset.cells.size)
     put(group, "parameter_name", np.array(parameters), ["parameter"])
     put(group, "z", points.z, ["vertex", "unknown"], "unknowns and multipliers")
     put(group, "p", points.p, ["vertex", "parameter"], "parameters, see parameter_name")
@@ -81,7 +84,7 @@ def read(group: h5py.Group, structure: Structure) -> EquilibriumSet:
         box=Box(**about["box"]),
         fixed=about["fixed"],
         constraints=tuple(
-            Constraint(structure.descriptor(text), sense, bound)
+            Constraint(worst_named(structure, text), sense, bound)
             for text, sense, bound in about["constraints"]
         ),
         intervals=tuple(about["intervals"]),

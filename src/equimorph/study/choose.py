@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import State, States
-from equimorph.structures.naming import descriptor_named
 from equimorph.study.sections.extent import StateSection
 
 AGREEMENT = 1e-3
@@ -40,10 +40,10 @@ def choose_state(eset: EquilibriumSet, section: StateSection, key: str) -> State
     if section.near is not None:
         return _nearest(here, section.near, key)
     if section.highest is not None:
-        values = descriptor_named(eset.structure, section.highest)(stable)
+        values = worst_named(eset.structure, section.highest)(stable)
         return stable[int(np.argmax(values))]
     if section.lowest is not None:
-        values = descriptor_named(eset.structure, section.lowest)(stable)
+        values = worst_named(eset.structure, section.lowest)(stable)
         return stable[int(np.argmin(values))]
     if len(stable) > 1:
         raise InputError(
@@ -60,7 +60,7 @@ def chosen_start(eset: EquilibriumSet, section: StateSection | None, key: str) -
 
 def _nearest(here: States, near: dict[str, float], key: str) -> State:
     ((text, wanted),) = near.items()
-    values: Float[np.ndarray, " lanes"] = descriptor_named(here.structure, text)(here)
+    values: Float[np.ndarray, " lanes"] = worst_named(here.structure, text)(here)
     best = int(np.argmin(np.abs(values - wanted)))
     state = here[best]
     if abs(values[best] - wanted) > AGREEMENT:

@@ -7,10 +7,10 @@ import re
 from dataclasses import dataclass
 from typing import Literal, cast
 
+from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.model import Constraint
 from equimorph.structures import Structure
-from equimorph.structures.naming import descriptor_named
 
 LARGEST = 1e9
 """Largest number of a study; all scales of a structure are near 1."""
@@ -28,7 +28,7 @@ class Comparison:
 
     def on(self, structure: Structure) -> Constraint:
         """Return the same comparison with the descriptor of a structure."""
-        return Constraint(descriptor_named(structure, self.descriptor), self.sense, self.bound)
+        return Constraint(worst_named(structure, self.descriptor), self.sense, self.bound)
 
 
 def parse_comparison(text: str) -> Comparison:

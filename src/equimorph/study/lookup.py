@@ -1,16 +1,16 @@
 """Names of a study file, looked up: parameters, descriptors, points, with the key of what fails."""
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
+from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import INTERVALS
 from equimorph.model import Box, Constraint, Descriptor, parameter_vector, position
 from equimorph.structures import Structure
-from equimorph.structures.naming import descriptor_named
 from equimorph.study.expressions import parse_comparison
 from equimorph.study.sections.extent import SetSection, StateSection
 
@@ -112,6 +112,13 @@ def check_value(structure: Structure, name: str, value: float) -> None:
         )
 
 
+def check_parameters(structure: Structure, names: Iterable[str], key: str) -> None:
+    """Refuse names that are no parameters; `key` for the message."""
+    for name in names:
+        with at_key(key):
+            position(structure.parameters, name)
+
+
 def constraints_of(structure: Structure, texts: Sequence[str], key: str) -> tuple[Constraint, ...]:
     """Look up comparisons; `InputError` names the key of one that means nothing."""
     constraints = []
@@ -132,7 +139,7 @@ def check_state(ground: Ground, section: StateSection, key: str) -> None:
 def descriptor_at(structure: Structure, text: str, key: str) -> Descriptor:
     """Look up a descriptor; `InputError` names the key if it means nothing."""
     with at_key(key):
-        return descriptor_named(structure, text)
+        return worst_named(structure, text)
 
 
 def descriptors_of(

@@ -13,15 +13,23 @@ from equimorph.errors import InputError
 from equimorph.study.complaint import complaint
 from equimorph.study.sections.extent import PointSection, SetSection
 from equimorph.study.sections.fields import Section, TaskSection, requirement
+from equimorph.study.sections.robustness import (
+    ImperfectionSection,
+    RoomSection,
+    SensitivitySection,
+    SnapSection,
+)
 from equimorph.study.sections.structures import StructureSection
 from equimorph.study.sections.tasks import (
     EstimateSection,
     MapSection,
     OptimumSection,
+    ReachSection,
     RouteSection,
     ShapeSection,
     TrackSection,
 )
+from equimorph.study.sections.ways import FOLDER, TrialsSection, VerifySection
 from equimorph.study.syntax import parse_toml
 
 
@@ -36,6 +44,13 @@ class Study(Section):
     shapes: list[ShapeSection] = Field(default_factory=list, alias="shape")
     optima: list[OptimumSection] = Field(default_factory=list, alias="optimum")
     tracks: list[TrackSection] = Field(default_factory=list, alias="track")
+    reaches: list[ReachSection] = Field(default_factory=list, alias="reach")
+    checks: list[VerifySection] = Field(default_factory=list, alias="verify")
+    sensitivities: list[SensitivitySection] = Field(default_factory=list, alias="sensitivity")
+    imperfections: list[ImperfectionSection] = Field(default_factory=list, alias="imperfection")
+    rooms: list[RoomSection] = Field(default_factory=list, alias="room")
+    snaps: list[SnapSection] = Field(default_factory=list, alias="snap")
+    trials: list[TrialsSection] = Field(default_factory=list, alias="trials")
     estimates: list[EstimateSection] = Field(default_factory=list, alias="estimate")
     maps: list[MapSection] = Field(default_factory=list, alias="map")
 
@@ -79,7 +94,7 @@ def read_study_text(path: Path) -> str:
         raise InputError(f"`study file` must be a readable file; got {path}: {reason}.") from error
 
 
-def parse_study(text: str, name: str) -> Study:
+def parse_study(text: str, name: str, folder: Path | None = None) -> Study:
     """Check the text of a study file.
 
     Parameters
@@ -88,6 +103,8 @@ def parse_study(text: str, name: str) -> Study:
         Content of the file.
     name
         Name of the file, for messages.
+    folder
+        Where schedules lie that the study names; None: where the process is.
 
     Raises
     ------
@@ -96,6 +113,6 @@ def parse_study(text: str, name: str) -> Study:
     """
     content = parse_toml(text, name)
     try:
-        return Study.model_validate(content)
+        return Study.model_validate(content, context={FOLDER: folder or Path()})
     except ValidationError as error:
         raise complaint(error, Study, name) from error

@@ -85,7 +85,7 @@ def read_problem(path: Path) -> tuple[str, Study, Problem]:
         For a wrong study file, or one that needs more memory than there is.
     """
     text = read_study_text(path)
-    study = parse_study(text, path.name)
+    study = parse_study(text, path.name, path.parent)
     try:
         problem = prepare(study)
         check_memory(problem)

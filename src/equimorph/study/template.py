@@ -7,7 +7,7 @@ from equimorph.errors import InputError
 
 KINDS = (
     *("arch", "arm", "beam", "bridge", "column", "deep_arch", "lee", "maps", "network", "spring"),
-    *("stack", "strip", "truss"),
+    *("stack", "strip", "tasks", "truss"),
 )
 
 

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 
+import numpy as np
 from rich.markup import escape as plain
 
 from equimorph.equilibria import Leg
@@ -22,6 +24,9 @@ from equimorph.study.lookup import Ground, at_key, check_state, constraints_of, 
 from equimorph.study.names import schedule_table, task_files
 from equimorph.study.sections.tasks import TrackSection
 from equimorph.tasks import Route, Tracking, track
+
+MOST_ROWS = 8
+"""Compromises that a page shows."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,7 @@ class TrackKind(Kind[TrackSection, TrackTask, Tracking]):
                 actuators=task.actuators,
                 within=[*eset.constraints, *task.constraints],
                 monitor=[ground.height],
+                beyond=task.section.beyond,
             )
 
     def write_tables(self, task: TrackTask, answer: Tracking, folder: Path) -> None:
@@ -98,7 +104,7 @@ class TrackKind(Kind[TrackSection, TrackTask, Tracking]):
         pictures = pictures_of_way(folder, task.files, "motion")
         if not answer.arrived:
             done = f"After {html.number(answer.last_good)} of {len(task.legs)} legs: {answer.why}"
-            return [head, html.refused(done), pictures]
+            return [head, html.refused(done), *_compromise(answer), pictures]
         turn = answer.holonomy
         back = ""
         if turn is not None:
@@ -130,6 +136,24 @@ def _leg(structure: Structure, leg: Mapping[str, float], key: str) -> dict[Descr
         (text if text in names else descriptor_at(structure, text, key)): value
         for text, value in leg.items()
     }
+
+
+def _compromise(answer: Tracking) -> list[str]:
+    """What comes nearest to the targets after the failure, step by step."""
+    found = answer.compromise
+    if found is None:
+        return []
+    words = "The states nearest to the targets, by the sum of squares of what is missed:"
+    misses = np.sqrt(2.0 * np.maximum(found.values, 0.0))
+    shown = np.unique(np.linspace(0, len(found.states) - 1, MOST_ROWS).round().astype(int))
+    names = list(answer.actuators)
+    rows = [
+        [html.number(found.at[k], 4), html.number(misses[k], 3)]
+        + [html.number(found.states[k][name], 6) for name in names]
+        for k in shown
+    ]
+    head = ["leg", "miss", *map(escape, names)]
+    return [f"<p>{words}</p>", html.table(head, rows)]
 
 
 def _as_route(answer: Tracking) -> Route:

@@ -14,13 +14,12 @@ from equimorph.tasks import Route
 
 def figures_of_way(eset: EquilibriumSet | None, name: str, route: Route) -> Sequence[Figure]:
     """Shapes and margins; over two parameters also the plane, alone if refused, and a film."""
-    assert eset is not None
     names = route_figures(name)
-    plane = still(names.plane, partial(plotting.parameter_plane, eset, route))
     shapes = still(names.shapes, partial(plotting.shapes, route))
     margins = still(names.margins, partial(plotting.margins, route))
-    if len(eset.names) != 2:
+    if eset is None or len(eset.names) != 2:
         return [shapes, margins] if route.arrived else []
+    plane = still(names.plane, partial(plotting.parameter_plane, eset, route))
     film = Figure((names.film,), partial(_draw_film, eset, route, names.film))
     return [plane, shapes, margins, film] if route.arrived else [plane]
 

@@ -1,6 +1,6 @@
 """Fields of a study file: numbers, intervals, points and comparisons, strict and finite."""
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -73,7 +73,9 @@ class Section(BaseModel):
 class TaskSection(Section):
     """A question of a study; its files begin with its name."""
 
-    needs_set: ClassVar[bool] = True
-    """Whether it is asked of the set of the study."""
-
     name: Name
+
+    @property
+    def needs_set(self) -> bool:
+        """Whether it is asked of the set of the study."""
+        return True

@@ -1,6 +1,6 @@
 """Questions of a study file."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -63,7 +63,27 @@ class TrackSection(TaskSection):
     start: StateSection
     targets: list[Annotated[dict[str, Number], Field(min_length=1)]] = Field(min_length=1)
     actuators: list[str] = Field(min_length=1)
+    beyond: bool = False
     within: list[ComparisonText] = Field(default_factory=list)
+
+
+class ReachSection(TaskSection):
+    """What a state leads to; see `equimorph.reachable` and `equimorph.attainable`."""
+
+    start: StateSection
+    descriptors: list[str] = Field(min_length=1)
+    kind: Literal["reachable", "attainable"] = "reachable"
+    targets: list[list[Number]] = Field(default_factory=list)
+    accuracy: float | None = Field(default=None, gt=0, le=LARGEST)
+    within: list[ComparisonText] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _as_many(self) -> "ReachSection":
+        if self.kind == "attainable" and self.accuracy is not None:
+            raise requirement("give an accuracy to reachable sets only")
+        if any(len(target) != len(self.descriptors) for target in self.targets):
+            raise requirement("give each target one value for each of its descriptors")
+        return self
 
 
 class EstimateSection(TaskSection):
@@ -77,8 +97,6 @@ class EstimateSection(TaskSection):
 class MapSection(TaskSection):
     """A map over two actuators, from the natural states of their settings on."""
 
-    needs_set: ClassVar[bool] = False
-
     kind: Literal["limit_load_map", "curvature_map"]
     box: Annotated[dict[str, Interval], AfterValidator(two)]
     intervals: Intervals
@@ -88,6 +106,11 @@ class MapSection(TaskSection):
     bound: float = Field(default=100.0, gt=0, le=LARGEST)
     fixed: Point = Field(default_factory=dict)
     within: list[ComparisonText] = Field(default_factory=list)
+
+    @property
+    def needs_set(self) -> bool:
+        """It begins with natural states."""
+        return False
 
     @model_validator(mode="after")
     def _level(self) -> "MapSection":

@@ -51,6 +51,11 @@ class ImperfectionLaw:
     sizes: Float[np.ndarray, " tried"]
     loads: Float[np.ndarray, " tried"]
 
+    @property
+    def power(self) -> float:
+        """Exponent to which the coefficient belongs: of the law, or as fitted if unknown."""
+        return next((power for power, name in LAWS.items() if name == self.law), self.exponent)
+
     def __repr__(self) -> str:
         """Name and formula."""
         if self.status != "fitted":

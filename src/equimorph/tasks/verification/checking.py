@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -66,6 +67,14 @@ class Verification:
     def margin(self) -> float:
         """Smallest stability margin at the states."""
         return float(self.margins.min())
+
+    @cached_property
+    def path(self) -> Path:
+        """States with their lengths, and how the way ended."""
+        states, at = self.states, float(self.at[-1])
+        lost = "arrived" if self.verified else "constraint"
+        end = self.violation or Event(lost, states[-1], at, detail=self.why)
+        return Path(states, self.at, _lengths(states), np.zeros(len(states), int), (end,))
 
 
 def verify(  # noqa: PLR0913  # all but two by keyword
@@ -154,7 +163,7 @@ def _legs(
             raise InputError("`start` must be given with way-points; got none.")
         check_start(start)
         return start, _moving(np.array(way_points(start.structure, start.p, schedule)))
-    begin = start or _first_state(schedule, structure)
+    begin = start or first_state(schedule, structure)
     names = names_of(begin.structure.parameters)
     if schedule.names != names:
         raise InputError(
@@ -179,8 +188,14 @@ def _moving(rows: Float[np.ndarray, "rows parameters"]) -> Float[np.ndarray, "mo
     return np.asarray(rows[1:][moves])
 
 
-def _first_state(schedule: Schedule, structure: Structure | None) -> State:
-    """State in which a schedule begins."""
+def first_state(schedule: Schedule, structure: Structure | None) -> State:
+    """State in which a schedule begins, of its own structure unless another is given.
+
+    Raises
+    ------
+    InputError
+        If it carries no structure, or does not begin at an equilibrium.
+    """
     owner, unknowns = structure, schedule.start.get("unknowns")
     if owner is None:
         if schedule.start.get("structure") is None:
@@ -246,12 +261,16 @@ def _table(
     done: March, margins: Float[np.ndarray, " points"], descriptors: Sequence[Descriptor]
 ) -> Schedule:
     """Schedule of all states."""
-    states = done.states
+    at = done.at.copy()
+    at[done.corners] = np.arange(len(done.corners))
+    path = Path(done.states, at, _lengths(done.states), np.zeros(len(at), int), (done.end,))
+    return scheduled(path, margins, tuple(dict.fromkeys(descriptors)))
+
+
+def _lengths(states: States) -> Float[np.ndarray, " points"]:
+    """Length of the way to each state, in the metric and scaled parameters."""
     structure = states.structure
     dz = np.diff(states.z[:, : structure.unknowns], axis=0)
     dp = np.diff(states.p, axis=0) / structure.scales
-    length = np.concatenate([[0.0], np.cumsum(np.sqrt(dz**2 @ structure.mass + (dp**2).sum(1)))])
-    at = done.at.copy()
-    at[done.corners] = np.arange(len(done.corners))
-    path = Path(states, at, length, np.zeros(len(at), int), (done.end,))
-    return scheduled(path, margins, tuple(dict.fromkeys(descriptors)))
+    steps = np.sqrt(dz**2 @ structure.mass + (dp**2).sum(axis=1))
+    return np.concatenate([[0.0], np.cumsum(steps)])

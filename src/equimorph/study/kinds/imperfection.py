@@ -1,0 +1,104 @@
+"""Limit loads of imperfect structures: ``[[imperfection]]``."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from html import escape
+from pathlib import Path
+
+from rich.markup import escape as plain
+
+from equimorph import plotting
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Constraint, Progress
+from equimorph.storage.parts import RECORD_PART
+from equimorph.study import html
+from equimorph.study.choose import choose_state
+from equimorph.study.kinds.found import heading
+from equimorph.study.kinds.kind import Figure, Kind, still
+from equimorph.study.lookup import Ground, at_key, check_parameters, check_state, constraints_of
+from equimorph.study.names import task_files
+from equimorph.study.sections.robustness import ImperfectionSection
+from equimorph.tasks import ImperfectionLaw, imperfection_law
+
+
+@dataclass(frozen=True)
+class ImperfectionTask:
+    """Laws of imperfections that are wanted, with their constraints as objects."""
+
+    key: str
+    section: ImperfectionSection
+    constraints: tuple[Constraint, ...]
+
+
+class ImperfectionKind(Kind[ImperfectionSection, ImperfectionTask, Mapping[str, ImperfectionLaw]]):
+    """How a limit load changes with imperfections."""
+
+    table = "imperfection"
+    part = RECORD_PART
+
+    def prepared(self, ground: Ground, section: ImperfectionSection, key: str) -> ImperfectionTask:
+        """Look up state, load, imperfections and constraints."""
+        check_state(ground, section.state, f"{key}.state")
+        check_parameters(ground.structure, [section.load], f"{key}.load")
+        check_parameters(ground.structure, section.imperfections, f"{key}.imperfections")
+        if section.load in section.imperfections:
+            raise InputError(f"`{key}.imperfections` must not name the load; got {section.load}.")
+        constraints = constraints_of(ground.structure, section.within, f"{key}.within")
+        return ImperfectionTask(key, section, constraints)
+
+    def answer(
+        self, ground: Ground, eset: EquilibriumSet | None, task: ImperfectionTask, sink: Progress
+    ) -> Mapping[str, ImperfectionLaw]:
+        """Fit a law to each imperfection."""
+        assert eset is not None
+        section = task.section
+        state = choose_state(eset, section.state, f"{task.key}.state")
+        with at_key(task.key):
+            return {
+                name: imperfection_law(state, section.load, name, within=task.constraints)
+                for name in section.imperfections
+            }
+
+    def figures(
+        self,
+        ground: Ground,
+        eset: EquilibriumSet | None,
+        task: ImperfectionTask,
+        answer: Mapping[str, ImperfectionLaw],
+    ) -> Sequence[Figure]:
+        """Return the powers on logarithmic axes, if any was found."""
+        known = {name: law for name, law in answer.items() if law.status == "fitted"}
+        if not known:
+            return []
+        draw = partial(plotting.imperfection_laws, ground.structure, known, task.section.load)
+        return [still(task_files(self.table, task.section.name), draw)]
+
+    def report(
+        self, task: ImperfectionTask, answer: Mapping[str, ImperfectionLaw], folder: Path
+    ) -> list[str]:
+        """A table: one row for each imperfection."""
+        files = task_files(self.table, task.section.name)
+        rows = [
+            [
+                escape(name),
+                html.number(law.perfect, 8),
+                html.number(law.coefficient, 5),
+                html.number(law.exponent, 5),
+                escape(law.law if law.status == "fitted" else law.why),
+            ]
+            for name, law in answer.items()
+        ]
+        caption = "Changes of the limit load with imperfections, and the fitted powers."
+        head = ["imperfection ε", "limit load", "coefficient", "fitted exponent", "law"]
+        return [
+            heading(self.table, task.section.name),
+            html.table(head, rows),
+            html.pictures(folder, {}, {f"{files}.png": caption}),
+        ]
+
+    def verdict(self, task: ImperfectionTask, answer: Mapping[str, ImperfectionLaw]) -> str:
+        """Return the formulas."""
+        laws = "; ".join(f"{name}: {law!r}" for name, law in answer.items())
+        return plain(f"Imperfection {task.section.name}: {laws}.")

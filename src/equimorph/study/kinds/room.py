@@ -1,0 +1,100 @@
+"""Room around a state: ``[[room]]``."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from html import escape
+from pathlib import Path
+
+from rich.markup import escape as plain
+
+from equimorph import plotting
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Constraint, Progress
+from equimorph.storage.parts import RECORD_PART
+from equimorph.structures import State
+from equimorph.study import html
+from equimorph.study.choose import choose_state
+from equimorph.study.kinds.found import heading
+from equimorph.study.kinds.kind import Figure, Kind, still
+from equimorph.study.lookup import Ground, at_key, check_parameters, check_state, constraints_of
+from equimorph.study.names import task_files
+from equimorph.study.sections.robustness import RoomSection
+from equimorph.tasks import Room, stable_room
+
+
+@dataclass(frozen=True)
+class RoomTask:
+    """A room that is wanted, with its constraints as objects."""
+
+    key: str
+    section: RoomSection
+    constraints: tuple[Constraint, ...]
+
+
+class RoomKind(Kind[RoomSection, RoomTask, tuple[State, Room]]):
+    """How far parameters may stray from a state."""
+
+    table = "room"
+    part = RECORD_PART
+
+    def prepared(self, ground: Ground, section: RoomSection, key: str) -> RoomTask:
+        """Look up state, tolerances and constraints."""
+        check_state(ground, section.state, f"{key}.state")
+        check_parameters(ground.structure, section.tolerances, f"{key}.tolerances")
+        constraints = constraints_of(ground.structure, section.within, f"{key}.within")
+        return RoomTask(key, section, constraints)
+
+    def answer(
+        self, ground: Ground, eset: EquilibriumSet | None, task: RoomTask, sink: Progress
+    ) -> tuple[State, Room]:
+        """Lift rays."""
+        assert eset is not None
+        section = task.section
+        state = choose_state(eset, section.state, f"{task.key}.state")
+        with at_key(task.key):
+            found = stable_room(
+                state, section.tolerances, shape=section.shape, within=task.constraints,
+                most=section.most,
+            )  # fmt: skip
+        return state, found
+
+    def figures(
+        self,
+        ground: Ground,
+        eset: EquilibriumSet | None,
+        task: RoomTask,
+        answer: tuple[State, Room],
+    ) -> Sequence[Figure]:
+        """Where it lies, over two parameters."""
+        if len(task.section.tolerances) != 2:
+            return []
+        draw = partial(plotting.room, *answer, eset)
+        return [still(task_files(self.table, task.section.name), draw)]
+
+    def report(self, task: RoomTask, answer: tuple[State, Room], folder: Path) -> list[str]:
+        """Its sides, and what bounds it."""
+        _, room = answer
+        box, files = room.boxes[0], task_files(self.table, task.section.name)
+        rows = [
+            [escape(name), html.number(low, 6), html.number(high, 6)]
+            for name, low, high in zip(box.names, box.lower, box.upper, strict=True)
+        ]
+        caption = "The room around the state (●) and where it ends (×)."
+        return [
+            heading(self.table, task.section.name),
+            f"<p>{escape(_room_in_words(task, room))}</p>",
+            html.table(["", "from", "to"], rows),
+            html.pictures(folder, {}, {f"{files}.png": caption}),
+        ]
+
+    def verdict(self, task: RoomTask, answer: tuple[State, Room]) -> str:
+        """Its size."""
+        return f"Room {task.section.name}: {plain(_room_in_words(task, answer[1]))}"
+
+
+def _room_in_words(task: RoomTask, room: Room) -> str:
+    shape = task.section.shape
+    if room.kind[0] == "arrived":
+        return f"the {shape} of {room.least:.6g} tolerances is stable, the largest that was tried."
+    return f"stable up to the {shape} of {room.least:.6g} tolerances; then {room.kind[0]}."
