@@ -9,7 +9,7 @@ import pytest
 import equimorph as em
 from equimorph.paper import reproduction
 from equimorph.paper.examples import EXAMPLES, Example
-from equimorph.paper.quoted import QUOTED
+from equimorph.paper.quoted import QUOTED, TABLES
 from typecheck import unchecked
 
 COARSE = em.Grid(Theta=(0.2, 2.5, 23), Delta=(-2.0, 2.0, 30))
@@ -26,8 +26,17 @@ def numbers_of(name, folder, **how):
 
 
 def test_spring(folder):
-    """PHYSICS section 2."""
+    """PHYSICS section 2: F = (1 − x_l/cos δ) sin δ, E'' = x_l (x_l − cos³ δ)/cos⁴ δ."""
     found = numbers_of("spring", folder)
+    for delta, x_l, name in ((0.62, 0.8, "C_s"), (0.4, 0.9, "(0.40, 0.90)"),
+                             (0.3, 0.925, "(0.30, 0.925)")):  # fmt: skip
+        load = (1 - x_l / np.cos(delta)) * np.sin(delta)
+        np.testing.assert_allclose(found[f"load of {name}"], load, rtol=1e-10)
+    stiffness = 0.925 * (0.925 - np.cos(0.3) ** 3) / np.cos(0.3) ** 4
+    np.testing.assert_allclose(found["margin of (0.30, 0.925)"], stiffness, rtol=1e-8)
+    np.testing.assert_allclose(found["x_l of the cusp"], 1.0, rtol=1e-8)
+    assert found["free parameters of the set"] == 2.0
+    assert found["routes to C_t1 at fixed load"] == 1.0
     np.testing.assert_allclose(found["load of C_s"], 0.009908, atol=5e-7)
     np.testing.assert_allclose(found["load of (0.40, 0.90)"], 0.008904, atol=5e-7)
     np.testing.assert_allclose(found["x_l of delta = 0.40 at the load of C_s"], 0.89763, atol=5e-6)
@@ -45,7 +54,13 @@ def test_limit_loads(folder):
     found = numbers_of("limit_loads", folder, grid=COARSE)
     np.testing.assert_allclose(found["uniform: limit load at (0.9, 0)"], 4.2439977594, rtol=1e-10)
     np.testing.assert_allclose(found["left-half: limit load at (0.9, 0)"], 2.3638940346, rtol=1e-10)
+    np.testing.assert_allclose(found["uniform: limit load at (0.9, 0.02)"], 3.9485039281, rtol=1e-9)
+    np.testing.assert_allclose(found["uniform: lambda there"], 1.9075023017, rtol=1e-8)
+    np.testing.assert_allclose(found["uniform: largest limit load"], 4.264995, rtol=1e-6)
     np.testing.assert_allclose(found["left-half: largest limit load"], 4.0, rtol=0.05)
+    for load in ("uniform", "left-half"):
+        ends = [v for k, v in found.items() if k.startswith(f"{load}: settings that end by")]
+        assert sum(ends) == 24 * 31
     np.testing.assert_allclose(found["left-half: its Theta"], 0.94, atol=0.02)
     np.testing.assert_allclose(found["left-half: its Delta"], 0.60, atol=0.02)
 
@@ -56,7 +71,18 @@ def test_curvatures(folder):
     np.testing.assert_allclose(found["uniform: max |kappa| at (0.96, 0)"], 2.132, atol=1e-3)
     key = "left-half: max |kappa| at (0.96, 0)"
     np.testing.assert_allclose(found[key], 14.17, atol=0.01)
-    assert found[f"{key}: snaps on the way"] == 1.0
+    assert found["left-half: snaps on the way to (0.96, 0)"] == 1.0
+    assert found["uniform: snaps on the way to (0.96, 0)"] == 0.0
+    np.testing.assert_allclose(
+        found["uniform: max |kappa| at (0.64, 1.16)"],
+        found["uniform: max |kappa| at (0.64, -1.16)"],
+        rtol=1e-9,
+    )
+    for load in ("uniform", "left-half"):
+        product = found[f"{load}: factor"] * found[f"{load}: least max |kappa|"]
+        there = found[f"{load}: max |kappa| there under the other load"]
+        np.testing.assert_allclose(product, there, rtol=1e-12)
+        assert found[f"{load}: factor"] > 3.0  # "more than a 3-fold increase"
     np.testing.assert_allclose(found["left-half: least max |kappa|"], 3.02, atol=0.01)
     np.testing.assert_allclose(found["left-half: its Theta"], 0.65, atol=0.005)
     np.testing.assert_allclose(found["left-half: its Delta"], 0.52, atol=0.005)
@@ -64,33 +90,44 @@ def test_curvatures(folder):
 
 def test_inside_out(folder):
     """PHYSICS sections 4.9 and 5."""
-    found = numbers_of("inside_out", folder)
+    found = numbers_of("inside_out", folder, intervals=(24, 41))
     assert found["equilibria at (1, 0)"] == 5.0
     np.testing.assert_allclose(found["crown of the upright arch"], 0.2258, atol=5e-5)
     np.testing.assert_allclose(found["crown of the inverted arch"], -0.1496, atol=5e-5)
     np.testing.assert_allclose(found["smallest margin of the route"], 0.462, atol=5e-4)
     np.testing.assert_allclose(found["largest max |kappa| of the route"], 16.4, atol=0.06)
     np.testing.assert_allclose(found["max |kappa| of the goal"], 10.55, atol=5e-3)
+    assert found["routes along the way-points"] == 1.0
     assert found["routes within max |kappa| <= 6"] == 0.0
+    assert found["thrust lambda of the inverted arch"] > 0.0  # the supports push
+    assert found["stable equilibria at (1, 0)"] == 2.0
+    assert found["stable equilibria at (1.3, 1.3)"] == 1.0
 
 
 def test_tracking(folder):
     """PHYSICS section 5: Θ = 1.621098, Δ = 0; the square is stable all around and closes."""
-    found = numbers_of("tracking", folder)
+    found = numbers_of("tracking", folder, intervals=(18, 31))
     np.testing.assert_allclose(found["Theta at (0.15, 0.15)"], 1.621098, atol=5e-7)
     np.testing.assert_allclose(found["Delta at (0.15, 0.15)"], 0.0, atol=1e-9)
     assert found["square tracked"] == 1.0
     assert found["largest change of an actuator around it"] < 1e-9
+    assert found["stable states at (0.15, 0.15)"] == 1.0
+    assert found["most stable states at a corner"] == 2.0
+    assert found["kinds of boundary of the reachable set"] == 3.0
+    assert found["sides of the box on its boundary"] == 4.0
 
 
 def test_introduction(folder):
-    """Heights at s = 1/3 and 2/3 are those at rest, so that the crown is nearly so."""
+    """The article's statements: two stable states, and a stable way to the target."""
     found = numbers_of("introduction", folder)
     assert found["margin of the upper state"] > 0.0
     assert found["margin of the lower state"] > 0.0
     assert found["crown of the upper state"] > 0.0 > found["crown of the lower state"]
-    sag = found["crown at rest"] - found["crown under the force"]
-    assert abs(found["crown at rest"] - found["crown adapted"]) < sag
+    assert found["stable states under the force"] == 2.0
+    assert found["target reached"] == 1.0
+    assert found["smallest margin on the way"] > 0.0
+    np.testing.assert_allclose(found["height at 1/3 adapted"], 0.23, rtol=1e-9)
+    np.testing.assert_allclose(found["height at 2/3 adapted"], 0.10, rtol=1e-9)
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda each: each.name)
@@ -111,10 +148,13 @@ def test_the_report_shows_theirs_beside_ours(tmp_path):
 
     def stand_in(example):
         keys = [each.key for each in QUOTED if each.example == example.name]
+        cells = [row[1] for table in TABLES if table.example == example.name for row in table.rows]
+        keys += [key for row in cells for _, key in row]
         return Example(
             example.name, example.title, lambda _: dict.fromkeys(keys, 1.5), example.captions
         )
 
+    tmp_path = tmp_path / "results" / "paper"  # made if it does not exist
     reproduction.reproduce(tmp_path, examples=[stand_in(each) for each in EXAMPLES])
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
@@ -123,6 +163,8 @@ def test_the_report_shows_theirs_beside_ours(tmp_path):
         assert each.note in plain
         assert f"| {each.what} |" in plain
     assert page.count("<h2>") == len(EXAMPLES)
+    assert all(table.caption in plain for table in TABLES)
+    assert "| 0.96, 0 | 2.1 (1.5) | 7.6 (1.5) |" in plain
 
 
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path):

@@ -112,7 +112,15 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
     """
     _check_count(eset, descriptors)
     fabric = _fabric(eset)
-    cut = _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors))
+    return _divided(eset, _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors)))
+
+
+def divided_by(eset: EquilibriumSet, constraint: Constraint) -> Division:
+    """Cut a set exactly along the bound of a constraint; the side is -1 where it is obeyed."""
+    return _divided(eset, _cut(_fabric(eset), lambda v: constraint.excess(v.z, v.p)))
+
+
+def _divided(eset: EquilibriumSet, cut: "Cut") -> Division:
     nothing = np.zeros(len(cut.values), bool)
     whole = part_of(eset, cut.fabric, np.ones(len(cut.fabric.cells), bool), (nothing, cut.lost))
     side = np.sign(cut.values[cut.fabric.cells].sum(axis=1)).astype(int)

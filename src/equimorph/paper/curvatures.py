@@ -6,31 +6,42 @@ import equimorph as em
 
 GRID = {"Theta": (0.2, 2.5, 121), "Delta": (-2.0, 2.0, 160)}
 LOAD = 2.5
-TABLE = em.Grid(Theta=(0.64, 0.96, 1), Delta=(-1.16, 1.16, 2))
-"""Its corners and middles are the settings of the table, with Δ of either sign."""
-
-SETTINGS = {(0.96, 0.0): (1, 1), (0.64, 1.16): (0, 2), (0.64, -1.16): (0, 0)}
+SETTINGS = ((0.96, 0.0), (0.64, 1.16), (0.64, -1.16))
+"""Of the article's table; its Δ has another sign or scale, so that both signs are tried."""
+BESIDE = 1e-3
 
 
 def main(folder: Path, grid: em.Grid | None = None) -> dict[str, float]:
     """Compute both maps with their barriers, the table, and the least curvatures."""
     grid = grid or em.Grid(**GRID)
+    arches = {load: em.Rod(load) for load in ("uniform", "left-half")}
     numbers: dict[str, float] = {}
-    for load in ("uniform", "left-half"):
-        arch = em.Rod(load)
+    best: dict[str, em.State] = {}
+    for load, arch in arches.items():
         kappa = arch.max_curvature
         curvatures = em.curvature_map(arch, grid, "q", LOAD)
         em.plotting.save(em.plotting.curvature_map(curvatures), folder, f"curvatures-{load}")
-        table = em.curvature_map(arch, TABLE, "q", LOAD)
-        for (theta, delta), (row, column) in SETTINGS.items():
-            setting = f"{load}: max |kappa| at ({theta:g}, {delta:g})"
-            numbers[setting] = float(table.value[row, column])
-            numbers[f"{setting}: snaps on the way"] = float(table.snaps[row, column])
+        for theta, delta in SETTINGS:
+            value, snaps = curvature_at(arch, theta, delta)
+            numbers[f"{load}: max |kappa| at ({theta:g}, {delta:g})"] = value
+            numbers[f"{load}: snaps on the way to ({theta:g}, {delta:g})"] = snaps
         eset = em.equilibrium_set(
             arch, grid.box, fixed={"q": LOAD}, within=[kappa <= 20], intervals=(24, 41)
         )
-        best = em.optimise(eset, kappa).best
-        numbers[f"{load}: least max |kappa|"] = best.value
-        numbers[f"{load}: its Theta"] = best.state["Theta"]
-        numbers[f"{load}: its Delta"] = best.state["Delta"]
+        best[load] = em.optimise(eset, kappa).best.state
+        numbers[f"{load}: least max |kappa|"] = kappa(best[load])
+        numbers[f"{load}: its Theta"] = best[load]["Theta"]
+        numbers[f"{load}: its Delta"] = best[load]["Delta"]
+    for load, other in (("uniform", "left-half"), ("left-half", "uniform")):
+        value, snaps = curvature_at(arches[other], best[load]["Theta"], best[load]["Delta"])
+        numbers[f"{load}: max |kappa| there under the other load"] = value
+        numbers[f"{load}: factor"] = value / numbers[f"{load}: least max |kappa|"]
+        numbers[f"{load}: snaps on the way under the other load"] = snaps
     return numbers
+
+
+def curvature_at(arch: em.Rod, theta: float, delta: float) -> tuple[float, float]:
+    """Largest curvature of the first stable state at one setting, and whether the way snaps."""
+    corner = em.Grid(Theta=(theta, theta + BESIDE, 1), Delta=(delta, delta + BESIDE, 1))
+    found = em.curvature_map(arch, corner, "q", LOAD)
+    return float(found.value[0, 0]), float(found.snaps[0, 0])

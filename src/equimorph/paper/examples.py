@@ -33,11 +33,13 @@ EXAMPLES = (
         "Two states under one load; adaptation to a load",
         introduction.main,
         {
-            "two-states": "Two stable states of a rod clamped in actuators at Θ = 1, Δ = 0.1 under "
-            "the force F = 1 at its middle.",
-            "adaptation": "From the shape under F = 1 (start) the ends turn until the points at "
-            "s = 1/3 and 2/3 are as high as they were at rest (goal); all states on the way "
-            "are stable.",
+            "two-states": "Two stable states of one rod of length L, clamped in rotary actuators "
+            "sin 1 · L apart at Θ = 1, Δ = 0.1, under the same force F = 1 · 4π²B/L² at its "
+            "middle: the upper one (1, full line) and the lower one (2, dashed).",
+            "adaptation": "The rod of the figure before, under the force F = 1 · 4π²B/L² at its "
+            "middle with Θ = 0.9, Δ = 0 (start, dark), turns its ends until its points at s = 1/3 "
+            "and 2/3 are 0.23 L and 0.10 L high (goal, light); thin: states on the way, all "
+            "stable.",
         },
     ),
     Example(
@@ -45,10 +47,17 @@ EXAMPLES = (
         "The constrained spring",
         spring.main,
         {
-            "spring-equilibria": "Equilibria at x_l = 0.80 over the force.",
-            "spring-set": "The equilibrium set over x_l and F. With the load free a route leads "
-            "around the cusp at x_l = 1 from C_s (○) to its mirror image at the same load (●).",
-            "spring-plane": "The same route over the plane of both parameters.",
+            "spring-equilibria": "Angle δ of the spring's equilibria over the force F with the "
+            "actuator at x_l = 0.80: stable states as full lines, unstable ones dashed, rings at "
+            "the folds, at which the spring snaps.",
+            "spring-set": "Equilibrium set of the spring over actuator x_l and force F; blue "
+            "states are stable, orange ones unstable, the thick line between them is the fold. "
+            "With the load free a route leads around the cusp at x_l = 1, F = 0 from C_s (○) to "
+            "δ = −0.62 at the same load (●).",
+            "spring-levels": "The set seen along F, with its level sets: full lines where stable, "
+            "dashed where not; the thick line is the stability boundary x_l = cos³ δ. C_t1 and "
+            "C_t2 are reached from C_s along its level; C_t3 lies on another branch of that level "
+            "and is reached with the load free only (red).",
         },
     ),
     Example(
@@ -56,8 +65,11 @@ EXAMPLES = (
         "Limit loads",
         limit_loads.main,
         {
-            f"limit-loads-{load}": f"Largest load before stability is lost or max |κ| reaches 10, "
-            f"{load} load, with the curves on which it jumps or bends."
+            f"limit-loads-{load}": f"Largest {load} load over half the difference Θ and half the "
+            f"sum Δ of the end angles, from the unloaded state until stability is lost (C1) or "
+            "max |κ| reaches 10 (C2; dotted regions); hatched: C2 is violated without load. Lines "
+            "are all curves on which the limit load jumps or bends, named by their causes; ends "
+            "of lines are cusps or meet other lines. Thin: contours."
             for load in ("uniform", "left-half")
         },
     ),
@@ -67,7 +79,10 @@ EXAMPLES = (
         curvatures.main,
         {
             f"curvatures-{load}": f"Largest curvature of the first stable state with q = 2.5 on "
-            f"the path from rest, {load} load, with barriers; dots: a real loading snaps."
+            f"the path from rest under the {load} load, over half the difference Θ and half the "
+            "sum Δ of the end angles. Thick: barriers, at which neighbours are far from each "
+            "other on the set. Dotted regions: a real loading snaps on the way; hatched: the path "
+            "leads to no stable state. Thin: contours."
             for load in ("uniform", "left-half")
         },
     ),
@@ -75,18 +90,25 @@ EXAMPLES = (
         "tracking",
         "A closed curve of heights, tracked",
         tracking.main,
-        {"tracking-shapes": "The arch at the corners of the square of heights."},
+        {
+            "tracking": "The arch under the uniform load q = 2.5 leads its heights at s = 1/3 and "
+            "2/3 around a square (red, corners numbered). (a) Heights, with what can be reached "
+            "from y(1/3) = y(2/3) = 0.15 L (ring) and its boundary by kinds. (b) The motion on "
+            "the stable states. (c) The end angles, with the region of the start. (d) Shapes at "
+            "the corners.",
+        },
     ),
     Example(
         "inside_out",
         "The arch turned inside out",
         inside_out.main,
         {
-            "inside-out-surface": "The equilibrium set at q = 2.5, and the route along the "
-            "article's way-points.",
-            "inside-out-plane": "The route over the plane of both end angles; where the arch has "
-            "two stable states it is darker.",
-            "inside-out-shapes": "Shapes at equal steps along the route.",
+            "inside-out": "The arch under the uniform load q = 2.5 is turned inside out without a "
+            "snap, along the article's way-points (red, 1 to 5). (a) The equilibrium set over both "
+            "end angles, coloured by the number of unstable directions and cut at max |κ| = 20; "
+            "thick: stability boundary and other folds; dashed: max |κ| = 6, paler beyond. (b) "
+            "The end angles, darker where the arch has two stable states. (c) Shapes at the "
+            "way-points.",
         },
     ),
 )

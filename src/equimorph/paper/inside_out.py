@@ -5,28 +5,35 @@ from pathlib import Path
 import equimorph as em
 
 WAY = ({"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0})
+INTERVALS = (47, 81)
 
 
-def main(folder: Path) -> dict[str, float]:
+def main(folder: Path, intervals: tuple[int, int] = INTERVALS) -> dict[str, float]:
     """Follow the route, measure it, and look for a shorter one."""
     arch = em.Rod("uniform")
     kappa, crown = arch.max_curvature, arch.height(0.5)
     box = em.Box(Theta=(0.2, 2.5), Delta=(-2, 2))
-    eset = em.equilibrium_set(arch, box, fixed={"q": 2.5}, within=[kappa <= 20], intervals=(47, 81))
+    eset = em.equilibrium_set(
+        arch, box, fixed={"q": 2.5}, within=[kappa <= 20], intervals=intervals
+    )
     here = eset.at(Theta=1.0, Delta=0.0)
     up, down = max(here.stable, key=crown), min(here.stable, key=crown)
     route = em.plan(eset, up, down, via=WAY, monitor=[kappa])
     limited = em.plan(eset, up, down, via=WAY, within=[kappa <= 6])
     shorter = em.plan(eset, up, down, margin=0.3)
-    plots = em.plotting
-    plots.save(plots.surface(eset, crown, route=route), folder, "inside-out-surface")
-    plots.save(plots.parameter_plane(eset, route, count="stable"), folder, "inside-out-plane")
-    plots.save(plots.shapes(route), folder, "inside-out-shapes")
+    panels = em.plotting.route_panels(eset, route, crown, limit=kappa <= 6)
+    em.plotting.save(panels, folder, "inside-out")
+    stable = eset.at(Theta=1.3, Delta=1.3).stable
     return {
         "equilibria at (1, 0)": float(len(here)),
         "stable equilibria at (1, 0)": float(len(here.stable)),
+        "stable equilibria at (1.3, 1.3)": float(len(stable)),
         "crown of the upright arch": crown(up),
         "crown of the inverted arch": crown(down),
+        "thrust lambda of the upright arch": float(up.multipliers[0]),
+        "thrust lambda of the inverted arch": float(down.multipliers[0]),
+        "supports that pull on the inverted arch": float(down.multipliers[0] < 0.0),
+        "routes along the way-points": float(route.arrived),
         "smallest margin of the route": route.margin,
         "length of the route": route.length,
         "largest max |kappa| of the route": float(kappa(route.path.states).max()),

@@ -8,15 +8,22 @@ from time import perf_counter
 
 from equimorph.model import Progress, Silent
 from equimorph.paper.examples import EXAMPLES, Example
-from equimorph.paper.quoted import QUOTED, Quoted
+from equimorph.paper.quoted import CONVENTION, QUOTED, TABLES, Quoted, QuotedTable
 from equimorph.storage.files import write_text
 from equimorph.study import html
+from equimorph.study.folder import writable
 
 TITLE = "Quasi-static shape control of soft, morphing structures, computed anew"
 SOURCE = (
     "E. Fehér, A. Á. Sipos, P. L. Várkonyi: Quasi-static shape control of soft, morphing "
     "structures, arXiv:2509.12916."
 )
+INTRODUCTION = (
+    "Every figure, table and number of the article, computed anew: theirs, ours, the difference, "
+    "and a sentence where they differ."
+)
+WIDE = ("tracking", "inside-out", "parameterisations")
+"""Figures two columns wide."""
 HEAD = ("what", "theirs", "ours", "difference", "")
 
 
@@ -32,6 +39,15 @@ class Reproduction:
         return [
             (each, self.numbers[example][each.key]) for each in QUOTED if each.example == example
         ]
+
+    def tables(self, example: str) -> list[tuple[QuotedTable, list[list[str]]]]:
+        """Tables of the article that belong to an example, with our numbers in their cells."""
+        ours = self.numbers[example]
+        return [
+            (table, [[label, *(_cell(theirs, ours[key]) for theirs, key in cells)]
+                     for label, cells in table.rows])
+            for table in TABLES if table.example == example
+        ]  # fmt: skip
 
 
 def reproduce(
@@ -54,6 +70,8 @@ def reproduce(
         If the folder cannot be written.
     """
     sink = progress or Silent()
+    with writable(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "index.html", "")  # says at once if the folder cannot be written
     numbers: dict[str, dict[str, float]] = {}
     seconds: dict[str, float] = {}
@@ -71,18 +89,16 @@ def reproduce(
 
 def markdown(found: Reproduction, examples: Sequence[Example]) -> str:
     """Return the report as Markdown."""
-    lines = [f"# {TITLE}", "", SOURCE, ""]
+    lines = [f"# {TITLE}", "", SOURCE, "", INTRODUCTION, "", CONVENTION, ""]
     for example in examples:
         lines += [f"## {example.title}", ""]
         for name, caption in example.captions.items():
             lines += [f"![{caption}]({name}.png)", "", f"*{caption}*", ""]
+        for table, cells in found.tables(example.name):
+            lines += [f"*{table.caption}*", "", *_piped(table.head, cells), ""]
         rows = found.rows(example.name)
         if rows:
-            lines += [f"| {' | '.join(HEAD)} |", "|---|---|---|---|---|"]
-            for row in rows:
-                cells = [cell.replace("|", "\\|") for cell in _cells(*row)]
-                lines.append(f"| {' | '.join(cells)} |")
-            lines.append("")
+            lines += [*_piped(HEAD, [_cells(*row) for row in rows]), ""]
         ours = found.numbers[example.name].items()
         lines += [*(f"- {key}: {html.number(value, 8)}" for key, value in ours), ""]
     return "\n".join(lines)
@@ -91,10 +107,17 @@ def markdown(found: Reproduction, examples: Sequence[Example]) -> str:
 def page(found: Reproduction, examples: Sequence[Example], folder: Path) -> str:
     """Return the report as one page; the figures are in the folder."""
     body = [f"<h1>{escape(TITLE)}</h1>", f'<p class="lead">{escape(SOURCE)}</p>']
+    body += [f"<p>{escape(text)}</p>" for text in (INTRODUCTION, CONVENTION)]
     for example in examples:
         body.append(f"<h2>{escape(example.title)}</h2>")
-        captions = {f"{name}.png": text for name, text in example.captions.items()}
-        body.append(html.pictures(folder, {}, captions))
+        wide, small = (
+            {f"{k}.png": text for k, text in example.captions.items() if (k in WIDE) is large}
+            for large in (True, False)
+        )
+        body.append(html.pictures(folder, wide, small))
+        for table, cells in found.tables(example.name):
+            body.append(f'<p class="faint">{escape(table.caption)}</p>')
+            body.append(html.table(table.head, [[escape(c) for c in row] for row in cells]))
         rows = [[escape(cell) for cell in _cells(*row)] for row in found.rows(example.name)]
         if rows:
             body.append(html.table(HEAD, rows))
@@ -104,6 +127,17 @@ def page(found: Reproduction, examples: Sequence[Example], folder: Path) -> str:
     times = ", ".join(f"{name} {value:.1f} s" for name, value in found.seconds.items())
     body.append(f'<p class="faint">Wall time: {escape(times)}.</p>')
     return html.page(TITLE, body)
+
+
+def _piped(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return [f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines]
+
+
+def _cell(theirs: str, ours: float) -> str:
+    """Theirs, if there is any, and ours in brackets."""
+    return f"{theirs} ({html.number(ours, 4)})".strip()
 
 
 def _cells(quoted: Quoted, ours: float) -> list[str]:

@@ -4,12 +4,14 @@ from equimorph.plotting.charts import chart_domain, parameterisation
 from equimorph.plotting.curvature_map import curvature_map
 from equimorph.plotting.diagram import diagram
 from equimorph.plotting.film import film
+from equimorph.plotting.level_plane import level_plane
 from equimorph.plotting.load_map import load_map
 from equimorph.plotting.margins import margins
 from equimorph.plotting.plane import parameter_plane
 from equimorph.plotting.portraits import portraits
 from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
 from equimorph.plotting.robustness import imperfection_laws, room, sensitivities, trials
+from equimorph.plotting.route_panels import route_panels
 from equimorph.plotting.shapes import shapes
 from equimorph.plotting.solutions import solutions
 from equimorph.plotting.style import house_style, save
@@ -22,6 +24,7 @@ __all__ = [
     "film",
     "house_style",
     "imperfection_laws",
+    "level_plane",
     "load_map",
     "margins",
     "parameter_plane",
@@ -31,6 +34,7 @@ __all__ = [
     "reach_parameters",
     "reach_plane",
     "room",
+    "route_panels",
     "save",
     "sensitivities",
     "shapes",

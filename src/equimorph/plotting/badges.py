@@ -23,9 +23,10 @@ _SPACING = 2.0  # of the points that stand for a curve
 _CROWDED = 6.0
 _COLOUR = style.ROUTE_COLOUR
 _DOT: dict[str, Any] = {"ms": 4, "color": _COLOUR, "mec": "white", "mew": 0.7}
-_BOX: dict[str, Any] = {
+BOX: dict[str, Any] = {
     "boxstyle": "round,pad=0.2,rounding_size=0.6", "fc": "white", "ec": _COLOUR, "lw": 0.6,
 }  # fmt: skip
+"""Frame of a number."""
 _LEADER: dict[str, Any] = {
     "arrowstyle": "-", "color": _COLOUR, "lw": 0.5, "shrinkA": 0, "shrinkB": 0,
 }  # fmt: skip
@@ -64,7 +65,7 @@ def number_points(ax: Axes, places: Places) -> Places:
         offset = (float(middle[0] - here[0]), float(middle[1] - here[1]))
         ax.annotate(
             text, tuple(place.tolist()), offset, textcoords="offset points", size=6.5,
-            ha="center", va="center", zorder=7.5, bbox=_BOX, arrowprops=_LEADER,
+            ha="center", va="center", zorder=7.5, bbox=BOX, arrowprops=_LEADER,
         )  # fmt: skip
     return np.asarray(to_points.inverted().transform(rims))
 

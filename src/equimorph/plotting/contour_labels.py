@@ -21,7 +21,7 @@ def label_contours(ax: Axes, lines: ContourSet, taken: Points) -> None:
         pieces = [np.asarray(p) for p in path.to_polygons(closed_only=False)]
         choices = _choices([(piece - corner) / size for piece in pieces if len(piece) > 1])
         for _ in range(_LABELS_PER_LEVEL):
-            place = _roomiest(choices, full)
+            place = roomiest(choices, full)
             if place is None:
                 break
             full = np.concatenate([full, place[None]])
@@ -38,8 +38,11 @@ def _choices(pieces: list[Points]) -> Points:
     return np.concatenate([np.empty((0, 2)), *long])
 
 
-def _roomiest(choices: Points, full: Points) -> Float[np.ndarray, "2"] | None:
-    """The point farthest from the frame and from all that is taken; None if none is far enough."""
+def roomiest(choices: Points, full: Points) -> Float[np.ndarray, "2"] | None:
+    """The point farthest from the frame and from all that is taken; None if none is far enough.
+
+    In shares of the frame.
+    """
     if not len(choices):
         return None
     room = np.minimum(choices, 1.0 - choices).min(axis=1)

@@ -12,7 +12,7 @@ _LOOKS = {
     "jump": CurveLook("barrier", True, {"linewidth": 1.5, "linestyle": _DASHED}),
     "snap": CurveLook("edge of snapping", True, {"linewidth": 0.8, "linestyle": (0, (3, 1.5))}),
     "gap": CurveLook("edge of a gap", True, {"linewidth": 0.8}),
-    "place": CurveLook("other extremum", False, {"linewidth": 1.0, "linestyle": _DOTTED}),
+    "place": CurveLook("two extrema tie", False, {"linewidth": 1.0, "linestyle": _DOTTED}),
     "edge": CurveLook("", True, {"linewidth": 0.6}),
 }
 

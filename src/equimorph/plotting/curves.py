@@ -7,7 +7,8 @@ from jaxtyping import Bool, Float, Int, Shaped
 
 from equimorph.equilibria import Path, newton
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
+from equimorph.manifold import Division, EquilibriumSet
+from equimorph.manifold.topology import adjacency, pieces
 from equimorph.model import position
 from equimorph.structures import States
 from equimorph.tasks import Route
@@ -24,11 +25,11 @@ def fold_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]
     Vertices of each piece in order, and the lower index of its two sides: 0 on the boundary of
     stability.
     """
-    pieces = []
+    found = []
     for fold in eset.folds:
         low = _lowest_index_beside(eset, fold)
-        pieces += [(fold[a : b + 1], int(low[a])) for a, b in _runs(low)]
-    return pieces
+        found += [(fold[a : b + 1], int(low[a])) for a, b in _runs(low)]
+    return found
 
 
 def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[tuple[Int[np.ndarray, " _"], int]]:
@@ -45,15 +46,30 @@ def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[tuple[Int[np.nda
     -------
     Vertices of each piece in order, and the index of the cells beside it.
     """
-    pieces = []
+    found = []
     for boundary in eset.boundaries:
         vertices = boundary.vertices
         on_box = _along_box(eset, vertices)
         index = _lowest_index_beside(eset, vertices)
         for a, b in _runs(2 * index + on_box):
             if bool(on_box[a]) is box:
-                pieces.append((vertices[a : b + 1], int(index[a])))
-    return pieces
+                found.append((vertices[a : b + 1], int(index[a])))
+    return found
+
+
+def limit_pieces(division: Division) -> list[tuple[Int[np.ndarray, " _"], int]]:
+    """Bound along which a set was divided, cut where the index of its sides changes.
+
+    Returns
+    -------
+    Vertices of each piece in order, and the lower index of its two sides.
+    """
+    facets = adjacency(division.eset.cells).facets
+    found = []
+    for line in pieces(facets[division.on_level[facets].all(axis=1)]):
+        low = _lowest_index_beside(division.eset, line)
+        found += [(line[a : b + 1], int(low[a])) for a, b in _runs(low)]
+    return found
 
 
 def track(eset: EquilibriumSet, states: States) -> Float[np.ndarray, "points 2"]:

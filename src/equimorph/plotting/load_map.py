@@ -13,7 +13,7 @@ _LOOKS = {
     "jump": CurveLook("jump", True, {"linewidth": 0.9, "linestyle": _DASHED}),
     "branch point": CurveLook("branch point", True, {"linewidth": 1.3, "linestyle": _CHAIN}),
     "exchange": CurveLook("stability / constraint", True, {"linewidth": 0.8}),
-    "place": CurveLook("other extremum", False, {"linewidth": 1.0, "linestyle": _DOTTED}),
+    "place": CurveLook("two extrema tie", False, {"linewidth": 1.0, "linestyle": _DOTTED}),
     "kink": CurveLook("kink", False, {"linewidth": 0.7, "linestyle": (0, (2, 1.5))}),
     "edge": CurveLook("", True, {"linewidth": 0.6}),
 }

@@ -49,3 +49,12 @@ def _height(outlines: Outlines, room: float) -> float:
     left, bottom, right, top = _MARGINS
     drawing = (style.SINGLE_COLUMN - left - right) * float(height / width)
     return bottom + top + min(drawing, 1.4 * style.SINGLE_COLUMN)
+
+
+def farthest_apart(outlines: Outlines) -> list[int]:
+    """Where each outline is farthest from its nearest neighbour at the same share of its way."""
+    if len(outlines) == 1:
+        return [outlines.shape[1] // 2]
+    gaps = np.linalg.norm(outlines[:, None] - outlines[None], axis=3)
+    gaps[np.arange(len(outlines)), np.arange(len(outlines))] = np.inf
+    return [int(at) for at in gaps.min(axis=1).argmax(axis=1)]

@@ -18,10 +18,18 @@ from scipy import ndimage
 from equimorph.charts.regions import Regions, count_regions
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
+from equimorph.manifold import EquilibriumSet, divided_by
+from equimorph.model import Constraint
 from equimorph.plotting import style
 from equimorph.plotting.badges import number_way_points
-from equimorph.plotting.curves import boundary_pieces, fold_pieces, intended, track, way_points
+from equimorph.plotting.curves import (
+    boundary_pieces,
+    fold_pieces,
+    intended,
+    limit_pieces,
+    track,
+    way_points,
+)
 from equimorph.plotting.symbols import constraint_label, parameter_label
 from equimorph.tasks import Route
 
@@ -53,6 +61,7 @@ def parameter_plane(
     ax: Axes | None = None,
     *,
     count: str = "all",
+    limit: Constraint | None = None,
 ) -> Axes:
     """Number of equilibria over the parameters, with fold curves and a route.
 
@@ -68,6 +77,8 @@ def parameter_plane(
         Where to draw; None makes a figure one column wide.
     count
         Which equilibria to count: "all" or "stable".
+    limit
+        Its bound is drawn where it meets states that are counted.
 
     Returns
     -------
@@ -91,6 +102,8 @@ def parameter_plane(
         frame_plane(ax, eset)
         largest = shade_regions(ax, eset, regions)
         lines = draw_folds(ax, eset, stable_only=count == "stable")
+        if limit is not None:
+            lines += _draw_limit(ax, eset, limit, stable_only=count == "stable")
         covered = np.empty((0, 2))
         if route is not None and route.path is not None:
             lines.append(draw_track(ax, eset, route, route.path))
@@ -163,6 +176,20 @@ def draw_folds(ax: Axes, eset: EquilibriumSet, *, stable_only: bool = False) -> 
         if low == 0 or not stable_only:
             (kinds[label],) = ax.plot(*eset.coordinates[vertices].T, **looks[label], label=label)
     return [kinds[label] for label in looks if label in kinds]
+
+
+def _draw_limit(
+    ax: Axes, eset: EquilibriumSet, limit: Constraint, *, stable_only: bool
+) -> list[Line2D]:
+    """Draw the bound of a constraint; return one labelled line, if it meets the set."""
+    division = divided_by(eset, limit)
+    places, label = division.eset.coordinates, constraint_label([limit])
+    drawn = [
+        ax.plot(*places[line].T, **style.LIMIT_LINE, zorder=4, label=label)[0]
+        for line, low in limit_pieces(division)
+        if low == 0 or not stable_only
+    ]
+    return drawn[:1]
 
 
 def draw_track(ax: Axes, eset: EquilibriumSet, route: Route, path: Path) -> Line2D:

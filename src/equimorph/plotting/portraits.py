@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from equimorph.errors import InputError
 from equimorph.plotting import style
-from equimorph.plotting.outlines import framed
+from equimorph.plotting.outlines import farthest_apart, framed
 from equimorph.structures import States
 
 _ROOM = 0.1
@@ -46,7 +45,7 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
     with style.house_style():
         ax = framed(states, ax, room=_ROOM)
         colours = style.progress_map()(np.linspace(0.0, 0.8, len(states)))
-        for k, (outline, at) in enumerate(zip(outlines, _places(outlines), strict=True)):
+        for k, (outline, at) in enumerate(zip(outlines, farthest_apart(outlines), strict=True)):
             look = {"color": colours[k], "linestyle": _DASHES[k % len(_DASHES)]}
             ax.plot(*outline.T, linewidth=1.6, zorder=3, **look)
             above = outline[at, 1] >= np.median(outlines[:, at, 1])
@@ -55,12 +54,3 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
                 va="bottom" if above else "top", textcoords="offset points", zorder=5,
             )  # fmt: skip
     return ax
-
-
-def _places(outlines: Float[np.ndarray, "states points 2"]) -> list[int]:
-    """Where each outline is farthest from its nearest neighbour at the same share of its way."""
-    if len(outlines) == 1:
-        return [outlines.shape[1] // 2]
-    gaps = np.linalg.norm(outlines[:, None] - outlines[None], axis=3)
-    gaps[np.arange(len(outlines)), np.arange(len(outlines))] = np.inf
-    return [int(at) for at in gaps.min(axis=1).argmax(axis=1)]

@@ -17,9 +17,9 @@ from equimorph.charts.regions import count_regions
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.badges import number_way_points
-from equimorph.plotting.furniture import draw_supports, frame_shapes
+from equimorph.plotting.numbered import numbered_shapes
 from equimorph.plotting.surface import surface
-from equimorph.plotting.symbols import descriptor_label, parameter_label, with_unit
+from equimorph.plotting.symbols import descriptor_label, parameter_label
 from equimorph.tasks import Reach, Tracking
 
 _HEIGHT = 148 * style.MILLIMETRE
@@ -175,7 +175,7 @@ def reach_panels(reach: Reach, motion: Tracking) -> Figure:
         assert legend is not None
         legend.remove()  # below are all kinds of lines
         reach_parameters(reach, motion, plane)
-        _shapes(shapes, motion)
+        numbered_shapes(shapes, motion.states[np.array(_steps(motion))])
         shapes.set_anchor("C")
         for letter, ax in zip("acd", (image, plane, shapes), strict=True):
             ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
@@ -249,27 +249,3 @@ def _steps(motion: Tracking) -> list[int]:
 
 def _corners(motion: Tracking, line: Line) -> Float[np.ndarray, "corners 2"]:
     return line[_steps(motion)]
-
-
-def _shapes(ax: Axes, motion: Tracking) -> None:
-    """Shapes at the corners, each number at its highest point."""
-    steps = _steps(motion)
-    states = motion.states[np.array(steps)]
-    outlines = states.shape()
-    frame_shapes(ax, outlines, room=0.09)
-    draw_supports(ax, states)
-    seen: list[Float[np.ndarray, "points 2"]] = []
-    colours = style.progress_map()(np.linspace(0.0, 1.0, len(steps)))
-    for number, (outline, colour) in enumerate(zip(outlines, colours, strict=True), start=1):
-        if any(np.abs(outline - other).max() < 1e-6 for other in seen):
-            continue
-        seen.append(outline)
-        ax.plot(*outline.T, color=colour, linewidth=1.3, zorder=2)
-        top = outline[int(outline[:, 1].argmax())]
-        ax.annotate(
-            str(number), top, (0, 2.5), textcoords="offset points", ha="center", va="bottom",
-            color=colour, weight="bold",
-        )  # fmt: skip
-    unit = states.structure.length_unit
-    ax.set_xlabel(with_unit("$x$", unit))
-    ax.set_ylabel(with_unit("$y$", unit))

@@ -29,6 +29,8 @@ INK = "#1a1a1a"
 FAINT = "#8c8c8c"
 HAIRLINE = 0.5
 ROUTE_COLOUR = "#d1004b"
+LIMIT_LINE: dict[str, Any] = {"color": INK, "linewidth": 1.2, "linestyle": (0, (2.4, 1.0))}
+"""Bounds that a set was not cut at: wider than its edges, longer dashes than hidden folds."""
 
 # Lightness (CIE L*) 38, 67, 86, 94: four greys that can be told apart in print.
 INDEX_COLOURS = ("#1f5f99", "#e8902a", "#f3d65c", "#ececec")

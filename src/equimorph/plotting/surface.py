@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -13,10 +13,16 @@ from mpl_toolkits.mplot3d import Axes3D
 
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
-from equimorph.model import Descriptor
+from equimorph.manifold import EquilibriumSet, divided_by
+from equimorph.model import Constraint, Descriptor
 from equimorph.plotting import style
-from equimorph.plotting.curves import boundary_pieces, fold_pieces, states_along, track
+from equimorph.plotting.curves import (
+    boundary_pieces,
+    fold_pieces,
+    limit_pieces,
+    states_along,
+    track,
+)
 from equimorph.plotting.scene import Curve, Scene
 from equimorph.plotting.shading import Paint, corner_normals
 from equimorph.plotting.symbols import constraint_label, descriptor_label, parameter_label
@@ -27,9 +33,10 @@ Cells = Float[np.ndarray, "cells 3 3"]
 Pieces = Float[np.ndarray, "pieces 3 3"]
 
 _ELEVATION, _AZIMUTH = 23.0, 125.0
-_ASPECT = np.array([1.2, 1.3, 1.0])
+ASPECT = np.array([1.2, 1.3, 1.0])
 _ZOOM = 1.17
 _LINES_PER_TICK = 2
+_BEYOND = 0.55  # share of white in the colours beyond a limit
 _ROUTE_POINTS = 240
 # The route runs on the exact surface, which is curved between the vertices of the drawn one.
 _ROUTE_SLACK = 0.015
@@ -42,6 +49,7 @@ _CROSSING: dict[str, Any] = {
     "linewidth": 1.5,
     "linestyle": (0, (4, 1.2, 1, 1.2)),
 }
+_LIMIT = style.LIMIT_LINE
 _HIDDEN_FOLD: dict[str, Any] = {
     "color": style.INK,
     "linewidth": 0.6,
@@ -68,6 +76,8 @@ def surface(
     height_descriptor: Descriptor,
     ax: Axes | None = None,
     route: Route | Tracking | None = None,
+    *,
+    limit: Constraint | None = None,
 ) -> Axes:
     """Equilibrium surface in three dimensions: two free parameters and a descriptor.
 
@@ -84,6 +94,8 @@ def surface(
         Three-dimensional axes to draw on; None makes a figure one and a half columns wide.
     route
         Route or motion, drawn with its start and goal; one without a path is left out.
+    limit
+        The set is cut along its bound, and paler where it is not obeyed.
 
     Returns
     -------
@@ -99,17 +111,26 @@ def surface(
             ax = _new_axes()
         elif ax.name != "3d":
             raise InputError(f'`ax` must be three-dimensional (projection="3d"); got {ax.name!r}.')
+        beyond = np.zeros(len(eset.cells), bool)
+        bounds: list[Int[np.ndarray, " _"]] = []
+        if limit is not None:
+            division = divided_by(eset, limit)
+            eset, beyond = division.eset, division.side > 0
+            bounds = [line for line, _ in limit_pieces(division)]
         heights = np.asarray(height_descriptor(eset.points))
         points = np.column_stack([eset.coordinates, heights])
         _frame(ax, eset, height_descriptor, points)
         curves, legend = _curves(eset, points)
+        if limit is not None:
+            curves += [Curve(points[line], _LIMIT | {"path_effects": _RIM}) for line in bounds]
+            legend.append(Line2D([], [], **_LIMIT, label=constraint_label([limit])))
         if route is not None and route.path is not None:
             states = states_along(route.path, _ROUTE_POINTS)
             places = np.column_stack([track(eset, states), height_descriptor(states)])
             curves.append(Curve(places, _ROUTE, _HIDDEN_ROUTE, slack=_ROUTE_SLACK))
             legend.append(_route_entry(route.status, route.path))
             _draw_ends(ax, places)
-        ax.add_artist(Scene(points[eset.cells], _paint(ax, eset, points), curves))
+        ax.add_artist(Scene(points[eset.cells], _paint(ax, eset, points, beyond), curves))
         ax.legend(handles=legend, loc="upper center", ncols=4, bbox_to_anchor=(0.53, 1.0))
     return ax
 
@@ -118,14 +139,14 @@ def _new_axes() -> Axes:
     """Axes that fill a figure; room for the labels is inside them."""
     figure = Figure(figsize=(0.72 * style.DOUBLE_COLUMN, 0.58 * style.DOUBLE_COLUMN))
     style.attach_canvas(figure)
-    return figure.add_axes((-0.045, 0.0, 1.0, 0.98), projection="3d")
+    return figure.add_axes((-0.045, 0.03, 1.0, 0.95), projection="3d")
 
 
 def _frame(ax: Axes3D, eset: EquilibriumSet, height: Descriptor, points: Points) -> None:
     """View, limits, labels and a quiet background."""
     ax.set_proj_type("ortho")
     ax.view_init(elev=_ELEVATION, azim=_AZIMUTH)
-    ax.set_box_aspect(_ASPECT, zoom=_ZOOM)
+    ax.set_box_aspect(ASPECT, zoom=_ZOOM)
     ax.computed_zorder = False
     low, high = points.min(axis=0), points.max(axis=0)
     room = 0.02 * (high - low)
@@ -155,11 +176,15 @@ def _curves(eset: EquilibriumSet, points: Points) -> tuple[list[Curve], list[Pat
     return curves, _legend(eset, bool(folds), bool(caps))
 
 
-def _paint(ax: Axes3D, eset: EquilibriumSet, points: Points) -> Paint:
+def _paint(
+    ax: Axes3D, eset: EquilibriumSet, points: Points, beyond: Bool[np.ndarray, " cells"]
+) -> Paint:
     """Cells in the colours of their indices, with thin lines at even steps of the parameters."""
     limits = np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()])
-    proportions = _ASPECT / np.ptp(limits, axis=1)
+    proportions = ASPECT / np.ptp(limits, axis=1)
     palette = np.array([style.rgba(style.index_colour(k))[:3] for k in range(1 + eset.index.max())])
+    colours = palette[eset.cell_index]
+    colours[beyond] += _BEYOND * (1.0 - colours[beyond])
     steps = [np.diff(style.few_ticks().tick_values(*ends))[0] for ends in limits[:2]]
     return Paint(
         corner_normals(
@@ -169,7 +194,7 @@ def _paint(ax: Axes3D, eset: EquilibriumSet, points: Points) -> Paint:
             np.unique(np.concatenate([np.zeros(0, int), *eset.crossings])),
         ),
         proportions,
-        palette[eset.cell_index],
+        colours,
         tuple(float(step) / _LINES_PER_TICK for step in steps),
         style.rgba(style.INK)[:3],
     )

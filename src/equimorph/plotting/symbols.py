@@ -49,7 +49,8 @@ def parameter_label(structure: Structure, name: str) -> str:
 
 def descriptor_label(descriptor: Descriptor) -> str:
     """Axis label of a descriptor."""
-    return with_unit(descriptor.symbol or symbol(descriptor.name), descriptor.unit)
+    printed = _SYMBOLS.get(descriptor.name) or descriptor.symbol or symbol(descriptor.name)
+    return with_unit(printed, descriptor.unit)
 
 
 def constraint_label(constraints: Sequence[Constraint]) -> str:

@@ -1,0 +1,91 @@
+"""A route on its set: surface, parameter plane and shapes side by side."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Constraint, Descriptor
+from equimorph.plotting import style
+from equimorph.plotting.curves import corner_steps, track
+from equimorph.plotting.numbered import number_in_space, numbered_shapes
+from equimorph.plotting.plane import parameter_plane
+from equimorph.plotting.surface import ASPECT, surface
+from equimorph.tasks import Route
+
+_HEIGHT = 108 * style.MILLIMETRE
+_ZOOM = 1.06
+_SOLID, _PLANE, _SHAPES = (
+    (-0.04, 0.12, 0.6, 0.88),
+    (0.68, 0.575, 0.235, 0.38),
+    (0.68, 0.13, 0.3, 0.34),
+)
+
+
+def route_panels(
+    eset: EquilibriumSet,
+    route: Route,
+    height_descriptor: Descriptor,
+    *,
+    limit: Constraint | None = None,
+) -> Figure:
+    """Draw a route on the surface, over the parameters, and the shapes at its way-points.
+
+    The way-points are numbered alike in all panels; the plane is shaded by the number of stable
+    equilibria.
+
+    Parameters
+    ----------
+    eset
+        Equilibrium set over two free parameters.
+    route
+        A route that arrived.
+    height_descriptor
+        Third axis of the surface.
+    limit
+        The surface is paler where it is not obeyed; its bound is drawn in both panels.
+
+    Returns
+    -------
+    The figure, two columns wide.
+
+    Raises
+    ------
+    InputError
+        For a route that did not arrive.
+    """
+    if route.path is None or route.schedule is None:
+        raise InputError(f"`route` must have arrived; got one that was refused: {route.why}")
+    figure = style.attach_canvas(Figure(figsize=(style.DOUBLE_COLUMN, _HEIGHT)))
+    with style.house_style():
+        solid: Any = figure.add_axes(_SOLID, projection="3d")
+        plane, shapes = figure.add_axes(_PLANE), figure.add_axes(_SHAPES)
+        surface(eset, height_descriptor, solid, route, limit=limit)
+        solid.set_box_aspect(ASPECT, zoom=_ZOOM)
+        entries = {each.get_label(): each for each in _taken_legend(solid)}
+        parameter_plane(eset, route, plane, count="stable", limit=limit)
+        _taken_legend(plane)
+        states = route.path.states[corner_steps(route)]
+        corners = np.column_stack([track(eset, states), height_descriptor(states)])
+        number_in_space(solid, corners)
+        numbered_shapes(shapes, states)
+        for letter, ax in (("b", plane), ("c", shapes)):
+            ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
+        figure.text(0.012, 0.962, "(a)", weight="bold", size=8)
+        figure.legend(
+            handles=list(entries.values()), loc="lower center", ncols=4, bbox_to_anchor=(0.5, 0.0)
+        )
+    return figure
+
+
+def _taken_legend(ax: Axes) -> list[Artist]:
+    """Take the legend of a panel away, and return its entries."""
+    legend = ax.get_legend()
+    assert legend is not None
+    entries = [entry for entry in legend.legend_handles if entry is not None]
+    legend.remove()
+    return entries
