@@ -4,7 +4,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from equimorph.paper import curvatures, inside_out, introduction, limit_loads, spring, tracking
+from equimorph.paper import (
+    curvatures,
+    inside_out,
+    introduction,
+    limit_loads,
+    parameterisations,
+    spring,
+    tracking,
+)
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,20 @@ EXAMPLES = (
             "middle with Θ = 0.9, Δ = 0 (start, dark), turns its ends until its points at s = 1/3 "
             "and 2/3 are 0.23 L and 0.10 L high (goal, light); thin: states on the way, all "
             "stable.",
+        },
+    ),
+    Example(
+        "parameterisations",
+        "Internal parameterisations",
+        parameterisations.main,
+        {
+            "parameterisations": "Equilibrium sets of the arch under the uniform load q = 2.5 "
+            "(above; crown over both end angles, cut at max |κ| = 10, near a cusp of its folds) "
+            "and their internal parameterisations (below). (a) Projection to Θ and Δ gives every "
+            "state its own place. (b) It fails where two states lie over one setting "
+            "(hatched crosswise), and the height y(2/3) with Δ works. (c) Reduction to the state "
+            "with the highest crown leaves a barrier (thick), over which neighbours jump, and a "
+            "gap (hatched), over which no state is. (d) Dissection in three charts.",
         },
     ),
     Example(

@@ -53,6 +53,8 @@ _NO_ONE = "F = k (1 − x_l/cos δ) sin δ is {} k there, not 1."
 _FIXED = "(0.40, 0.90) lies on the level 0.0089 k, C_s on 0.0099 k."
 
 QUOTED = (
+    Quoted("parameterisations", "(d) charts", "charts of the dissection in panel (d)", 3.0),
+    Quoted("parameterisations", "(c) barriers", "barriers of the reduction in panel (c)", 1.0),
     Quoted("spring", "free parameters of the set", "d of the set over x_l and F", 2.0),
     Quoted("spring", "x_l of the cusp", "x_l beyond which all states are stable", 1.0),
     Quoted("spring", "load of C_s", "F at C_s = (0.62, 0.80)", 1.0, _NO_ONE.format(0.0099)),
