@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from equimorph.errors import InputError
-from equimorph.study import parse_study, prepare
+from equimorph.study import parse_study, prepare, read_problem
 from equimorph.study.template import KINDS, template, write_template
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -11,7 +11,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_template_is_a_sound_study(kind: str):
-    problem = prepare(parse_study(template(kind), kind))
+    problem = prepare(parse_study(template(kind), kind, EXAMPLES))
     assert problem.tasks
 
 
@@ -25,6 +25,13 @@ def test_a_file_that_exists_is_kept(tmp_path: Path):
     with pytest.raises(InputError, match="must not exist yet"):
         write_template(tmp_path / "a.toml", "arch")
     assert (tmp_path / "a.toml").read_text() == "mine"
+
+
+def test_the_data_of_a_template_come_with_it(tmp_path: Path):
+    write_template(tmp_path / "mine.toml", "calibration")
+    data = (EXAMPLES / "calibration.csv").read_text()
+    assert (tmp_path / "calibration.csv").read_text() == data
+    assert read_problem(tmp_path / "mine.toml")[2].tasks
 
 
 def test_another_ending_is_refused(tmp_path: Path):

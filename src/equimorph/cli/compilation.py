@@ -13,7 +13,7 @@ from equimorph.equilibria import find_equilibria, limit_load
 from equimorph.equilibria.stepping.kernels import proceed
 from equimorph.linalg.compiled import is_kept
 from equimorph.manifold import equilibrium_set
-from equimorph.model import Box
+from equimorph.model import Box, Constraint
 from equimorph.structures import Spring
 from equimorph.study import Problem
 
@@ -50,11 +50,15 @@ def march() -> None:
 
 def evaluate(problem: Problem) -> None:
     """Evaluate everything that the structure of a study knows of one state."""
-    structure, extent = problem.structure, next(iter(problem.extents.values()))
-    box, fixed, constraints = extent.box, extent.fixed, extent.constraints
-    values = {each.name: each.default for each in structure.parameters}
-    values |= dict(zip(box.names, (box.lower + box.upper) / 2, strict=True))
-    values |= dict(fixed) | dict(structure.unloaded())
+    structure, values = problem.structure, dict[str, float]()
+    constraints: tuple[Constraint, ...] = ()
+    for each in structure.parameters:
+        values[each.name] = 0.3 * each.scale if each.default is None else each.default
+    for extent in [*problem.extents.values()][:1]:
+        box, constraints = extent.box, extent.constraints
+        values |= dict(zip(box.names, (box.lower + box.upper) / 2, strict=True))
+        values |= dict(extent.fixed)
+    values |= dict(structure.unloaded())
     p = np.array([[values[each.name] for each in structure.parameters]])
     structure.natural(p)
     z = structure.sample(p, np.random.default_rng(0))  # natural states need not exist here
@@ -66,5 +70,5 @@ def evaluate(problem: Problem) -> None:
     structure.resolved(z, p)
     structure.error_estimate(z, p)
     structure.shape(z, p)
-    for each in (problem.ground.height, *(limit.descriptor for limit in constraints)):
-        each.function(z, p)
+    for shown in (problem.ground.height, *(limit.descriptor for limit in constraints)):
+        shown.function(z, p)

@@ -1,5 +1,6 @@
 """Figures and films of results; nothing else in the package draws."""
 
+from equimorph.plotting.calibration import calibration
 from equimorph.plotting.charts import chart_domain, parameterisation
 from equimorph.plotting.curvature_map import curvature_map
 from equimorph.plotting.diagram import diagram
@@ -18,6 +19,7 @@ from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 
 __all__ = [
+    "calibration",
     "chart_domain",
     "curvature_map",
     "diagram",

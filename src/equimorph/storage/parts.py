@@ -10,12 +10,13 @@ import h5py
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.storage import map_group, record_group, route_group, set_group, states_group
-from equimorph.storage.hdf import content, opened
-from equimorph.structures import State, States, Structure
-from equimorph.tasks import ActuatorMap, Route
+from equimorph.storage.hdf import content, get_json, opened, put_json
+from equimorph.structures import State, States, Structure, from_identity
+from equimorph.tasks import ActuatorMap, Calibration, Route
 
 FORMAT = "an equimorph checkpoint"
 VERSION = 1
+STRUCTURE, FOUND = "structure", "found"
 START, GOAL, ROUTE = "start", "goal", "route"
 
 Answer = TypeVar("Answer")
@@ -88,6 +89,21 @@ def _read_journey(group: h5py.Group, structure: Structure) -> Journey:
 
 JOURNEY_PART: Part[Journey] = Part("journey", _write_journey, _read_journey)
 
+
+def _write_calibration(group: h5py.Group, found: Calibration) -> None:
+    put_json(group, STRUCTURE, found.states.structure.identity())
+    record_group.write(group.create_group(FOUND), found)
+
+
+def _read_calibration(group: h5py.Group, _: Structure) -> Calibration:
+    fitted = from_identity(get_json(group, STRUCTURE))
+    found = record_group.read(group[FOUND], fitted)
+    assert isinstance(found, Calibration)
+    return found
+
+
+CALIBRATION_PART: Part[Calibration] = Part("calibration", _write_calibration, _read_calibration)
+"""Calibrations: their states belong to a structure with the data that were found."""
 
 RECORD_PART: Part[Any] = Part("record", record_group.write, record_group.read)
 """Results of tasks that are records."""

@@ -21,6 +21,7 @@ from equimorph.study.sections.robustness import (
 )
 from equimorph.study.sections.structures import StructureSection
 from equimorph.study.sections.tasks import (
+    CalibrationSection,
     EstimateSection,
     MapSection,
     OptimumSection,
@@ -52,6 +53,7 @@ class Study(Section):
     snaps: list[SnapSection] = Field(default_factory=list, alias="snap")
     trials: list[TrialsSection] = Field(default_factory=list, alias="trials")
     estimates: list[EstimateSection] = Field(default_factory=list, alias="estimate")
+    calibrations: list[CalibrationSection] = Field(default_factory=list, alias="calibration")
     maps: list[MapSection] = Field(default_factory=list, alias="map")
 
     @property
@@ -75,7 +77,7 @@ class Study(Section):
             if self.equilibria or any(section.needs_set for section in asked):
                 raise requirement("have a [set] to which its equilibria and questions belong")
             if not asked:
-                raise requirement("ask for something: a [set] or a [[map]]")
+                raise requirement("ask for something: a [set], a [[map]] or a [[calibration]]")
         return self
 
 
@@ -104,7 +106,7 @@ def parse_study(text: str, name: str, folder: Path | None = None) -> Study:
     name
         Name of the file, for messages.
     folder
-        Where schedules lie that the study names; None: where the process is.
+        Where files lie that the study names, schedules or data; None: where the process is.
 
     Raises
     ------

@@ -183,10 +183,10 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
         (staging / INPUT_COPY).write_text(text, encoding="utf-8")
         for each in outcome.answers:
             each.asked.kind.write_tables(each.asked.task, each.answer, staging)
-        if not folder.holds([RESULTS]):
+        eset, maps = outcome.equilibrium_set, outcome.of("map")
+        if (eset is not None or maps) and not folder.holds([RESULTS]):
             routes = {name: journey.route for name, journey in outcome.of("route").items()}
-            eset, height = outcome.equilibrium_set, outcome.problem.ground.height
-            maps = outcome.of("map")
+            height = outcome.problem.ground.height
             write_results(staging / RESULTS, eset, height, routes, outcome.points, maps)
 
 

@@ -1,13 +1,14 @@
 """Studies to begin with: the examples, as they are shipped."""
 
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from equimorph.errors import InputError
 
 KINDS = (
-    *("arch", "arm", "beam", "bridge", "column", "deep_arch", "lee", "maps", "network", "spring"),
-    *("stack", "strip", "tasks", "truss"),
+    *("arch", "arm", "beam", "bridge", "calibration", "column", "deep_arch", "lee", "maps"),
+    *("network", "spring", "stack", "strip", "tasks", "truss"),
 )
 
 
@@ -21,11 +22,15 @@ def template(kind: str) -> str:
     """
     if kind not in KINDS:
         raise InputError(f"`kind` must be one of {', '.join(KINDS)}; got {kind!r}.")
-    return files("equimorph.study").joinpath(f"templates/{kind}.toml").read_text(encoding="utf-8")
+    return _shipped(f"{kind}.toml").read_text(encoding="utf-8")
+
+
+def _shipped(name: str) -> Traversable:
+    return files("equimorph.study").joinpath(f"templates/{name}")
 
 
 def write_template(path: Path, kind: str) -> None:
-    """Write an example study to a file that does not exist yet.
+    """Write an example study to a file that does not exist yet, and its data beside it.
 
     Raises
     ------
@@ -34,9 +39,18 @@ def write_template(path: Path, kind: str) -> None:
     """
     if path.suffix != ".toml":
         raise InputError(f"`study file` must end in .toml; got {path.name!r}.")
+    texts = {path: template(kind)}
+    data = _shipped(f"{kind}.csv")
+    if data.is_file():
+        texts[path.with_name(data.name)] = data.read_text(encoding="utf-8")
+    for each, text in texts.items():
+        _write_new(each, text)
+
+
+def _write_new(path: Path, text: str) -> None:
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(template(kind))
+            file.write(text)
     except FileExistsError as error:
         raise InputError(f"`study file` must not exist yet; got {path}.") from error
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from equimorph.study.kinds.calibration import CalibrationKind
 from equimorph.study.kinds.estimate import EstimateKind
 from equimorph.study.kinds.imperfection import ImperfectionKind
 from equimorph.study.kinds.kind import Kind
@@ -30,5 +31,6 @@ KINDS: tuple[Kind[Any, Any, Any], ...] = (
     SnapKind(),
     TrialsKind(),
     EstimateKind(),
+    CalibrationKind(),
     MapKind(),
 )

@@ -6,6 +6,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from equimorph.study.expressions import LARGEST
 from equimorph.study.names import PLANE, STABLE_PLANE
+from equimorph.study.sections.data import DataFile
 from equimorph.study.sections.extent import StateSection
 from equimorph.study.sections.fields import (
     ComparisonText,
@@ -92,6 +93,20 @@ class EstimateSection(TaskSection):
     measured: dict[str, Number] = Field(min_length=1)
     errors: dict[str, Annotated[float, Field(gt=0, le=LARGEST)]] = Field(min_length=1)
     confidence: float = Field(default=0.95, gt=0.5, lt=1.0)
+
+
+class CalibrationSection(TaskSection):
+    """Unknown parameters or data from measured points of shapes; see `equimorph.calibrate`."""
+
+    data: DataFile
+    unknown: dict[str, Literal["value", "offset", "gain", "data"]] = Field(min_length=1)
+    at: Point = Field(default_factory=dict)
+    sigma: float | None = Field(default=None, gt=0, le=LARGEST)
+
+    @property
+    def needs_set(self) -> bool:
+        """It begins with natural states."""
+        return False
 
 
 class MapSection(TaskSection):

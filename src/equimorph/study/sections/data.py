@@ -1,0 +1,64 @@
+"""Measured data beside a study file: a table of numbers, read with the study."""
+
+import csv
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
+
+from equimorph.study.expressions import LARGEST
+from equimorph.study.sections.fields import Section, requirement
+from equimorph.study.sections.ways import FOLDER
+
+MOST_ROWS = 100_000
+"""Of a table."""
+
+
+class DataTable(Section):
+    """Content of a CSV file: the answers of a study depend on it as on the study itself."""
+
+    file: str
+    columns: list[str]
+    rows: list[list[float | None]]
+    """Numbers; None where an entry is empty."""
+
+
+def _read(given: Any, info: Any) -> Any:
+    """Read the file of a name; `FOLDER` of the context is where the study file lies."""
+    if not isinstance(given, str) or Path(given).name != given or not given.endswith(".csv"):
+        raise requirement("be the name of a CSV file that lies beside the study file")
+    folder = Path((info.context or {}).get(FOLDER, "."))
+    try:
+        text = (folder / given).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise requirement(f"be a readable file beside the study file ({reason})") from error
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip(" ,;\t")]
+    lines = [(k, line) for k, line in lines if not line.startswith("#")]
+    if not 2 <= len(lines) <= MOST_ROWS:
+        raise requirement(f"hold a line of column names, and from 1 to {MOST_ROWS} of numbers")
+    columns, *rows = ([cell.strip() for cell in cells] for cells in csv.reader(x for _, x in lines))
+    if len(set(columns)) < len(columns) or "" in columns:
+        raise requirement("give every column a name of its own in its first line")
+    numbers = [_numbers(k, row, columns) for (k, _), row in zip(lines[1:], rows, strict=True)]
+    return {"file": given, "columns": columns, "rows": numbers}
+
+
+def _numbers(line: int, row: list[str], columns: list[str]) -> list[float | None]:
+    if len(row) != len(columns):
+        raise requirement(f"have {len(columns)} entries in each line (line {line} has {len(row)})")
+    return [None if cell == "" else _number(cell, line) for cell in row]
+
+
+def _number(cell: str, line: int) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) <= LARGEST:
+        raise requirement(f"hold numbers up to {LARGEST:g} with a point (line {line}: {cell!r})")
+    return value
+
+
+DataFile = Annotated[DataTable, BeforeValidator(_read)]
+"""Name of a CSV file in a study, with its content."""
