@@ -7,6 +7,7 @@ constraint. New ends are new equilibria.
 
 import numpy as np
 
+from equimorph.errors import InputError
 from equimorph.manifold.directly import lift_directly
 from equimorph.manifold.hard import trace
 from equimorph.manifold.pairing import HARD, LONG, UNTRACED, Pairing, Rays
@@ -16,6 +17,8 @@ from equimorph.model import Progress
 STEPS = 4
 """Into so many equal steps long edges are cut before they count as hard."""
 CHUNK = 4096
+ENDLESS = 250
+"""More equilibria than this over one point, and the set is refused: it may wind for ever."""
 
 
 def flood(pairing: Pairing, progress: Progress) -> None:
@@ -42,8 +45,24 @@ def flood_directly(pairing: Pairing, progress: Progress) -> None:
     pairing.fit()
     while len((rays := pairing.marked(UNTRACED)).points):
         _lift(pairing, rays, 1)
+        _refuse_endless(pairing)
         live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == GRID)
         progress.report("lifting edges", int(live), None)
+
+
+def _refuse_endless(pairing: Pairing) -> None:
+    """Raise InputError if a set grows without end, like one that winds around a circle for ever."""
+    store, setting = pairing.points, pairing.setting
+    vertex = store.vertex[: store.count]
+    sheets = np.bincount(vertex[vertex >= 0], minlength=1)
+    if sheets.max() > ENDLESS:
+        p = setting.parameters(pairing.mesh.vertices[sheets.argmax()][None])[0, setting.free]
+        names = [setting.structure.parameters[place].name for place in setting.free]
+        point = ", ".join(f"{name} = {value:g}" for name, value in zip(names, p, strict=True))
+        raise InputError(
+            f"`within` must leave at most {ENDLESS} equilibria over a point; got more over "
+            f"{point}. The set may wind for ever: bound a descriptor that grows as it winds."
+        )
 
 
 def _one_of_each_pair(pairing: Pairing, rays: Rays) -> Rays:
