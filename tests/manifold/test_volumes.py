@@ -11,8 +11,9 @@ from equimorph.manifold import (
     refine,
     stability_distance,
 )
+from equimorph.manifold.reconnection import dihedral_angles
 from equimorph.manifold.simplices import volumes
-from equimorph.manifold.topology import euler_characteristic
+from equimorph.manifold.topology import adjacency, euler_characteristic, orientation
 from equimorph.manifold.volumes import volumes_over
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
@@ -49,6 +50,12 @@ def projected_volume(eset: EquilibriumSet, index: int) -> float:
     """Volume over the box of the cells of an index."""
     corners = eset.coordinates[eset.cells[eset.cell_index == index]]
     return float(np.abs(volumes(corners)).sum())
+
+
+def folded_over(eset: EquilibriumSet, volume: np.ndarray) -> np.ndarray:
+    """Cells whose signed volume over coordinates of the whole set differs from most in sign."""
+    own = volume * orientation(eset.cells, adjacency(eset.cells))[0]
+    return own * np.sign(own.sum()) < 0.0
 
 
 def test_sheets_that_never_meet_are_balls():
@@ -166,16 +173,21 @@ def test_refined_three_sphere_is_within_the_accuracy():
     """| |x| − 1 | inside the tetrahedra; the volume below each half tends to 4π/3."""
     eset = lifted(ball(), BOX, (5, 6, 5))
     with unchecked():
-        fine = refine(eset, 0.03)
+        fine = refine(eset, 0.05)
     assert_faithful(fine)
     assert topology(fine) == topology(eset)
+    # seen from the middle of the sphere no cell is turned over, and few are slender
+    whole = np.concatenate([fine.points.z, fine.coordinates], axis=1)
+    assert not folded_over(fine, np.linalg.det(whole[fine.cells])).any()
+    assert fine.audit.smallest_dihedral > 0.0
+    assert np.mean(np.degrees(dihedral_angles(whole, fine.cells)).min(axis=1) < 10.0) < 0.1
     place = np.concatenate([fine.points.z, fine.coordinates], axis=1)
     inside = np.random.default_rng(0).dirichlet(np.ones(4), len(fine.cells))
     middle = np.einsum("ck,ckd->cd", inside, place[fine.cells])
-    assert np.abs(np.linalg.norm(middle, axis=1) - 1.0).max() <= 0.03
-    assert fine.audit.deviation <= 0.03
+    assert np.abs(np.linalg.norm(middle, axis=1) - 1.0).max() <= 0.05
+    assert fine.audit.deviation <= 0.05
     for index in (0, 1):
-        assert projected_volume(fine, index) == pytest.approx(4 * np.pi / 3, rel=0.03)
+        assert projected_volume(fine, index) == pytest.approx(4 * np.pi / 3, rel=0.04)
 
 
 def test_volume_of_the_bistable_region_of_the_spring():
@@ -183,7 +195,14 @@ def test_volume_of_the_bistable_region_of_the_spring():
     box = Box(x_l=(0.5, 1.2), F=(-0.3, 0.3), k=(1.0, 1.2))
     with unchecked():
         eset = refine(lifted(Spring(), box, (10, 9, 2)), 0.01)
-    assert eset.audit.clean, eset.audit
+    assert_faithful(eset)
+    # the set is a graph over the angle, the actuator and the stiffness
+    along = np.stack([eset.points.z[:, 0], eset.points["x_l"], eset.points["k"]], axis=1)
+    size = volumes(along[eset.cells])
+    turned = folded_over(eset, size)
+    # slivers where the fold leaves through a side of the box
+    assert turned.mean() < 5e-3
+    assert np.abs(size[turned]).sum() < 5e-4 * np.abs(size).sum()
     x = np.linspace(0.5, 1.0, 20001)
     area = np.trapezoid(2 * (1 - np.cbrt(x) ** 2) ** 1.5, x)
     wanted = area * (1.2**2 - 1) / 2

@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.topology import (
     adjacency,
+    faces_of,
     flags_of,
     labels,
     orientation,
@@ -27,6 +28,24 @@ def assert_faithful(eset: EquilibriumSet) -> None:
     assert_orientation_alternates(eset)
     assert_folds_part_indices(eset)
     assert_boundaries(eset)
+    if len(eset.names) == 3:
+        assert_links(eset)
+
+
+def assert_links(eset: EquilibriumSet) -> None:
+    """Around every vertex of a set over three parameters, cells form a ball, or half of one.
+
+    Its link is a sphere, or a disc at the boundary of the set: vertices − edges + triangles.
+    """
+    count = len(eset.points)
+    amounts = [
+        np.bincount(faces.ravel(), minlength=count)
+        for faces in (faces_of(eset.cells, 2), faces_of(eset.cells, 3), eset.cells)
+    ]
+    whole = adjacency(eset.cells)
+    rim = np.zeros(count, bool)
+    rim[whole.facets[whole.counts == 1]] = True
+    assert np.array_equal(amounts[0] - amounts[1] + amounts[2], np.where(rim, 1, 2))
 
 
 def assert_exact(eset: EquilibriumSet) -> None:

@@ -20,7 +20,8 @@ class Audit:
 
     Of refined sets: the `accuracy` that was asked for, the largest `deviation` of straight cells
     from the set as their edges show it, how many edges are `unrefined` (they could not be
-    bisected), and the `smallest_angle` of the triangles in degrees. All are zero otherwise.
+    bisected), the `smallest_angle` of the triangles in degrees, and the `smallest_dihedral` angle
+    of the tetrahedra. All are zero otherwise.
     """
 
     vertices: int
@@ -46,6 +47,7 @@ class Audit:
     unrefined: int = 0
     smallest_angle: float = 0.0
     crossings: int = 0
+    smallest_dihedral: float = 0.0
 
     @property
     def missing_at_most(self) -> float:
@@ -81,6 +83,8 @@ class Audit:
             ("edges too long", str(self.unrefined)),
             ("smallest angle", f"{self.smallest_angle:.1f}°"),
         ]
+        if self.smallest_dihedral:
+            refined.append(("smallest dihedral angle", f"{self.smallest_dihedral:.1f}°"))
         return [
             ("equilibria (vertices)", str(self.vertices)),
             ("cells", str(self.cells)),

@@ -18,6 +18,7 @@ from equimorph.manifold.parting import Parts, closed_surfaces, part
 from equimorph.manifold.pins import Pinned, pin
 from equimorph.manifold.points import AMID, CAP, CORNER, FOLD
 from equimorph.manifold.spheres import Surfaces, find_spheres
+from equimorph.manifold.topology import distinct
 
 
 @dataclass(frozen=True)
@@ -92,8 +93,7 @@ def _grouped(
 ) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
     """Distinct points of each group, in order: their groups and their numbers."""
     base = int(points.max(initial=0)) + 1
-    keys = np.sort((group[:, None] * base + points).ravel())
-    at, own = np.divmod(keys[np.diff(keys, prepend=-1) > 0], base)
+    at, own = np.divmod(distinct((group[:, None] * base + points).ravel()), base)
     return at, own
 
 

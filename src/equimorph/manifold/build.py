@@ -30,7 +30,7 @@ from equimorph.structures import Structure
 
 COARSE = {1: 12, 2: 12, 3: 7}
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
-BISECTIONS = {1: 12, 2: 24, 3: 30}
+BISECTIONS = {1: 12, 2: 24, 3: 60}
 """Rounds by the number of free parameters: each cuts the longest edges of doubtful cells."""
 GRIDS = 3
 """Grids that are tried, each with twice the intervals, until refinement succeeds everywhere."""

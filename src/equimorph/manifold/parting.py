@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.manifold.spheres import Surfaces, rings
-from equimorph.manifold.topology import keys_of, labels
+from equimorph.manifold.topology import distinct, keys_of, labels
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,6 @@ def _of_regions(
 def _characteristics(closed: Closed, base: int) -> Int[np.ndarray, " S"]:
     """Euler characteristic of each closed surface: vertices less half the triangles."""
     count = len(closed.owner)
-    keys = np.sort((closed.surface[:, None] * base + closed.corners).ravel())
-    own = keys[np.diff(keys, prepend=-1) > 0] // base
+    own = distinct((closed.surface[:, None] * base + closed.corners).ravel()) // base
     triangles = np.bincount(closed.surface, minlength=count)
     return np.asarray(np.bincount(own, minlength=count) - triangles // 2)

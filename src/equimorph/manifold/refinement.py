@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
+from equimorph.manifold.collapsing import collapse_edges
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.fabric import (
     HOLE,
@@ -24,6 +25,7 @@ from equimorph.manifold.fabric import (
 )
 from equimorph.manifold.on_edges import on_edges
 from equimorph.manifold.pairing import Setting
+from equimorph.manifold.reconnection import reconnect, smallest_dihedral
 from equimorph.manifold.surgery import collapse, flip, smallest_angle
 from equimorph.manifold.tangents import Cubics
 from equimorph.manifold.topology import keys_of
@@ -32,6 +34,10 @@ from equimorph.model import Progress, Silent
 ROUNDS = 200
 TIDIED = 1
 """How often slivers are taken away in between."""
+ALTERNATIONS, FEWER = 8, 0.98
+"""How often tetrahedra are reconnected and vertices taken out, as long as cells get fewer."""
+GROWN = 1.6
+"""How much more tetrahedra there are when slivers are taken away anew."""
 SHARE = {1: 1.0, 2: 0.75, 3: 2.0 / 3.0}
 """Part of the tolerance that edges may use up: inside a cell their deviations add up to 2d/(d + 1)
 of the largest."""
@@ -104,6 +110,7 @@ def refine(
         deviation=float(edges.error.max(initial=0.0) / SHARE[len(free)]),
         unrefined=int((edges.error > SHARE[len(free)] * accuracy).sum()),
         smallest_angle=smallest_angle(fabric),
+        smallest_dihedral=smallest_dihedral(fabric),
     )
     return replace(out, audit=quality)
 
@@ -155,7 +162,7 @@ class _Memory:
 
 def _refined(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progress) -> Fabric:
     """Bisect and flip until nothing is left to do; then take slivers away, and begin again."""
-    tidied = 0
+    tidied, cells = 0, len(fabric.cells)
     for _ in range(ROUNDS):
         edges = _known(fabric, memory)
         hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
@@ -165,20 +172,30 @@ def _refined(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progre
             if tidied == TIDIED:
                 break
             tidied += 1
-            cells, fabric = fabric.cells, _tidied(fabric, memory)
-            if fabric.cells is cells:
+            before, fabric = fabric.cells, _tidied(fabric, memory)
+            if fabric.cells is before:
                 break
             continue
         progress.report("refining", int((edges.error <= tolerance).sum()), len(edges.error))
         fabric = _bisect(fabric, edges, _chosen(edges, tolerance), memory)
         if fabric.dimension == 2:
             fabric = flip(fabric, memory.cut)
+        elif fabric.dimension == 3 and len(fabric.cells) > GROWN * cells:
+            fabric = _tidied(fabric, memory)
+            cells = len(fabric.cells)
     return fabric
 
 
 def _tidied(fabric: Fabric, memory: _Memory) -> Fabric:
     """Take slivers away."""
-    if fabric.dimension != 2:
+    if fabric.dimension == 3:
+        for _ in range(ALTERNATIONS):
+            cells = len(fabric.cells)
+            fabric = collapse_edges(reconnect(fabric, memory.cut), memory.cut)
+            if len(fabric.cells) > FEWER * cells:
+                break
+        return reconnect(fabric, memory.cut)
+    if fabric.dimension == 1:
         return fabric
     return flip(collapse(flip(fabric, memory.cut), passes=4), memory.cut)
 

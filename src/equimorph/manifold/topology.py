@@ -60,9 +60,17 @@ def faces_of(cells: Cells, size: int) -> Int[np.ndarray, "n size"]:
     """All distinct faces of cells with so many corners."""
     base = int(cells.max(initial=0)) + 1
     sides = [cells[:, list(chosen)] for chosen in combinations(range(cells.shape[1]), size)]
-    keys = np.sort(np.concatenate([keys_of(side, base) for side in sides]))
-    # sorting beats the hashing of `np.unique` several times over
-    return rows_of(keys[np.diff(keys, prepend=-1) > 0], base, size)
+    keys = distinct(np.concatenate([keys_of(side, base) for side in sides]))
+    return rows_of(keys, base, size)
+
+
+def distinct(keys: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+    """Return distinct numbers, none negative, in order.
+
+    Sorting beats the hashing of `np.unique` several times over.
+    """
+    keys = np.sort(keys)
+    return keys[np.diff(keys, prepend=-1) > 0]
 
 
 def adjacency(cells: Cells) -> Adjacency:
