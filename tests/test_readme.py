@@ -1,4 +1,4 @@
-"""The example of the README runs as it is printed."""
+"""The examples of the README and of the guide run as they are printed."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,8 @@ import pytest
 
 from typecheck import unchecked
 
-README = Path(__file__).parents[1] / "README.md"
+ROOT = Path(__file__).parents[1]
+BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 NUMBER = re.compile(r"\d+\.\d+")
 
 
@@ -15,15 +16,25 @@ def numbers(line: str) -> list[float]:
     return [float(number) for number in NUMBER.findall(line)]
 
 
+def ran(page: Path, capsys) -> tuple[list[str], list[str]]:
+    """What the code of a page prints, and what the page says that it prints."""
+    code = "".join(BLOCK.findall(page.read_text(encoding="utf-8")))
+    with unchecked():  # the tests of what it calls check shapes
+        exec(compile(code, str(page), "exec"), {})  # our own text
+    said = [line.split("  # ")[1] for line in code.splitlines() if line.startswith("print")]
+    return capsys.readouterr().out.splitlines(), said
+
+
 def test_the_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code = README.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
-    with unchecked():  # the tests of sets check shapes
-        exec(compile(code, str(README), "exec"), {})  # our own text
-    said = [line.split("  # ")[1] for line in code.splitlines() if line.startswith("print")]
-    (limit, route) = capsys.readouterr().out.splitlines()
+    (limit, route), said = ran(ROOT / "README.md", capsys)
     assert limit[:23] == said[0][:23]
     # way-points lie on vertices of the grid: lengths of routes are as good as its steps
     assert NUMBER.sub("", route) == NUMBER.sub("", said[1])
     assert numbers(route) == pytest.approx(numbers(said[1]), rel=1e-3)
     assert (tmp_path / "schedule.csv").exists()
+
+
+def test_the_guide_prints_what_it_says(capsys):
+    printed, said = ran(ROOT / "docs" / "extending.md", capsys)
+    assert printed == said
