@@ -89,7 +89,9 @@ class Rod(Described):
         Resolution: the default, six elements of degree 9, keeps limit loads, heights and
         curvature within 1e-8 for max |κ| ≤ 10; `error_estimate` bounds what it loses beyond.
     ends
-        Ends A and B: "clamped", "pinned", "free", "sliding" (angle and y are held), or an `End`.
+        Ends A and B: "clamped", "pinned", "free", "sliding" (angle and y are held), or an `End`,
+        also one that rolls along an inclined line: ``End("free", slide=0.5)``; the line's distance
+        `offset` from the other end is then a parameter, by default so that it meets (span, rise).
     stiffness
         B(s) relative to B (to `EI`): a number, a table or a callable; positive.
     curvature

@@ -34,7 +34,7 @@ def _profile(shape: Any) -> Any:
 
 
 def _end(given: Any) -> Any:
-    table = isinstance(given, dict) and set(given) <= {"angle", "x", "y"}
+    table = isinstance(given, dict) and set(given) <= {"angle", "x", "y", "slide"}
     parts = given.values() if table else [given]
     if not all(isinstance(part, str) or (table and is_number(part)) for part in parts):
         raise requirement(

@@ -12,7 +12,7 @@ from equimorph.errors import InputError, suggestion
 from equimorph.model import Parameter
 from equimorph.model.parameter import Role
 from equimorph.structures.rod.discretisation import mesh_with_kinks
-from equimorph.structures.rod.general.ends import End, check_supports, end
+from equimorph.structures.rod.general.ends import End, check_supports, end, support_axes
 from equimorph.structures.rod.general.mechanics import GeneralMechanics
 from equimorph.structures.rod.general.model import Build, RodModel, raw_model
 from equimorph.structures.rod.general.terms import LineLoad, PointForce, Pressure, Term, term
@@ -27,7 +27,7 @@ TURNING = {
     "Delta": {"theta_A": 1.0, "theta_B": 1.0},
 }
 """Coordinates of the end angles of a rod that is held at both."""
-RESERVED = ("theta_A", "theta_B", "nu", "rise")
+RESERVED = ("theta_A", "theta_B", "nu", "rise", "offset")
 CLOSEST = 1e-6
 """Shortest piece of a rod between kinks."""
 
@@ -112,7 +112,7 @@ class Description:
         for name, terms in self.terms.items():
             if not any(isinstance(one, Pressure) for one in terms):
                 continue
-            if not all(end.x == end.y == "held" for end in self.supports):
+            if not all(end.x == end.y == "held" and end.slide is None for end in self.supports):
                 raise InputError(
                     f"`ends` must hold x and y of both ends of a rod under the pressure `{name}`; "
                     "got one that moves: where the chord moves, pressure is a follower load "
@@ -139,10 +139,7 @@ class Description:
             if support.angle != "free"
         ]
         names += self.terms
-        for name, axis in (("nu", "x"), ("rise", "y")):
-            if all(getattr(support, axis) != "free" for support in self.supports):
-                names.append(name)
-        return tuple(names)
+        return (*names, *(axis.name for axis in support_axes(self.supports) if axis.opposed))
 
     @cached_property
     def _coordinates(self) -> dict[str, dict[str, float]]:
@@ -207,6 +204,10 @@ class Description:
             blank = Parameter(raw, label, scale, "fixed", None, -far, far)
             span = self.span * scale if units.plain else self.span
             return Parameter(raw, label, scale, "fixed", blank.check(span), -far, far)
+        if raw == "offset":
+            unit = support_axes(self.supports)[1].unit
+            span = self.span * scale if units.plain else self.span
+            return Parameter(raw, label, scale, "fixed", float(np.dot(unit, (span, self.rise))))
         if raw == "rise":
             return Parameter(raw, label, scale, "fixed", float(self.rise))
         role: Role = "load" if raw in self.loads else "actuator"
@@ -278,7 +279,7 @@ class Description:
                 data[name] = value.tolist() if isinstance(value, np.ndarray) else value
         if self.coordinates is not None:
             data["coordinates"] = self._coordinates
-        if "nu" in self._raw:
+        if "nu" in self._raw or "offset" in self._raw:
             data["span"] = float(self.span)
         if self.rise != 0.0:
             data["rise"] = float(self.rise)

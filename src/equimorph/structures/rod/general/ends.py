@@ -31,15 +31,20 @@ class End:
         The end's tangent angle.
     x, y
         Its coordinates.
+    slide
+        Direction in radians from the x axis of a line on which the support rolls: along it the end
+        is free, across it held at the distance `offset` from the other end, which holds x and y.
     """
 
     angle: Holding = HELD
     x: Holding = HELD
     y: Holding = HELD
+    slide: float | None = None
 
     def __post_init__(self) -> None:
         """Check the words and stiffnesses."""
-        for name, value in asdict(self).items():
+        for name in ("angle", "x", "y"):
+            value = getattr(self, name)
             if value in (HELD, FREE):
                 continue
             number = np.nan
@@ -51,16 +56,34 @@ class End:
                     f"positive number; got {value!r}."
                 )
 
+        if self.slide is not None:
+            self._check_slide(self.slide)
+
+    def _check_slide(self, slide: Any) -> None:
+        number = isinstance(slide, int | float) and not isinstance(slide, bool)
+        if not (number and -2.0 * np.pi <= slide <= 2.0 * np.pi):
+            raise InputError(
+                f"`slide` of an end must be a direction in radians, within ±2π; got {slide!r}."
+            )
+        if (self.x, self.y) != (HELD, HELD):
+            raise InputError(
+                "`slide` must be given to an end whose x and y are 'held': it says along which "
+                f"line they are not; got x = {self.x!r}, y = {self.y!r}."
+            )
+
     def scaled(self, angle: float, force: float) -> "End":
         """The same end with its stiffnesses divided by units of moment and of force per length."""
         parts = ((self.angle, angle), (self.x, force), (self.y, force))
-        return End(*(value if isinstance(value, str) else value / unit for value, unit in parts))
+        turn, x, y = (each if isinstance(each, str) else each / unit for each, unit in parts)
+        return End(turn, x, y, self.slide)
 
     def data(self) -> str | dict[str, Any]:
-        """A word if there is one for it, else the three parts."""
+        """A word if there is one for it, else its parts."""
         parts = (self.angle, self.x, self.y)
         words = [word for word, meaning in WORDS.items() if meaning == parts]
-        return words[0] if words else asdict(self)
+        if self.slide is not None:
+            return asdict(self)
+        return words[0] if words else dict(zip(("angle", "x", "y"), parts, strict=True))
 
 
 def end(spec: Any, name: str) -> End:
@@ -75,12 +98,44 @@ def end(spec: Any, name: str) -> End:
         return spec
     if isinstance(spec, str) and spec in WORDS:
         return End(*WORDS[spec])
-    if isinstance(spec, Mapping) and set(spec) <= {"angle", "x", "y"}:
+    if isinstance(spec, Mapping) and set(spec) <= {"angle", "x", "y", "slide"}:
         return End(**spec)
     raise InputError(
-        f"`{name}` must be one of {', '.join(map(repr, WORDS))}, or an End(angle, x, y) of "
+        f"`{name}` must be one of {', '.join(map(repr, WORDS))}, or an End(angle, x, y, slide) of "
         f"'held', 'free' and spring stiffnesses; got {spec!r}."
     )
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A direction in which both ends are supported, or not.
+
+    name: of the parameter that places end B along it, if both are.
+    """
+
+    name: str
+    unit: tuple[float, float]
+    first: Holding
+    last: Holding
+
+    @property
+    def opposed(self) -> bool:
+        """Whether both ends are supported in this direction: then there is a multiplier."""
+        return FREE not in (self.first, self.last)
+
+
+def support_axes(ends: tuple[End, End]) -> tuple[Axis, Axis]:
+    """x and y, or the direction along which an end slides and the one across it."""
+    first, last = ends
+    slide = last.slide if first.slide is None else first.slide
+    if slide is None:
+        return (
+            Axis("nu", (1.0, 0.0), first.x, last.x),
+            Axis("rise", (0.0, 1.0), first.y, last.y),
+        )
+    c, s = float(np.cos(slide)), float(np.sin(slide))
+    along = (HELD if first.slide is None else FREE, HELD if last.slide is None else FREE)
+    return Axis("", (c, s), *along), Axis("offset", (-s, c), HELD, HELD)
 
 
 def compliance(holding: Holding) -> float:
@@ -97,6 +152,13 @@ def check_supports(ends: tuple[End, End]) -> None:
         If neither end holds x, or y, or nothing holds the rotation.
     """
     first, last = ends
+    if first.slide is not None or last.slide is not None:
+        other = last if first.slide is not None else first
+        if (other.x, other.y, other.slide) != (HELD, HELD, None):
+            raise InputError(
+                "`ends` must hold x and y of the end opposite to one that slides; got "
+                f"{other.data()!r}. Hold it, or turn the axes so that x or y is free."
+            )
     for axis in ("x", "y"):
         if getattr(first, axis) == FREE and getattr(last, axis) == FREE:
             raise InputError(

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.structures.rod.discretisation import Mesh, reference_element
-from equimorph.structures.rod.general.ends import FREE, HELD, End, compliance
+from equimorph.structures.rod.general.ends import FREE, HELD, Axis, End, compliance, support_axes
 from equimorph.structures.rod.general.terms import Effects, Term
 from equimorph.structures.rod.loads import LoadShape
 from equimorph.structures.rod.profiles import at_nodes
@@ -163,24 +163,20 @@ def raw_names(build: Build) -> tuple[str, ...]:
         for name, end in zip(("theta_A", "theta_B"), build.ends, strict=True)
         if end.angle != FREE
     ]
-    places = [name for name, axis in (("nu", "x"), ("rise", "y")) if _opposed(build.ends, axis)]
+    places = [axis.name for axis in support_axes(build.ends) if axis.opposed]
     return (*angles, *build.terms, *places)
-
-
-def _opposed(ends: tuple[End, End], axis: str) -> bool:
-    """Whether both ends are supported in a direction: then there is a multiplier."""
-    return all(getattr(end, axis) != FREE for end in ends)
 
 
 def raw_model(build: Build) -> RodModel:
     """Arrays of a rod in the parameters of `raw_names`."""
     names, mesh, ends = raw_names(build), build.mesh, build.ends
-    opposed = [axis for axis in ("x", "y") if _opposed(ends, axis)]
+    axes = support_axes(ends)
+    opposed = [axis for axis in axes if axis.opposed]
     m = len(opposed)
     place = {name: m + i for i, name in enumerate(names)}
     count = m + len(names) + 1
     fine = Mesh(mesh.breaks, reference_element(max(20, 2 * mesh.degree)))
-    nodal, finer = (_densities(build, grid, opposed, place, count) for grid in (mesh, fine))
+    nodal, finer = (_densities(build, grid, axes, place, count) for grid in (mesh, fine))
     unit = mesh.reference.derivative / mesh.lengths[:, None, None]
     weighted = mesh.element_weights * nodal.rigidity
     bending = np.einsum("eki,ek,ekj->eij", unit, weighted, unit)
@@ -243,19 +239,22 @@ def _summed(terms: Sequence[Term], mesh: Mesh) -> Effects:
 
 
 def _densities(
-    build: Build, mesh: Mesh, opposed: Sequence[str], place: Mapping[str, int], count: int
+    build: Build, mesh: Mesh, axes: Sequence[Axis], place: Mapping[str, int], count: int
 ) -> Densities:
     """Rows of all scalars on a mesh with the elements of the rod."""
     rigidity = at_nodes(build.stiffness, mesh) / FOUR_PI_SQUARED
     along, across, bending, tension = np.zeros((4, count, mesh.elements, mesh.degree + 1))
-    for c, axis in enumerate(opposed):
-        (along if axis == "x" else across)[c] = 1.0
+    for c, axis in enumerate(each for each in axes if each.opposed):
+        along[c], across[c] = axis.unit
     bending[-1] = rigidity * at_nodes(build.curvature, mesh)
     for name, terms in build.terms.items():
         effects, row = _summed(terms, mesh), place[name]
         # a free end B takes no load: what lies beyond a cross-section hangs on end A
-        along[row] = effects.along - (effects.force[0] if build.ends[1].x == FREE else 0.0)
-        across[row] = effects.across - (effects.force[1] if build.ends[1].y == FREE else 0.0)
+        hung = sum(
+            (np.dot(effects.force, axis.unit) * np.array(axis.unit) for axis in axes
+             if axis.last == FREE), np.zeros(2),
+        )  # fmt: skip
+        along[row], across[row] = effects.along - hung[0], effects.across - hung[1]
         bending[row] = effects.bending + rigidity * effects.natural
         tension[row] = 0.0 if build.axial is None else effects.tension
     softness = np.zeros_like(rigidity)
@@ -295,7 +294,7 @@ def _curvature_energy(
 
 def _supports(
     build: Build,
-    opposed: Sequence[str],
+    opposed: Sequence[Axis],
     place: Mapping[str, int],
     quadratic: Float[np.ndarray, "scalars scalars"],
 ) -> tuple[Float[np.ndarray, "2 scalars"], Float[np.ndarray, "2 scalars"], tuple[bool, bool]]:
@@ -308,24 +307,29 @@ def _supports(
     count = len(quadratic)
     reactions, origin = np.zeros((2, 2, count))
     from_start = [True, True]
-    for axis, (name, coordinate) in enumerate((("nu", "x"), ("rise", "y"))):
-        first, last = (getattr(end, coordinate) for end in build.ends)
-        total = np.zeros(count)
-        for term_name, terms in build.terms.items():
-            total[place[term_name]] = _summed(terms, build.mesh).force[axis]
+    forces = np.zeros((count, 2))
+    for name, terms in build.terms.items():
+        forces[place[name]] = _summed(terms, build.mesh).force
+    for i, axis in enumerate(support_axes(build.ends)):
+        unit = np.array(axis.unit)
+        total = forces @ unit
         reaction, site = np.zeros(count), np.zeros(count)
-        if coordinate in opposed:
-            reaction[opposed.index(coordinate)] = 1.0
-            site[place[name]] = 1.0
-        elif last == FREE:
-            reaction = -total
-        rest, reactions[axis] = reaction + total, reaction
+        if axis.opposed:
+            reaction[opposed.index(axis)] = 1.0
+            site[place[axis.name]] = 1.0
+        else:
+            reaction = -total if axis.last == FREE else reaction
+        rest = reaction + total
+        reactions += np.outer(unit, reaction)
         quadratic -= np.outer(rest, site) + np.outer(site, rest)
-        if first != FREE:
-            quadratic -= compliance(first) * np.outer(reaction, reaction)
-            origin[axis] = -compliance(first) * reaction
-        if last != FREE:
-            quadratic -= compliance(last) * np.outer(rest, rest)
-        if first == FREE:
-            origin[axis], from_start[axis] = compliance(last) * rest, False
+        if axis.first != FREE:
+            quadratic -= compliance(axis.first) * np.outer(reaction, reaction)
+            origin -= compliance(axis.first) * np.outer(unit, reaction)
+        if axis.last != FREE:
+            quadratic -= compliance(axis.last) * np.outer(rest, rest)
+        if axis.first == FREE:
+            origin += compliance(axis.last) * np.outer(unit, rest)
+            from_start[i] = False
+    if build.ends[0].slide is not None:  # from end B, whose place across the line is given
+        origin[:], from_start = np.outer(unit, site), [False, False]
     return reactions, origin, (from_start[0], from_start[1])

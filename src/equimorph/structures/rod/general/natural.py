@@ -7,6 +7,7 @@ from numpy.polynomial import legendre
 from equimorph.structures.rod.continuation import Part, follow, newton
 from equimorph.structures.rod.discretisation import reference_element
 from equimorph.structures.rod.general.mechanics import GeneralMechanics
+from equimorph.structures.rod.general.model import RodModel
 from equimorph.structures.rod.natural import Natural, Outcome
 
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -64,7 +65,7 @@ def _stress_free(
     theta += before[:, :, None]
     weights = lengths * fine.weights
     chord = np.stack([(weights * f(theta)).sum(axis=(1, 2)) for f in (np.cos, np.sin)], axis=1)
-    turn = _orientation(model.names, p, theta[:, -1, -1], chord)
+    turn = _orientation(model, p, theta[:, -1, -1], chord)
     theta += turn[:, None, None]
     basis = legendre.legvander(2.0 * model.mesh.reference.nodes - 1.0, fine.degree)
     local = np.einsum("ki,lei->lek", basis @ fine.to_legendre, theta)
@@ -77,6 +78,9 @@ def _stress_free(
         "nu": (weights * np.cos(theta)).sum(axis=(1, 2)),
         "rise": (weights * np.sin(theta)).sum(axis=(1, 2)),
     }
+    if "offset" in model.names:
+        across = model.nodal.along[0, 0, 0], model.nodal.across[0, 0, 0]
+        places["offset"] = across[0] * places["nu"] + across[1] * places["rise"]
     for i, name in enumerate(model.names):
         start[:, i] = places.get(name, start[:, i])
     return start, z
@@ -95,10 +99,10 @@ def _forces(rod: GeneralMechanics) -> Bool[np.ndarray, " parameters"]:
 
 
 def _orientation(
-    names: tuple[str, ...], p: Parameters, turning: Values, chord: Float[np.ndarray, "lanes 2"]
+    model: RodModel, p: Parameters, turning: Values, chord: Float[np.ndarray, "lanes 2"]
 ) -> Values:
     """Angle of the stress-free shape at end A; `chord` and `turning` are those from angle 0."""
-    value = dict(zip(names, p.T, strict=True))
+    value = dict(zip(model.names, p.T, strict=True))
     if "theta_A" in value and "theta_B" not in value:
         return np.asarray(value["theta_A"])
     if "theta_B" in value and "theta_A" not in value:
@@ -108,6 +112,9 @@ def _orientation(
         wanted = np.arctan2(value["rise"], value["nu"])
     elif "theta_A" in value:
         return np.asarray(0.5 * (value["theta_A"] + value["theta_B"] - turning))
+    elif "offset" in value:  # sin(angle − slide) times the length
+        slide = np.arctan2(-model.nodal.along[0, 0, 0], model.nodal.across[0, 0, 0])
+        wanted = slide + np.arcsin(np.clip(value["offset"] / length, -1.0, 1.0))
     elif "nu" in value:
         wanted = np.arccos(np.clip(value["nu"] / length, -1.0, 1.0))
     else:
