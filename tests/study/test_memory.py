@@ -50,6 +50,57 @@ def test_a_study_that_needs_too_much_is_refused_with_the_numbers():
         check_memory(problem)
 
 
+SET = """
+import re, sys
+from pathlib import Path
+from equimorph.manifold import equilibrium_set
+from equimorph.model import Box
+from equimorph.structures import Rod
+arch, d = Rod(), int(sys.argv[1])
+ranges = {"Theta": (0.2, 2.5), "Delta": (-2, 2), "q": (0, 6)}
+def build(names, intervals):
+    fixed = {"Delta": 0.3, "q": 2.5} if d == 1 else {}
+    box = Box(**{name: ranges[name] for name in names})
+    equilibrium_set(arch, box, fixed=fixed, within=[arch.max_curvature <= 20],
+                    intervals=intervals, checks=0)
+def peak():
+    found = re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())
+    return 1024 * int(found[1])
+names = list(ranges)[:d]
+build(names, (3,) * d)
+before = peak()
+build(names, tuple(map(int, sys.argv[2:])))
+print(peak() - before)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("intervals", [(20_000,), (12, 15, 8)])
+def test_the_estimate_for_sets_over_one_and_three_parameters(intervals: tuple[int, ...]):
+    """The set alone, beyond what the program takes with a small one."""
+    words = [sys.executable, "-c", SET, str(len(intervals)), *map(str, intervals)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    peak = float(done.stdout.split()[-1])
+    estimate = memory.estimated_memory(Rod().size, intervals) - memory.PROGRAM
+    assert peak <= estimate <= 2.0 * peak
+
+
+@pytest.mark.parametrize(
+    ("box", "intervals"),
+    [
+        ("F = [-0.4, 0.4]", [1_000_000_000]),
+        ("F = [-0.4, 0.4]\nx_l = [0.5, 1.2]\nk = [1, 2]", [900] * 3),
+    ],
+)
+def test_sets_over_one_and_three_parameters_are_refused_if_too_large(
+    box: str, intervals: list[int]
+):
+    head = 'title = "t"\n[structure]\nkind = "spring"'
+    text = f"{head}\n[set]\nintervals = {intervals}\n[set.box]\n{box}\n"
+    with pytest.raises(InputError, match=r"`set\.intervals` must fit into memory; got .* GB"):
+        check_memory(prepare(parse_study(text, "spring.toml")))
+
+
 def test_numbers_beyond_all_floats_are_refused():
     text = _with_intervals("spring", (10**400, 2))
     with pytest.raises(InputError, match=r"`set\.intervals\[0\]` must be at most"):

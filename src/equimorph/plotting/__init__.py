@@ -14,6 +14,7 @@ from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
 from equimorph.plotting.robustness import imperfection_laws, room, sensitivities, trials
 from equimorph.plotting.route_panels import route_panels
 from equimorph.plotting.shapes import shapes
+from equimorph.plotting.snaps import snap_panels
 from equimorph.plotting.solutions import solutions
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
@@ -40,6 +41,7 @@ __all__ = [
     "save",
     "sensitivities",
     "shapes",
+    "snap_panels",
     "solutions",
     "surface",
     "trials",

@@ -12,8 +12,8 @@ from equimorph.study.prepare import Problem
 
 PROGRAM = 550e6
 """Bytes of libraries, compiled kernels, and the frames of a film."""
-PER_VERTEX = 6500.0
-"""Bytes per vertex of the grid: curves, cells and their book-keeping."""
+PER_VERTEX = {1: 6500.0, 2: 6500.0, 3: 56000.0}
+"""Bytes per vertex of the grid, by the number of parameters: curves, cells, their book-keeping."""
 PER_UNKNOWN = 70.0
 """Bytes per vertex of the grid and unknown: states, and work space while they are lifted."""
 RESERVE = 150e6
@@ -29,7 +29,8 @@ _GROUP_FILES = (
 def estimated_memory(size: int, intervals: tuple[int, ...]) -> float:
     """Peak of the resident memory of a run in bytes.
 
-    For sets with one or two equilibria over most points, like those of the arch and the spring:
+    For sets with one or two equilibria over most points, like those of the arch and the spring (in
+    three parameters, up to seven):
     there the measured peak lies between half of the estimate and all of it.
 
     Parameters
@@ -40,7 +41,7 @@ def estimated_memory(size: int, intervals: tuple[int, ...]) -> float:
         Of the grid.
     """
     vertices = math.prod(count + 1 for count in intervals)
-    return PROGRAM + vertices * (PER_VERTEX + PER_UNKNOWN * size)
+    return PROGRAM + vertices * (PER_VERTEX[len(intervals)] + PER_UNKNOWN * size)
 
 
 def available_memory() -> float:
