@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import proj3d
 
 from equimorph import plotting
 from equimorph.errors import InputError
+from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.scene import Scene
 from equimorph.plotting.shading import corner_normals, lit
@@ -74,3 +76,16 @@ def test_a_surface_is_lit_alike_from_both_sides():
     np.testing.assert_array_equal(lit(colours, normals), lit(colours, -normals))
     assert lit(colours, normals).min() >= 0.0
     assert lit(colours, normals).max() <= 1.0
+
+
+def test_the_surface_keeps_clear_of_its_legend(spring_set):
+    """Highest at the back, it would be drawn over the legend if nothing made room."""
+    back = Descriptor("back", "1", lambda _, p: 30 * p[:, 0] - p[:, 1])
+    ax = plotting.surface(spring_set, back)
+    points = np.column_stack([spring_set.coordinates, back(spring_set.points)])
+    across, up, _ = proj3d.proj_transform(*points.T, ax.get_proj())
+    x, y = ax.transData.transform(np.column_stack([across, up])).T
+    box = ax.get_legend().get_window_extent()
+    assert not ((box.x0 < x) & (x < box.x1) & (box.y0 < y)).any()
+    low, high = ax.get_zlim()
+    assert high - points[:, 2].max() > points[:, 2].min() - low  # room was made

@@ -31,7 +31,7 @@ def check_and_show(file: Path) -> None:
     counts = {"point": len(study.equilibria)}
     counts |= {table: len(sections) for table, sections in study.tasks.items()}
     asked = [_count(number, word) for word, number in counts.items() if number]
-    what = " and ".join(asked) or "an equilibrium set"
+    what = " and ".join(filter(None, [", ".join(asked[:-1]), *asked[-1:]])) or "an equilibrium set"
     screen.print(f"{escape(str(file))} is a sound study with {what}.", soft_wrap=True)
     for line in _extents(problem):
         screen.print(line, soft_wrap=True)

@@ -6,10 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import AbstractPathEffect, withStroke
-from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d import Axes3D, proj3d
 
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
@@ -41,6 +42,8 @@ _ROUTE_POINTS = 240
 # The route runs on the exact surface, which is curved between the vertices of the drawn one.
 _ROUTE_SLACK = 0.015
 
+_KEY: dict[str, Any] = {"loc": "upper center", "ncols": 4, "bbox_to_anchor": (0.53, 1.0)}
+_GAP = 4.0  # below the legend, in pixels
 _BOX: dict[str, Any] = {"color": style.INK, "linewidth": 0.5}
 _CAP: dict[str, Any] = {"color": "#4d4d4d", "linewidth": 0.9}
 _FOLD: dict[str, Any] = {"color": style.INK, "linewidth": 1.5, "capstyle": "round"}
@@ -130,8 +133,8 @@ def surface(
             curves.append(Curve(places, _ROUTE, _HIDDEN_ROUTE, slack=_ROUTE_SLACK))
             legend.append(_route_entry(route.status, route.path))
             _draw_ends(ax, places)
+        _lower(ax, points, ax.legend(handles=legend, **_KEY))
         ax.add_artist(Scene(points[eset.cells], _paint(ax, eset, points, beyond), curves))
-        ax.legend(handles=legend, loc="upper center", ncols=4, bbox_to_anchor=(0.53, 1.0))
     return ax
 
 
@@ -160,6 +163,20 @@ def _frame(ax: Axes3D, eset: EquilibriumSet, height: Descriptor, points: Points)
         axis.labelpad = -5
         axis.set_tick_params(pad=0 if axis is ax.zaxis else -3)
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+
+
+def _lower(ax: Axes3D, points: Points, legend: Legend) -> None:
+    """Make room above the set if it would be drawn over the legend."""
+    box = legend.get_window_extent()
+    ax.apply_aspect()
+    low, high = ax.get_zlim()
+    ends = [[*points[0, :2], low], [*points[0, :2], high]]  # the height of the frame
+    across, up, _ = proj3d.proj_transform(*np.vstack([points, ends]).T, ax.get_proj())
+    x, y = ax.transData.transform(np.column_stack([across, up])).T
+    behind = (box.x0 - _GAP < x[:-2]) & (x[:-2] < box.x1 + _GAP)
+    excess = float(np.max(y[:-2][behind], initial=-np.inf)) + _GAP - box.y0
+    if excess > 0.0:
+        ax.set_zlim(low, low + (high - low) / (1.0 - min(0.5, excess / (y[-1] - y[-2]))))
 
 
 def _curves(eset: EquilibriumSet, points: Points) -> tuple[list[Curve], list[Patch | Line2D]]:
