@@ -56,3 +56,10 @@ def bench_states_of_a_reduction(benchmark, large):
     chart = em.reduce(large, prefer=em.lowest(large.structure.descriptor("energy")))
     at = np.random.default_rng(0).uniform(BOX.lower, BOX.upper, (10_000, 2))
     benchmark.pedantic(chart.state, (at,), rounds=3, warmup_rounds=1)
+
+
+@pytest.mark.parametrize("rule", [em.quasi_static, em.first_stable_on_path])
+def bench_reductions_by_paths_over_24_by_41_intervals(benchmark, rule):
+    eset = arch_set((24, 41))
+    chart = benchmark.pedantic(em.reduce, (eset,), {"prefer": rule("q")}, rounds=2)
+    benchmark.extra_info.update(barriers=len(chart.barriers), lost=chart.lost)

@@ -5,7 +5,7 @@ from equimorph.charts.barriers import Barrier
 from equimorph.charts.chart import STATUSES, Chart, Charted
 from equimorph.charts.dissecting import dissect
 from equimorph.charts.domain import Domain, Edge
-from equimorph.charts.path_rules import first_stable_on_path, quasi_static
+from equimorph.charts.path_rules import first_stable_on_path, quasi_static, rule_from
 from equimorph.charts.projection import DescriptorChart, Projection
 from equimorph.charts.reducing import Reduction, reduce
 from equimorph.charts.rules import Rule, highest, lowest, nearest
@@ -35,4 +35,5 @@ __all__ = [
     "nearest",
     "quasi_static",
     "reduce",
+    "rule_from",
 ]

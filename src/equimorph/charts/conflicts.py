@@ -70,27 +70,22 @@ def overlapping(cells: Cells) -> Int[np.ndarray, "n 2"]:
         for other in vertices.T:
             apart &= one[a] != other[b]
     a, b = a[apart], b[apart]
-    for k in range(6 if corners.shape[2] == 2 else 0):
-        depth = _depth(corners, a, b, k) if k < 3 else _depth(corners, b, a, k - 3)
-        a, b = a[depth > TOUCHING], b[depth > TOUCHING]
+    inward = _inward(corners) if corners.shape[2] == 2 else np.zeros((0, 0, 2))
+    for k in range(2 * inward.shape[1]):
+        one, other, side = (a, b, k) if k < 3 else (b, a, k - 3)
+        normal, at = inward[one, side], corners[other] - corners[one, side][:, None]
+        deep = np.einsum("nd,nkd->nk", normal, at).max(axis=1) > TOUCHING
+        a, b = a[deep], b[deep]
     return np.stack([plain[a], plain[b]], axis=1)
 
 
-def _depth(
-    corners: Float[np.ndarray, "C 3 2"],
-    a: Int[np.ndarray, " n"],
-    b: Int[np.ndarray, " n"],
-    side: int,
-) -> Float[np.ndarray, " n"]:
-    """How far triangles reach over one side of others, to which their normals point inwards."""
-    start = corners[a, side]
-    along = corners[a, (side + 1) % 3] - start
-    third = corners[a, (side + 2) % 3] - start
-    inward = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
-    inward *= np.sign(np.einsum("nd,nd->n", inward, third))[:, None]
-    reach = [np.einsum("nd,nd->n", corners[b, k] - start, inward) for k in range(3)]
-    return np.asarray(np.maximum(np.maximum(reach[0], reach[1]), reach[2]))
+def _inward(corners: Float[np.ndarray, "C 3 2"]) -> Float[np.ndarray, "C 3 2"]:
+    """Normals of the sides of triangles, each from a corner to the next, that point inwards."""
+    along = np.roll(corners, -1, axis=1) - corners
+    third = np.roll(corners, -2, axis=1) - corners
+    normal = np.stack([-along[..., 1], along[..., 0]], axis=2)
+    normal /= np.maximum(np.hypot(normal[..., 0], normal[..., 1])[..., None], 1e-300)
+    return np.asarray(normal * np.sign((normal * third).sum(axis=2))[..., None])
 
 
 def _near_pairs(corners: Float[np.ndarray, "C 3 2"]) -> Int[np.ndarray, "n 2"]:

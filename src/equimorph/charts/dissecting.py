@@ -61,6 +61,7 @@ def dissect(eset: EquilibriumSet) -> Atlas:
     check_cells(eset)
     work = _Work.of(eset)
     if len(eset.names) > 1:
+        work = work.cusped()
         open_ = list(range(len(eset.strata)))
         for _ in range(MOST):
             if not open_:
@@ -94,13 +95,13 @@ class _Work:
     origin
         Stratum of each chart.
     cusps
-        Vertices at cusps; none are known before they are needed.
+        Vertices at cusps.
     """
 
     eset: EquilibriumSet
     fabric: Fabric
     origin: Int[np.ndarray, " charts"]
-    cusps: tuple[int, ...] | None = None
+    cusps: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, eset: EquilibriumSet) -> "_Work":
@@ -133,14 +134,10 @@ class _Work:
 
     def parted(self, chart: int) -> tuple["_Work", list[int]]:
         """The same with a chart cut once, and the charts to look at again."""
-        cells, _ = self.cells(chart)
+        cells, own = self.cells(chart)
         colour = conflicts_of(cells).colour
         if not (colour >= 0).any():
             return self, []
-        work = self._with_cusps()
-        if work is not self:
-            return work.parted(chart)
-        cells, own = self.cells(chart)
         side = least_cut(cells, colour == 0, colour > 0)
         straight = self._straight(chart, cells, side, colour < 0)
         if straight is not None:
@@ -155,11 +152,13 @@ class _Work:
         origin = np.concatenate([self.origin, np.full(max(more, 0), self.origin[chart])])
         return replace(self, fabric=replace(self.fabric, cell_index=label), origin=origin)
 
-    def _with_cusps(self) -> "_Work":
+    def cusped(self) -> "_Work":
         """The same with vertices at the cusps, where sheets part that a cut has to part."""
-        if self.cusps is not None or self.fabric.dimension != 2:
+        if self.fabric.dimension != 2:
             return self
         fabric, cusps = with_cusps(self.fabric)
+        if len(cusps) == 0:
+            return self
         return replace(self, fabric=fabric, cusps=tuple(cusps.tolist()))._untangled()
 
     def _untangled(self) -> "_Work":
@@ -188,7 +187,7 @@ class _Work:
         free = Walker(cells.corners, places, np.ones_like(alone))
         ways = []
         for path in _paths(cells, side):
-            drawn = _snapped((clear, free), cells, path, self.cusps or ())
+            drawn = _snapped((clear, free), cells, path, self.cusps)
             ways.append(straightened(clear, free, drawn))
         cut = _crossed(self.fabric, ways)
         if cut is None:

@@ -1,13 +1,23 @@
 """Rules that follow paths in a load from the natural states."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.charts.location import Found
-from equimorph.charts.rules import Chooser, Points, Rule, first_of_each
+from equimorph.charts.rules import (
+    Chooser,
+    Identity,
+    Points,
+    Rule,
+    first_of_each,
+    highest,
+    lowest,
+    nearest,
+)
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.first_stable import OFF, STABLE, FirstStable
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
@@ -28,6 +38,8 @@ MATCH = 1e-4
 """Distance in the metric below which a state is the end of a path."""
 INTERVALS = 24
 """Intervals of the grid over which natural states are known."""
+BOUND = 100.0
+"""Largest load up to which paths are followed, unless said."""
 AT_END = 1e-7
 """Part of a path that may be left where an event lies at its end."""
 
@@ -42,10 +54,12 @@ def quasi_static(parameter: str) -> Rule:
     parameter
         The load: a free or a fixed parameter of the set.
     """
-    return _OnPath("quasi_static", parameter, _loaded)
+    return _OnPath(
+        "quasi_static", parameter, _loaded, {"rule": "quasi_static", "parameter": parameter}
+    )
 
 
-def first_stable_on_path(parameter: str, bound: float = 100.0) -> Rule:
+def first_stable_on_path(parameter: str, bound: float = BOUND) -> Rule:
     """Prefer the first stable state on the path from the natural state, through unstable parts too.
 
     The rule of curvature maps. A real structure may have snapped on the way.
@@ -58,8 +72,33 @@ def first_stable_on_path(parameter: str, bound: float = 100.0) -> Rule:
         Largest load, of either sign, up to which paths are followed.
     """
     return _OnPath(
-        "first_stable_on_path", parameter, lambda eset, load, low: _first(eset, load, low, bound)
+        "first_stable_on_path",
+        parameter,
+        lambda eset, load, low: _first(eset, load, low, bound),
+        {"rule": "first_stable_on_path", "parameter": parameter, "bound": bound},
     )
+
+
+def rule_from(identity: Mapping[str, Any], structure: Structure) -> Rule:
+    """Return a rule by its identity, with the descriptors of a structure.
+
+    Raises
+    ------
+    InputError
+        For an unknown rule, or a descriptor that the structure does not have.
+    """
+    known: dict[str, Callable[[], Rule]] = {
+        "lowest": lambda: lowest(structure.descriptor(identity["of"])),
+        "highest": lambda: highest(structure.descriptor(identity["of"])),
+        "nearest": lambda: nearest(int(identity["of"])),
+        "quasi_static": lambda: quasi_static(identity["parameter"]),
+        "first_stable_on_path": lambda: first_stable_on_path(
+            identity["parameter"], float(identity.get("bound", BOUND))
+        ),
+    }
+    if identity["rule"] not in known:
+        raise InputError(f"`rule` must be one of {', '.join(known)}; got {identity['rule']!r}.")
+    return known[identity["rule"]]()
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,6 +108,7 @@ class _OnPath(Rule):
     name: str
     parameter: str
     ends: Callable[[EquilibriumSet, int, float], Ends] = field(repr=False)
+    identity: Identity | None = None
 
     def __repr__(self) -> str:
         """Return the rule as it is written."""

@@ -35,8 +35,8 @@ DIFFERENT = 1e-4
 BESIDE, MOVED = 0.02, 0.3
 """How far beside a fold, in lengths of edges, the preference is looked at, and how far its state
 may be away there: at a cusp it is the cube root of that."""
-PARTS, ROUNDS = 12, 8
-"""Edges are divided in so many parts so often: the preference changes within 3e-9 of them."""
+PARTS, ROUNDS = 5, 11
+"""Edges are divided in so many parts so often: the preference changes within 2e-8 of them."""
 
 Solved = tuple[Lanes, Parameters, Bool[np.ndarray, " n"]]
 Way = Callable[[Int[np.ndarray, " n"], Float[np.ndarray, " n"]], Solved]

@@ -1,7 +1,7 @@
 """Rules that prefer one of the states over a point."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,8 +22,14 @@ Chooser = Callable[[Found, Points], Bool[np.ndarray, " found"]]
 """Which of the states over points are preferred: at most one over each."""
 
 
+Identity = Mapping[str, str | int | float]
+
+
 class Rule(ABC):
     """A way to prefer at most one of the states over each point."""
+
+    identity: Identity | None
+    """Plain data from which `rule_from` makes the rule again; None for functions and states."""
 
     @abstractmethod
     def on(self, eset: EquilibriumSet) -> Chooser:
@@ -36,6 +42,7 @@ class _Least(Rule):
 
     name: str
     score: Callable[[EquilibriumSet], Callable[[Found], Scores]] = field(repr=False)
+    identity: Identity | None = None
 
     def __repr__(self) -> str:
         """Return what is preferred."""
@@ -68,6 +75,7 @@ def lowest(descriptor: Descriptor) -> Rule:
     return _Least(
         f"lowest {descriptor.name}",
         lambda _: lambda found: descriptor.function(found.states.z, found.states.p),
+        {"rule": "lowest", "of": descriptor.name},
     )
 
 
@@ -76,6 +84,7 @@ def highest(descriptor: Descriptor) -> Rule:
     return _Least(
         f"highest {descriptor.name}",
         lambda _: lambda found: -descriptor.function(found.states.z, found.states.p),
+        {"rule": "highest", "of": descriptor.name},
     )
 
 
@@ -96,7 +105,8 @@ def nearest(to: State | int) -> Rule:
             "nearest to a state",
             lambda _: lambda found: np.asarray((found.states.z[:, :n] - u) ** 2 @ mass),
         )
-    return _Least(f"nearest to stratum {to}", lambda eset: _distance_from(eset, to))
+    identity: Identity = {"rule": "nearest", "of": to}
+    return _Least(f"nearest to stratum {to}", lambda eset: _distance_from(eset, to), identity)
 
 
 def by_score(function: Callable[[States], Scores]) -> Rule:

@@ -53,11 +53,25 @@ class Walker:
         return found
 
     @cached_property
+    def _rows(self) -> list[int]:
+        """Vertices of the triangles one after the other: long lists of lists are slow to make."""
+        rows: list[int] = self.corners.ravel().tolist()
+        return rows
+
+    def _corners(self, cell: int) -> list[int]:
+        return self._rows[3 * cell : 3 * cell + 3]
+
+    @cached_property
+    def _columns(self) -> tuple[list[float], list[float]]:
+        x, y = self.places.T
+        return x.tolist(), y.tolist()
+
+    @cached_property
     def _around(self) -> dict[int, list[int]]:
         """Allowed triangles around each vertex."""
         around: dict[int, list[int]] = {}
         for cell in np.flatnonzero(self.allowed).tolist():
-            for vertex in self.corners[cell].tolist():
+            for vertex in self._corners(cell):
                 around.setdefault(vertex, []).append(cell)
         return around
 
@@ -87,7 +101,7 @@ class Walker:
         if far == 0.0:
             return None
         for cell in self._around.get(start, ()):
-            a, b = (v for v in self.corners[cell].tolist() if v != start)
+            a, b = (v for v in self._corners(cell) if v != start)
             entry = self._crossed(origin, ahead, a, b)
             if entry is None:
                 continue
@@ -110,10 +124,10 @@ class Walker:
         way: Way = [crossing]
         while len(way) < LONGEST:
             a, b, _ = crossing
-            cell = self._beyond[cell][self.corners[cell].tolist().index(corner)]
+            cell = self._beyond[cell][self._corners(cell).index(corner)]
             if cell < 0:
                 return None
-            third = next(v for v in self.corners[cell].tolist() if v not in {a, b})
+            third = next(v for v in self._corners(cell) if v not in {a, b})
             for side, rest in ((a, b), (b, a)):
                 entry = self._crossed(*ray, side, third)
                 if entry is None or entry[1] > 1.0 + AT_VERTEX:
@@ -132,7 +146,8 @@ class Walker:
     ) -> tuple[int | Crossing, float] | None:
         """Where a ray crosses an edge, or which of its ends it meets; and after which share."""
         (px, py), (dx, dy) = origin.tolist(), ahead.tolist()
-        (ax, ay), (bx, by) = self.places[a].tolist(), self.places[b].tolist()
+        x, y = self._columns
+        ax, ay, bx, by = x[a], y[a], x[b], y[b]
         side_a = dx * (ay - py) - dy * (ax - px)
         side_b = dx * (by - py) - dy * (bx - px)
         if side_a == side_b:
@@ -140,8 +155,8 @@ class Walker:
         share = side_a / (side_a - side_b)
         if not -AT_VERTEX <= share <= 1.0 + AT_VERTEX:
             return None
-        x, y = ax + share * (bx - ax), ay + share * (by - ay)
-        along = ((x - px) * dx + (y - py) * dy) / (dx * dx + dy * dy)
+        ahead_x, ahead_y = ax + share * (bx - ax) - px, ay + share * (by - ay) - py
+        along = (ahead_x * dx + ahead_y * dy) / (dx * dx + dy * dy)
         if along <= 0.0:
             return None
         if share < AT_VERTEX:

@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.manifold.embedding import embed
+from equimorph.manifold.kernels import square_sides
 from equimorph.manifold.pairing import Setting
 from equimorph.structures.contract import Border
 
@@ -190,19 +192,40 @@ def best_corners(
     Oriented as the cells are with the given signs, if these matter.
     """
     place = embed(setting, z, p)
-    corners = cells.shape[1]
+    corners, count = cells.shape[1], len(cells)
     owner = cells.T.ravel()
-    sides = np.concatenate(
-        [place[np.delete(cells, k, axis=1)] - place[cells[:, k]][:, None] for k in range(corners)]
-    )
-    sides = sides / np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-300)
-    breadth = np.linalg.det(sides @ np.swapaxes(sides, 1, 2))
+    breadth = _breadths(place, cells).T.ravel()
     order = np.lexsort((-breadth, owner))
     first = order[np.diff(owner[order], prepend=-1) > 0]
-    basis, share = np.linalg.qr(np.swapaxes(sides[first], 1, 2))
+    corner, cell = np.divmod(first, count)
+    others = np.stack([np.delete(np.arange(corners), k) for k in range(corners)])[corner]
+    sides = place[cells[cell[:, None], others]] - place[cells[cell, corner]][:, None]
+    sides /= np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-300)
+    basis, share = np.linalg.qr(np.swapaxes(sides, 1, 2))
     if signs is None:
         return np.ascontiguousarray(np.swapaxes(basis, 1, 2))
-    corner, cell = np.divmod(first, len(cells))
     turned = np.linalg.det(share) * signs[cell] * (-1) ** corner < 0
     basis[turned, :, 0] *= -1.0
     return np.ascontiguousarray(np.swapaxes(basis, 1, 2))
+
+
+def _breadths(
+    place: Float[np.ndarray, "V coordinates"], cells: Int[np.ndarray, "C corners"]
+) -> Float[np.ndarray, "C corners"]:
+    """How far the sides from each corner are from dependent: the determinant of their cosines."""
+    corners = cells.shape[1]
+    pairs = list(combinations(range(corners), 2))
+    squared = np.empty((len(cells), len(pairs)))
+    square_sides(place, np.ascontiguousarray(cells), squared)
+    length = np.zeros((len(cells), corners, corners))
+    for (i, j), own in zip(pairs, squared.T, strict=True):
+        length[:, i, j] = length[:, j, i] = own
+    out = np.empty((len(cells), corners))
+    for k in range(corners):
+        rest = np.delete(np.arange(corners), k)
+        own = np.maximum(length[:, k, rest], 1e-300)
+        inner = length[:, rest[:, None], rest]
+        cosines = 0.5 * (own[:, :, None] + own[:, None, :] - inner)
+        cosines /= np.sqrt(own[:, :, None] * own[:, None, :])
+        out[:, k] = np.linalg.det(cosines)
+    return out

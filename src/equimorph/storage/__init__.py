@@ -1,5 +1,6 @@
 """Results and schedules as files that other programs open."""
 
+from equimorph.storage.charts import load_chart, save_chart
 from equimorph.storage.map_table import write_map
 from equimorph.storage.results import (
     Results,
@@ -15,9 +16,11 @@ from equimorph.storage.surface import write_surface
 __all__ = [
     "Results",
     "append_results",
+    "load_chart",
     "load_set",
     "read_results",
     "read_schedule",
+    "save_chart",
     "save_set",
     "write_map",
     "write_results",
