@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.equilibria.pools import Ground
 from typecheck import unchecked
 
 BAYS = [("A", "B"), ("B", "C"), ("C", "D")]
@@ -81,6 +82,84 @@ def test_a_truss_in_space_has_its_images():
         z, p = each.apply(state.z[None], state.p[None])
         assert np.abs(truss.residual(z, p)).max() < 1e-12
         np.testing.assert_array_equal(each.apply(z, p)[0][0], state.z)
+
+
+def two_angles():
+    return em.Rod(
+        ends=("clamped", "clamped"), coordinates={}, loads={"q": em.LineLoad()}, elements=3
+    )
+
+
+def two_segments():
+    halves = {"left": em.Curvature(1.0, 0.0, 0.5), "right": em.Curvature(1.0, 0.5, 1.0)}
+    return em.Rod(
+        ends=("pinned", "pinned"), curvature=-1.5, actuators=halves, elements=4,
+        loads={"P": em.PointForce(0.25), "Q": em.PointForce(0.75)},
+    )  # fmt: skip
+
+
+def two_bars():
+    return em.Truss(
+        {"A": (-1, 0), "B": (0, 0.5), "C": (1, 0)},
+        [("A", "B"), ("B", "C")],
+        {"A": "xy", "C": "xy"},
+        {"F": {"B": (0, -1)}},
+        {"a": {"A-B": 1.0}, "b": {"B-C": 1.0}},
+    )
+
+
+def two_columns():
+    return em.Frame(
+        {"A": (0, 0), "B": (0, 1), "C": (1, 1), "D": (1, 0)},
+        BAYS,
+        {"A": "fixed", "D": "fixed"},
+        {"V": {"B": (0, -1)}, "W": {"C": (0, -1)}, "H": {"B": (1, 0), "C": (1, 0)}},
+        degree=5,
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "swapped", "at", "sign"),
+    [
+        (two_angles, ("theta_A", "theta_B"), {"theta_A": 1.1, "theta_B": -0.8, "q": 1.0}, -1.0),
+        (two_segments, ("left", "right"), {"left": 0.4, "right": -0.3, "P": 0.2, "Q": 0.1}, 1.0),
+        (two_bars, ("a", "b"), {"a": 0.05, "b": -0.02, "F": 0.01}, 1.0),
+        (two_columns, ("V", "W"), {"V": 0.8, "W": 0.3, "H": 0.2}, 1.0),
+    ],
+)
+def test_parameters_that_change_places_in_the_mirror(make, swapped, at, sign):
+    """Equilibria go to equilibria of the same energy with both values exchanged. Round-off."""
+    structure = make()
+    mirror = next(each for each in structure.symmetries() if sorted(each.order) != [*each.order])
+    loads = {name: value for name, value in at.items() if name in structure.unloaded()}
+    fixed = {name: value for name, value in at.items() if name not in loads}
+    with unchecked():
+        state = em.lift(structure.natural_state(**fixed), loads).end.state
+    z, p = mirror.apply(state.z[None], state.p[None])
+    image = em.State(structure, z[0], p[0])
+    np.testing.assert_array_equal(p[0], mirror.image(state.p))
+    for one, other in (swapped, swapped[::-1]):
+        assert image[one] == sign * state[other]
+    assert image.residual < 1e-11
+    assert image.index == state.index
+    assert image.energy == pytest.approx(state.energy, abs=1e-11)
+    back = mirror.apply(z, p)
+    np.testing.assert_allclose(back[0][0], state.z, atol=1e-12)
+    np.testing.assert_array_equal(back[1][0], state.p)
+
+
+def test_a_set_over_both_angles_gets_the_images_of_what_is_found():
+    """At θ_A = −θ_B the rod is its own image: a state found there brings its mirror image."""
+    rod = two_angles()
+    at = {"theta_A": 1.0, "theta_B": -1.0, "q": 2.5}
+    vector = np.array([at.get(each.name, each.default) for each in rod.parameters])
+    ground = Ground(rod, vector[None], ())
+    z = rod.sample(vector[None], np.random.default_rng(0))
+    [image] = ground.images(z, 0)
+    np.testing.assert_array_equal(image[0, : rod.unknowns], -z[0, : rod.unknowns][::-1])
+    assert ground.images(z, 0)[0].shape == z.shape
+    apart = Ground(rod, vector[None] + np.eye(len(vector))[:1], ())
+    assert apart.images(z, 0) == []
 
 
 @pytest.mark.parametrize(

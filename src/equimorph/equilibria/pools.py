@@ -65,7 +65,7 @@ class Ground:
         return [
             symmetry.apply(z, p)[0]
             for symmetry in self.structure.symmetries()
-            if np.array_equal(symmetry.signs * vector, vector)
+            if np.array_equal(symmetry.image(vector), vector)
         ]
 
 

@@ -53,7 +53,15 @@ class Symmetry:
     name: str
     apply: Callable[[Lanes, Parameters], tuple[Lanes, Parameters]]
     signs: Float[np.ndarray, " parameters"]
-    """Sign of each parameter under the symmetry: −1 where it is reversed."""
+    """Sign of each parameter of the image: −1 where it is reversed."""
+    order: Int[np.ndarray, " parameters"] | None = None
+    """From which parameter each of the image comes, if some change places: two end angles, say."""
+
+    def image(
+        self, p: Float[np.ndarray, "*lanes parameters"]
+    ) -> Float[np.ndarray, "*lanes parameters"]:
+        """Parameters of the image: ``signs · p[order]``."""
+        return np.asarray(self.signs * (p if self.order is None else p[..., self.order]))
 
 
 class Structure(ABC):

@@ -1,6 +1,6 @@
 """Mirror images of networks of joints, and structures that are their own."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -50,6 +50,26 @@ def sign_between(a: np.ndarray, b: np.ndarray) -> float | None:
         if np.abs(a - sign * b).max(initial=0.0) <= near:
             return sign
     return None
+
+
+def exchanged(
+    here: Sequence[np.ndarray], image: Sequence[np.ndarray]
+) -> tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]] | None:
+    """Signs and order (see `Symmetry`) of parameters whose effects have images among each other.
+
+    None if an effect has no such image, or the image of the image is another one.
+    """
+    count = len(here)
+    signs, order = np.zeros(count), np.full(count, -1)
+    for k in range(count):
+        for j in (k, *range(count)):  # stays where it is, if it may
+            sign = sign_between(image[k], here[j])
+            if sign is not None and order[j] < 0:
+                signs[j], order[j] = sign, k
+                break
+    if (order < 0).any() or (order[order] != range(count)).any():
+        return None
+    return (signs, order) if (signs[order] == signs).all() else None
 
 
 def is_symmetry(structure: Structure, apply: Apply) -> bool:

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.linalg.dense import multiply
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.mechanics import FrameMechanics
-from equimorph.structures.images import images, is_symmetry, sign_between
+from equimorph.structures.images import exchanged, images, is_symmetry
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -21,10 +21,10 @@ def symmetries(frame: FrameMechanics) -> tuple[Symmetry, ...]:
     found = []
     for name, axes, joints in images(frame.model.network.places):
         image = _Image(frame, axes, joints)
-        if not image.possible or image.signs is None:
+        if not image.possible or image.exchanged is None:
             continue
         if is_symmetry(frame, image.apply):
-            found.append(Symmetry(name, image.apply, image.signs))
+            found.append(Symmetry(name, image.apply, *image.exchanged))
     return tuple(found)
 
 
@@ -65,9 +65,11 @@ class _Image:
         return np.asarray(ends[self.there, 0] != self.joints[ends[:, 0]])
 
     @cached_property
-    def signs(self) -> Float[np.ndarray, " parameters"] | None:
-        """Sign of each parameter in the image; None if the image is another frame."""
-        given, found = self.frame.model.patterns, []
+    def exchanged(
+        self,
+    ) -> tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]] | None:
+        """Signs and order of the parameters in the image; None if the image is another frame."""
+        given, heres, mapped = self.frame.model.patterns, [], []
         bend = self.turn * np.where(self.reversed, -1.0, 1.0)
         for k in range(given.count):
             vectors = (given.forces[k], given.moves[k])
@@ -81,12 +83,9 @@ class _Image:
             image[4][self.there] = self.axes * given.lines[k]
             image[5][self.there] = bend * given.curvature[k]
             image[6][self.there] = given.length[k]
-            flat = (np.concatenate([each.ravel() for each in part]) for part in (image, here))
-            sign = sign_between(*flat)
-            if sign is None:
-                return None
-            found.append(sign)
-        return np.array(found)
+            heres.append(np.concatenate([each.ravel() for each in here]))
+            mapped.append(np.concatenate([each.ravel() for each in image]))
+        return exchanged(heres, mapped)
 
     @cached_property
     def nodes(self) -> Int[np.ndarray, " nodes"]:
@@ -107,9 +106,11 @@ class _Image:
         model, (nx, ny) = self.frame.model, self.axes
         m, count = model.multipliers, model.scalars
         members, points = len(model.lengths), len(model.owner) // len(model.lengths)
-        assert self.signs is not None
+        assert self.exchanged is not None
+        signs, order = self.exchanged
         matrix, parts = np.zeros((count, count)), []
-        matrix[range(m, count), range(m, count)] = np.append(self.signs, 1.0)
+        matrix[m + order, range(m, count - 1)] = signs
+        matrix[-1, -1] = 1.0
         for sign, forces in ((nx, model.forces[0]), (ny, model.forces[1])):
             here = model.points_of(forces).reshape(members, points, count)
             image = np.zeros_like(here)

@@ -1,6 +1,7 @@
 """Symmetries of general rods, found by comparing their Lagrangian with its mirror images."""
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -19,14 +20,14 @@ CANDIDATES = (("mirror", True, -1.0), ("reflection", False, -1.0), ("half turn",
 
 
 def mirrors(model: RodModel, unknowns: int) -> tuple[Symmetry, ...]:
-    """Symmetries among the `CANDIDATES` that the rod has, with signs of its parameters."""
+    """Symmetries among the `CANDIDATES` that the rod has, with what becomes of its parameters."""
     found = []
     for name, reverse, sign in CANDIDATES:
         matrix = _scalar_map(model, reverse=reverse, sign=sign)
         if matrix is not None:
-            signs = np.diag(matrix)[model.multipliers : -1].copy()
+            own = matrix[model.multipliers : -1, model.multipliers : -1]
             apply = _applied(matrix, unknowns, reverse=reverse, sign=sign)
-            found.append(Symmetry(name, apply, signs))
+            found.append(Symmetry(name, apply, own.sum(axis=0), np.abs(own).argmax(axis=0)))
     return tuple(found)
 
 
@@ -65,7 +66,7 @@ def _equal(a: np.ndarray, b: np.ndarray) -> bool:
 def _scalar_map(model: RodModel, *, reverse: bool, sign: float) -> Matrix | None:
     """Matrix T that takes scalars to those of the image, ``y T``; None if there is none.
 
-    Parameters change their sign at most; multipliers may take up a share of the loads.
+    Parameters change their sign, or places two by two; multipliers may take up a share of loads.
     """
     if reverse and not _reversible(model):
         return None
@@ -83,6 +84,9 @@ def _scalar_map(model: RodModel, *, reverse: bool, sign: float) -> Matrix | None
         beside = model.quadratic[:m, j]
         if not here[j].any() and beside.any():
             matrix[j, j] = matrix[np.argmax(np.abs(beside)), np.argmax(np.abs(beside))]
+    own = matrix[m:, m:]
+    if not np.array_equal(own @ own, np.eye(count - m)):
+        return None
     moved = matrix[:m] @ model.quadratic @ matrix.T
     return matrix if _equal(moved, model.quadratic[:m]) else None
 
@@ -90,11 +94,13 @@ def _scalar_map(model: RodModel, *, reverse: bool, sign: float) -> Matrix | None
 def _row_of_map(
     j: int, here: np.ndarray, image: np.ndarray, m: int, *, last: bool
 ) -> Float[np.ndarray, " scalars"] | None:
-    """Row j of the map: ± itself, plus shares of the multipliers."""
-    for own in (1.0,) if last else (1.0, -1.0):
-        row = np.zeros(len(here))
-        row[j] = own
-        rest = here[j] - own * image[j]
+    """Row j of the map: ± itself or another parameter, plus shares of the multipliers."""
+    count = len(here)
+    others = range(m, count - 1) if m <= j < count - 1 and here[j].any() else ()
+    for k, own in product((j, *others), (1.0,) if last else (1.0, -1.0)):
+        row = np.zeros(count)
+        row[k] = own
+        rest = here[j] - own * image[k]
         if j >= m > 0:
             row[:m] = np.linalg.lstsq(image[:m].T, rest, rcond=None)[0]
             row[:m][np.abs(row[:m]) < SAME] = 0.0
