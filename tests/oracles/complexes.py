@@ -4,6 +4,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.fabric import fabric_of
+from equimorph.manifold.levels import fabric_setting
+from equimorph.manifold.simplices import volumes
 from equimorph.manifold.topology import (
     adjacency,
     faces_of,
@@ -104,6 +107,34 @@ def assert_orientation_alternates(eset: EquilibriumSet) -> None:
         own = volume[patch == k] * np.sign(volume[patch == k].sum())
         assert -own[own < 0].sum() < 0.01 * own.sum()
         assert (own < 0).sum() < 0.05 * len(own)
+
+
+def assert_upright(eset: EquilibriumSet, turned: int = 0) -> None:
+    """No cell is folded over, neither over the parameters nor in the tangent planes at its corners.
+
+    Coherently oriented, all cells project with the sign of their index's parity; and, on average
+    over their corners, they look the same way as the tangent planes, which cells around orient;
+    but for so many of them.
+    """
+    assert eset.audit.overturned == 0
+    whole = adjacency(eset.cells)
+    signs, _ = orientation(eset.cells, whole)
+    volume = projected_volume(eset.coordinates, eset.cells) * signs * (-1) ** eset.cell_index
+    patch = labels(len(eset.cells), whole.links[whole.manifold])
+    for k in range(patch.max(initial=-1) + 1):
+        own = volume[patch == k]
+        assert (own * np.sign(own.sum()) >= 0.0).all()
+    setting = fabric_setting(eset)
+    fabric = fabric_of(setting, eset)
+    corners = fabric.vertices.place[eset.cells]
+    total = np.zeros(len(eset.cells))
+    for plane in eset.cells.T:
+        flat = np.einsum("cde,cke->ckd", fabric.vertices.rows[plane], corners - corners[:, :1])
+        total += volumes(flat) * signs
+    for k in range(patch.max(initial=-1) + 1):
+        own = total[patch == k]
+        turned -= int((own * np.sign(own.sum()) <= 0.0).sum())
+    assert turned >= 0
 
 
 def facets_of(piece: np.ndarray, d: int) -> np.ndarray:

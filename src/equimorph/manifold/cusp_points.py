@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Locus, settle
@@ -11,7 +11,7 @@ from equimorph.errors import InputError
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.fabric import ON_FOLD, Fabric, Vertices, fabric_of
-from equimorph.manifold.levels import fabric_setting
+from equimorph.manifold.levels import fabric_setting, roots
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import lower_index
 from equimorph.structures import States
@@ -19,6 +19,8 @@ from equimorph.structures import States
 REACH = 1.5
 """How far a cusp may lie from the ends of the edge beside which it is sought, in its lengths."""
 SAME = 1e-6
+CLOSE = 1e-3
+"""Shares of an edge next to its ends in which a cusp is that of the end."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,48 @@ def _between(
         if away.max() <= REACH * length and lower_index(setting, z, p)[0] == low:
             return z[0], p[0]
     return None
+
+
+def with_cusps_beside(fabric: Fabric, beside: Bool[np.ndarray, " C"]) -> Fabric:
+    """The same with vertices at the cusps beside some cells.
+
+    A cell that cuts a cusp off is overturned: the sheet around goes all the way round the cusp.
+    """
+    near = np.zeros(len(fabric.vertices), bool)
+    near[fabric.cells[beside]] = True
+    ends, found = cusps_on_edges(fabric, near)
+    place = fabric.vertices.place
+    gap = np.stack([np.linalg.norm(found.place - place[end], axis=1) for end in ends.T])
+    whole = np.linalg.norm(place[ends[:, 1]] - place[ends[:, 0]], axis=1)
+    apart = np.flatnonzero((gap > CLOSE * whole).all(axis=0))
+    return fabric.bisected(ends[apart], found.take(apart)) if len(apart) else fabric
+
+
+def cusps_on_edges(
+    fabric: Fabric, near: Bool[np.ndarray, " V"] | None = None
+) -> tuple[Int[np.ndarray, "n 2"], Vertices]:
+    """Fold edges with cusps, of those with an end near a place, and the cusps."""
+    ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    if near is not None:
+        ends = ends[near[ends].any(axis=1)]
+    store = fabric.vertices
+    if len(ends) == 0:
+        return ends, store.take(np.zeros(0, int))
+    side = sides_of_existence(store.take(ends[:, 0]))
+    other = sides_of_existence(store.take(ends[:, 1]))
+    known = np.stack(
+        [np.einsum("ni,ni->n", side, side), np.einsum("ni,ni->n", side, other)], axis=1
+    )
+    turning = np.flatnonzero(known[:, 1] < 0.0)
+    if len(turning) == 0:
+        return ends[:0], store.take(turning)
+    lowest = store.index[ends[turning]].min(axis=1)
+
+    def value(at: Vertices, lanes: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
+
+    done, found = roots(fabric, ends[turning], (ON_FOLD, lowest), known[turning], value)
+    return ends[turning[done]], found
 
 
 def null_vectors(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Complex
@@ -17,6 +17,7 @@ from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.kernels import square_sides
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.points import CAP, CORNER, FOLD
+from equimorph.manifold.simplices import volumes
 from equimorph.manifold.tangents import (
     Ends,
     best_corners,
@@ -25,13 +26,15 @@ from equimorph.manifold.tangents import (
     placed_frames,
     tangent_frames,
 )
-from equimorph.manifold.topology import adjacency, flags_of, keys_of, orientation, rows_of
+from equimorph.manifold.topology import adjacency, flags_of, keys_of, rows_of, senses
 from equimorph.structures import States
 
 ON_FOLD, ON_CAP, SIDES = 1, 2, 4
 """Marks; from `SIDES` on two for each free parameter: its lower and its upper bound."""
 HOLE = 1 << 20
 """Mark of facets on the boundary that lie on nothing: the set is incomplete there."""
+TRIANGLES = 2
+"""Dimension of their cells."""
 ON_BOX = 1e-9
 ON_BOUND = 1e-7
 
@@ -71,7 +74,8 @@ class Fabric:
     """Vertices, cells with their index, and marked facets.
 
     box: lower and upper bounds of the free parameters; squared: lengths of the sides of the cells,
-    squared, in the order 01, 02, 12 and so on.
+    squared, in the order 01, 02, 12 and so on; sense: sign that the areas of triangles in the free
+    parameters have, unless they are overturned; empty in other dimensions.
     """
 
     setting: Setting
@@ -82,6 +86,7 @@ class Fabric:
     facets: Int[np.ndarray, "F d"]
     marks: Int[np.ndarray, " F"]
     squared: Float[np.ndarray, "C sides"]
+    sense: Int[np.ndarray, " T"]
 
     @property
     def dimension(self) -> int:
@@ -122,6 +127,14 @@ class Fabric:
         stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, d))
         return Ends(store.place[at], rows, stacked)
 
+    def overturned(
+        self, cells: Int[np.ndarray, "n corners"], sense: Int[np.ndarray, " n"]
+    ) -> Bool[np.ndarray, " n"]:
+        """Which of some cells project against their sense."""
+        place = self.vertices.place
+        flat = place[:, place.shape[1] - self.dimension :]
+        return np.asarray(volumes(flat[cells]) * sense < 0.0)
+
     def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
         """Cut edges at new vertices, and all cells and facets around them.
 
@@ -141,6 +154,7 @@ class Fabric:
             squared=squared,
             cells=cells,
             cell_index=self.cell_index[of_cells],
+            sense=self.sense[of_cells] if self.dimension == TRIANGLES else self.sense,
             facets=facets,
             marks=self.marks[of_facets],
         )
@@ -218,7 +232,8 @@ def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
         )
     z, p = eset.points.z, eset.points.p
     whole = adjacency(eset.cells)
-    rows = best_corners(setting, z, p, eset.cells, orientation(eset.cells, whole)[0])
+    sense = senses(eset.cells, eset.cell_index, eset.coordinates, whole)
+    rows = best_corners(setting, z, p, eset.cells, sense.signs)
     others = (eset.index, eset.grid_vertex)
     vertices = vertices_of(setting, (z, p), eset.kinds, others, rows)
     d = len(eset.names)
@@ -233,7 +248,9 @@ def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
     box = np.stack([eset.box.lower, eset.box.upper])
     squared = squared_sides(vertices.place, eset.cells)
     facets = (whole.facets[marked], marks[marked])
-    return Fabric(setting, box, vertices, eset.cells, eset.cell_index, *facets, squared)
+    upright = sense.signs * np.where(eset.cell_index % 2 == 0, 1, -1)
+    upright = upright if d == TRIANGLES else np.zeros(0, int)
+    return Fabric(setting, box, vertices, eset.cells, eset.cell_index, *facets, squared, upright)
 
 
 def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:

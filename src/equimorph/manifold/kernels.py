@@ -146,13 +146,44 @@ def _stays_up(place, rows, a, b, c, d):
 
 
 @njit(nogil=True)
-def flip_edges(cells, squared, index, facets, place, rows, least):
+def _overturned_area(place, a, b, c, sense):
+    """Area, twice, of a triangle in the last two coordinates, the parameters, if it is overturned.
+
+    Else zero.
+    """
+    x, y = place.shape[1] - 2, place.shape[1] - 1
+    area = (place[b, x] - place[a, x]) * (place[c, y] - place[a, y])
+    area -= (place[b, y] - place[a, y]) * (place[c, x] - place[a, x])
+    return max(-area * sense, 0.0)
+
+
+@njit(nogil=True)
+def _worth(place, squared, sense, corners, pair, least):
+    """Whether to flip: what is overturned counts first, then what the angles gain.
+
+    corners: a, b, c, d of triangles t, abc, and u, bad; pair: t, k, u, j, c being corner k of t and
+    d corner j of u.
+    """
+    a, b, c, d = corners
+    t, k, u, j = pair
+    own = sense[t]
+    before = _overturned_area(place, a, b, c, own) + _overturned_area(place, b, a, d, own)
+    after = _overturned_area(place, a, d, c, own) + _overturned_area(place, d, b, c, own)
+    if abs(before - after) > 1e-9 * max(before, after):
+        return after < before
+    return -_cotangent(squared[t], k) - _cotangent(squared[u], j) > least
+
+
+@njit(nogil=True)
+def flip_edges(cells, squared, index, sense, facets, place, rows, least):
     """Flip edges of triangles whose opposite angles add up to more than π; return how many.
 
-    Changes cells (T, 3) and the squares of their sides 01, 02, 12. Edges between triangles of
-    different index, `facets` (F, 2), and edges of other than two triangles stay. A flip must gain
-    `least`: minus the sum of the cotangents of both angles. Nothing may fold over in the tangent
-    planes, spanned by rows (V, 2, coordinates), at all four corners.
+    Changes cells (T, 3), the squares of their sides 01, 02, 12, and their sense (T,): the sign of
+    their area in the parameters, if they are not overturned. Edges between triangles of different
+    index, `facets` (F, 2), and edges of other than two triangles stay. A flip must gain `least`:
+    minus the sum of the cotangents of both angles; or leave less area overturned, never more.
+    Nothing may fold over in the tangent planes, spanned by rows (V, 2, coordinates), at all four
+    corners.
     """
     base, count = place.shape[0], cells.shape[0]
     size = 16
@@ -177,7 +208,7 @@ def flip_edges(cells, squared, index, facets, place, rows, least):
         c, a, b = cells[t, k], cells[t, (k + 1) % 3], cells[t, (k + 2) % 3]
         j = _corner_apart(cells, u, a, b)
         d = cells[u, j]
-        if -_cotangent(squared[t], k) - _cotangent(squared[u], j) <= least:
+        if not _worth(place, squared, sense, (a, b, c, d), (t, k, u, j), least):
             continue
         new = _slot(keys, _edge_key(c, d, base))
         if counts[new] > 0 or not _stays_up(place, rows, a, b, c, d):
@@ -197,6 +228,7 @@ def flip_edges(cells, squared, index, facets, place, rows, least):
         squared[t, 0], squared[t, 1], squared[t, 2] = ad, ac, gap
         across[t, 0], across[t, 1], across[t, 2] = u, beside_ac, beside_ad
         cells[u, 0], cells[u, 1], cells[u, 2] = d, b, c
+        sense[u] = sense[t]
         squared[u, 0], squared[u, 1], squared[u, 2] = bd, gap, bc
         across[u, 0], across[u, 1], across[u, 2] = beside_bc, t, beside_bd
         if beside_bc >= 0:

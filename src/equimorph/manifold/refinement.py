@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
 from equimorph.manifold.collapsing import collapse_edges
+from equimorph.manifold.cusp_points import with_cusps_beside
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.fabric import (
     HOLE,
@@ -32,12 +33,13 @@ from equimorph.manifold.topology import keys_of
 from equimorph.model import Progress, Silent
 
 ROUNDS = 200
-TIDIED = 1
-"""How often slivers are taken away in between."""
 ALTERNATIONS, FEWER = 8, 0.98
 """How often tetrahedra are reconnected and vertices taken out, as long as cells get fewer."""
 GROWN = 1.6
 """How much more tetrahedra there are when slivers are taken away anew."""
+PLANS = (3 * (False, True), 6 * (True,))
+"""Whether all edges around overturned cells are cut, round by round, or only folds and constraints;
+another plan if one fails."""
 SHARE = {1: 1.0, 2: 0.75, 3: 2.0 / 3.0}
 """Part of the tolerance that edges may use up: inside a cell their deviations add up to 2d/(d + 1)
 of the largest."""
@@ -162,20 +164,36 @@ class _Memory:
 
 def _refined(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progress) -> Fabric:
     """Bisect and flip until nothing is left to do; then take slivers away, and begin again."""
-    tidied, cells = 0, len(fabric.cells)
+    fabric = _settled(fabric, tolerance, memory, progress)
+    fabric = _settled(_tidied(fabric, memory), tolerance, memory, progress)
+    return _righted(fabric, tolerance, memory, progress) if fabric.dimension == 2 else fabric
+
+
+def _righted(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progress) -> Fabric:
+    """Cells turned upright that bisection and flips have left overturned, as far as possible."""
+    first, best, fewest = fabric, fabric, _faults(fabric, tolerance, memory)
+    for plan in PLANS:
+        fabric = first
+        for widely in plan:
+            if fewest[1] == 0:
+                return best
+            fabric = with_cusps_beside(fabric, fabric.overturned(fabric.cells, fabric.sense))
+            fabric = _settled(_tidied(fabric, memory), tolerance, memory, progress)
+            faults = _faults(fabric, tolerance, memory)
+            if faults < fewest:
+                best, fewest = fabric, faults
+            fabric = _cut_around(fabric, memory, widely)
+    return best
+
+
+def _settled(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progress) -> Fabric:
+    """Bisect and flip until no edge deviates that can be bisected."""
+    cells = len(fabric.cells)
     for _ in range(ROUNDS):
         edges = _known(fabric, memory)
         hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
-        if hopeless or len(fabric.vertices) > MOST:
+        if hopeless or len(fabric.vertices) > MOST or not edges.deviating(tolerance).any():
             break
-        if not edges.deviating(tolerance).any():
-            if tidied == TIDIED:
-                break
-            tidied += 1
-            before, fabric = fabric.cells, _tidied(fabric, memory)
-            if fabric.cells is before:
-                break
-            continue
         progress.report("refining", int((edges.error <= tolerance).sum()), len(edges.error))
         fabric = _bisect(fabric, edges, _chosen(edges, tolerance), memory)
         if fabric.dimension == 2:
@@ -184,6 +202,30 @@ def _refined(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progre
             fabric = _tidied(fabric, memory)
             cells = len(fabric.cells)
     return fabric
+
+
+def _faults(fabric: Fabric, tolerance: float, memory: _Memory) -> tuple[int, int]:
+    """Numbers of edges that deviate, and of cells that are overturned."""
+    deviating = int((_known(fabric, memory).error > tolerance).sum())
+    return deviating, int(fabric.overturned(fabric.cells, fabric.sense).sum())
+
+
+def _cut_around(fabric: Fabric, memory: _Memory, widely: bool) -> Fabric:
+    """Edges cut on folds and constraints: chords of these that pass a vertex turn cells over.
+
+    If not `widely`; else all edges of overturned cells and of those that touch them.
+    """
+    edges = _known(fabric, memory)
+    cells = fabric.overturned(fabric.cells, fabric.sense)
+    wanted = (edges.marks & (ON_FOLD | ON_CAP)) > 0
+    if widely:
+        near = np.zeros(len(fabric.vertices), bool)
+        near[fabric.cells[cells]] = True
+        cells, wanted = near[fabric.cells].any(axis=1), np.ones_like(wanted)
+    chosen = np.unique(edges.of_cells[cells])
+    chosen = chosen[wanted[chosen] & ~edges.stuck[chosen]]
+    chosen = chosen[np.argsort(-edges.length[chosen], kind="stable")]
+    return flip(_bisect(fabric, edges, chosen, memory), memory.cut)
 
 
 def _tidied(fabric: Fabric, memory: _Memory) -> Fabric:

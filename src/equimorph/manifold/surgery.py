@@ -15,7 +15,7 @@ from equimorph.manifold.kernels import flip_edges
 from equimorph.manifold.topology import keys_of
 
 SLENDER = np.radians(20.0)
-"""Triangles with a smaller angle lose an edge, if that helps."""
+"""Triangles with a smaller angle lose an edge, if that helps, and overturned ones."""
 GAIN = 1e-3
 """Least gain of a flip: minus the sum of the cotangents of both opposite angles."""
 LONGER = 1.5
@@ -42,14 +42,15 @@ def smallest_angle(fabric: Fabric) -> float:
 def flip(fabric: Fabric, but: Int[np.ndarray, "m 2"] | None = None) -> Fabric:
     """Flip edges whose opposite angles add up to more than π, as far as nothing folds over.
 
+    And those whose flip leaves fewer cells overturned, whatever the angles.
     Edges between the pairs of vertices `but` do not come into being.
     """
-    cells, squared = fabric.cells.copy(), fabric.squared.copy()
+    cells, squared, sense = fabric.cells.copy(), fabric.squared.copy(), fabric.sense.copy()
     fixed = fabric.facets if but is None else np.concatenate([fabric.facets, but])
     store = fabric.vertices
-    parts = (fabric.cell_index, np.ascontiguousarray(fixed), store.place, store.rows)
+    parts = (fabric.cell_index, sense, np.ascontiguousarray(fixed), store.place, store.rows)
     count = flip_edges(cells, squared, *parts, GAIN)
-    return replace(fabric, cells=cells, squared=squared) if count else fabric
+    return replace(fabric, cells=cells, squared=squared, sense=sense) if count else fabric
 
 
 def _cotangents(squared: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3"]:
@@ -100,6 +101,7 @@ def collapse(fabric: Fabric, passes: int) -> Fabric:
             cells=cells[kept],
             squared=squared[kept],
             cell_index=fabric.cell_index[kept],
+            sense=fabric.sense[kept],
             facets=facets[whole],
             marks=fabric.marks[whole],
         )
@@ -114,10 +116,9 @@ def _proper(rows: Int[np.ndarray, "n k"]) -> Bool[np.ndarray, " n"]:
 def _moves(fabric: Fabric) -> Int[np.ndarray, "m 2"]:
     """Vertices that go, and into which neighbours; stars of those that go do not overlap."""
     cells, base = fabric.cells, len(fabric.vertices)
-    slender = np.flatnonzero(_smallest(fabric.squared) < SLENDER)
-    if len(slender) == 0:
+    corners = cells[(_smallest(fabric.squared) < SLENDER) | fabric.overturned(cells, fabric.sense)]
+    if len(corners) == 0:
         return np.zeros((0, 2), int)
-    corners = cells[slender]
     around = [corners[:, [i, j]] for i in range(3) for j in range(3) if i != j]
     moves = np.unique(np.concatenate(around), axis=0)
     near = np.zeros(base, bool)
@@ -171,7 +172,7 @@ def _spread(
 
 
 def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, " m"]:
-    """How many slender triangles fewer there are if a vertex is drawn into a neighbour.
+    """How many slender or overturned triangles fewer there are if vertices go into neighbours.
 
     And, less than one, by how much the smallest angle around it grows. Minus one where a triangle
     would fold over, get much more slender or much longer.
@@ -179,7 +180,8 @@ def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, "
     base = len(fabric.vertices)
     going = np.zeros(base, bool)
     going[moves[:, 0]] = True
-    cells = fabric.cells[going[fabric.cells].any(axis=1)]
+    chosen = going[fabric.cells].any(axis=1)
+    cells, sense = fabric.cells[chosen], fabric.sense[chosen]
     order = np.argsort(cells.ravel(), kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(cells.ravel(), minlength=base))])
     row, at = _spread(starts, moves[:, 0])
@@ -191,10 +193,12 @@ def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, "
     old_angle, new_angle = _angles(fabric, old), _angles(fabric, new[stays])
     np.minimum.at(before, row, old_angle)
     np.minimum.at(after, row[stays], new_angle)
-    fewer = np.bincount(row[old_angle < SLENDER], minlength=len(moves))
-    fewer -= np.bincount(row[stays][new_angle < SLENDER], minlength=len(moves))
+    sense = sense[order[at] // 3]
+    old_over, new_over = fabric.overturned(old, sense), fabric.overturned(new[stays], sense[stays])
+    fewer = np.bincount(row[(old_angle < SLENDER) | old_over], minlength=len(moves))
+    fewer -= np.bincount(row[stays][(new_angle < SLENDER) | new_over], minlength=len(moves))
     good = np.ones(len(moves), bool)
-    turned = _turned(fabric, old[stays], new[stays])
+    turned = _turned(fabric, old[stays], new[stays]) | (new_over & ~old_over[stays])
     good[row[stays][turned]] = False
     reach, longest = np.zeros(len(moves)), np.zeros(len(moves))
     np.maximum.at(reach, row, _longest(fabric, old))
