@@ -137,14 +137,7 @@ class _Crossings:
 def _only(fabric: Fabric, cells: Bool[np.ndarray, " C"]) -> Fabric:
     """Some cells of a fabric, with their facets."""
     own = flags_of(fabric.facets, adjacency(fabric.cells[cells]).facets)
-    return replace(
-        fabric,
-        cells=fabric.cells[cells],
-        cell_index=fabric.cell_index[cells],
-        squared=fabric.squared[cells],
-        facets=fabric.facets[own],
-        marks=fabric.marks[own],
-    )
+    return replace(fabric.only(cells), facets=fabric.facets[own], marks=fabric.marks[own])
 
 
 def _signs(preference: Preference) -> Float[np.ndarray, " V"]:

@@ -127,6 +127,16 @@ class Fabric:
         stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, d))
         return Ends(store.place[at], rows, stacked)
 
+    def only(self, cells: Bool[np.ndarray, " C"]) -> "Fabric":
+        """Some of the cells, with all facets."""
+        return replace(
+            self,
+            cells=self.cells[cells],
+            cell_index=self.cell_index[cells],
+            squared=self.squared[cells],
+            sense=self.sense[cells] if self.dimension == TRIANGLES else self.sense,
+        )
+
     def overturned(
         self, cells: Int[np.ndarray, "n corners"], sense: Int[np.ndarray, " n"]
     ) -> Bool[np.ndarray, " n"]:

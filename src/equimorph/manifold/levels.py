@@ -360,11 +360,8 @@ def part_of(
     kinds = fabric.vertices.kinds.copy()
     kinds[on_level] = np.where(np.isin(kinds[on_level], (FOLD, CORNER)), CORNER, CAP)
     fabric = replace(
-        fabric,
+        fabric.only(cells),
         vertices=replace(fabric.vertices, kinds=kinds),
-        cells=fabric.cells[cells],
-        cell_index=fabric.cell_index[cells],
-        squared=fabric.squared[cells],
         facets=facets[(marks & HOLE) == 0],
         marks=marks[(marks & HOLE) == 0],
     )
