@@ -125,6 +125,33 @@ def sliding_rod():
     return rod, (0.3, 0.4, 0.1, 0.1), lagrangian
 
 
+def rolling_rod():
+    """End B rolls along an inclined line: one multiplier, across it."""
+    slide, force = 0.7, (1.0, -1.0)
+    rod = Rod(
+        ends=("clamped", End(angle="free", slide=slide)),
+        loads={"P": PointForce(0.5, force)},
+        axial=4.0,
+        elements=4,
+        degree=5,
+    )
+    g = Quadrature(rod)
+    t, n = np.array([[np.cos(slide), np.sin(slide)], [-np.sin(slide), np.cos(slide)]])
+
+    def lagrangian(z, p):
+        start, P, offset = p.T
+        theta, mu = np.concatenate([start[:, None], z[:, :-1]], axis=1), z[:, -1]
+        angles, right = theta[:, g.at], g.s > 0.5
+        x, y = (
+            column(P) * (right * force[i] - (t @ force) * t[i]) + column(mu) * n[i] for i in (0, 1)
+        )
+        normal = x * np.cos(angles) + y * np.sin(angles)
+        out = bending(g, theta, 1 / (4 * np.pi**2), 0.0) + g.total(normal - normal**2 / 8.0)
+        return out - (mu + P * (n @ force)) * offset
+
+    return rod, (0.3, 0.4, 0.1), lagrangian
+
+
 def stretchable_arch():
     """Clamped, extensible: the multipliers have a trailing block."""
     rod = Rod(axial=4.0, load="left-half", elements=4, degree=5)

@@ -241,6 +241,7 @@ SPECIMENS = (
     _general("sprung rod", rods.sprung_rod),
     _general("stretchable cantilever", rods.stretchable_cantilever),
     _general("sliding rod", rods.sliding_rod),
+    _general("rolling rod", rods.rolling_rod),
     _general("stretchable arch", rods.stretchable_arch),
     _general("inflated rod", rods.inflated_rod),
     _general("pulled rod", rods.pulled_rod),

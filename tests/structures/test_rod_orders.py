@@ -80,6 +80,14 @@ OPTIONS = {
         {},
         {"q": 1.0},
     ),
+    "inclined roller": (
+        {
+            "ends": ("clamped", em.End(angle="free", slide=0.5)),
+            "loads": {"q": em.LineLoad(exponential)},
+        },
+        {},
+        {"q": 0.4},
+    ),
     "pressure": (
         {"ends": ("clamped", "pinned"), "curvature": -2.0, "loads": {"p": em.Pressure()}},
         {"theta_A": 1.0},
