@@ -8,6 +8,7 @@ from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.equilibria.fronts import initial_front
 from equimorph.equilibria.outcome import Batching
 from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD
+from equimorph.structures import States
 from oracles.polynomial import fold_form, pitchfork_form
 
 
@@ -147,3 +148,22 @@ def test_progress_is_reported_and_an_error_of_the_sink_cancels():
     [(stage, done, total)] = sink.seen
     assert stage == "tracing lanes"
     assert 0 <= done < total == 20000
+
+
+def test_lanes_whose_steps_end_next_to_the_goal_arrive_there():
+    """Newton's method takes them from within 1e-9 of it; those farther away are lost.
+
+    A smallest step above the second one makes lanes end after the first.
+    """
+    rest = em.Spring().natural_state(x_l=1.5)
+    first = em.lift(rest, {"F": 0.5}).states["F"][1]
+    options = TraceOptions(smallest_step=0.2)
+    for excess, kind in ((5e-11, "arrived"), (1e-6, "lost")):
+        goal = first * (1.0 + excess)
+        many = em.lift(States(rest.structure, *(np.tile(x, (3, 1)) for x in (rest.z, rest.p))),
+                       {"F": goal}, options=options)  # fmt: skip
+        alone = em.lift(rest, {"F": goal}, options=options).end
+        assert set(many.kind.tolist()) == {alone.kind} == {kind}
+    there = em.lift(rest, {"F": first * (1.0 + 5e-11)}, options=options).end.state
+    assert there["F"] == first * (1.0 + 5e-11)
+    assert there.residual < 1e-14

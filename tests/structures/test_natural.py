@@ -106,16 +106,31 @@ def test_states_of_a_batch_do_not_depend_on_the_batch(monkeypatch):
     np.testing.assert_allclose(together.z, apart.z, atol=1e-9)
 
 
-@pytest.mark.parametrize("Theta", [0.001, 0.01, 0.05])
+@pytest.mark.parametrize("Theta", [1e-9, 1e-6, 1e-4, 0.001, 0.01, 0.05])
 def test_a_rod_that_is_all_but_straight_buckles_upward(Theta):
     """As Θ → 0 the elastica with end angles zero: λ = 1.05299, rise 0.19492 at ν = 0.9.
 
-    [Love1927]_, §§ 262-263; terms of order Θ apart.
+    [Love1927]_, §§ 262-263; terms of order Θ and the last digit apart.
     """
     state = Rod().natural_state(Theta=Theta, nu=0.9)
     assert state.stable
-    assert state.multipliers[0] == pytest.approx(1.05299, abs=1.2 * Theta)
-    assert Rod().height(0.5)(state) == pytest.approx(0.19492, abs=1.2 * Theta)
+    assert state.multipliers[0] == pytest.approx(1.05299, abs=1.2 * Theta + 5e-6)
+    assert Rod().height(0.5)(state) == pytest.approx(0.19492, abs=1.2 * Theta + 5e-6)
+
+
+def test_ever_smaller_end_angles_lead_to_one_buckled_state_whatever_their_ratio():
+    """Natural states are smooth in (Θ, Δ) at the limit: differences shrink like the angles."""
+    rod = Rod()
+    for ratio in (-3.0, 0.0, 0.7):
+        sizes = np.array([1e-3, 1e-5, 1e-7, 1e-9])
+        p = settings(sizes, [0.0])
+        p[:, 1] = ratio * sizes
+        states, found = rod.natural_states(p)
+        assert found.all()
+        assert states.residual.max() < 1e-12
+        assert (states.index == 0).all()
+        gaps = np.abs(states.z[:-1] - states.z[-1]).max(axis=1)
+        np.testing.assert_allclose(gaps / sizes[:-1], gaps[0] / sizes[0], rtol=0.05)
 
 
 def test_natural_states_pulled_too_straight_are_refused_up_to_the_span_named():

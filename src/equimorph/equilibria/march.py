@@ -7,10 +7,11 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import kernels
 from equimorph.equilibria.cubics import least_inside
-from equimorph.equilibria.curves import Curve
+from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.fronts import Bracket, Front, new_scalars
 from equimorph.equilibria.happenings import Happenings
 from equimorph.equilibria.kernels import (
+    ARRIVAL,
     BRANCH,
     CONSTRAINT,
     CONVERGED,
@@ -19,8 +20,9 @@ from equimorph.equilibria.kernels import (
     ENDING,
     HIDDEN,
     REFUSED,
+    RETURN,
 )
-from equimorph.equilibria.location import locate_branch_point
+from equimorph.equilibria.location import locate_branch_point, polish
 from equimorph.equilibria.probing import NARROW, inside_step
 from equimorph.equilibria.records import EventFile, PointFile
 from equimorph.equilibria.starts import ON_BOUND
@@ -39,6 +41,9 @@ DIFFERENCE = 1e-5
 """Step of differences along a curve, in the metric."""
 MISS = 0.1
 """Error of the largest value of a cubic inside a step, as a share of its rise above the ends."""
+AT_GOAL, FROM_GOAL = 1e-9, 1e-6
+"""Distance from an end of t, and of the states in the metric, from which Newton's method takes
+lanes there whose steps became too small."""
 PATIENCE = 40
 """Share of lanes, one in so many, that may be finished before their gaps are closed."""
 WHY = {
@@ -304,18 +309,37 @@ class Block:
         )
 
     def _given_up(self) -> list[Loss]:
-        """Lanes that cannot go on."""
+        """Lanes that cannot go on; those that are at their goal but for round-off arrive."""
         (numbers, counts), lost = self._scalars, list[Loss]()
         stage = counts[kernels.STAGE, : self.active]
         for i in np.flatnonzero(stage > ENDED):
             why = WHY[int(stage[i])].format(most=counts[kernels.MOST, i])
             front = self._front(np.array([i]))
+            if stage[i] == kernels.SHORT and self._arrives(int(i), front):
+                continue
             state = self.curve.take(counts[kernels.LANE, [i]]).states(front.z, front.t)
             if not self.curve.structure.resolved(*state)[0]:
                 why = f"{why}, where {UNRESOLVED}"
             length = float(numbers[kernels.TRAVELLED, i])
             lost.append(Loss(int(counts[kernels.LANE, i]), why, front, length))
         return lost
+
+    def _arrives(self, i: int, front: Front) -> bool:
+        """Whether Newton's method takes a lane that is next to its goal there; notes the event."""
+        (numbers, counts), up = self._scalars, front.tangent_t > 0.0
+        goal, mark = np.where(up, 1.0, 0.0), np.where(up, ARRIVAL, RETURN)
+        if counts[kernels.STEPS, i] == 0 or np.abs(goal - front.t)[0] > AT_GOAL:
+            return False
+        lane = counts[kernels.LANE, [i]]
+        curve = self.curve.take(lane)
+        z, found = polish(curve, front.z, goal)
+        gap = squared_length(curve.metric, curve.weight, z - front.z, goal - front.t)
+        there = bool(found[0] and np.sqrt(gap[0]) < FROM_GOAL)
+        if there:
+            index = np.stack([front.index, front.index], 1)
+            way = numbers[kernels.TRAVELLED, [i]] + np.sqrt(gap)
+            self.hidden.append(Happenings(lane, mark, z, goal, way, index, found))
+        return there
 
     def drop(self, lanes: Some) -> None:
         """Take lanes out, wherever they are."""

@@ -185,7 +185,8 @@ class _Job:
             self._fill()
         if block.active:
             self._lose(block.tick())
-        if block.events.count >= (EVENTS_AT_ONCE if block.active else 1):
+        waiting = block.events.count + len(block.hidden)
+        if waiting >= (EVENTS_AT_ONCE if block.active else 1):
             self._locate()
         return bool(block.active or self.again or self.queue.handed < self.queue.total)
 

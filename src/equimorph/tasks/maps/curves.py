@@ -2,17 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.locus import Test
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.structures import States
 from equimorph.tasks.maps.brackets import (
-    PARTS,
-    SHRINKING,
     Brackets,
     divided,
     edges_ahead,
@@ -20,24 +16,18 @@ from equimorph.tasks.maps.brackets import (
     narrowed,
     suspicious,
 )
+from equimorph.tasks.maps.candidates import BESIDE, SAME, candidates, sharp
 from equimorph.tasks.maps.causes import Paths
 from equimorph.tasks.maps.chains import chains
-from equimorph.tasks.maps.polish import TestsOf, polished
 from equimorph.tasks.maps.samples import Samples, difference
 
 ROUNDS = 3
 """How often causes are looked for, in parts of parts of a pair."""
 DIVISIONS = 1
 """Of what remains without a cause: it is known to 8⁻⁴ of an edge."""
-BESIDE = 1.0 / PARTS**2
-"""Distance from a place at which both sides are looked at, as a share of the pair."""
-SLACK = 1e-3
-"""How far outside its bracket, in lengths of it, an exact place may lie."""
 EXACT = 1e-10
 """Error of places that have a cause, in units of the parameters' scales: Newton's method ends with
 a correction of 1e-9, and is linear with a rate of 1e-6."""
-SAME = 1e-7
-"""Places closer than this, in units of the parameters' scales, are one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,32 +99,12 @@ def explained(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets
     Places with narrow brackets around them; pairs without a cause; what is left of the others on
     both sides, where its ends differ in kind.
     """
-    count, structure = len(pairs), paths.sheet.structure
-    kind, found = np.full(count, "", dtype=object), np.zeros(count, bool)
-    z, p = pairs.a.z.copy(), pairs.a.p.copy()
+    found = candidates(paths, pairs)
     moving = np.argmax(np.abs(pairs.b.setting - pairs.a.setting), axis=1)
-    for cause in paths.causes(pairs):
-        open_ = ~found[cause.lanes]
-        some = np.flatnonzero(open_)
-        at, start = cause.lanes[some], cause.start.take(some)
-        if not len(at):
-            continue
-        free = np.stack([paths.sheet.places[moving[at]], np.full(len(at), paths.load)], axis=1)
-        tests = partial(_of_some, cause.tests, some)
-        new_z, new_p, good = polished(structure, start.z, start.p, free, tests)
-        good &= _within(pairs.take(at), new_p[:, paths.sheet.places])
-        hit = at[good]
-        found[hit], kind[hit], z[hit], p[hit] = True, cause.kind, new_z[good], new_p[good]
-    error = EXACT * structure.scales[paths.sheet.places[moving]]
-    place = p[:, paths.sheet.places]
-    return _confirmed(paths, pairs, Places(pairs, kind, error, place, z, p), found)
-
-
-def _of_some(
-    tests: TestsOf, some: Int[np.ndarray, " some"], lanes: Int[np.ndarray, " fewer"]
-) -> tuple[Test, Test]:
-    """Tests of lanes that are numbered among some of all."""
-    return tests(some[lanes])
+    error = EXACT * paths.sheet.structure.scales[paths.sheet.places[moving]]
+    setting = found.p[:, paths.sheet.places]
+    places = Places(pairs, found.kind, error, setting, found.z, found.p)
+    return _confirmed(paths, pairs, places, found.found)
 
 
 def _confirmed(
@@ -151,14 +121,12 @@ def _confirmed(
     low = np.abs(here.setting - wide.a.setting).sum(axis=1) < np.abs(room).sum(axis=1)
     high = np.abs(here.setting - wide.b.setting).sum(axis=1) < np.abs(room).sum(axis=1)
     left, right = wide.a.where(low, left), wide.b.where(high, right)
-    now, before = difference(structure, left, right), difference(structure, wide.a, wide.b)
-    sharp = np.isinf(now) | (np.isfinite(before) & (now > (2.0 * BESIDE) ** SHRINKING * before))
-    sharp &= paths.known(left) & paths.known(right)
+    sure = sharp(paths, (left, right), wide, BESIDE)
+    sure &= paths.known(left) & paths.known(right)
     rest = Brackets(wide.a, left, wide.edge).with_more(Brackets(right, wide.b, wide.edge))
-    again = np.isinf(difference(structure, rest.a, rest.b)) & np.tile(sharp, 2)
+    again = np.isinf(difference(structure, rest.a, rest.b)) & np.tile(sure, 2)
     narrow = Brackets(left, right, wide.edge)
-    sure = np.flatnonzero(sharp)
-    confirmed = replace(here, brackets=narrow).take(sure)
+    confirmed = replace(here, brackets=narrow).take(np.flatnonzero(sure))
     open_ = np.setdiff1d(np.arange(len(pairs)), at[sure])
     return confirmed, pairs.take(open_), rest.take(np.flatnonzero(again))
 
@@ -210,17 +178,6 @@ def _together(parts: list[Places]) -> Places:
     for part in parts[1:]:
         whole = whole.with_more(part)
     return whole
-
-
-def _within(
-    brackets: Brackets, place: Float[np.ndarray, "brackets 2"]
-) -> Bool[np.ndarray, " brackets"]:
-    """Whether places lie in their brackets."""
-    a, b = brackets.a.setting, brackets.b.setting
-    room = SLACK * np.abs(b - a) + 1e-9
-    return np.asarray(
-        ((place >= np.minimum(a, b) - room) & (place <= np.maximum(a, b) + room)).all(axis=1)
-    )
 
 
 def unexplained(paths: Paths, pairs: Brackets) -> Places:
