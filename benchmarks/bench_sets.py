@@ -70,8 +70,11 @@ def bench_refined_set(benchmark, accuracy):
     )
 
 
-def bench_set_over_three_parameters(benchmark):
-    """(Θ, Δ, q) on 10 × 13 × 8 intervals: about 7 300 equilibria, 39 000 tetrahedra."""
+@pytest.mark.parametrize(
+    "intervals", [(10, 13, 8), (18, 24, 15)], ids="{0[0]}x{0[1]}x{0[2]}".format
+)
+def bench_set_over_three_parameters(benchmark, intervals):
+    """(Θ, Δ, q): about 7 300 and 28 000 equilibria, 39 000 and 155 000 tetrahedra."""
     arch = Rod()
     box = Box(Theta=(0.6, 1.4), Delta=(-0.6, 0.6), q=(0, 3))
 
@@ -80,7 +83,7 @@ def bench_set_over_three_parameters(benchmark):
         return equilibrium_set(arch, box, within=within, intervals=intervals, checks=0)
 
     build((3, 3, 2))
-    note(benchmark, benchmark.pedantic(build, ((10, 13, 8),), rounds=1))
+    note(benchmark, benchmark.pedantic(build, (intervals,), rounds=1))
 
 
 def bench_completeness_checks(benchmark):

@@ -13,7 +13,13 @@ from equimorph.manifold import (
 )
 from equimorph.manifold.reconnection import dihedral_angles
 from equimorph.manifold.simplices import volumes
-from equimorph.manifold.topology import adjacency, euler_characteristic, orientation
+from equimorph.manifold.topology import (
+    adjacency,
+    euler_characteristic,
+    keys_of,
+    labels,
+    orientation,
+)
 from equimorph.manifold.volumes import volumes_over
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
@@ -148,6 +154,47 @@ def test_arch_over_both_actuators_and_the_load():
     assert len(eset.components) == 1
     around = np.concatenate([piece.vertices for piece in eset.boundaries])
     assert euler_characteristic(around) == 2 * eset.audit.euler_characteristic
+
+
+@pytest.mark.slow
+def test_every_surface_around_a_grid_cell_of_the_arch_is_a_sphere(monkeypatch):
+    """The cells over each grid tetrahedron form balls: closed surfaces of characteristic two.
+
+    Over all of (Θ, Δ, q ∈ [0, 6]), where a strip between a fold and the constraint gets as thin as
+    a thirtieth of a grid cell, and balls are cut off by the constraint.
+    """
+    last = []
+
+    def kept(*given):
+        last.append(volumes_over(*given))
+        return last[-1]
+
+    monkeypatch.setattr(cells, "volumes_over", kept)
+    arch = Rod()
+    box = Box(Theta=(0.2, 2.5), Delta=(-2, 2), q=(0, 6))
+    eset = lifted(arch, box, (12, 15, 8), within=[arch.max_curvature <= 20])
+    assert_faithful(eset)
+    balls = last[-1].balls
+    count, base = len(balls.corners), int(balls.corners.max()) + 1
+    links = adjacency(balls.corners).links
+    ball = labels(count, links[balls.owner[links[:, 0]] == balls.owner[links[:, 1]]])
+    facets = np.concatenate([np.delete(balls.corners, k, axis=1) for k in range(4)])
+    owner = np.tile(ball, 4)
+    order = np.lexsort([keys_of(facets, base), owner])
+    facets, owner = np.sort(facets[order], axis=1), owner[order]
+    same = (facets[1:] == facets[:-1]).all(axis=1) & (owner[1:] == owner[:-1])
+    inner = np.concatenate([same, [False]]) | np.concatenate([[False], same])
+    facets, owner = facets[~inner], owner[~inner]
+    sides = np.concatenate([np.delete(facets, k, axis=1) for k in range(3)])
+    faces = [owner, np.tile(owner, 3) * base**2 + keys_of(sides, base)]
+    points = np.unique(np.repeat(owner, 3) * base + facets.ravel()) // base
+    edges, shares = np.unique(faces[1], return_counts=True)
+    assert (shares == 2).all()
+    characteristic = sum(
+        sign * np.bincount(each, minlength=ball.max() + 1)
+        for sign, each in ((1, points), (-1, edges // base**2), (1, owner))
+    )
+    assert (characteristic == 2).all()
 
 
 @pytest.mark.slow
