@@ -174,7 +174,7 @@ def _each_once(found: list[Barrier], cells: Cells) -> tuple[Barrier, ...]:
     """Barriers without their images from the other side.
 
     The other side of a sheet's end is where the preference changes on another sheet; of a tie both
-    sides are cut, and the one with the greater descriptor counts that tells sheets apart.
+    sides are cut, and the one counts on which the descriptor is greater that tells sheets apart.
     """
     ends = [barrier for barrier in found if barrier.kind != "tie"]
     elevation = cells.eset.structure.elevation
@@ -188,9 +188,8 @@ def _each_once(found: list[Barrier], cells: Cells) -> tuple[Barrier, ...]:
         gap = np.min([e.distance(barrier.points, size) for e in ends], axis=0) if ends else np.inf
         if np.median(gap) < BESIDE * step:
             continue
-        middle = len(barrier.points) // 2
-        near, far = barrier.near[middle].batch, barrier.far[middle].batch
-        if elevation(near)[0] >= elevation(far)[0]:
+        # both sides have the same points, so that their means have different signs
+        if np.nanmean(elevation(barrier.near) - elevation(barrier.far)) >= 0.0:
             kept.append(barrier)
     return tuple(kept)
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.charts.location import Cells, Found
-from equimorph.charts.rules import Chooser
+from equimorph.charts.rules import Chooser, Scoring
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.fabric import (
     ON_CAP,
@@ -48,6 +48,7 @@ class Preference:
 
     cells: Cells
     choose: Chooser
+    score: Scoring | None = None
 
     def over(self, points: Points) -> Found:
         """Preferred states over points."""
@@ -56,6 +57,26 @@ class Preference:
 
     def prefers(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
         """Whether states of the set are the preferred ones over their points."""
+        both, points = self._with_others(z, p)
+        return self.choose(both, points)[len(both.point) - len(z) :]
+
+    def excess(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+        """Function that is positive where another state is preferred.
+
+        The score less that of the best other state, which is smooth where the preference changes;
+        −1 where there is none. Of rules without a score ±1.
+        """
+        if self.score is None:
+            return np.where(self.prefers(z, p), -1.0, 1.0)
+        both, _ = self._with_others(z, p)
+        others = len(both.point) - len(z)
+        score, best = self.score(both), np.full(len(z), np.inf)
+        np.minimum.at(best, both.point[:others], score[:others])
+        alone = ~np.isfinite(best)
+        return np.where(alone, -1.0, score[others:] - np.where(alone, 0.0, best))
+
+    def _with_others(self, z: Lanes, p: Parameters) -> tuple[Found, Points]:
+        """Other states over the points of states, then these; and the points."""
         structure = self.cells.eset.structure
         points, n = self.cells.coordinates(z, p), structure.unknowns
         found = self.cells.find(points)
@@ -77,7 +98,7 @@ class Preference:
             np.concatenate([others.cell, cell]),
             np.concatenate([others.inside, np.ones(len(z), bool)]),
         )
-        return self.choose(both, points)[len(others.point) :]
+        return both, points
 
 
 def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndarray, " V"], int]:

@@ -37,8 +37,8 @@ class Reduction(Chart):
     Parameters
     ----------
     eset
-        The preferred part of the set, cut exactly along barriers and gaps; a set of its own, which
-        every task takes.
+        The preferred part of the set, cut exactly along barriers and gaps; a set of its own. Tasks
+        take it together with `constraint`.
     whole
         The set that was reduced, with vertices at its cusps.
     rule
@@ -76,7 +76,7 @@ class Reduction(Chart):
     def preference(self) -> Preference:
         """The rule, ready for the set."""
         cells = Cells(self.whole, self.coordinates, self.among)
-        return Preference(cells, self.rule.on(self.whole))
+        return Preference(cells, self.rule.on(self.whole), self.rule.scores(self.whole))
 
     @cached_property
     def cells(self) -> Cells:
@@ -101,14 +101,12 @@ class Reduction(Chart):
 
     @cached_property
     def constraint(self) -> Constraint:
-        """The constraint that states are the preferred ones, for tasks on the whole set."""
+        """The constraint that states are the preferred ones.
 
-        def outside(
-            z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
-        ) -> Float[np.ndarray, " lanes"]:
-            return np.where(self.preference.prefers(z, p), -1.0, 1.0)
-
-        return Descriptor("not preferred", "", outside) <= 0.0
+        Tasks that lift, track, solve or optimise take it with their other constraints: over the
+        preferred part alone, Newton's method may end beyond a barrier.
+        """
+        return Descriptor("not preferred", "", self.preference.excess) <= 0.0
 
     def _on_barrier(self, points: Points) -> Bool[np.ndarray, " points"]:
         on = np.zeros(len(points), bool)

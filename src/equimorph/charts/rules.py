@@ -20,6 +20,7 @@ Scores = Float[np.ndarray, " found"]
 Points = Float[np.ndarray, "points d"]
 Chooser = Callable[[Found, Points], Bool[np.ndarray, " found"]]
 """Which of the states over points are preferred: at most one over each."""
+Scoring = Callable[[Found], Scores]
 
 
 Identity = Mapping[str, str | int | float]
@@ -35,6 +36,11 @@ class Rule(ABC):
     def on(self, eset: EquilibriumSet) -> Chooser:
         """Return the rule made ready for a set."""
 
+    def scores(self, eset: EquilibriumSet) -> "Scoring | None":
+        """Return the score whose least value is preferred, if the rule has one."""
+        del eset
+        return None
+
 
 @dataclass(frozen=True, repr=False)
 class _Least(Rule):
@@ -47,6 +53,10 @@ class _Least(Rule):
     def __repr__(self) -> str:
         """Return what is preferred."""
         return self.name
+
+    def scores(self, eset: EquilibriumSet) -> Scoring:
+        """Return the score."""
+        return self.score(eset)
 
     def on(self, eset: EquilibriumSet) -> Chooser:
         """Prefer the least score."""
