@@ -2,14 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.spatial.distance import cdist
 
-from equimorph.equilibria import ParameterLine, TraceOptions, distinct
+from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.cell_index import CellIndex, Hits
 from equimorph.manifold.topology import adjacency, senses
 from equimorph.model import Constraint
@@ -148,7 +150,7 @@ class Sheets:
         parity: where the sum of (−1)^index is not that of the cells above, or a cell gives no
         state, all known equilibria nearby are lifted to the point instead.
         """
-        chunks = [self._some(p[at : at + CHUNK], at) for at in range(0, len(p), CHUNK)]
+        chunks = self._in_chunks(p)
         parts = [found for found, _ in chunks]
         doubtful = [near for _, near in chunks if len(near)]
         if doubtful:
@@ -163,6 +165,23 @@ class Sheets:
         order = np.lexsort((cell, point))
         point = point[order]
         return States(self.structure, z[order], p[point]), point, cell[order]
+
+    def _in_chunks(self, p: Points) -> list[tuple[Found, Hits]]:
+        """States and doubtful cells as `_some` finds them, chunk by chunk, on all threads."""
+        starts = range(0, len(p), CHUNK)
+        out: dict[int, tuple[Found, Hits]] = {}
+
+        def serve(own: range) -> None:
+            for at in own:
+                out[at] = self._some(p[at : at + CHUNK], at)
+
+        number = min(threads(), len(starts))
+        if number < 2:
+            serve(starts)
+        else:
+            for task in in_background([partial(serve, starts[k::number]) for k in range(number)]):
+                task.result()
+        return [out[at] for at in starts]
 
     def _some(self, p: Points, first: int) -> tuple[Found, Hits]:
         """States over points that are sure, and the cells near the others; `first` is added."""
@@ -253,13 +272,15 @@ class Sheets:
         lifted, which = lift_to(self.points[corner], p[owner], self.constraints)
         z = np.concatenate([solved, lifted])
         point = np.concatenate([of_solved, owner[which]])
-        for number in np.unique(near.point):
-            own = z[point == number]
-            own = own[distinct(self.structure, own)]
-            index = self.structure.index(own, np.tile(p[number], (len(own), 1)))
-            mine = near.point == number
-            cell = self._nearest(own, index, guess[mine], near.take(mine))
-            yield own, np.full(len(own), number), cell
+        numbers = np.unique(near.point)
+        lanes = [np.flatnonzero(point == number) for number in numbers]
+        kept = np.concatenate([own[_firsts(self.structure, z[own])] for own in lanes])
+        z, point = z[kept], point[kept]
+        index = self.structure.index(z, p[point])
+        for number in numbers:
+            own, mine = point == number, near.point == number
+            cell = self._nearest(z[own], index[own], guess[mine], near.take(mine))
+            yield z[own], point[own], cell
 
     def _exact(
         self, starts: Lanes, p: Points, owner: Int[np.ndarray, " lanes"]
@@ -294,6 +315,12 @@ def rooted(
     root = np.sqrt(np.maximum(share, CLOSEST))
     on = np.where(folded, weights + 1e-12, 0.0)
     return np.asarray(off / share * root + on / on.sum(axis=1, keepdims=True) * (1.0 - root))
+
+
+def _firsts(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
+    """States that no earlier one is the same as."""
+    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    return np.flatnonzero(~np.tril(cdist(u, u) <= SAME, -1).any(axis=1))
 
 
 def lift_to(
