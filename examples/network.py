@@ -47,7 +47,7 @@ def network() -> em.Frame:
 def main(intervals: tuple[int, int] = (11, 11)) -> Result:
     """Find the stable states without load, the loads at which they end, and the set."""
     frame, height = network(), network().displacement("M2", "y")
-    gentle = [frame.max_curvature <= 2]
+    gentle = [frame.max_curvature <= 3]
     found = em.find_equilibria(frame, {"t": 0.0, "P": 0.0}, within=gentle).stable
     upright, inverted = max(found, key=height), min(found, key=height)
     press = em.lift(upright, {"P": 30.0}).end.state["P"]

@@ -103,3 +103,14 @@ def test_the_network_is_pressed_over_and_pulled_back():
     assert found.loads == pytest.approx((14.2530, -14.0613), abs=6e-5)
     assert found.inverted.stable
     assert found.eset.audit.clean
+
+
+@pytest.mark.slow
+def test_the_set_of_the_network_is_clean_for_sharper_bends():
+    """Up to |κ| = 5 there are 14 pieces: what grows with the bound is the number of sheets."""
+    frame = example("network").network()
+    box = em.Box(t=(-1.5, 1.5), P=(-8.0, 16.0))
+    with unchecked():
+        bent = em.equilibrium_set(frame, box, within=[frame.max_curvature <= 5], intervals=(11, 11))
+    assert bent.audit.clean
+    assert bent.audit.components == 14
