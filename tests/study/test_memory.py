@@ -57,19 +57,19 @@ from equimorph.manifold import equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Rod
 arch, d = Rod(), int(sys.argv[1])
-ranges = {"Theta": (0.2, 2.5), "Delta": (-2, 2), "q": (0, 6)}
-def build(names, intervals):
+small = {"Theta": (0.6, 1.4), "Delta": (-0.6, 0.6), "q": (0, 3)}
+whole = {"Theta": (0.2, 2.5), "Delta": (-2, 2), "q": (0, 6)}
+def build(ranges, intervals):
     fixed = {"Delta": 0.3, "q": 2.5} if d == 1 else {}
-    box = Box(**{name: ranges[name] for name in names})
+    box = Box(**dict(list(ranges.items())[:d]))
     equilibrium_set(arch, box, fixed=fixed, within=[arch.max_curvature <= 20],
                     intervals=intervals, checks=0)
 def peak():
     found = re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())
     return 1024 * int(found[1])
-names = list(ranges)[:d]
-build(names, (3,) * d)
+build(small, (3,) * d)
 before = peak()
-build(names, tuple(map(int, sys.argv[2:])))
+build(whole, tuple(map(int, sys.argv[2:])))
 print(peak() - before)
 """
 

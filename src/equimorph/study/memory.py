@@ -12,7 +12,7 @@ from equimorph.study.prepare import Problem
 
 PROGRAM = 550e6
 """Bytes of libraries, compiled kernels, and the frames of a film."""
-PER_VERTEX = {1: 6500.0, 2: 6500.0, 3: 56000.0}
+PER_VERTEX = {1: 6500.0, 2: 6500.0, 3: 60000.0}
 """Bytes per vertex of the grid, by the number of parameters: curves, cells, their book-keeping."""
 PER_UNKNOWN = 70.0
 """Bytes per vertex of the grid and unknown: states, and work space while they are lifted."""
