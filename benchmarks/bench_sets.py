@@ -114,6 +114,19 @@ def bench_plan(benchmark, arch_set, via, margin):
     )
 
 
+@pytest.mark.parametrize("objective", ["length", "work", "clearance"])
+def bench_plan_by_objective(benchmark, arch_set, objective):
+    here = arch_set.at(Theta=1.0, Delta=0.0).stable
+    rise = arch_set.structure.height(0.5)
+    ends = max(here, key=rise), min(here, key=rise)
+    route = benchmark.pedantic(
+        lambda: plan(arch_set, *ends, objective=objective), rounds=3, warmup_rounds=1
+    )
+    benchmark.extra_info.update(
+        status=route.status, cost=route.cost, margin=route.margin, corners=len(route.way_points)
+    )
+
+
 def bench_states_over_many_points(benchmark, arch_set):
     """10⁴ random points in one call."""
     points = np.random.default_rng(0).uniform([0.2, -2], [2.5, 2], (10_000, 2))

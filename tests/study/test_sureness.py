@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.storage import read_schedule
-from equimorph.study import Outcome, parse_study, prepare, run_study
+from equimorph.study import Outcome, html, parse_study, prepare, run_study
 from studies import draw_dots
 from typecheck import unchecked
 
@@ -94,6 +94,12 @@ trials = 20
 name = "robust"
 objective = "worst(angle for F ± 0.01)"
 within = ["F <= 0.05", "x_l <= 0.7", "angle >= 0.1"]
+
+[[route]]
+name = "cheap"
+start = {{ at = {{ x_l = 0.8, F = 0.01 }}, highest = "angle" }}
+goal = {{ at = {{ x_l = 0.6, F = -0.05 }}, highest = "angle" }}
+objective = "work"
 
 [[track]]
 name = "beyond"
@@ -223,6 +229,15 @@ def test_a_robust_optimum_is_that_of_the_worst_load(run):
     assert "worst(angle for F ± 0.01)" in page(run[1])
 
 
+def test_a_route_is_planned_for_what_is_asked(run):
+    """The cost is read back from the folder."""
+    route = run[0].of("route")["cheap"].route
+    assert route.objective == "work"
+    spent = em.Objective(((1.0, "work"),)).along(route.path.states)
+    np.testing.assert_allclose(route.cost, spent, rtol=1e-12)
+    assert f", work {html.number(route.cost)}" in page(run[1])
+
+
 def test_a_motion_beyond_reach_is_followed_by_the_best_compromise(run):
     """The nearest states are at the smallest angle that is stable: sin³δ = 0.02."""
     motion = run[0].of("track")["beyond"]
@@ -260,6 +275,11 @@ def test_answers_come_from_the_folder_until_the_schedule_changes(run, monkeypatc
 
 
 WRONG = {
+    "a route for nothing": (
+        "route",
+        f'start = {UPPER}\ngoal = {UPPER}\nobjective = "speed"',
+        r"`route\[0\]\.objective` must be 'length', 'travel', 'work' or 'clearance'",
+    ),
     "no way": ("verify", "", r"`verify\[0\]` must give a schedule, or a start with its steps"),
     "two ways": (
         "verify",

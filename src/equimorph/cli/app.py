@@ -43,6 +43,7 @@ class Kind(StrEnum):
     spring = "spring"
     stack = "stack"
     bistable_strip = "strip"  # a member called strip would hide that of str
+    tasks = "tasks"
     truss = "truss"
 
 

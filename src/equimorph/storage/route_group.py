@@ -15,9 +15,10 @@ ABOUT, EVENTS, SCHEDULE = "about", "events", "schedule"
 def write(group: h5py.Group, route: Route) -> None:
     """Write a route into an empty group."""
     words = {"status": route.status, "why": route.why, "way_points": route.way_points}
+    words |= {"objective": route.objective}
     put_json(group, ABOUT, words)
     # Attributes, because a refused route has none of them and JSON knows no NaN.
-    group.attrs.update(margin=route.margin, length=route.length)
+    group.attrs.update(margin=route.margin, length=route.length, cost=route.cost)
     if route.path is not None:
         _write_path(group, route.path)
     if route.schedule is not None:
@@ -29,6 +30,7 @@ def read(group: h5py.Group, structure: Structure) -> Route:
     return Route(
         margin=float(group.attrs["margin"]),
         length=float(group.attrs["length"]),
+        cost=float(group.attrs.get("cost", np.nan)),  # older files have none
         path=_read_path(group, structure) if "z" in group else None,
         schedule=_read_schedule(group[SCHEDULE]) if SCHEDULE in group else None,
         **get_json(group, ABOUT),

@@ -18,7 +18,7 @@ from equimorph.study.kinds.way import figures_of_way, pictures_of_way
 from equimorph.study.lookup import Ground, at_key, check_point, check_state, constraints_of
 from equimorph.study.names import schedule_table
 from equimorph.study.sections.tasks import RouteSection
-from equimorph.tasks import plan
+from equimorph.tasks import Route, plan
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,7 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
                 via=section.via,
                 within=task.constraints,
                 margin=section.margin,
+                objective=section.objective,
                 monitor=[ground.height],
             )
         return Journey(start, goal, route)
@@ -86,7 +87,8 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
         return [
             heading,
             '<p class="verdict"><strong>Arrived.</strong> Every state on the way is stable: '
-            f"smallest margin {html.number(route.margin)}, length {html.number(route.length)}.</p>",
+            f"smallest margin {html.number(route.margin)}, length {html.number(route.length)}"
+            f"{_cost(route)}.</p>",
             html.schedule_links(schedule_table(name)),
             pictures,
         ]
@@ -98,5 +100,12 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
             return f"{head}: [bold red]refused[/]. {plain(route.why)}"
         return (
             f"{head}: [bold green]arrived[/] without a snap, smallest margin "
-            f"{route.margin:.3f}, length {route.length:.3f}."
+            f"{route.margin:.3f}, length {route.length:.3f}{_cost(route)}."
         )
+
+
+def _cost(route: Route) -> str:
+    """What it was planned for, if that is not the length."""
+    if route.objective == "length":
+        return ""
+    return f", {route.objective} {html.number(route.cost)}"

@@ -37,6 +37,7 @@ class RouteSection(TaskSection):
     via: list[Annotated[Point, Field(min_length=1)]] | None = Field(default=None, min_length=1)
     within: list[ComparisonText] = Field(default_factory=list)
     margin: float = Field(default=0.0, ge=0, le=LARGEST)
+    objective: Literal["length", "travel", "work", "clearance"] = "length"
 
 
 class ShapeSection(TaskSection):

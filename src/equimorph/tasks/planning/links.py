@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria import ParameterLine, TraceOptions, newton
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.model import Constraint
@@ -58,6 +58,28 @@ def links(source: States, target: States, demands: Demands) -> tuple[Flags, Valu
     z, linked, cost = straight_lifts(source, target.p, demands)
     linked &= distances(source.structure.mass, z - target.z) < MATCH
     return linked, cost
+
+
+def chords(source: States, target: States, demands: Demands) -> tuple[Flags, Values]:
+    """Links as they seem to be from both ends and the state amid them, and what they cost so.
+
+    For comparing many near ways in little time; which of them can be lifted is for `links` to say.
+    """
+    structure, count = source.structure, len(source)
+    p = 0.5 * (source.p + target.p)
+    z, found = newton(structure, 0.5 * (source.z + target.z), p, iterations=8)
+    ways = States(
+        structure,
+        np.concatenate([source.z, z, target.z]),
+        np.concatenate([source.p, p, target.p]),
+    )
+    good = np.repeat(found[None], 2, axis=0)
+    some = np.flatnonzero(good.ravel())
+    good.ravel()[some] = demands.admissible(ways[count:][some])
+    here = np.arange(count)
+    cost = demands.objective.costs(ways, here, here + count)
+    cost += demands.objective.costs(ways, here + count, here + 2 * count)
+    return np.asarray(good.all(axis=0)), np.asarray(cost)
 
 
 def straight_lifts(

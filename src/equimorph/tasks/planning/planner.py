@@ -18,7 +18,7 @@ from equimorph.tasks.planning.objectives import Wish, objective_of
 from equimorph.tasks.planning.snapping import with_snaps
 from equimorph.tasks.route import Corners, Route, refused
 
-RESERVES = ((1.0, 0.0), (1.02, 1e-3), (1.1, 1e-2))
+EXACT, RESERVES = (1.0, 0.0), ((1.05, 1e-3), (1.15, 1e-2))
 """Factors on the demanded margin, and shares of that of the ends that are added to it.
 
 Dips between the points that are watched need a reserve.
@@ -111,18 +111,20 @@ def _check_price(snap_price: float | None, via: Sequence[Mapping[str, float]] | 
 def _free(
     eset: EquilibriumSet, ends: Ends, demands: Demands, monitor: Sequence[Descriptor]
 ) -> Route:
-    """Return the cheapest route found, searched with a growing reserve of margin."""
-    least = min(end.margin for end in ends)
-    for factor, share in RESERVES:
+    """Return the cheapest route found, searched with a growing reserve of margin.
+
+    What leaves no room for a reserve is searched without one before it is refused.
+    """
+    least, route = min(end.margin for end in ends), None
+    for factor, share in (*RESERVES, EXACT) if demands.margin > 0.0 else (EXACT, *RESERVES):
         reserved = min(demands.margin * factor + least * share, least)
         tightened = replace(demands, margin=reserved)
         path = cheapest_path(eset, ends, tightened)
-        if path is None:
-            return refused(no_route(eset, ends, tightened))
-        route = checked_route(ends, corners_of(eset, path, tightened), demands, monitor)
-        if route.arrived:
-            break
-    return route
+        if path is not None:
+            route = checked_route(ends, corners_of(eset, path, tightened), demands, monitor)
+            if route.arrived:
+                return route
+    return route or refused(no_route(eset, ends, demands))
 
 
 def _checked_corners(

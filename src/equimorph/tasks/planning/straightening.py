@@ -1,5 +1,7 @@
 """Paths over a mesh made straight, and drawn to where they cost least."""
 
+from collections.abc import Callable
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -8,18 +10,25 @@ from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.model import Box
 from equimorph.structures import States
-from equimorph.tasks.planning.links import Demands, links, shortest
+from equimorph.tasks.planning.links import Demands, Flags, Values, chords, links, shortest
+
+Legs = Callable[[States, States, Demands], tuple[Flags, Values]]
+"""Whether states are linked, and at what cost."""
 
 MOST_SHORTCUTS = 8000
-"""Number of straight lifts that are tried to shorten a path."""
-MOST_MARGINS = 1000
-"""The same where margins are needed all along, which cost more than the lifts."""
+"""Number of straight lifts that are tried to shorten a path within its class."""
+STATIONS, STATIONS_WITH_MARGINS = 28, 16
+"""States of a path any two of which are tried otherwise; margins all along cost more than lifts."""
+CORNER = 1e-3
+"""Share of the cost that a further corner has to save."""
 LEGS = 12
 """Legs longer than this part of the way in the parameters are divided before corners move."""
 MOST_CORNERS = 32
 SIZES = (0.12, 0.04, 0.013)
 """Moves of corners, in scaled parameters, that are tried one after the other."""
-ROUNDS = 6
+ROUNDS, POLISHING = 6, 2
+MERGED = 8
+"""Legs that may become one."""
 LEAST_GAIN = 2e-6
 """Share of the cost that a move has to gain."""
 GAIN = 1e-4
@@ -33,17 +42,31 @@ def straightened(states: States, demands: Demands, same_class: bool = False) -> 
     lift connects is a short cut. With `same_class` only those count that can be drawn there: all
     states between are reached, too, so that the short cut sweeps over the set.
     """
-    first, second = np.triu_indices(len(states), 1)
-    most = MOST_MARGINS if demands.objective.needs_margins else MOST_SHORTCUTS
-    stride = 1 + len(first) // most
-    keep = (second - first == 1) | ((second - first) % stride == 0)
-    first, second = first[keep], second[keep]
+    most = STATIONS_WITH_MARGINS if demands.objective.needs_margins else STATIONS
+    first, second = _pairs(len(states), None if same_class else most)
     linked, cost = links(states[first], states[second], demands)
     if same_class:
         linked &= _swept(first, second, linked)
     pairs = np.stack([first[linked], second[linked]], axis=1)
-    path = shortest(len(states), pairs, cost[linked], (0, len(states) - 1))
+    each = cost[linked] + CORNER * cost[second - first == 1].sum()
+    path = shortest(len(states), pairs, each, (0, len(states) - 1))
     return states if path is None else states[path]
+
+
+def _pairs(
+    count: int, most: int | None
+) -> tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]]:
+    """Neighbours on a path of so many states, and pairs of all, or of `most` of its states."""
+    if most is None:
+        first, second = np.triu_indices(count, 1)
+        stride = 1 + len(first) // MOST_SHORTCUTS
+        keep = (second - first == 1) | ((second - first) % stride == 0)
+        return first[keep], second[keep]
+    some = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+    first, second = (some[each] for each in np.triu_indices(len(some), 1))
+    far = second - first > 1
+    at = np.arange(count - 1)
+    return np.concatenate([at, first[far]]), np.concatenate([at + 1, second[far]])
 
 
 def _swept(
@@ -67,17 +90,49 @@ def relaxed(
     """Corners moved to where the chain of straight lifts costs least.
 
     Every other corner is tried at once in several directions and the best admissible move is made;
-    moves become smaller and smaller. Then corners that are of no use are left out.
+    moves become smaller and smaller. Costs along chords tell enough for that, unless what comes out
+    cannot be lifted. Then corners that are of no use are left out.
     """
     corners = _divided(corners, demands)
-    for size in SIZES:
-        for _ in range(ROUNDS):
+    if not same_class:
+        drawn = _drawn(corners, demands, room, (chords, SIZES, ROUNDS))
+        corners, whole = _linked(corners, drawn, demands)
+        if not whole:
+            corners = _drawn(corners, demands, room, (links, SIZES[1:], POLISHING))
+    else:
+        corners = _drawn(corners, demands, room, (links, SIZES, ROUNDS))
+    return _thinned(corners, demands, same_class)
+
+
+def _linked(before: States, after: States, demands: Demands) -> tuple[States, bool]:
+    """Corners after their moves, but for those whose legs cannot be lifted; whether all can."""
+    back = np.zeros(len(before), bool)
+    while True:
+        z = np.where(back[:, None], before.z, after.z)
+        corners = States(before.structure, z, np.where(back[:, None], before.p, after.p))
+        good, _ = links(corners[:-1], corners[1:], demands)
+        bad = np.flatnonzero(~good)
+        if len(bad) == 0 or back[bad].all() & back[bad + 1].all():
+            return corners, not back.any()
+        back[bad], back[bad + 1] = True, True
+
+
+def _drawn(
+    corners: States,
+    demands: Demands,
+    room: tuple[Box, Int[np.ndarray, " d"]],
+    how: tuple[Legs, tuple[float, ...], int],
+) -> States:
+    """Corners moved as long as that makes their legs cheaper."""
+    legs, sizes, rounds = how
+    for size in sizes:
+        for _ in range(rounds):
             before = corners
             for odd in (1, 2):
-                corners = _moved(corners, odd, size, demands, room)
+                corners = _moved(corners, (odd, size), demands, room, legs)
             if corners is before:
                 break
-    return _thinned(corners, demands, same_class)
+    return corners
 
 
 def _divided(corners: States, demands: Demands) -> States:
@@ -111,13 +166,13 @@ def _lifted(
 
 def _moved(
     corners: States,
-    odd: int,
-    size: float,
+    move: tuple[int, float],
     demands: Demands,
     room: tuple[Box, Int[np.ndarray, " d"]],
+    legs: Legs,
 ) -> States:
     """Corners with every other one moved, if that makes its two legs cheaper."""
-    box, free = room
+    (odd, size), (box, free) = move, room
     at = np.arange(odd, len(corners) - 1, 2)
     if len(at) == 0:
         return corners
@@ -128,29 +183,45 @@ def _moved(
     p[:, free] = np.clip(p[:, free] + step, box.lower, box.upper)
     some = np.flatnonzero(np.abs(p - corners.p[tried]).max(axis=1) > 0.0)
     tried, p = tried[some], p[some]
-    # whether these lie on the branch of the corner is what the lifts from its neighbours show
+    # whether these lie on the branch of the corner is what lifts from its neighbours show
     z, there = newton(structure, corners.z[tried], p, iterations=8)
     tried, p, z = tried[there], p[there], z[there]
     if len(tried) == 0:
         return corners
-    new = States(structure, z, p)
+    new, old = States(structure, z, p), chords(corners[:-1], corners[1:], demands)[1]
+    gain = _gain(corners, tried, new, demands, (chords, old))
+    if legs is links:  # lifts are for moves that look good: those that fail take longest
+        some = np.flatnonzero(gain > 0.0)
+        if len(some) == 0:
+            return corners
+        tried, new = tried[some], new[some]
+        old = links(corners[:-1], corners[1:], demands)[1]
+        gain = _gain(corners, tried, new, demands, (links, old))
+    return _taken(corners, tried, new, np.where(gain > LEAST_GAIN * old.sum(), gain, 0.0))
+
+
+def _gain(
+    corners: States,
+    tried: Int[np.ndarray, " n"],
+    new: States,
+    demands: Demands,
+    how: tuple[Legs, Values],
+) -> Float[np.ndarray, " n"]:
+    """What each move saves; −∞ where a leg is broken. `how` has the costs of the legs now."""
+    legs, old = how
     sources = States(
-        structure,
-        np.concatenate([corners.z[tried - 1], z, corners.z[:-1]]),
-        np.concatenate([corners.p[tried - 1], p, corners.p[:-1]]),
+        corners.structure,
+        np.concatenate([corners.z[tried - 1], new.z]),
+        np.concatenate([corners.p[tried - 1], new.p]),
     )
     targets = States(
-        structure,
-        np.concatenate([z, corners.z[tried + 1], corners.z[1:]]),
-        np.concatenate([p, corners.p[tried + 1], corners.p[1:]]),
+        corners.structure,
+        np.concatenate([new.z, corners.z[tried + 1]]),
+        np.concatenate([new.p, corners.p[tried + 1]]),
     )
-    good, cost = links(sources, targets, demands)
-    count = len(tried)
-    to_it, from_it, old = cost[:count], cost[count : 2 * count], cost[2 * count :]
-    both = good[:count] & good[count : 2 * count]
-    gain = np.where(both, old[tried - 1] + old[tried] - to_it - from_it, -np.inf)
-    worth = np.where(gain > LEAST_GAIN * old.sum(), gain, 0.0)
-    return _taken(corners, tried, new, worth)
+    good, cost = legs(sources, targets, demands)
+    both, total = good.reshape(2, -1).all(axis=0), cost.reshape(2, -1).sum(axis=0)
+    return np.where(both, old[tried - 1] + old[tried] - total, -np.inf)
 
 
 def _directions(d: int) -> Float[np.ndarray, "directions d"]:
@@ -179,7 +250,7 @@ def _taken(
 def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
     """Fewest corners whose chain costs hardly more."""
     first, second = np.triu_indices(len(corners), 1)
-    near = second - first <= (3 if demands.objective.needs_margins else len(corners))
+    near = second - first <= (3 if demands.objective.needs_margins else MERGED)
     first, second = first[near], second[near]
     linked, cost = links(corners[first], corners[second], demands)
     if same_class:
