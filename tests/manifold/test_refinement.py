@@ -170,8 +170,8 @@ def test_refined_arch_does_not_depend_on_the_grid(intervals, refined_arch, fine_
     """Surfaces within 0.01 of the set: twice that from each other, with the same pieces."""
     eset = refined_arch(intervals, 0.01)
     assert_faithful(eset)
-    # of index 3, beside (0.983, 0), where two folds nearly meet
-    assert_upright(eset, turned=int(intervals == (6, 11)))
+    # of index 3 or 5, beside (0.983, 0) or (0.901, 0), where two folds nearly meet
+    assert_upright(eset, turned=1)
     assert_folds_are_singular(eset, 1e-8)
     assert topology(eset) == topology(fine_arch)
     assert max(farthest(eset, fine_arch), farthest(fine_arch, eset)) <= 0.02
