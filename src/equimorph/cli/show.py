@@ -121,7 +121,10 @@ def _extent(structure: Structure, extent: Extent, others: list[str]) -> str:
 
 
 def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
+    if number == 1 or word.endswith("s"):
+        return f"{number} {word}"
+    ends = {"y": f"{word[:-1]}ies", "h": f"{word}es"}
+    return f"{number} {ends.get(word[-1], word + 's')}"
 
 
 def _show(outcome: Outcome, screen: Console) -> None:
