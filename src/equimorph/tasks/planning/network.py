@@ -57,7 +57,10 @@ class Network:
         """Cost of each link, along its chord."""
         key = repr(objective)
         if key not in self._costs:
-            self._costs[key] = objective.costs(eset.points, *self.pairs.T)
+            # margins of unstable vertices would be for nothing
+            used, pairs = np.unique(self.pairs, return_inverse=True)
+            first, second = pairs.reshape(self.pairs.shape).T
+            self._costs[key] = objective.costs(eset.points[used], first, second)
         return self._costs[key]
 
     def verdicts(self, demands: Demands) -> tuple[Flags, Flags]:
