@@ -187,7 +187,7 @@ def test_lifts_across_the_cut_go_from_chart_to_chart(arch_atlas):
 
 
 def test_surfaces_are_dissected_along_their_folds():
-    """Sphere: two caps. Cusp: one cut. One and three parameters: strata."""
+    """Sphere: two caps. Cusp: one cut. One parameter: strata."""
     ball = em.dissect(lifted(sphere(), em.Box(a=(-1.3, 1.2), b=(-1.5, 1.5)), (7, 8)))
     assert [chart.index for chart in ball.charts] in ([0, 1], [1, 0])
     assert all(chart.single_valued for chart in ball.charts)
@@ -198,6 +198,11 @@ def test_surfaces_are_dissected_along_their_folds():
     curve = em.dissect(lifted(fold_form(), em.Box(a=(-1, 1)), (7,)))
     assert len(curve) == 2
     assert [len(each.states) for each in curve.transitions] == [1]
+
+
+@pytest.mark.slow
+def test_bodies_are_dissected_along_their_folds():
+    """Swallowtail: charts that do not overlap."""
     box = em.Box(a=(-1.5, 0.5), b=(-1, 1), c=(-1, 1))
     with unchecked():
         body = em.dissect(lifted(swallowtail(), box, (3, 3, 3)))
