@@ -17,6 +17,8 @@ Counts = Int[np.ndarray, " lanes"]
 VANISHED, LOCATED = 1e-4, 1e-8
 """Eigenvalue, relative to the small ones at the start of the path, that counts as zero; that of a
 simple fold where it is located."""
+AT_ONCE = 1024
+"""Lanes looked at together, so that memory does not grow with all of them."""
 
 
 def with_multiple_points(
@@ -39,21 +41,30 @@ def with_multiple_points(
     ended = np.flatnonzero(np.isin(outcome.code, (LOST, FOLD)))
     if len(ended) == 0 or not curve.folds_change_index:
         return outcome
+    code, why = outcome.code.copy(), dict(outcome.why)
+    for first in range(0, len(ended), AT_ONCE):
+        some = ended[first : first + AT_ONCE]
+        for lane, several in zip(some.tolist(), _several(curve, start, outcome, some), strict=True):
+            if several > 1:
+                code[lane] = MULTIPLE
+                why[lane] = (
+                    f"{several} eigenvalues vanish at once, and no direction leads on: an "
+                    "imperfection that parts them, however small, does"
+                )
+    return replace(outcome, code=code, why=why)
+
+
+def _several(
+    curve: Curve, start: Lanes, outcome: Outcome, ended: Int[np.ndarray, " some"]
+) -> list[int]:
+    """How many eigenvalues vanish where some lanes ended."""
     here, structure = curve.take(ended), curve.structure
     begun = here.states(start[ended], np.zeros(len(ended)))
     there = here.states(outcome.z[ended], outcome.t[ended])
     small = _small_eigenvalue(structure, *begun)
     count = multiplicity(structure, *there, VANISHED * small)
     simple = (outcome.code[ended] == FOLD) & (multiplicity(structure, *there, LOCATED * small) == 1)
-    code, why = outcome.code.copy(), dict(outcome.why)
-    for lane, several in zip(ended.tolist(), np.where(simple, 1, count).tolist(), strict=True):
-        if several > 1:
-            code[lane] = MULTIPLE
-            why[lane] = (
-                f"{several} eigenvalues vanish at once, and no direction leads on: an imperfection "
-                "that parts them, however small, does"
-            )
-    return replace(outcome, code=code, why=why)
+    return [int(n) for n in np.where(simple, 1, count)]
 
 
 def multiplicity(
