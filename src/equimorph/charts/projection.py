@@ -9,7 +9,7 @@ import numpy as np
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells
-from equimorph.charts.sheets import sheet_labels
+from equimorph.charts.sheets import sheet_labels, single_valued
 from equimorph.charts.untangling import untangled
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
@@ -103,6 +103,14 @@ class DescriptorChart(Chart):
     def singular(self) -> Level:
         """Exact states at which the coordinates fold: their Jacobian along the set vanishes."""
         return singular_set(self.eset, self.coordinates.scalars)
+
+    @cached_property
+    def single_valued(self) -> bool:
+        """Whether all states have different coordinates: these fold nowhere, and nothing overlaps.
+
+        Folds are found exactly, where the overlap beside them may be narrower than a cell.
+        """
+        return len(self.singular.states) == 0 and single_valued(self.cells)
 
     def _jacobians(self) -> np.ndarray:
         """|det J| at some vertices, with coordinates measured in their ranges."""

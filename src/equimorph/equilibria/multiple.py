@@ -60,11 +60,13 @@ def _several(
     """How many eigenvalues vanish where some lanes ended."""
     here, structure = curve.take(ended), curve.structure
     begun = here.states(start[ended], np.zeros(len(ended)))
-    there = here.states(outcome.z[ended], outcome.t[ended])
+    z, p = here.states(outcome.z[ended], outcome.t[ended])
     small = _small_eigenvalue(structure, *begun)
-    count = multiplicity(structure, *there, VANISHED * small)
-    simple = (outcome.code[ended] == FOLD) & (multiplicity(structure, *there, LOCATED * small) == 1)
-    return [int(n) for n in np.where(simple, 1, count)]
+    count = multiplicity(structure, z, p, VANISHED * small)
+    folds = np.flatnonzero((count > 1) & (outcome.code[ended] == FOLD))
+    alone = multiplicity(structure, z[folds], p[folds], LOCATED * small[folds]) == 1
+    count[folds[alone]] = 1
+    return [int(n) for n in count]
 
 
 def multiplicity(
