@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from typecheck import unchecked
 
 RISE = 0.2
 
@@ -66,6 +67,11 @@ def test_equal_elements_reach_their_limits_together(bars):
     many = em.limit_load(rest.batch, "F")
     assert many.kind[0] == "multiple point"
     assert many.value[0] == pytest.approx(path.value, rel=1e-10)
-    landed = [each for each in em.snap_landing(path.state) if each.landed]
+
+
+def test_equal_elements_snap_from_their_common_limit():
+    path = em.limit_load(stack(2).natural_state(), "F")
+    with unchecked():  # thousands of small steps of the gradient flow
+        landed = [each for each in em.snap_landing(path.state) if each.landed]
     assert landed
     assert all(each.released > 0.0 for each in landed)

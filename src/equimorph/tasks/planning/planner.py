@@ -18,7 +18,7 @@ from equimorph.tasks.planning.objectives import Wish, objective_of
 from equimorph.tasks.planning.snapping import with_snaps
 from equimorph.tasks.route import Corners, Route, refused
 
-EXACT, RESERVES = (1.0, 0.0), ((1.05, 1e-3), (1.15, 1e-2))
+EXACT, RESERVES = (1.0, 0.0), ((1.01, 1e-3), (1.05, 1e-2), (1.15, 1e-2))
 """Factors on the demanded margin, and shares of that of the ends that are added to it.
 
 Dips between the points that are watched need a reserve.
