@@ -6,6 +6,7 @@ import pytest
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.plotting import chart_domain, parameterisation
+from equimorph.plotting.charts import rows_of
 from oracles.charted import lifted
 from oracles.polynomial import fold_form
 from typecheck import unchecked
@@ -35,11 +36,25 @@ def test_panels_show_the_set_above_and_every_chart_below(spring_set):
     assert len(figure.axes) - len(flat) == 2
     assert len(flat) == 2 + 3
     assert "δ" in flat[1].get_xlabel()
-    shares = [ax.get_position().bounds for ax in flat]
-    assert np.all(np.diff([left for left, *_ in shares]) > 0)
+    left, bottom = np.array([ax.get_position().bounds[:2] for ax in flat]).T
+    assert (np.diff(left[:2]) > 0.0).all()
+    assert (np.diff(left[2:]) > 0.0).all()
+    assert bottom[:2].min() > bottom[2:].max()  # a row for each, with room for both
 
 
 def test_only_charts_over_two_coordinates_are_drawn():
     curve = em.Projection(lifted(fold_form(), em.Box(a=(-1, 1)), (7,)))
     with pytest.raises(InputError, match="`chart` must have two coordinates; got 1"):
         chart_domain(curve)
+
+
+@pytest.mark.parametrize(
+    ("widths", "places"),
+    [
+        ([1, 2, 1, 3], [(0, 0), (0, 1), (0, 3), (1, 0)]),
+        ([5, 1], [(0, 0), (1, 0)]),
+        ([1], [(0, 0)]),
+    ],
+)
+def test_panels_fill_rows_of_four_columns(widths, places):
+    assert rows_of(widths) == places

@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from equimorph.charts import Atlas, Chart, Domain, Edge, Reduction
 from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.surface import surface
@@ -39,6 +40,8 @@ _ZOOM = 0.82
 """Of the pictures above: their labels stay inside."""
 _PAD = 1  # of the label beside up to five digits, in points
 _WIDTH, _ABOVE, _BELOW, _LEGEND = 2.0, 1.8, 1.6, 0.3  # inches
+_COLUMNS, _ENTRIES = 4, 2
+"""Columns in a row of panels, and entries of the legend for each of them."""
 
 
 def chart_domain(chart: Chart, ax: Axes | None = None) -> Axes:
@@ -95,36 +98,48 @@ def parameterisation(
         Third axis of the pictures above.
     """
     leaves = [_leaves(each) for each in charts]
-    columns = sum(len(each) for each in leaves)
-    size = (_WIDTH * columns + 0.2, _ABOVE + _BELOW + _LEGEND + 0.2)
+    rows = rows_of([len(own) for own in leaves])
+    columns = max(column + len(own) for (_, column), own in zip(rows, leaves, strict=True))
+    size = (_WIDTH * columns + 0.2, (_ABOVE + _BELOW) * (1 + rows[-1][0]) + _LEGEND + 0.2)
     figure = style.attach_canvas(Figure(figsize=size))
     with style.house_style({"hatch.linewidth": 0.4}):
-        column = 0
-        for number, own in enumerate(leaves):
-            left, wide = _WIDTH * column, _WIDTH * len(own)
-            above: Any = figure.add_axes(
-                _place(size, (left + 0.5 * (wide - _WIDTH), _BELOW + _LEGEND, _WIDTH, _ABOVE)),
-                projection="3d",
-            )
-            surface(own[0].eset, height, ax=above)
-            above.set_box_aspect((1.2, 1.3, 1.0), zoom=_ZOOM)
-            for axis in (above.xaxis, above.yaxis, above.zaxis):
-                axis.set_major_locator(MaxNLocator(3))
-            above.zaxis.labelpad = _PAD
-            if above.get_legend() is not None:
-                above.get_legend().remove()
-            figure.text(
-                (left + 0.08) / size[0], 1.0 - 0.16 / size[1], f"({chr(97 + number)})", size=8
-            )
+        for number, ((row, column), own) in enumerate(zip(rows, leaves, strict=True)):
+            left = _WIDTH * column
+            bottom = _LEGEND + (_ABOVE + _BELOW) * (rows[-1][0] - row)
+            middle = left + 0.5 * _WIDTH * (len(own) - 1)
+            above = _place(size, (middle, bottom + _BELOW, _WIDTH, _ABOVE))
+            _draw_above(figure.add_axes(above, projection="3d"), own[0].eset, height)
+            top = (bottom + _BELOW + _ABOVE + 0.04) / size[1]
+            figure.text((left + 0.08) / size[0], top, f"({chr(97 + number)})", size=8)
             for k, chart in enumerate(own):
-                below = figure.add_axes(
-                    _place(size, (left + k * _WIDTH + 0.55, _LEGEND + 0.42, _WIDTH - 0.65, 1.1))
-                )
-                chart_domain(chart, below)
-            column += len(own)
+                inches = (left + k * _WIDTH + 0.55, bottom + 0.42, _WIDTH - 0.65, 1.1)
+                chart_domain(chart, figure.add_axes(_place(size, inches)))
         entries = _legend([chart for own in leaves for chart in own])
-        figure.legend(handles=entries, loc="lower center", ncols=len(entries), frameon=False)
+        columns = min(len(entries), _ENTRIES * columns)
+        figure.legend(handles=entries, loc="lower center", ncols=columns, frameon=False)
     return figure
+
+
+def rows_of(widths: Sequence[int]) -> list[tuple[int, int]]:
+    """Row and first column of panels that are so many columns wide."""
+    places, row, column = [], 0, 0
+    for width in widths:
+        if column and column + width > _COLUMNS:
+            row, column = row + 1, 0
+        places.append((row, column))
+        column += width
+    return places
+
+
+def _draw_above(ax: Any, eset: EquilibriumSet, height: Descriptor) -> None:
+    """The set, small and without a legend."""
+    surface(eset, height, ax=ax)
+    ax.set_box_aspect((1.2, 1.3, 1.0), zoom=_ZOOM)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_major_locator(MaxNLocator(3))
+    ax.zaxis.labelpad = _PAD
+    if ax.get_legend() is not None:
+        ax.get_legend().remove()
 
 
 def _leaves(panel: Chart | Atlas | Sequence[Chart]) -> tuple[Chart, ...]:
@@ -172,8 +187,8 @@ def _frame(ax: Axes, chart: Chart) -> None:
     ]
     ax.set_xlabel(labels[0])
     ax.set_ylabel(labels[1])
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(style.few_ticks())
+    ax.xaxis.set_major_locator(MaxNLocator(4))
+    ax.yaxis.set_major_locator(style.few_ticks())
 
 
 def _legend(charts: Sequence[Chart]) -> list[Patch | Line2D]:
