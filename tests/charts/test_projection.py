@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import equimorph as em
 from equimorph.charts.regions import count_regions
+from equimorph.charts.sheets import single_valued
 from equimorph.errors import InputError
 from equimorph.manifold import part
 from oracles.charted import lifted, spring_fold
@@ -148,6 +149,16 @@ def test_projection_over_one_parameter():
     along = em.DescriptorChart(eset, ["0"])
     assert along.single_valued
     assert along.state(np.array([[-0.3]])).states["a"][0] == pytest.approx(0.09, abs=1e-12)
+
+
+def test_a_chart_that_folds_in_less_than_a_cell_is_not_single_valued():
+    """(x + 0.97)² folds at x = −0.97, between the end of the set at x = −1 and its neighbour."""
+    eset = lifted(fold_form(), em.Box(a=(-1, 1)), (7,))
+    near_the_end = em.Descriptor("bent", "1", lambda z, p: (z[:, 0] + 0.97) ** 2)
+    chart = em.DescriptorChart(eset, [near_the_end])
+    assert single_valued(chart.cells)  # no cell is seen to lie over another
+    np.testing.assert_allclose(chart.singular.states.z[:, 0], [-0.97], atol=1e-9)
+    assert not chart.single_valued
 
 
 @pytest.mark.slow
