@@ -8,6 +8,7 @@ import pytest
 from typecheck import unchecked
 
 ROOT = Path(__file__).parents[1]
+ROOTS = ROOT, ROOT / "src", ROOT / "src" / "equimorph"
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 NUMBER = re.compile(r"\d+\.\d+")
 
@@ -38,3 +39,10 @@ def test_the_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
 def test_the_guide_prints_what_it_says(capsys):
     printed, said = ran(ROOT / "docs" / "extending.md", capsys)
     assert printed == said
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/extending.md"])
+def test_files_that_pages_name_exist(name):
+    page = (ROOT / name).read_text(encoding="utf-8")
+    named = re.findall(r"`((?:\w+/)+\w+\.(?:py|toml))`", page)
+    assert [path for path in named if not any((root / path).exists() for root in ROOTS)] == []
