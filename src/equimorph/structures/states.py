@@ -47,6 +47,11 @@ class States:
         """Kind and number."""
         return f"States({self.structure.kind}: {len(self)})"
 
+    @property
+    def parameters(self) -> dict[str, Float[np.ndarray, " lanes"]]:
+        """All parameters by name, one number for each state."""
+        return {name: self[name] for name in names_of(self.structure.parameters)}
+
     @cached_property
     def index(self) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian; 0 is stable."""

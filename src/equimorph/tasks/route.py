@@ -10,7 +10,7 @@ from jaxtyping import Float
 from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
-from equimorph.structures import State, Structure
+from equimorph.structures import State, States, Structure
 
 FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=20000)
 """Step control of the final check of every route."""
@@ -51,6 +51,11 @@ class Route:
     def arrived(self) -> bool:
         """Whether there is a verified route."""
         return self.status == "arrived"
+
+    @property
+    def states(self) -> States | None:
+        """States along the route; of a refused one as far as it went, None if it did not begin."""
+        return self.path.states if self.path else None
 
 
 def refused(why: str, way_points: Corners | None = None, path: Path | None = None) -> Route:

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.nearest import local_minima
-from equimorph.model import NOT_KEPT, Constraint, Descriptor
+from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.kinematics import Predictor, aimed, best_fits, family, predictor
 from equimorph.tasks.optimising.plane import Spots, spots_of
@@ -94,6 +94,11 @@ class Shapes:
     def margin(self) -> Float[np.ndarray, " lanes"]:
         """Stability margin of each solution."""
         return self.states.margin if len(self) else np.zeros(0)
+
+    @property
+    def schedule(self) -> Schedule | None:
+        """Way to the best solution that can be reached from the start, if there is a start."""
+        return next((route.schedule for route in self.routes if route.arrived), None)
 
     @cached_property
     def nearest(self) -> State | None:

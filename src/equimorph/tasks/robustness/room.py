@@ -32,6 +32,8 @@ class Room:
 
     Parameters
     ----------
+    states
+        In the middle.
     scale
         Largest multiple of the tolerances that stays stable and within the constraints, of each
         state: exact along the rays that were lifted, an upper bound otherwise. At least
@@ -45,6 +47,7 @@ class Room:
     """
 
     shape: Shape
+    states: States
     scale: Float[np.ndarray, " states"]
     met: States
     kind: tuple[str, ...]
@@ -52,8 +55,21 @@ class Room:
 
     def __repr__(self) -> str:
         """Smallest scale and what bounds it."""
+        end = self.kind[int(np.argmin(self.scale))]
+        return f"Room({self.shape}: {self.least:.6g} tolerances, then {end})"
+
+    @property
+    def status(self) -> Literal["bounded", "open"]:
+        """Whether anything was met; "open": nothing up to `most` tolerances."""
+        return "open" if set(self.kind) == {"arrived"} else "bounded"
+
+    @property
+    def why(self) -> str:
+        """What was met first, and where."""
+        if self.status == "open":
+            return ""
         worst = int(np.argmin(self.scale))
-        return f"Room({self.shape}: {self.scale[worst]:.6g} tolerances, then {self.kind[worst]})"
+        return f"{self.kind[worst]} at {self.met[worst]}"
 
     @property
     def least(self) -> float:
@@ -207,6 +223,5 @@ class _Rays:
             for a, b in zip((middle - half).tolist(), (middle + half).tolist(), strict=True)
         )
         kinds = tuple(KINDS[int(code)] for code in self.code)
-        return Room(
-            self.shape, self.scale, States(self.states.structure, self.z, self.p), kinds, boxes
-        )
+        met = States(self.states.structure, self.z, self.p)
+        return Room(self.shape, self.states, self.scale, met, kinds, boxes)

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.manifold import EquilibriumSet, StabilityDistance, stability_distance
-from equimorph.structures import State
+from equimorph.structures import State, States
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +30,17 @@ class LeastSnap:
     distance: StabilityDistance
     change: dict[str, float]
     landing: Landing | None
+
+    @property
+    def states(self) -> States | None:
+        """Where stability is lost, and where the snap ends; None without a snap."""
+        lost, landing = self.distance.nearest, self.landing
+        if lost is None or landing is None:
+            return None
+        ends = lost, landing.state
+        return States(
+            lost.structure, np.array([end.z for end in ends]), np.array([end.p for end in ends])
+        )
 
     def __repr__(self) -> str:
         """Change and landing."""

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
@@ -30,8 +32,6 @@ class Trials:
         Where: number of the step + share of it.
     states
         Last states.
-    margin
-        Stability margins of the last states; 0 where stability was lost.
     """
 
     names: tuple[str, ...]
@@ -43,9 +43,24 @@ class Trials:
     def __repr__(self) -> str:
         """Share of successes with its interval, and what the others met."""
         low, high = self.interval
-        kinds, counts = np.unique(self.kind[~self.arrived], return_counts=True)
-        others = "".join(f", {n} {k}" for k, n in zip(kinds, counts, strict=True))
+        others = f", {self.why}" if self.why else ""
         return f"Trials({self.share:.4g} ({low:.3g} … {high:.3g}) of {len(self.kind)}{others})"
+
+    @property
+    def status(self) -> Literal["arrived", "failed"]:
+        """Whether all trials came to the end without a snap."""
+        return "arrived" if self.arrived.all() else "failed"
+
+    @property
+    def why(self) -> str:
+        """How many did not, and what they met."""
+        kinds, counts = np.unique(self.kind[~self.arrived], return_counts=True)
+        return ", ".join(f"{n} {kind}" for kind, n in zip(kinds, counts, strict=True))
+
+    @cached_property
+    def margin(self) -> Float[np.ndarray, " trials"]:
+        """Stability margins of the last states; 0, but for rounding, where stability was lost."""
+        return self.states.margin
 
     @property
     def arrived(self) -> Bool[np.ndarray, " trials"]:

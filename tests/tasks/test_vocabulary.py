@@ -1,0 +1,69 @@
+"""All answers speak the same words: status, why, states, margin, schedule."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+
+
+@pytest.fixture(scope="module")
+def spring():
+    return em.Spring()
+
+
+@pytest.fixture(scope="module")
+def eset(spring):
+    return em.equilibrium_set(spring, em.Box(x_l=(0.3, 1.5), F=(-0.4, 0.4)), intervals=(24, 24))
+
+
+@pytest.fixture(scope="module")
+def start(spring, eset):
+    return max(eset.at(x_l=0.8, F=0.0).stable, key=spring.descriptor("angle"))
+
+
+def test_a_route_has_its_states_and_its_schedule(spring, eset, start):
+    goal = min(eset.at(x_l=0.8, F=0.0).stable, key=spring.descriptor("angle"))
+    route = em.plan(eset, start, goal)
+    assert (route.status, route.why) == ("arrived", "")
+    assert route.states.margin.min() == route.margin
+    assert len(route.states) == len(route.schedule.values)
+    none = em.plan(eset, start, goal, within=[em.value_of(spring, "x_l") <= 0.9])
+    assert none.status == "refused"
+    assert none.why
+    assert none.states is None
+    assert none.schedule is None
+
+
+def test_shapes_have_the_schedule_to_the_best(spring, eset, start):
+    angle = spring.descriptor("angle")
+    found = em.solve_shape(eset, {angle: 0.3, em.value_of(spring, "x_l"): 0.95}, start=start)
+    assert found.status == "solved"
+    assert found.states.parameters["x_l"] == pytest.approx([0.95])
+    assert found.schedule.values[-1] == pytest.approx(found.states.p[0], abs=1e-9)
+    assert em.solve_shape(eset, {angle: 0.3, em.value_of(spring, "x_l"): 0.95}).schedule is None
+    none = em.solve_shape(eset, {angle: 1.6}, start=start)
+    assert none.status == "refused"
+    assert len(none.states) == len(none.margin) == 0
+    assert none.schedule is None
+
+
+def test_robustness_says_what_bounds_it(eset, start):
+    room = em.stable_room(start, {"F": 0.1})
+    assert room.status == "bounded"
+    assert room.why.startswith("fold at State(spring: x_l=0.8, F=")
+    assert np.array_equal(room.states.z[0], start.z)
+    free = em.stable_room(start, {"F": 1e-4}, most=2.0)
+    assert (free.status, free.why) == ("open", "")
+    snap = em.least_snap(eset, start)
+    assert snap.status == "found"
+    assert snap.states.margin == pytest.approx([0.0, snap.landing.state.margin], abs=1e-9)
+
+
+def test_trials_say_how_many_fail_and_of_what(start):
+    safe = em.random_trials(start, [{"x_l": 0.85}], {"F": 1e-4}, trials=20)
+    assert (safe.status, safe.why) == ("arrived", "")
+    assert safe.margin.min() > 0.0
+    risky = em.random_trials(start, [{"x_l": 0.99}], {"F": 1e-2}, trials=20)
+    assert risky.status == "failed"
+    assert risky.why == f"{np.sum(~risky.arrived)} fold"
+    assert risky.margin[~risky.arrived] == pytest.approx(0.0, abs=1e-9)
