@@ -126,9 +126,10 @@ def assert_upright(eset: EquilibriumSet, turned: int = 0) -> None:
         assert (own * np.sign(own.sum()) >= 0.0).all()
     setting = fabric_setting(eset)
     fabric = fabric_of(setting, eset)
-    corners = fabric.vertices.place[eset.cells]
+    # the signs of those parts of sheets between which others cross are their own
+    corners = fabric.vertices.place[fabric.cells]
     total = np.zeros(len(eset.cells))
-    for plane in eset.cells.T:
+    for plane in fabric.cells.T:
         flat = np.einsum("cde,cke->ckd", fabric.vertices.rows[plane], corners - corners[:, :1])
         total += volumes(flat) * signs
     for k in range(patch.max(initial=-1) + 1):

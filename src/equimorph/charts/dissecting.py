@@ -18,6 +18,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.fabric import (
     Fabric,
     Vertices,
+    check_sheets_do_not_cross,
     fabric_of,
     squared_sides,
     vertices_of,
@@ -106,6 +107,7 @@ class _Work:
     @classmethod
     def of(cls, eset: EquilibriumSet) -> "_Work":
         """Nothing is cut: charts are strata."""
+        check_sheets_do_not_cross(eset)
         fabric = fabric_of(fabric_setting(eset), eset)
         number = np.arange(len(eset.strata))
         return cls(eset, replace(fabric, cell_index=eset.stratum.copy()), number)

@@ -15,6 +15,7 @@ from equimorph.manifold.fabric import (
     ON_FOLD,
     Fabric,
     Vertices,
+    check_sheets_do_not_cross,
     edges_of,
     fabric_of,
     vertices_of,
@@ -104,6 +105,7 @@ class Preference:
 def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndarray, " V"], int]:
     """The preferred part of a set, which of its vertices lie on cuts, and edges without a cut."""
     eset = preference.cells.eset
+    check_sheets_do_not_cross(eset)
     fabric = fabric_of(fabric_setting(eset), eset)
     among = np.zeros(len(eset.cells), bool)
     among[preference.cells.numbers] = True

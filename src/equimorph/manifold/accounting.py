@@ -18,6 +18,7 @@ from equimorph.manifold.equilibrium_set import (
 from equimorph.manifold.hard import EFFORTS
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.pairing import Pairing, Setting, abandoned
+from equimorph.manifold.parted_sheets import parted
 from equimorph.manifold.points import CROSSING
 from equimorph.manifold.topology import (
     Adjacency,
@@ -121,8 +122,9 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         flags_of(whole.facets, each) for each in (given.folds, given.caps, given.crossings)
     )
     component = labels(len(corners), whole.links)
-    stratum = labels(len(corners), whole.links[whole.manifold & ~folds[whole.across]])
-    boundaries = _boundaries(whole, caps, folds)
+    parting = folds | crossed
+    stratum = labels(len(corners), whole.links[whole.manifold & ~parting[whole.across]])
+    boundaries = _boundaries(whole, {"cap": caps, "crossing": crossed, "fold": folds})
     strata = tuple(
         Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
@@ -159,14 +161,15 @@ def _kept(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:
 
 
 def _boundaries(
-    whole: Adjacency, caps: Bool[np.ndarray, " F"], folds: Bool[np.ndarray, " F"]
+    whole: Adjacency, flagged: Mapping[str, Bool[np.ndarray, " F"]]
 ) -> tuple[Boundary, ...]:
+    """Pieces of the boundary; of facets of several kinds the first counts."""
     once = whole.counts == 1
     base = int(whole.facets.max(initial=0)) + 1
-    marked = {
-        kind: keys_of(whole.facets[once & flags], base)
-        for kind, flags in (("cap", caps), ("fold", folds & ~caps))
-    }
+    marked, left = {}, once
+    for kind, flags in flagged.items():
+        marked[kind] = keys_of(whole.facets[left & flags], base)
+        left = left & ~flags
     out = []
     for piece in pieces(whole.facets[once]):
         keys = keys_of(_facets_of(piece, whole.facets.shape[1]), base)
@@ -216,16 +219,20 @@ def _audit(
     boundaries: tuple[Boundary, ...],
 ) -> Audit:
     corners, cell_index, crossed, whole, coordinates = parts
-    sense = senses(corners, cell_index, coordinates, whole)
-    regular = crossed & (whole.counts == SHEETS_AT_A_CROSSING)
+    # of parts of sets two cells may be left at a crossing that belong to different sheets
+    cells, origin = parted(corners, whole.facets[crossed], len(points))
+    sense = senses(cells, cell_index, coordinates[origin], adjacency(cells))
+    whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
+    most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
     kinds = [boundary.kind for boundary in boundaries]
     return Audit(
         vertices=len(points),
         cells=len(corners),
         **vars(lifting),
-        non_manifold=int(((whole.counts > 2) & ~regular).sum()),
-        crossings=int(regular.sum()),
-        contradictions=sense.contradictions + unbalanced(corners, whole, sense, regular),
+        non_manifold=int((whole.counts > most).sum()),
+        crossings=int(crossed.sum()),
+        contradictions=sense.contradictions
+        + unbalanced(corners, whole, sense, crossed & whole_crossing),
         overturned=int(sense.overturned.sum()),
         euler_characteristic=euler_characteristic(corners),
         components=int(labels(len(corners), whole.links).max(initial=-1)) + 1,

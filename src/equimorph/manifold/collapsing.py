@@ -148,7 +148,8 @@ class _Around:
 def _along(fabric: Fabric, moves: Moves) -> Bool[np.ndarray, " m"]:
     """Whether what the vertex lies on goes on along the edge."""
     own = fabric.vertex_marks[moves[:, 0]]
-    return np.asarray(own == fabric.edge_marks(np.sort(moves, axis=1)))
+    alone = fabric.vertices.shared[moves[:, 0]] < 0
+    return np.asarray(alone & (own == fabric.edge_marks(np.sort(moves, axis=1))))
 
 
 def _new(

@@ -38,7 +38,7 @@ class Stratum:
 class Boundary:
     """A connected piece of the boundary: on the box ("box") or a constraint ("cap").
 
-    Of parts of sets also on a "fold"; "mixed" if on several of these.
+    Of parts of sets also on a "fold" or a "crossing"; "mixed" if on several of these.
 
     vertices: one point (d = 1), a loop with the first vertex repeated (d = 2; an arc between ends
     of crossings, where there are such), or triangles, one a row (d = 3).

@@ -12,11 +12,13 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Complex
+from equimorph.manifold.crossing_frames import crossing_frames
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.kernels import square_sides
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.points import CAP, CORNER, FOLD
+from equimorph.manifold.parted_sheets import parted
+from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.simplices import volumes
 from equimorph.manifold.tangents import (
     Ends,
@@ -31,6 +33,9 @@ from equimorph.structures import States
 
 ON_FOLD, ON_CAP, SIDES = 1, 2, 4
 """Marks; from `SIDES` on two for each free parameter: its lower and its upper bound."""
+ON_CROSSING = 1 << 19
+"""Mark of facets at which another sheet crosses."""
+CURVES = ON_FOLD | ON_CAP | ON_CROSSING
 HOLE = 1 << 20
 """Mark of facets on the boundary that lie on nothing: the set is incomplete there."""
 TRIANGLES = 2
@@ -52,8 +57,11 @@ class Vertices:
     frame: Float[np.ndarray, "V d full"]
     rows: Float[np.ndarray, "V d coordinates"]
     fold_slope: Float[np.ndarray, "V d"]
-    """Slope, along the frame, of what vanishes on folds; zero off folds. So for constraints."""
+    """Slope, along the frame, of what vanishes on folds; zero off folds. So for the others."""
     cap_slope: Float[np.ndarray, "V d"]
+    crossing_slope: Float[np.ndarray, "V d"]
+    shared: Int[np.ndarray, " V"]
+    """Number that vertices have in common which are the same point of several sheets; else −1."""
 
     def __len__(self) -> int:
         """Return the number of vertices."""
@@ -72,6 +80,8 @@ class Vertices:
 @dataclass(frozen=True)
 class Fabric:
     """Vertices, cells with their index, and marked facets.
+
+    Where sheets cross, each of their parts has vertices of its own (see `parted_sheets`).
 
     box: lower and upper bounds of the free parameters; squared: lengths of the sides of the cells,
     squared, in the order 01, 02, 12 and so on; sense: sign that the areas of triangles in the free
@@ -115,17 +125,35 @@ class Fabric:
             np.bitwise_or.at(out, column, self.marks)
         return out
 
-    def end(self, at: Int[np.ndarray, " edges"], mark: int) -> Ends:
-        """Ends of edges with a mark: at its vertices, and what stays zero along the edges."""
-        store, d = self.vertices, self.dimension
+    def end(self, edges: Int[np.ndarray, "edges 2"], side: int, mark: int) -> Ends:
+        """One end of edges with a mark: its point, frame, and what stays zero along the edges."""
+        store, d, at = self.vertices, self.dimension, edges[:, side]
         rows, slopes = store.rows[at], []
         if mark & ON_FOLD:
-            slopes.append(store.fold_slope[at])
+            slopes.append(self._fold_slopes(edges, side))
         if mark & ON_CAP:
             slopes.append(store.cap_slope[at])
+        if mark & ON_CROSSING:
+            slopes.append(store.crossing_slope[at])
         slopes.extend(rows[:, :, rows.shape[2] - d + k] for k in held(mark, d))
         stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, d))
         return Ends(store.place[at], rows, stacked)
+
+    def _fold_slopes(
+        self, edges: Int[np.ndarray, "edges 2"], side: int
+    ) -> Float[np.ndarray, "edges d"]:
+        """Slopes of what vanishes on folds; where a fold passes a crossing, across its edges.
+
+        There the slope is zero, because it vanishes on the crossing, too.
+        """
+        store, at = self.vertices, edges[:, side]
+        slopes = store.fold_slope[at]
+        hub = np.flatnonzero((store.kinds[at] == CROSSING) & (self.dimension == TRIANGLES))
+        if len(hub):
+            chord = store.place[edges[hub, 1 - side]] - store.place[at[hub]]
+            x, y = np.einsum("nkc,nc->kn", store.rows[at[hub]], chord)
+            slopes[hub] = np.stack([-y, x], axis=1)
+        return np.asarray(slopes)
 
     def only(self, cells: Bool[np.ndarray, " C"]) -> "Fabric":
         """Some of the cells, with all facets."""
@@ -169,12 +197,31 @@ class Fabric:
             marks=self.marks[of_facets],
         )
 
+    @property
+    def points(self) -> Int[np.ndarray, " V"]:
+        """For each vertex the first one that is the same point."""
+        shared = self.vertices.shared
+        own = np.arange(len(shared))
+        copies = np.flatnonzero(shared >= 0)
+        _, first, inverse = np.unique(shared[copies], return_index=True, return_inverse=True)
+        own[copies] = copies[first[inverse]]
+        return own
+
+    @property
+    def numbers(self) -> Int[np.ndarray, " V"]:
+        """Numbers of the vertices in the complex; −1 for those that it leaves out."""
+        points = self.points
+        used = np.zeros(len(points), bool)
+        used[points[self.cells]] = True
+        return np.asarray(np.where(used, np.cumsum(used) - 1, -1)[points])
+
     def complex(self) -> Complex:
         """Return what is needed to describe the set; vertices without cells are left out."""
-        used = np.flatnonzero(np.bincount(self.cells.ravel(), minlength=len(self.vertices)))
-        number = np.full(len(self.vertices), -1)
-        number[used] = np.arange(len(used))
-        own = self.vertices.take(used)
+        number = self.numbers
+        _, used = np.unique(number, return_index=True)
+        own = self.vertices.take(used[number[used] >= 0])
+        facets = [number[self.facets[(self.marks & m) > 0]] for m in (ON_FOLD, ON_CAP, ON_CROSSING)]
+        folds, caps, crossings = (each[(each >= 0).all(axis=1)] for each in facets)
         return Complex(
             States(self.setting.structure, own.z, own.p),
             own.kinds,
@@ -182,9 +229,9 @@ class Fabric:
             own.grid_vertex,
             number[self.cells],
             self.cell_index,
-            number[self.facets[(self.marks & ON_FOLD) > 0]],
-            number[self.facets[(self.marks & ON_CAP) > 0]],
-            np.zeros((0, self.dimension), int),
+            folds,
+            caps,
+            crossings,
         )
 
 
@@ -212,62 +259,88 @@ def vertices_of(
 ) -> Vertices:
     """Vertices with their frames; `others` are index and grid vertex, `rows` nearby planes."""
     z, p = states
-    frame = tangent_frames(setting, z, p, rows)
-    slopes = [np.zeros((len(z), len(setting.free))) for _ in range(2)]
+    crossing = kinds == CROSSING
+    d = len(setting.free)
+    frame = np.empty((len(z), d, z.shape[1] + d))
+    folds, caps, crossings = (np.zeros((len(z), d)) for _ in range(3))
+    plain, met = np.flatnonzero(~crossing), np.flatnonzero(crossing)
+    frame[plain] = tangent_frames(setting, z[plain], p[plain], rows[plain])
+    if len(met):
+        frame[met], crossings[met] = crossing_frames(setting, z[met], p[met], rows[met])
+    capped = np.isin(kinds, (CAP, CORNER))
+    capped[met] = on_constraints(setting, z[met], p[met])
     for out, function, wanted in (
-        (slopes[0], fold_slopes, (FOLD, CORNER)),
-        (slopes[1], cap_slopes, (CAP, CORNER)),
+        (folds, fold_slopes, np.isin(kinds, (FOLD, CORNER))),
+        (caps, cap_slopes, capped),
     ):
-        own = np.flatnonzero(np.isin(kinds, wanted))
+        own = np.flatnonzero(wanted)
         if len(own):
             out[own] = function(setting, z[own], p[own], frame[own])
     place = embed(setting, z, p)
     placed = placed_frames(setting, frame)
-    return Vertices(z, p, kinds, *others, place, frame, placed, *slopes)
+    alone = np.full(len(z), -1)
+    return Vertices(z, p, kinds, *others, place, frame, placed, folds, caps, crossings, alone)
 
 
-def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
-    """Return a set as a fabric.
+def on_constraints(
+    setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Bool[np.ndarray, " n"]:
+    """Whether states lie on the bound of a constraint."""
+    out = np.zeros(len(z), bool)
+    for constraint in setting.constraints if len(z) else ():
+        out |= np.abs(constraint.excess(z, p)) < ON_BOUND
+    return out
 
-    Raises
-    ------
-    InputError
-        If sheets of the set cross: where they do, they have no common tangent space.
-    """
+
+def check_sheets_do_not_cross(eset: EquilibriumSet) -> None:
+    """Refuse sets that cross themselves, for tasks that need one tangent space at each state."""
     if eset.crossings:
         raise InputError(
             "`eset` must be a set whose sheets do not cross; got one that crosses itself along "
             f"{len(eset.crossings)} curves. Break its symmetry, for example by a small offset of a "
             "fixed parameter."
         )
-    z, p = eset.points.z, eset.points.p
-    whole = adjacency(eset.cells)
-    sense = senses(eset.cells, eset.cell_index, eset.coordinates, whole)
-    rows = best_corners(setting, z, p, eset.cells, sense.signs)
-    others = (eset.index, eset.grid_vertex)
-    vertices = vertices_of(setting, (z, p), eset.kinds, others, rows)
+
+
+def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
+    """Return a set as a fabric: its sheets are parted where they cross."""
     d = len(eset.names)
-    folds = [np.zeros((0, d), int), *(_facets(piece, d) for piece in eset.folds)]
-    folded = flags_of(whole.facets, np.concatenate(folds))
+    crossings, folds = (
+        np.concatenate([np.zeros((0, d), int), *(_facets(piece, d) for piece in pieces)])
+        for pieces in (eset.crossings, eset.folds)
+    )
+    cells, origin = parted(eset.cells, crossings, len(eset.points))
+    z, p = eset.points.z[origin], eset.points.p[origin]
+    whole = adjacency(cells)
+    sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
+    rows = best_corners(setting, z, p, cells, sense.signs)
+    others = (eset.index[origin], eset.grid_vertex[origin])
+    vertices = vertices_of(setting, (z, p), eset.kinds[origin], others, rows)
+    common = np.where(np.isin(origin, crossings), origin, -1)
+    vertices = replace(vertices, shared=common)
+    known = origin[whole.facets]
+    folded, crossed = (flags_of(known, each) for each in (folds, crossings))
     outer = whole.counts == 1
-    marks = np.where(folded, ON_FOLD, 0)
-    outer_marks = _outer_marks(eset, whole.facets[outer])
+    marks = np.where(folded, ON_FOLD, 0) | np.where(crossed, ON_CROSSING, 0)
+    outer_marks = _outer_marks(setting, eset, known[outer])
     # of parts of sets folds are boundaries, too
-    marks[outer] |= np.where(folded[outer], outer_marks & ~HOLE, outer_marks)
+    marks[outer] |= np.where(marks[outer] > 0, outer_marks & ~HOLE, outer_marks)
     marked = marks > 0
     box = np.stack([eset.box.lower, eset.box.upper])
-    squared = squared_sides(vertices.place, eset.cells)
+    squared = squared_sides(vertices.place, cells)
     facets = (whole.facets[marked], marks[marked])
     upright = sense.signs * np.where(eset.cell_index % 2 == 0, 1, -1)
     upright = upright if d == TRIANGLES else np.zeros(0, int)
-    return Fabric(setting, box, vertices, eset.cells, eset.cell_index, *facets, squared, upright)
+    return Fabric(setting, box, vertices, cells, eset.cell_index, *facets, squared, upright)
 
 
 def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
     return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
 
-def _outer_marks(eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
+def _outer_marks(
+    setting: Setting, eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]
+) -> Int[np.ndarray, " n"]:
     """On what facets of the boundary lie: on a side of the box, else on the constraint."""
     places = eset.coordinates[facets]
     size = eset.box.upper - eset.box.lower
@@ -276,8 +349,10 @@ def _outer_marks(eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]) -> Int[np
         on = (np.abs(places - bound) <= ON_BOX * size).all(axis=1)
         for k in range(len(size)):
             marks |= np.where(on[:, k], SIDES << (2 * k + side), 0)
-    capped = np.isin(eset.kinds, (CAP, CORNER))[facets].all(axis=1)
-    return np.where(marks > 0, marks, np.where(capped, ON_CAP, HOLE))
+    capped = np.isin(eset.kinds, (CAP, CORNER))
+    met = np.flatnonzero(eset.kinds == CROSSING)
+    capped[met] = on_constraints(setting, eset.points.z[met], eset.points.p[met])
+    return np.where(marks > 0, marks, np.where(capped[facets].all(axis=1), ON_CAP, HOLE))
 
 
 def _bisected(

@@ -8,12 +8,13 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
+from equimorph.manifold.copies import first_copies, with_copies
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.fabric import HOLE, ON_CAP, Fabric, Vertices, edges_of, fabric_of
 from equimorph.manifold.on_edges import on_edges
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.points import CAP, CORNER, FOLD
+from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.tangents import split_step
 from equimorph.manifold.topology import adjacency, pieces
 from equimorph.model import Constraint, Descriptor
@@ -124,7 +125,9 @@ def _divided(eset: EquilibriumSet, cut: "Cut") -> Division:
     nothing = np.zeros(len(cut.values), bool)
     whole = part_of(eset, cut.fabric, np.ones(len(cut.fabric.cells), bool), (nothing, cut.lost))
     side = np.sign(cut.values[cut.fabric.cells].sum(axis=1)).astype(int)
-    return Division(whole, cut.on_level, side, cut.lost)
+    on_level, number = np.zeros(len(whole.points), bool), cut.fabric.numbers
+    on_level[number[cut.on_level & (number >= 0)]] = True
+    return Division(whole, on_level, side, cut.lost)
 
 
 def jacobian(setting: Setting, at: Vertices, descriptors: Sequence[Descriptor]) -> Values:
@@ -200,6 +203,7 @@ def _level(eset: EquilibriumSet, function: Function) -> Level:
     cut = _cut(_fabric(eset), function)
     store, whole = cut.fabric.vertices, adjacency(cut.fabric.cells)
     facets = whole.facets[cut.on_level[whole.facets].all(axis=1)]
+    facets = np.unique(np.sort(cut.fabric.points[facets], axis=1), axis=0)
     used, inverse = np.unique(facets, return_inverse=True)
     states = States(eset.structure, store.z[used], store.p[used])
     return Level(states, tuple(pieces(inverse.reshape(facets.shape))), cut.lost)
@@ -215,10 +219,12 @@ def _cut(fabric: Fabric, function: Function) -> Cut:
     ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
         return roots(fabric, ends, about, known, lambda at, _: function(at))
 
-    return cut_between(fabric, values, between)
+    return cut_between(fabric, values, between, function)
 
 
-def cut_between(fabric: Fabric, values: Values, between: Between) -> Cut:
+def cut_between(
+    fabric: Fabric, values: Values, between: Between, function: Function | None = None
+) -> Cut:
     """Put vertices on edges whose ends have values of different signs, until there are none.
 
     Parameters
@@ -228,6 +234,9 @@ def cut_between(fabric: Fabric, values: Values, between: Between) -> Cut:
     between
         Finds the new vertices: of a fabric, edges, their mark and indices, and their values; tells
         on which edges it found some.
+    function
+        Gives values to vertices that cuts of one sheet put on another that crosses it, in place of
+        zero: it may depend on the sheet.
     """
     lost: set[tuple[int, int]] = set()
     while True:
@@ -239,6 +248,7 @@ def cut_between(fabric: Fabric, values: Values, between: Between) -> Cut:
         if len(chosen) == 0:
             return Cut(fabric, values, len(lost))
         marks = fabric.edge_marks(ends)
+        chosen = chosen[first_copies(fabric, ends[chosen], marks[chosen])]
         lowest = np.full(len(ends), np.iinfo(int).max)
         for side in of_cells.T:
             np.minimum.at(lowest, side, fabric.cell_index)
@@ -248,8 +258,12 @@ def cut_between(fabric: Fabric, values: Values, between: Between) -> Cut:
             done, more = between(fabric, ends[own], (mark, lowest[own]), known)
             lost.update(map(tuple, ends[own[~done]].tolist()))
             if done.any():
-                fabric = fabric.bisected(ends[own[done]], more)
-                values = np.concatenate([values, np.zeros(len(more))])
+                cut, whole = with_copies(fabric, ends[own[done]], more)
+                others = whole.take(np.arange(len(more), len(whole)))
+                known = function(others) if function else np.zeros(len(others))
+                known = np.where(np.abs(known) <= ROUND_OFF * np.abs(values).max(), 0.0, known)
+                fabric = fabric.bisected(cut, whole)
+                values = np.concatenate([values, np.zeros(len(more)), known])
 
 
 def _one_per_cell(
@@ -358,7 +372,8 @@ def part_of(
         facets = np.concatenate([facets, capped])
         marks = np.concatenate([marks, np.full(len(capped), ON_CAP)])
     kinds = fabric.vertices.kinds.copy()
-    kinds[on_level] = np.where(np.isin(kinds[on_level], (FOLD, CORNER)), CORNER, CAP)
+    plain = on_level & (kinds != CROSSING)
+    kinds[plain] = np.where(np.isin(kinds[plain], (FOLD, CORNER)), CORNER, CAP)
     fabric = replace(
         fabric.only(cells),
         vertices=replace(fabric.vertices, kinds=kinds),

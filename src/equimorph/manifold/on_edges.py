@@ -5,10 +5,19 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.fabric import ON_CAP, ON_FOLD, Fabric, Vertices, held, vertices_of
+from equimorph.manifold.crossing_points import corrected_crossings
+from equimorph.manifold.fabric import (
+    ON_CAP,
+    ON_CROSSING,
+    ON_FOLD,
+    Fabric,
+    Vertices,
+    held,
+    vertices_of,
+)
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import Aim, corrected, lower_index
-from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
+from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.tangents import Cubics, split_step
 
 REACH = 0.3
@@ -29,7 +38,7 @@ def on_edges(
 ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
     """Exact vertices at places t along edges with a mark, and for which edges they were found."""
     setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
-    first, second = (fabric.end(ends[:, side], mark) for side in range(2))
+    first, second = (fabric.end(ends, side, mark) for side in range(2))
     z, p = store.z[ends], store.p[ends]
     moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
     chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
@@ -47,29 +56,40 @@ def on_edges(
     rows = np.swapaxes(inside, 1, 2) @ plane
     aim_span = np.delete(np.eye(d), keep, axis=0)
     place = _embedded(fabric, z, p)
-    fold, cap = bool(mark & ON_FOLD), bool(mark & ON_CAP)
+    fold, cap, crossing = (bool(mark & each) for each in (ON_FOLD, ON_CAP, ON_CROSSING))
     aim = Aim(setting, fold, cap, np.tile(aim_span, (len(z), 1, 1)), place, rows)
     length = np.linalg.norm(second.place - first.place, axis=1)
-    pinned = corrected(aim, z, p, length)
+    pinned = (corrected_crossings if crossing else corrected)(aim, z, p, length)
     here = _embedded(fabric, pinned.z, pinned.p)
     found = pinned.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
     for end, part in ((first, t), (second, 1.0 - t)):
         found &= np.linalg.norm(here - end.place, axis=1) <= (part + EXCESS) * length
     free = pinned.p[:, setting.free]
     found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
-    count = lower_index if fold else _index
+    if crossing:
+        lowest = store.index[ends].max(axis=1)
+    count = lower_index if fold or crossing else _index
     found[found] = count(setting, pinned.z[found], pinned.p[found]) == lowest[found]
     kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
     others = (lowest[found], np.full(found.sum(), -1))
-    kinds = np.full(found.sum(), kind[fold, cap])
+    kinds = np.full(found.sum(), CROSSING if crossing else kind[fold, cap])
     states = (pinned.z[found], pinned.p[found])
     vertices = vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
-    # a point on another fold nearby sees the edge at a large angle
-    middle = replace(fabric, vertices=vertices).end(np.arange(len(vertices)), mark)
-    flat = middle.nearest((second.place - first.place)[found])
-    good = np.linalg.norm(flat, axis=1) >= ALONG * length[found]
+    good = _along(replace(fabric, vertices=vertices), mark, (second.place - first.place)[found])
     found[found] = good
     return found, vertices.take(np.flatnonzero(good))
+
+
+def _along(
+    fabric: Fabric, mark: int, chords: Float[np.ndarray, "n coordinates"]
+) -> Bool[np.ndarray, " n"]:
+    """Whether edges lead along the set, as seen at their new vertices, which are all there are.
+
+    A point on another fold nearby sees its edge at a large angle.
+    """
+    own = np.tile(np.arange(len(chords))[:, None], (1, 2))
+    flat = fabric.end(own, 0, mark).nearest(chords)
+    return np.asarray(np.linalg.norm(flat, axis=1) >= ALONG * np.linalg.norm(chords, axis=1))
 
 
 def _index(

@@ -14,12 +14,12 @@ from jaxtyping import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
 from equimorph.manifold.collapsing import collapse_edges
+from equimorph.manifold.copies import copies, doubled, first_copies, with_copies
 from equimorph.manifold.cusp_points import with_cusps_beside
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.fabric import (
+    CURVES,
     HOLE,
-    ON_CAP,
-    ON_FOLD,
     Fabric,
     edges_of,
     fabric_of,
@@ -95,6 +95,7 @@ def refine(
     memory = _Memory()
     fabric = _tidied(fabric_of(setting, eset), memory)
     fabric = _refined(fabric, SHARE[len(free)] * accuracy, memory, progress or Silent())
+    fabric = _told_apart(fabric, memory)
     edges = _known(fabric, memory)
     audit = eset.audit
     lifting = Lifting(
@@ -144,7 +145,7 @@ class _Edges:
         Where folds and constraints bulge far out between their vertices, they come first: edges
         beside them would cross them.
         """
-        first = (self.error > COARSE * tolerance) & ((self.marks & (ON_FOLD | ON_CAP)) > 0)
+        first = (self.error > COARSE * tolerance) & ((self.marks & CURVES) > 0)
         first = (first | self.pressing) & ~self.stuck
         return first if first.any() else np.asarray((self.error > tolerance) & ~self.stuck)
 
@@ -204,6 +205,16 @@ def _settled(fabric: Fabric, tolerance: float, memory: _Memory, progress: Progre
     return fabric
 
 
+def _told_apart(fabric: Fabric, memory: _Memory) -> Fabric:
+    """Vertices on edges of several sheets that join the same two points of their crossing."""
+    ends = doubled(fabric)
+    if len(ends) == 0:
+        return fabric
+    edges, base = _known(fabric, memory), len(fabric.vertices)
+    chosen = np.flatnonzero(np.isin(keys_of(edges.ends, base), keys_of(ends, base)))
+    return _bisect(fabric, edges, chosen, memory)
+
+
 def _faults(fabric: Fabric, tolerance: float, memory: _Memory) -> tuple[int, int]:
     """Numbers of edges that deviate, and of cells that are overturned."""
     deviating = int((_known(fabric, memory).error > tolerance).sum())
@@ -217,7 +228,7 @@ def _cut_around(fabric: Fabric, memory: _Memory, widely: bool) -> Fabric:
     """
     edges = _known(fabric, memory)
     cells = fabric.overturned(fabric.cells, fabric.sense)
-    wanted = (edges.marks & (ON_FOLD | ON_CAP)) > 0
+    wanted = (edges.marks & CURVES) > 0
     if widely:
         near = np.zeros(len(fabric.vertices), bool)
         near[fabric.cells[cells]] = True
@@ -281,7 +292,7 @@ def _pressing(
     for side in range(2):
         np.minimum.at(reach, ends[failed, side], length[failed])
     short = np.minimum(reach[ends[:, 0]], reach[ends[:, 1]])
-    return np.asarray(((marks & (ON_FOLD | ON_CAP)) > 0) & (length > BULGE * short))
+    return np.asarray(((marks & CURVES) > 0) & (length > BULGE * short))
 
 
 def _keys(ends: Int[np.ndarray, "E 2"]) -> Int[np.ndarray, " E"]:
@@ -295,7 +306,7 @@ def _deviations(
     """How far the set is from straight edges."""
     out = np.zeros(len(ends))
     for own in _chunks(np.arange(len(ends)), marks):
-        first, second = (fabric.end(ends[own, side], int(marks[own[0]])) for side in range(2))
+        first, second = (fabric.end(ends[own], side, int(marks[own[0]])) for side in range(2))
         out[own] = Cubics(first, second).error
     return out
 
@@ -355,6 +366,7 @@ def _bisect(
 ) -> Fabric:
     """Put exact vertices on edges; remember where that failed."""
     ends = edges.ends
+    chosen = chosen[first_copies(fabric, ends[chosen], edges.marks[chosen])]
     lowest = np.full(len(ends), np.iinfo(int).max)
     for side in edges.of_cells.T:
         np.minimum.at(lowest, side, fabric.cell_index)
@@ -370,7 +382,8 @@ def _bisect(
             own = own[~found]
             if len(own) == 0:
                 break
-        memory.stuck.update(map(tuple, ends[own].tolist()))
+        _, others = copies(fabric, ends[own])
+        memory.stuck.update(map(tuple, np.concatenate([ends[own], others]).tolist()))
         memory.failures += len(own)
     if not done:
         return fabric
@@ -380,7 +393,8 @@ def _bisect(
     rank[chosen] = np.arange(len(chosen))
     order = np.argsort(rank[at])
     at, more = at[order], more.take(order)
-    memory.cut = np.concatenate([memory.cut, ends[at]])
-    if np.isin(edges.marks[at], (ON_FOLD, ON_CAP)).any():
+    if ((edges.marks[at] & CURVES) > 0).any():
         memory.stuck.clear()  # beside a fold that is better known they may succeed
-    return fabric.bisected(ends[at], more) if len(at) else fabric
+    whole, more = with_copies(fabric, ends[at], more)
+    memory.cut = np.concatenate([memory.cut, whole])
+    return fabric.bisected(whole, more) if len(at) else fabric

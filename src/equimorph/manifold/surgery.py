@@ -142,6 +142,8 @@ def _free_to_move(
     along = fabric.edge_marks(np.sort(moves, axis=1))
     ends = np.bincount(fabric.facets.ravel(), minlength=base)[moves[:, 0]]
     good = (own == along) & ((own == 0) | (ends == 2))
+    # what sheets have in common stays
+    good &= fabric.vertices.shared[moves[:, 0]] < 0
     # common neighbours of both ends: only those across the triangles beside the edge
     starts, around = _neighbours(edges, base)
     row, at = _spread(starts, moves[:, 0])
