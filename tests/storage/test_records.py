@@ -93,7 +93,7 @@ def test_numbers_that_json_does_not_know(tmp_path, spring):
 def test_functions_are_refused_by_the_place_they_stand_at(tmp_path):
     with (
         h5py.File(tmp_path / "record.h5", "w") as file,
-        pytest.raises(em.InputError, match=r"`/0` must be data that a file can hold; got builtin"),
+        pytest.raises(em.InputError, match=r"`0` must be data that a file can hold; got builtin"),
     ):
         record_group.write(file.create_group("record"), {"x_l": abs})
 

@@ -207,5 +207,5 @@ def test_the_same_results_give_the_same_file(spring_set: EquilibriumSet, tmp_pat
 
 def test_a_file_needs_a_set_or_a_map(spring_set: EquilibriumSet, tmp_path: Path):
     angle = spring_set.structure.descriptor("angle")
-    with pytest.raises(InputError, match="`eset` must be an equilibrium set where there is no map"):
+    with pytest.raises(InputError, match="`structure` must be given where there is no set"):
         write_results(tmp_path / "results.h5", None, angle)

@@ -9,6 +9,7 @@ import pytest
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.model import Silent
+from equimorph.storage import read_results
 from equimorph.study import Outcome, parse_study, prepare, run_study
 from typecheck import unchecked
 
@@ -77,6 +78,14 @@ def test_the_folder_holds_covariances_points_figure_and_page(run):
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "Calibration strip" in page
     assert "75 degrees of freedom" in page
+
+
+def test_the_answer_is_in_the_results_though_there_is_no_set(run):
+    results = read_results(run[1] / "results.h5")
+    assert results.equilibrium_set is None
+    stored, found = results.answers["calibration"]["strip"], run[0].of("calibration")["strip"]
+    np.testing.assert_array_equal(stored.values, found.values)
+    assert stored.states.structure.signature == found.states.structure.signature
 
 
 @pytest.mark.usefixtures("plain_figures")

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import equimorph as em
 from equimorph.errors import InputError
-from equimorph.storage import read_schedule
+from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, html, parse_study, prepare, run_study
 from studies import draw_dots
 from typecheck import unchecked
@@ -133,6 +133,13 @@ def run(tmp_path_factory) -> tuple[Outcome, Path]:
 
 def page(out: Path) -> str:
     return (out / "index.html").read_text(encoding="utf-8")
+
+
+def test_every_answer_is_in_the_results(run):
+    stored = read_results(run[1] / "results.h5")
+    assert {each.asked.kind.table for each in run[0].answers} == {*stored.answers, "route"}
+    limit = stored.answers["imperfection"]["longer"]["x_l"].perfect
+    assert limit == run[0].of("imperfection")["longer"]["x_l"].perfect
 
 
 def test_a_reachable_set_has_its_boundary_by_kinds_and_answers_queries(run):
@@ -278,7 +285,7 @@ WRONG = {
     "a route for nothing": (
         "route",
         f'start = {UPPER}\ngoal = {UPPER}\nobjective = "speed"',
-        r"`route\[0\]\.objective` must be 'length', 'travel', 'work' or 'clearance'",
+        r"`route\[0\]\.objective` must be one of length, travel, work, clearance, time",
     ),
     "no way": ("verify", "", r"`verify\[0\]` must give a schedule, or a start with its steps"),
     "two ways": (

@@ -1,5 +1,6 @@
 """Figures and films of results; nothing else in the package draws."""
 
+from equimorph.plotting.alternatives import alternative_routes
 from equimorph.plotting.calibration import calibration
 from equimorph.plotting.charts import chart_domain, parameterisation
 from equimorph.plotting.curvature_map import curvature_map
@@ -20,6 +21,7 @@ from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 
 __all__ = [
+    "alternative_routes",
     "calibration",
     "chart_domain",
     "curvature_map",

@@ -105,6 +105,15 @@ def corner_steps(route: Route) -> Int[np.ndarray, " corners"]:
     return np.unique(np.concatenate([[0], route.schedule.way_points, [last]])).astype(int)
 
 
+def snap_steps(route: Route) -> Int[np.ndarray, " snaps"]:
+    """Steps of the path of a route from which it snaps: to the next one, at the same parameters."""
+    if route.path is None:
+        return np.zeros(0, int)
+    z = route.path.states.z
+    landed = [np.flatnonzero((z == snap.state.z).all(axis=1)) for snap in route.snaps]
+    return np.array([int(steps[0]) - 1 for steps in landed], dtype=int)
+
+
 def path_of(path_or_route: Path | Route) -> Path:
     """Path of a route, or the path itself.
 

@@ -8,7 +8,7 @@ from mpl_toolkits.axes_grid1 import make_axes_locatable
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.plotting import style
-from equimorph.plotting.curves import corner_steps, path_of
+from equimorph.plotting.curves import corner_steps, path_of, snap_steps
 from equimorph.plotting.symbols import descriptor_label
 from equimorph.tasks import Route
 
@@ -18,6 +18,7 @@ _CURVATURE_COLOUR = "#a1561a"
 _GAP = 0.1  # inches
 _ROOM = (0.46, 0.38, 0.1, 0.2)
 _MOST_NUMBERS = 12
+_ROUNDING = 1e-9
 
 
 def margins(route: Route, ax: Axes | None = None) -> Axes:
@@ -49,7 +50,8 @@ def margins(route: Route, ax: Axes | None = None) -> Axes:
             height = (0.5 if curvature is None else 0.8) * style.SINGLE_COLUMN
             ax = style.new_axes(style.SINGLE_COLUMN, height, _ROOM)
         lowest = ax
-        _draw(ax, schedule, schedule.margins, _MARGIN_COLOUR)
+        snaps = snap_steps(route)
+        _draw(ax, schedule, schedule.margins, _MARGIN_COLOUR, snaps)
         ax.set_ylabel("stability margin")
         ax.set_ylim(0.0, 1.15 * schedule.margins.max())
         _mark(ax, schedule, int(np.argmin(schedule.margins)), schedule.margins)
@@ -58,7 +60,7 @@ def margins(route: Route, ax: Axes | None = None) -> Axes:
             divider = make_axes_locatable(ax)
             lowest = divider.append_axes("bottom", size="100%", pad=_GAP, sharex=ax)
             ax.tick_params(labelbottom=False)
-            _draw(lowest, schedule, curvature, _CURVATURE_COLOUR)
+            _draw(lowest, schedule, curvature, _CURVATURE_COLOUR, snaps)
             descriptor = path_of(route).states.structure.descriptor(_CURVATURE)
             lowest.set_ylabel(descriptor_label(descriptor))
             lowest.set_ylim(0.0, 1.25 * curvature.max())
@@ -68,11 +70,20 @@ def margins(route: Route, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _draw(ax: Axes, schedule: Schedule, values: Float[np.ndarray, " steps"], colour: str) -> None:
-    """One quantity over the share of the route, with thin lines at the way-points."""
+def _draw(
+    ax: Axes,
+    schedule: Schedule,
+    values: Float[np.ndarray, " steps"],
+    colour: str,
+    snaps: Int[np.ndarray, " snaps"],
+) -> None:
+    """One quantity over the share of the route, with thin lines at the way-points and gaps."""
     for at in _corner_places(schedule):
         ax.axvline(at, color="#c4c4c4", linewidth=0.5, zorder=1)
-    ax.plot(schedule.progress, values, color=colour, linewidth=1.4, zorder=3)
+    for at in schedule.progress[snaps]:
+        ax.axvline(at, color=style.ROUTE_COLOUR, linewidth=0.9, linestyle=":", zorder=2)
+    x, y = (np.insert(each, snaps + 1, np.nan) for each in (schedule.progress, values))
+    ax.plot(x, y, color=colour, linewidth=1.4, zorder=3)
     ax.set_xlim(0.0, 1.0)
 
 
@@ -92,10 +103,12 @@ def _mark(
     above = not is_low or values[step] < 0.15 * ax.get_ylim()[1]
     place = (float(schedule.progress[step]), float(values[step]))
     ax.plot(*place, "o", markersize=3.5, color=style.INK, zorder=4, clip_on=False)
+    # At a fold from which the structure snaps the margin is zero up to rounding.
+    shown = 0.0 if abs(place[1]) < _ROUNDING * np.abs(values).max() else place[1]
     # Text near the end of the route is set to the left of its mark, to stay inside the frame.
     side = "right" if place[0] > 0.8 else "left" if place[0] < 0.2 else "center"
     ax.annotate(
-        f"{place[1]:.3g}", place, (0, 4 if above else -4), textcoords="offset points", ha=side,
+        f"{shown:.3g}", place, (0, 4 if above else -4), textcoords="offset points", ha=side,
         va="bottom" if above else "top", zorder=5,
     )  # fmt: skip
 

@@ -1,5 +1,6 @@
 """The plane of free parameters: how many equilibria where, the folds between, and the route."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -27,6 +28,7 @@ from equimorph.plotting.curves import (
     fold_pieces,
     intended,
     limit_pieces,
+    snap_steps,
     track,
     way_points,
 )
@@ -42,6 +44,15 @@ _CAP: dict[str, Any] = {
     "zorder": 3,
 }
 _ROUTE: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.6, "zorder": 6}
+
+_SNAP: dict[str, Any] = {
+    "marker": "*",
+    "linestyle": "none",
+    "ms": 10,
+    "mfc": "white",
+    "mec": style.ROUTE_COLOUR,
+    "mew": 1.0,
+}
 
 _FRAME_HEIGHT = 2.16  # inches
 _LEFT, _BOTTOM, _RIGHT, _TOP = 0.58, 0.4, 0.4, 0.08  # inches around the frame
@@ -106,25 +117,28 @@ def parameter_plane(
             lines += _draw_limit(ax, eset, limit, stable_only=count == "stable")
         covered = np.empty((0, 2))
         if route is not None and route.path is not None:
-            lines.append(draw_track(ax, eset, route, route.path))
+            lines += [draw_track(ax, eset, route, route.path), *_mark_snaps(ax, eset, route)]
             corners = way_points(eset, route)[: None if route.status == "arrived" else -1]
             _draw_directions(ax, corners)
             covered = np.concatenate([_covered(eset, route.path), number_way_points(ax, corners)])
         _write_counts(ax, regions, largest, covered)
         _count_bar(ax, largest, "equilibria" if count == "all" else "stable equilibria")
         if lines:
-            _write_legend(ax, lines, room=own)
+            legend_below(ax, lines, room=own)
     return ax
 
 
-def _write_legend(ax: Axes, lines: list[Line2D], *, room: bool) -> None:
-    """Legend below the frame; with `room`, the figure grows by its height."""
+def legend_below(ax: Axes, lines: Sequence[Line2D], *, room: bool) -> None:
+    """Legend below the frame, after the entries that are there; with `room`, the figure grows."""
+    legend = ax.get_legend()
+    known = [] if legend is None else [each for each in legend.legend_handles if each is not None]
+    entries = [*known, *lines]
     if room:
-        rows = -(-len(lines) // _LEGEND_COLUMNS)
-        style.grow_below(ax, _LEGEND_GAP + rows * _LEGEND_ROW)
+        rows, before = (-(-len(each) // _LEGEND_COLUMNS) for each in (entries, known))
+        style.grow_below(ax, (0.0 if known else _LEGEND_GAP) + (rows - before) * _LEGEND_ROW)
     below = -(_BOTTOM + 0.5 * _LEGEND_GAP) / _FRAME_HEIGHT
     ax.legend(
-        handles=lines, loc="upper center", bbox_to_anchor=(0.54, below), ncols=_LEGEND_COLUMNS,
+        handles=entries, loc="upper center", bbox_to_anchor=(0.54, below), ncols=_LEGEND_COLUMNS,
         borderaxespad=0.0, borderpad=0.0,
     )  # fmt: skip
 
@@ -209,6 +223,14 @@ def draw_track(ax: Axes, eset: EquilibriumSet, route: Route, path: Path) -> Line
         (cross,) = ax.plot(*places[-1:].T, "x", color=style.ROUTE_COLOUR, ms=6, mew=1.6, zorder=8)
         cross.set_path_effects(rim)
     return line
+
+
+def _mark_snaps(ax: Axes, eset: EquilibriumSet, route: Route) -> list[Line2D]:
+    """Mark where a route snaps; return one labelled line if it does."""
+    if route.path is None or not route.snaps:
+        return []
+    places = track(eset, route.path.states)[snap_steps(route)]
+    return ax.plot(*places.T, **_SNAP, zorder=8, label="snap")
 
 
 def _draw_directions(ax: Axes, corners: Float[np.ndarray, "corners 2"]) -> None:

@@ -17,18 +17,24 @@ from equimorph.tasks import ActuatorMap, Calibration, Route
 FORMAT = "an equimorph checkpoint"
 VERSION = 1
 STRUCTURE, FOUND = "structure", "found"
-START, GOAL, ROUTE = "start", "goal", "route"
+START, GOAL, ROUTE, OTHERS = "start", "goal", "route", "others"
 
 Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
 class Journey:
-    """Start, goal, and the route between them or its refusal."""
+    """Start, goal, the route between them or its refusal, and other routes, if any were wanted."""
 
     start: State
     goal: State
     route: Route
+    others: tuple[Route, ...] = ()
+
+    @property
+    def all(self) -> tuple[Route, ...]:
+        """Every route, the best first."""
+        return (self.route, *self.others)
 
 
 @dataclass(frozen=True)
@@ -80,11 +86,15 @@ def _write_journey(group: h5py.Group, journey: Journey) -> None:
     states_group.write(group.create_group(START), journey.start.batch)
     states_group.write(group.create_group(GOAL), journey.goal.batch)
     route_group.write(group.create_group(ROUTE), journey.route)
+    for number, route in enumerate(journey.others):
+        route_group.write(group.create_group(f"{OTHERS}/{number}"), route)
 
 
 def _read_journey(group: h5py.Group, structure: Structure) -> Journey:
     start, goal = (states_group.read(group[end], structure)[0] for end in (START, GOAL))
-    return Journey(start, goal, route_group.read(group[ROUTE], structure))
+    count = len(group[OTHERS]) if OTHERS in group else 0
+    others = (route_group.read(group[f"{OTHERS}/{k}"], structure) for k in range(count))
+    return Journey(start, goal, route_group.read(group[ROUTE], structure), tuple(others))
 
 
 JOURNEY_PART: Part[Journey] = Part("journey", _write_journey, _read_journey)
@@ -107,3 +117,8 @@ CALIBRATION_PART: Part[Calibration] = Part("calibration", _write_calibration, _r
 
 RECORD_PART: Part[Any] = Part("record", record_group.write, record_group.read)
 """Results of tasks that are records."""
+
+PARTS: dict[str, Part[Any]] = {
+    each.kind: each for each in (STATES_PART, MAP_PART, JOURNEY_PART, CALIBRATION_PART, RECORD_PART)
+}
+"""How answers are read, by their kinds."""

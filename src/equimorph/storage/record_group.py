@@ -62,7 +62,7 @@ def _encoded(group: h5py.Group, value: Any, place: str) -> Any:
     if isinstance(value, float):
         return value if np.isfinite(value) else {"float": repr(value)}
     if isinstance(value, tuple | list):
-        inner = [_encoded(group, each, f"{place}/{k}") for k, each in enumerate(value)]
+        inner = [_encoded(group, each, _inside(place, k)) for k, each in enumerate(value)]
         return {type(value).__name__: inner}
     if isinstance(value, Mapping):
         return {"mapping": _pairs(group, value, place)}
@@ -70,9 +70,14 @@ def _encoded(group: h5py.Group, value: Any, place: str) -> Any:
     if kind in RECORDS:
         values = {each.name: getattr(value, each.name) for each in _kept(value)}
         named = values.items()
-        own = {key: _encoded(group, each, f"{place}/{key}".strip("/")) for key, each in named}
+        own = {key: _encoded(group, each, _inside(place, key)) for key, each in named}
         return {"record": [kind, own]}
     return _put(group, value, place)
+
+
+def _inside(place: str, name: str | int) -> str:
+    """Place below another one; in the group itself, which paths from the root would leave."""
+    return f"{place}/{name}".lstrip("/")
 
 
 def _kept(record: Any) -> list[Field[Any]]:
@@ -82,7 +87,7 @@ def _kept(record: Any) -> list[Field[Any]]:
 
 def _pairs(group: h5py.Group, value: Mapping[Any, Any], place: str) -> list[list[Any]]:
     return [
-        [_encoded(group, key, ""), _encoded(group, each, f"{place}/{k}")]
+        [_encoded(group, key, ""), _encoded(group, each, _inside(place, k))]
         for k, (key, each) in enumerate(value.items())
     ]
 

@@ -1,14 +1,16 @@
 """Results as one HDF5 file for everybody: xarray opens its groups, ParaView its ``/VTKHDF``.
 
 Groups: ``set`` (vertices and cells of the equilibrium set), ``equilibria/<number>`` (states
-over one point each), ``routes/<name>`` and ``maps/<name>`` (one each), and ``VTKHDF``, an
-unstructured grid whose arrays are hard links to those of ``set``. The points of the grid are the
-free parameters and a descriptor: that embedding is for looking at, the states are in ``set``.
+over one point each), ``routes/<name>`` and ``maps/<name>`` (one each), ``answers/<table>/<name>``
+(to the other questions of a study), and ``VTKHDF``, an unstructured grid whose arrays are hard
+links to those of ``set``. The points of the grid are the free parameters and a descriptor: that
+embedding is for looking at, the states are in ``set``.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import h5py
 
@@ -18,36 +20,50 @@ from equimorph.model import Descriptor
 from equimorph.storage import map_group, route_group, set_group, states_group
 from equimorph.storage.files import write_bytes
 from equimorph.storage.hdf import content, extended, get_json, opened, put_json
+from equimorph.storage.parts import PARTS, Part
 from equimorph.storage.vtkhdf import link_grid
-from equimorph.structures import States, from_identity
+from equimorph.structures import States, Structure, from_identity
 from equimorph.tasks import ActuatorMap, Route
 
 FORMAT = "equimorph results"
 VERSION = 2
-SET, ROUTES, MAPS, EQUILIBRIA = "set", "routes", "maps", "equilibria"
-STRUCTURE = "structure"
+SET, ROUTES, MAPS, EQUILIBRIA, ANSWERS = "set", "routes", "maps", "equilibria", "answers"
+STRUCTURE, KIND = "structure", "kind"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An answer to a question of a study, and how such answers are stored."""
+
+    part: Part[Any]
+    value: Any
 
 
 @dataclass(frozen=True)
 class Results:
-    """What a results file holds: a set, routes and maps by name, and equilibria over points.
+    """What a results file holds: a set, equilibria over points, and what else was asked for.
 
-    Without a set there are maps only.
+    Routes and maps are there by name, other answers by table and name:
+    ``results.answers["optimum"]["flattest"]``.
     """
 
     equilibrium_set: EquilibriumSet | None
     routes: dict[str, Route]
     equilibria: tuple[States, ...]
     maps: dict[str, ActuatorMap] = field(default_factory=dict)
+    answers: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def write_results(
+def write_results(  # noqa: PLR0913  # one for each kind of content
     path: str | Path,
     eset: EquilibriumSet | None,
     height: Descriptor,
     routes: Mapping[str, Route] | None = None,
     equilibria: Sequence[States] = (),
     maps: Mapping[str, ActuatorMap] | None = None,
+    *,
+    answers: Mapping[str, Mapping[str, Answer]] | None = None,
+    structure: Structure | None = None,
 ) -> Path:
     """Write an equilibrium set and what was found on it, and maps, in one step.
 
@@ -56,7 +72,7 @@ def write_results(
     path
         Name of the file.
     eset
-        The set; without one, there must be a map.
+        The set, if there is one.
     height
         Coordinate after the free parameters in what ParaView shows.
     routes
@@ -65,18 +81,23 @@ def write_results(
         States over one point each.
     maps
         Maps by name.
+    answers
+        Other answers, by table and name.
+    structure
+        To which all belongs; needed where there is neither a set nor a map.
 
     Raises
     ------
     InputError
         If `path` cannot be written, the structure has a callable and cannot be written down, or
-        there is neither a set nor a map.
+        none is known.
     """
     described: list[EquilibriumSet | ActuatorMap] = [] if eset is None else [eset]
     described += (maps or {}).values()
-    if not described:
-        raise InputError("`eset` must be an equilibrium set where there is no map; got none.")
-    identity = described[0].structure.identity()
+    structures = [*([] if structure is None else [structure]), *(d.structure for d in described)]
+    if not structures:
+        raise InputError("`structure` must be given where there is no set and no map; got none.")
+    identity = structures[0].identity()
 
     def fill(file: h5py.File) -> None:
         put_json(file, STRUCTURE, identity)
@@ -84,6 +105,11 @@ def write_results(
             set_group.write(file.create_group(SET), eset, height)
             link_grid(file, file[SET], eset.cells.shape[1])
         _add(file, routes or {}, equilibria, maps or {})
+        for table, named in (answers or {}).items():
+            for name, answer in named.items():
+                group = file.create_group(f"{ANSWERS}/{table}/{name}")
+                group.attrs[KIND] = answer.part.kind
+                answer.part.write(group, answer.value)
 
     return write_bytes(Path(path), content(FORMAT, VERSION, fill))
 
@@ -204,4 +230,12 @@ def read_results(path: str | Path) -> Results:
         )
         names = list(file[MAPS]) if MAPS in file else []
         maps = {name: map_group.read(file[MAPS][name], structure) for name in names}
-    return Results(eset, routes, equilibria, maps)
+        answers = {
+            table: {name: _answer(group, structure) for name, group in named.items()}
+            for table, named in (file[ANSWERS].items() if ANSWERS in file else ())
+        }
+    return Results(eset, routes, equilibria, maps, answers)
+
+
+def _answer(group: h5py.Group, structure: Structure) -> Any:
+    return PARTS[group.attrs[KIND]].read(group, structure)

@@ -1,15 +1,16 @@
-"""A route as an HDF5 group: its path, its events, its schedule or the reason of its refusal."""
+"""A route as an HDF5 group: path, events, snaps, schedule, or the reason of its refusal."""
 
 import h5py
 import numpy as np
 
 from equimorph.equilibria import Event, Path
 from equimorph.model import Schedule
+from equimorph.storage import record_group
 from equimorph.storage.hdf import get, get_json, put, put_json
 from equimorph.structures import State, States, Structure
 from equimorph.tasks import Route
 
-ABOUT, EVENTS, SCHEDULE = "about", "events", "schedule"
+ABOUT, EVENTS, SCHEDULE, SNAPS = "about", "events", "schedule", "snaps"
 
 
 def write(group: h5py.Group, route: Route) -> None:
@@ -23,6 +24,8 @@ def write(group: h5py.Group, route: Route) -> None:
         _write_path(group, route.path)
     if route.schedule is not None:
         _write_schedule(group.create_group(SCHEDULE), route.schedule)
+    if route.snaps:
+        record_group.write(group.create_group(SNAPS), route.snaps)
 
 
 def read(group: h5py.Group, structure: Structure) -> Route:
@@ -33,6 +36,7 @@ def read(group: h5py.Group, structure: Structure) -> Route:
         cost=float(group.attrs.get("cost", np.nan)),  # older files have none
         path=_read_path(group, structure) if "z" in group else None,
         schedule=_read_schedule(group[SCHEDULE]) if SCHEDULE in group else None,
+        snaps=record_group.read(group[SNAPS], structure) if SNAPS in group else (),
         **get_json(group, ABOUT),
     )
 

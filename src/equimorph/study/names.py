@@ -40,3 +40,8 @@ def task_files(table: str, name: str) -> str:
 def schedule_table(name: str) -> str:
     """File name of the schedule of the route called `name`; its sidecar ends in ``.json``."""
     return f"{name}-schedule.csv"
+
+
+def route_name(name: str, number: int) -> str:
+    """Name of one of several routes between the same states, counted from 1, the best."""
+    return name if number == 1 else f"{name}-{number}"

@@ -19,6 +19,7 @@ from equimorph.study.sections.robustness import (
     SensitivitySection,
     SnapSection,
 )
+from equimorph.study.sections.routes import RouteSection
 from equimorph.study.sections.structures import StructureSection
 from equimorph.study.sections.tasks import (
     CalibrationSection,
@@ -26,7 +27,6 @@ from equimorph.study.sections.tasks import (
     MapSection,
     OptimumSection,
     ReachSection,
-    RouteSection,
     ShapeSection,
     TrackSection,
 )
@@ -68,6 +68,20 @@ class Study(Section):
         for table, sections in self.tasks.items():
             if len({each.name for each in sections}) < len(sections):
                 raise requirement(f"give every {table} a name of its own")
+        return self
+
+    @model_validator(mode="after")
+    def _files_differ(self) -> "Study":
+        owners: dict[str, str] = {}
+        for table, sections in self.tasks.items():
+            for each in sections:
+                for stem in each.stems(table):
+                    if stem in owners:
+                        raise requirement(
+                            f"give its {table} {each.name} a name without the files of the "
+                            f"{owners[stem]} ({stem})"
+                        )
+                    owners[stem] = f"{table} {each.name}"
         return self
 
     @model_validator(mode="after")

@@ -10,9 +10,9 @@ from typing import Any
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent
-from equimorph.storage import write_results
 from equimorph.storage.files import read_text
 from equimorph.storage.parts import STATES_PART, set_part
+from equimorph.storage.results import Answer, write_results
 from equimorph.structures import States
 from equimorph.study.checkpoints import Checkpoints
 from equimorph.study.figures import draw_figures
@@ -20,11 +20,12 @@ from equimorph.study.folder import ResultsFolder, open_results_folder
 from equimorph.study.kinds.kind import Asked
 from equimorph.study.lookup import Extent, Ground, at_key
 from equimorph.study.memory import MemoryWatch, check_memory
-from equimorph.study.names import INPUT_COPY, REPORT, RESULTS
+from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, route_name
 from equimorph.study.outcome import Answered, Outcome
 from equimorph.study.prepare import Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
 from equimorph.study.report import report
+from equimorph.tasks import Route
 
 
 def run_study(
@@ -183,11 +184,30 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
         (staging / INPUT_COPY).write_text(text, encoding="utf-8")
         for each in outcome.answers:
             each.asked.kind.write_tables(each.asked.task, each.answer, staging)
-        eset, maps = outcome.equilibrium_set, outcome.of("map")
-        if (eset is not None or maps) and not folder.holds([RESULTS]):
-            routes = {name: journey.route for name, journey in outcome.of("route").items()}
-            height = outcome.problem.ground.height
-            write_results(staging / RESULTS, eset, height, routes, outcome.points, maps)
+        if not folder.holds([RESULTS]):
+            _write_results(outcome, staging / RESULTS)
+
+
+def _write_results(outcome: Outcome, path: Path) -> None:
+    """Write all answers as one file: routes and maps in groups of their own."""
+    routes: dict[str, Route] = {}
+    for name, journey in outcome.of("route").items():
+        routes |= {route_name(name, k): each for k, each in enumerate(journey.all, 1)}
+    answers: dict[str, dict[str, Answer]] = {}
+    for each in outcome.answers:
+        kind = each.asked.kind
+        if kind.table not in ("route", "map"):
+            answers.setdefault(kind.table, {})[each.name] = Answer(kind.part, each.answer)
+    write_results(
+        path,
+        outcome.equilibrium_set,
+        outcome.problem.ground.height,
+        routes,
+        outcome.points,
+        outcome.of("map"),
+        answers=answers,
+        structure=outcome.problem.structure,
+    )
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """Limit loads of imperfect structures: ``[[imperfection]]``."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -11,25 +10,18 @@ from rich.markup import escape as plain
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Progress
+from equimorph.model import Progress
 from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
-from equimorph.study.choose import choose_state
 from equimorph.study.kinds.found import heading
 from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.lookup import Ground, at_key, check_parameters, check_state, constraints_of
+from equimorph.study.kinds.of_state import OfState, of_state
+from equimorph.study.lookup import Ground, at_key
 from equimorph.study.names import task_files
 from equimorph.study.sections.robustness import ImperfectionSection
 from equimorph.tasks import ImperfectionLaw, imperfection_law
 
-
-@dataclass(frozen=True)
-class ImperfectionTask:
-    """Laws of imperfections that are wanted, with their constraints as objects."""
-
-    key: str
-    section: ImperfectionSection
-    constraints: tuple[Constraint, ...]
+ImperfectionTask = OfState[ImperfectionSection]
 
 
 class ImperfectionKind(Kind[ImperfectionSection, ImperfectionTask, Mapping[str, ImperfectionLaw]]):
@@ -40,21 +32,18 @@ class ImperfectionKind(Kind[ImperfectionSection, ImperfectionTask, Mapping[str, 
 
     def prepared(self, ground: Ground, section: ImperfectionSection, key: str) -> ImperfectionTask:
         """Look up state, load, imperfections and constraints."""
-        check_state(ground, section.state, f"{key}.state")
-        check_parameters(ground.structure, [section.load], f"{key}.load")
-        check_parameters(ground.structure, section.imperfections, f"{key}.imperfections")
+        task = of_state(
+            ground, section, key, load=[section.load], imperfections=section.imperfections
+        )
         if section.load in section.imperfections:
             raise InputError(f"`{key}.imperfections` must not name the load; got {section.load}.")
-        constraints = constraints_of(ground.structure, section.within, f"{key}.within")
-        return ImperfectionTask(key, section, constraints)
+        return task
 
     def answer(
         self, ground: Ground, eset: EquilibriumSet | None, task: ImperfectionTask, sink: Progress
     ) -> Mapping[str, ImperfectionLaw]:
         """Fit a law to each imperfection."""
-        assert eset is not None
-        section = task.section
-        state = choose_state(eset, section.state, f"{task.key}.state")
+        section, state = task.section, task.state(eset)
         with at_key(task.key):
             return {
                 name: imperfection_law(state, section.load, name, within=task.constraints)

@@ -1,7 +1,6 @@
 """Room around a state: ``[[room]]``."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -10,26 +9,19 @@ from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Progress
+from equimorph.model import Progress
 from equimorph.storage.parts import RECORD_PART
 from equimorph.structures import State
 from equimorph.study import html
-from equimorph.study.choose import choose_state
 from equimorph.study.kinds.found import heading
 from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.lookup import Ground, at_key, check_parameters, check_state, constraints_of
+from equimorph.study.kinds.of_state import OfState, of_state
+from equimorph.study.lookup import Ground, at_key
 from equimorph.study.names import task_files
 from equimorph.study.sections.robustness import RoomSection
 from equimorph.tasks import Room, stable_room
 
-
-@dataclass(frozen=True)
-class RoomTask:
-    """A room that is wanted, with its constraints as objects."""
-
-    key: str
-    section: RoomSection
-    constraints: tuple[Constraint, ...]
+RoomTask = OfState[RoomSection]
 
 
 class RoomKind(Kind[RoomSection, RoomTask, tuple[State, Room]]):
@@ -40,18 +32,13 @@ class RoomKind(Kind[RoomSection, RoomTask, tuple[State, Room]]):
 
     def prepared(self, ground: Ground, section: RoomSection, key: str) -> RoomTask:
         """Look up state, tolerances and constraints."""
-        check_state(ground, section.state, f"{key}.state")
-        check_parameters(ground.structure, section.tolerances, f"{key}.tolerances")
-        constraints = constraints_of(ground.structure, section.within, f"{key}.within")
-        return RoomTask(key, section, constraints)
+        return of_state(ground, section, key, tolerances=section.tolerances)
 
     def answer(
         self, ground: Ground, eset: EquilibriumSet | None, task: RoomTask, sink: Progress
     ) -> tuple[State, Room]:
         """Lift rays."""
-        assert eset is not None
-        section = task.section
-        state = choose_state(eset, section.state, f"{task.key}.state")
+        section, state = task.section, task.state(eset)
         with at_key(task.key):
             found = stable_room(
                 state, section.tolerances, shape=section.shape, within=task.constraints,

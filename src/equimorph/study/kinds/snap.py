@@ -1,7 +1,6 @@
 """Least changes that lead to a snap: ``[[snap]]``."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
@@ -13,20 +12,14 @@ from equimorph.model import Progress
 from equimorph.storage.parts import RECORD_PART
 from equimorph.structures import State, States
 from equimorph.study import html
-from equimorph.study.choose import choose_state
 from equimorph.study.kinds.found import figures_of_states, heading, report_of_states
 from equimorph.study.kinds.kind import Figure, Kind
-from equimorph.study.lookup import Ground, at_key, check_state
+from equimorph.study.kinds.of_state import OfState, of_state
+from equimorph.study.lookup import Ground, at_key
 from equimorph.study.sections.robustness import SnapSection
 from equimorph.tasks import LeastSnap, least_snap
 
-
-@dataclass(frozen=True)
-class SnapTask:
-    """A least snap that is wanted."""
-
-    key: str
-    section: SnapSection
+SnapTask = OfState[SnapSection]
 
 
 class SnapKind(Kind[SnapSection, SnapTask, tuple[State, LeastSnap]]):
@@ -37,15 +30,14 @@ class SnapKind(Kind[SnapSection, SnapTask, tuple[State, LeastSnap]]):
 
     def prepared(self, ground: Ground, section: SnapSection, key: str) -> SnapTask:
         """Look up the state."""
-        check_state(ground, section.state, f"{key}.state")
-        return SnapTask(key, section)
+        return of_state(ground, section, key)
 
     def answer(
         self, ground: Ground, eset: EquilibriumSet | None, task: SnapTask, sink: Progress
     ) -> tuple[State, LeastSnap]:
         """Find it."""
         assert eset is not None
-        state = choose_state(eset, task.section.state, f"{task.key}.state")
+        state = task.state(eset)
         with at_key(task.key):
             return state, least_snap(eset, state)
 

@@ -7,6 +7,7 @@ from pydantic_core import PydanticCustomError
 
 from equimorph.errors import InputError
 from equimorph.study.expressions import LARGEST, parse_comparison
+from equimorph.study.names import task_files
 
 
 def requirement(text: str) -> PydanticCustomError:
@@ -79,3 +80,7 @@ class TaskSection(Section):
     def needs_set(self) -> bool:
         """Whether it is asked of the set of the study."""
         return True
+
+    def stems(self, table: str) -> list[str]:
+        """Beginnings of the names of its files, which no other question may have."""
+        return [task_files(table, self.name)]

@@ -11,34 +11,35 @@ from equimorph.study.sections.fields import ComparisonText, TaskSection
 Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 
 
-class SensitivitySection(TaskSection):
-    """Derivatives of descriptors at a state; see `equimorph.sensitivity`."""
+class OfStateSection(TaskSection):
+    """A question about one state."""
 
     state: StateSection
+
+
+class SensitivitySection(OfStateSection):
+    """Derivatives of descriptors at a state; see `equimorph.sensitivity`."""
+
     descriptors: list[str] = Field(min_length=1)
     parameters: list[str] | None = Field(default=None, min_length=1)
 
 
-class ImperfectionSection(TaskSection):
+class ImperfectionSection(OfStateSection):
     """How limit loads change with imperfections; see `equimorph.imperfection_law`."""
 
-    state: StateSection
     load: str
     imperfections: list[str] = Field(min_length=1)
     within: list[ComparisonText] = Field(default_factory=list)
 
 
-class RoomSection(TaskSection):
+class RoomSection(OfStateSection):
     """How far parameters may stray from a state; see `equimorph.stable_room`."""
 
-    state: StateSection
     tolerances: dict[str, Positive] = Field(min_length=1)
     shape: Literal["box", "ellipsoid"] = "box"
     most: Positive = 100.0
     within: list[ComparisonText] = Field(default_factory=list)
 
 
-class SnapSection(TaskSection):
+class SnapSection(OfStateSection):
     """The least change of parameters to a snap; see `equimorph.least_snap`."""
-
-    state: StateSection

@@ -5,39 +5,18 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from equimorph.study.expressions import LARGEST
-from equimorph.study.names import PLANE, STABLE_PLANE
 from equimorph.study.sections.data import DataFile
 from equimorph.study.sections.extent import StateSection
 from equimorph.study.sections.fields import (
     ComparisonText,
     Interval,
     Intervals,
-    Name,
     Number,
     Point,
     TaskSection,
     requirement,
     two,
 )
-
-
-def _unused(name: str) -> str:
-    """Refuse names under which files of the set are stored."""
-    if f"{name}-plane" in (STABLE_PLANE, PLANE):
-        raise requirement("be another name: figures of the set begin with it")
-    return name
-
-
-class RouteSection(TaskSection):
-    """A route between two states, along way-points or planned freely."""
-
-    name: Annotated[Name, AfterValidator(_unused)]
-    start: StateSection
-    goal: StateSection
-    via: list[Annotated[Point, Field(min_length=1)]] | None = Field(default=None, min_length=1)
-    within: list[ComparisonText] = Field(default_factory=list)
-    margin: float = Field(default=0.0, ge=0, le=LARGEST)
-    objective: Literal["length", "travel", "work", "clearance"] = "length"
 
 
 class ShapeSection(TaskSection):
