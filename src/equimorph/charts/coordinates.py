@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Int
 from equimorph.charts.solving import Scalars, solved_on_the_set, solved_over_parameters
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.exact import exact_states
 from equimorph.manifold.nearest import setting_of
-from equimorph.manifold.over import exact_states
 from equimorph.manifold.tangents import split_step
 from equimorph.model import Descriptor, position
 

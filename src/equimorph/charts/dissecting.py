@@ -15,6 +15,7 @@ from equimorph.charts.projection import check_cells
 from equimorph.charts.untangling import untangled
 from equimorph.charts.walking import Walker, Way, straightened
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.exact import exact_states
 from equimorph.manifold.fabric import (
     Fabric,
     Vertices,
@@ -24,7 +25,6 @@ from equimorph.manifold.fabric import (
     vertices_of,
 )
 from equimorph.manifold.levels import fabric_setting, part_of
-from equimorph.manifold.over import exact_states
 from equimorph.manifold.points import REFINED
 from equimorph.manifold.topology import chains, flags_of, keys_of, labels
 from equimorph.structures import States

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.rules import Chooser, Scoring
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.exact import exact_states
 from equimorph.manifold.fabric import (
     ON_CAP,
     ON_FOLD,
@@ -22,7 +23,7 @@ from equimorph.manifold.fabric import (
 )
 from equimorph.manifold.levels import About, Ends, cut_between, fabric_setting, part_of
 from equimorph.manifold.on_edges import on_edges
-from equimorph.manifold.over import exact_states, rooted
+from equimorph.manifold.over import rooted
 from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
 from equimorph.manifold.topology import adjacency, flags_of, keys_of
 from equimorph.structures import States

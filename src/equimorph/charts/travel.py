@@ -11,8 +11,9 @@ from scipy.sparse.csgraph import dijkstra
 from equimorph.charts.walking import Walker, Way, straightened
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.embedding import embed
+from equimorph.manifold.exact import exact_states
 from equimorph.manifold.nearest import setting_of
-from equimorph.manifold.over import exact_states, rooted
+from equimorph.manifold.over import rooted
 from equimorph.manifold.points import CORNER, FOLD
 from equimorph.manifold.topology import adjacency, faces_of
 from equimorph.structures import State, States

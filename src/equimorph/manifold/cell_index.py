@@ -51,7 +51,7 @@ class CellIndex:
     """Bins over a box that list the cells above them, and the barycentric maps of the cells.
 
     Points are scaled to the unit cube. Cells of bin b are ``cells[starts[b] : starts[b + 1]]``;
-    barycentric coordinate k of x in cell c is ``maps[k, c] @ (x, 1)``, nan if it has no volume.
+    barycentric coordinates of x in cell c are ``maps[c] @ (x, 1)``, nan if it has no volume.
     """
 
     lower: Float[np.ndarray, " d"]
@@ -59,7 +59,7 @@ class CellIndex:
     counts: Int[np.ndarray, " d"]
     starts: Int[np.ndarray, " bins_and_one"]
     cells: Int[np.ndarray, " entries"]
-    maps: Float[np.ndarray, "corners C corners"]
+    maps: Float[np.ndarray, "C corners corners"]
     overhang: Float[np.ndarray, " C"]
 
     @classmethod
@@ -101,20 +101,13 @@ class CellIndex:
         number = self.starts[bins + 1] - self.starts[bins]
         point = np.repeat(np.arange(len(points)), number)
         cell = self.cells[_ranges(self.starts[bins], number)]
-        shift = _inward(unit)
-        weights: list[Float[np.ndarray, " hits"]] = []
-        inside = np.ones(len(cell), bool)
-        for rows in self.maps:
-            row = rows[cell]
-            weight, push = row[:, -1].copy(), np.zeros(len(cell))
-            for k, (column, nudge) in enumerate(zip(unit.T, shift.T, strict=True)):
-                weight += row[:, k] * column[point]
-                push += row[:, k] * nudge[point]
-            inside &= weight + push >= 0.0
-            close = np.flatnonzero(weight > -self.overhang[cell] - NUDGE)
-            point, cell, inside = point[close], cell[close], inside[close]
-            weights = [each[close] for each in (*weights, weight)]
-        return Hits(point, cell, np.stack(weights, axis=1), inside)
+        # all cells of the bin, then the few that are near
+        maps, at = self.maps[cell], np.append(unit, np.ones((len(unit), 1)), axis=1)
+        weights = np.einsum("nij,nj->ni", maps, at[point])
+        close = (weights > -self.overhang[cell, None] - NUDGE).all(axis=1)
+        point, cell, weights = point[close], cell[close], weights[close]
+        push = np.einsum("nij,nj->ni", maps[close, :, :-1], _inward(unit)[point])
+        return Hits(point, cell, weights, (weights + push >= 0.0).all(axis=1))
 
 
 def _bins(extent: Float[np.ndarray, "C d"]) -> Int[np.ndarray, " d"]:
@@ -132,20 +125,21 @@ def _inward(unit: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
     return np.asarray(NUDGE * (0.5 + generic - unit))
 
 
-def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "corners C corners"]:
-    """Inverse of the matrix of each cell's corners over ones, row by row."""
+def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "C corners corners"]:
+    """Inverse of the matrix of each cell's corners over ones."""
     ones = np.ones((*unit.shape[:2], 1))
     homogeneous = np.concatenate([unit, ones], axis=2)
     flat = np.abs(volumes(unit)) < FLAT
     homogeneous[flat] = np.eye(homogeneous.shape[1])
     if unit.shape[1] == TRIANGLE:  # the products of two corners are all minors
         first, second, third = np.swapaxes(homogeneous, 0, 1)
-        maps = np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)])
-        maps /= np.einsum("ci,ci->c", first, maps[0])[:, None]
+        pairs = (second, third), (third, first), (first, second)
+        maps = np.stack([np.cross(*pair) for pair in pairs], axis=1)
+        maps /= np.einsum("ci,ci->c", first, maps[:, 0])[:, None, None]
     else:
-        maps = np.swapaxes(np.linalg.inv(np.swapaxes(homogeneous, 1, 2)), 0, 1)
-    maps[:, flat] = np.nan
-    return np.ascontiguousarray(maps)
+        maps = np.linalg.inv(np.swapaxes(homogeneous, 1, 2))
+    maps[flat] = np.nan
+    return np.asarray(maps)
 
 
 def _listed(

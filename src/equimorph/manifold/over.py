@@ -13,15 +13,13 @@ from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.cell_index import CellIndex, Hits
+from equimorph.manifold.exact import Lanes, Points, exact_states
 from equimorph.manifold.topology import adjacency, senses
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
 
 OVERHANG = 0.3
 """How far beyond a cell, in barycentric coordinates, a point may lie to be tried from it."""
-ITERATIONS = 12
-ROUND_OFF = 1e-14
-"""Bound of the next Newton correction, in the metric, below which a state is exact."""
 SAME = 1e-6
 """Distance in the metric below which two states over one point are the same."""
 CLOSEST = 1e-3
@@ -29,8 +27,6 @@ CLOSEST = 1e-3
 CHUNK = 2048
 """Points that are served together: their work arrays stay small."""
 
-Points = Float[np.ndarray, "points P"]
-Lanes = Float[np.ndarray, "lanes size"]
 Found = tuple[Float[np.ndarray, "n size"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]]
 """States, the points that they lie over, and their cells."""
 Guesses = Float[np.ndarray, "hits size"]
@@ -127,6 +123,12 @@ class Sheets:
         return CellIndex.of(self.points.p[:, self.free][self.cells], overhang)
 
     @cached_property
+    def _brims(self) -> Bool[np.ndarray, "C corners"]:
+        """Facets of cells, by the corner across, with all corners on folds or constraints."""
+        on = (self.folded | self.capped)[self.cells]
+        return np.asarray(on.sum(axis=1, keepdims=True) - on == on.shape[1] - 1)
+
+    @cached_property
     def _at_an_edge(self) -> Bool[np.ndarray, " C"]:
         """Cells on folds or constraints, where straight cells miss the curved edge."""
         return np.asarray((self.folded | self.capped)[self.cells].any(axis=1))
@@ -134,6 +136,10 @@ class Sheets:
     @cached_property
     def _at_a_cap(self) -> Bool[np.ndarray, " C"]:
         return np.asarray(self.capped[self.cells].any(axis=1))
+
+    @cached_property
+    def _sign(self) -> Int[np.ndarray, " C"]:
+        return 1 - 2 * (self.cell_index % 2)
 
     @cached_property
     def _overturned(self) -> Bool[np.ndarray, " C"]:
@@ -147,28 +153,27 @@ class Sheets:
 
         Cells that contain a point, and those on folds and constraints that it just misses, are
         interpolated and corrected by Newton. Across folds states appear in pairs of opposite
-        parity: where the sum of (−1)^index is not that of the cells above, or a cell gives no
-        state, all known equilibria nearby are lifted to the point instead.
+        parity: where the sum of (−1)^index is not that of the cells above, states beyond
+        constraints included, or a cell gives no state, all known equilibria nearby are lifted to
+        the point instead.
         """
         chunks = self._in_chunks(p)
         parts = [found for found, _ in chunks]
         doubtful = [near for _, near in chunks if len(near)]
         if doubtful:
             parts.extend(self._searched(p, Hits.joined(doubtful)))
-        if not parts:
-            return (
-                States(self.structure, np.zeros((0, self.structure.size)), p),
-                np.zeros(0, int),
-                np.zeros(0, int),
-            )
-        z, point, cell = (np.concatenate(column) for column in zip(*parts, strict=True))
-        order = np.lexsort((cell, point))
-        point = point[order]
-        return States(self.structure, z[order], p[point]), point, cell[order]
+        z, point, cell = (
+            column[0] if len(parts) == 1 else np.concatenate(column)
+            for column in zip(*parts, strict=True)
+        )
+        if doubtful:
+            order = np.lexsort((cell, point))
+            z, point, cell = z[order], point[order], cell[order]
+        return States(self.structure, z, p[point]), point, cell
 
     def _in_chunks(self, p: Points) -> list[tuple[Found, Hits]]:
         """States and doubtful cells as `_some` finds them, chunk by chunk, on all threads."""
-        starts = range(0, len(p), CHUNK)
+        starts = range(0, max(len(p), 1), CHUNK)
         out: dict[int, tuple[Found, Hits]] = {}
 
         def serve(own: range) -> None:
@@ -186,16 +191,18 @@ class Sheets:
     def _some(self, p: Points, first: int) -> tuple[Found, Hits]:
         """States over points that are sure, and the cells near the others; `first` is added."""
         near = self.above.near(p[:, self.free])
-        hits = near.take(near.inside | self._at_an_edge[near.cell])
+        beyond = (self._brims[near.cell] & (near.weights < 0.0)).any(axis=1)
+        hits = near.take(near.inside | beyond)
         z, good = self._polished(self._guess(hits), p, hits)
-        kept = np.flatnonzero(good)
-        kept = kept[_one_of_each(self.structure, z[kept], hits.take(kept))]
-        kept = kept[self._allowed(z[kept], p[hits.point[kept]])]
-        sure = self._sure(hits, good, kept, len(p))
-        kept = kept[sure[hits.point[kept]]]
+        found = np.flatnonzero(good)
+        found = found[_one_of_each(self.structure, z[found], hits.take(found))]
+        sure = self._sure(hits, good, found, len(p))
+        if not sure.all():
+            found = found[sure[hits.point[found]]]
+        kept = found[self._allowed(z[found], p[hits.point[found]])]
         doubtful = near.take(~sure[near.point])
-        found = z[kept], first + hits.point[kept], hits.cell[kept]
-        return found, replace(doubtful, point=first + doubtful.point)
+        states = z[kept], first + hits.point[kept], hits.cell[kept]
+        return states, replace(doubtful, point=first + doubtful.point)
 
     def _guess(self, hits: Hits) -> Lanes:
         """Interpolation between the corners, at the nearest point of the cell.
@@ -213,23 +220,25 @@ class Sheets:
             z += weights[:, k : k + 1] * self.points.z[corners[:, k]]
         return np.asarray(z)
 
-    def _size(self, cell: Int[np.ndarray, " hits"]) -> Float[np.ndarray, " hits"]:
+    @cached_property
+    def _size(self) -> Float[np.ndarray, " C"]:
         """Longest side of each cell from its first corner, in the metric."""
-        n, mass = self.structure.unknowns, self.structure.mass
-        some, back = np.unique(cell, return_inverse=True)
-        u, corners = self.points.z[:, :n], self.cells[some]
-        sides = [u[corner] - u[corners[:, 0]] for corner in corners.T[1:]]
-        return np.asarray(np.sqrt(np.max([side**2 @ mass for side in sides], axis=0))[back])
+        u = self.points.z[:, : self.structure.unknowns]
+        first, longest = u[self.cells[:, 0]], np.zeros(len(self.cells))
+        for corner in self.cells.T[1:]:
+            np.maximum(longest, (u[corner] - first) ** 2 @ self.structure.mass, out=longest)
+        return np.sqrt(longest)
 
     def _polished(
         self, guess: Lanes, p: Points, hits: Hits
     ) -> tuple[Lanes, Bool[np.ndarray, " hits"]]:
         """Exact states of the cells' own index near the guesses, where there are any."""
         structure = self.structure
-        z, good, index = exact_states(structure, guess, p[hits.point])
-        good &= index == self.cell_index[hits.cell]
+        wanted = self.cell_index[hits.cell]
+        z, good, index = exact_states(structure, guess, p[hits.point], wanted)
+        good &= index == wanted
         moved = np.sqrt((z - guess)[:, : structure.unknowns] ** 2 @ structure.mass)
-        good &= moved <= 2.0 * self._size(hits.cell) + SAME
+        good &= moved <= 2.0 * self._size[hits.cell] + SAME
         good[good] = structure.resolved(z[good], p[hits.point[good]])
         return z, good
 
@@ -237,19 +246,24 @@ class Sheets:
         self,
         hits: Hits,
         good: Bool[np.ndarray, " hits"],
-        kept: Int[np.ndarray, " kept"],
+        found: Int[np.ndarray, " found"],
         count: int,
     ) -> Bool[np.ndarray, " points"]:
-        """Points over which the states cannot be other than those kept."""
-        # a constraint takes single states away: all cells near it have to give a state
-        capped = np.bincount(hits.point, self._at_a_cap[hits.cell], count) > 0
-        failed = ~good & (hits.inside & ~self._at_an_edge[hits.cell] | capped[hits.point])
-        sign = 1 - 2 * (self.cell_index[hits.cell] % 2)
-        found = np.bincount(hits.point[kept], sign[kept], count)
-        sign = np.where(self._overturned[hits.cell], -sign, sign)
-        expected = np.bincount(hits.point, sign * hits.inside, count)
-        whole = np.bincount(hits.point, failed, count) == 0
-        return np.asarray(whole & (capped | (found == expected)))
+        """Points over which the states cannot be other than those found.
+
+        Constraints take single states away, others are not yet told apart from those beyond.
+        """
+        cell, inside = hits.cell, hits.inside
+        capped = self._at_a_cap[cell]
+        failed = ~good & (inside & ~self._at_an_edge[cell] | capped)
+        sign = self._sign[cell]
+        # a state just beyond the straight edge of a constraint has no cell above the point
+        paired = np.where(inside | ~capped, sign, 0)
+        surplus = np.bincount(hits.point[found], paired[found], count)
+        surplus -= np.bincount(
+            hits.point, np.where(self._overturned[cell], -sign, sign) * inside, count
+        )
+        return np.asarray((surplus == 0.0) & (np.bincount(hits.point, failed, count) == 0.0))
 
     def _allowed(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
         good = np.ones(len(z), bool)
@@ -340,34 +354,6 @@ def lift_to(
     return np.concatenate([states.z[still], outcome.z[arrived]]), which
 
 
-def exact_states(
-    structure: Structure, z: Lanes, p: Points
-) -> tuple[Lanes, Bool[np.ndarray, " lanes"], Int[np.ndarray, " lanes"]]:
-    """Newton at fixed parameters until the next correction would be round-off; and the index.
-
-    Corrections shrink quadratically: the one after sizes a and b is about b (b/a)².
-    """
-    z, n = z.copy(), structure.unknowns
-    good, index = np.zeros(len(z), bool), np.full(len(z), -1)
-    before, todo = np.zeros(len(z)), np.arange(len(z))
-    for _ in range(ITERATIONS):
-        count = len(todo)
-        if count == 0:
-            break
-        still, none = np.zeros((count, structure.size)), np.zeros(count)
-        fixed = np.zeros((count, p.shape[1]))
-        step = structure.advance(z[todo], p[todo], fixed, still, np.ones(count), none)
-        size = np.sqrt(step.dz[:, :n] ** 2 @ structure.mass)
-        alive = np.isfinite(size) & (size < 1.0)
-        z[todo[alive]] += step.dz[alive]
-        bound = size * (size / np.maximum(before[todo], np.maximum(size, 1e-300))) ** 2
-        done = alive & (bound < ROUND_OFF)
-        good[todo[done]], index[todo[done]] = True, step.index[done]
-        before[todo] = size
-        todo = todo[alive & ~done]
-    return z, good, index
-
-
 def _one_of_each(structure: Structure, z: Lanes, hits: Hits) -> Int[np.ndarray, " kept"]:
     """One of the equal states over each point, rather one from a cell that contains the point.
 
@@ -376,12 +362,10 @@ def _one_of_each(structure: Structure, z: Lanes, hits: Hits) -> Int[np.ndarray, 
     n, mass = structure.unknowns, structure.mass
     product = z[:, :n] @ (mass * np.cos(1.0 + np.arange(n)))
     order = np.lexsort((product, hits.point))
+    point, rank = hits.point[order], np.arange(len(order))
     gap = np.diff(z[order, :n], axis=0) ** 2 @ mass
-    new = np.ones(len(z), bool)
-    new[1:] = (gap > SAME**2) | (np.diff(hits.point[order]) > 0)
-    group = np.empty(len(z), int)
-    group[order] = np.cumsum(new)
-    order = np.lexsort((~hits.inside, group))
-    first = np.ones(len(z), bool)
-    first[1:] = np.diff(group[order]) > 0
-    return np.sort(order[first])
+    new = np.flatnonzero(np.append(True, (gap > SAME**2) | (point[1:] > point[:-1]))[: len(rank)])
+    # of each group the first, those from cells that do not contain the point last
+    rank = np.where(hits.inside[order], rank, rank + len(rank))
+    best = np.minimum.reduceat(rank, new) % max(len(rank), 1) if len(new) else new
+    return np.sort(order[best])

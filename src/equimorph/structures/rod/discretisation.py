@@ -85,6 +85,14 @@ class Mesh:
         return np.arange(self.elements)[:, None] * self.degree + np.arange(self.degree + 1)
 
     @cached_property
+    def highest(self) -> Float[np.ndarray, "coefficients nodes"]:
+        """What the two highest Legendre coefficients of all elements are of the nodal values."""
+        rows = np.zeros((self.elements, 2, self.elements * self.degree + 1))
+        for element, nodes in enumerate(self.element_nodes):
+            rows[element][:, nodes] = self.reference.to_legendre[-2:]
+        return rows.reshape(2 * self.elements, -1)
+
+    @cached_property
     def element_weights(self) -> Float[np.ndarray, "elements order"]:
         """Quadrature weights of each element."""
         return np.asarray(self.lengths[:, None] * self.reference.weights)

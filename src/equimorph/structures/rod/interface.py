@@ -131,9 +131,8 @@ class Mechanics(ABC):
 
     def tail(self, z: Lanes, p: Parameters) -> Values:
         """Largest of the two highest Legendre coefficients of θ in all elements."""
-        theta = self.nodal_angles(z, p)[:, self.mesh.element_nodes]
-        tail = np.abs(theta @ self.mesh.reference.to_legendre[-2:].T)
-        return np.asarray(tail.max(axis=(1, 2)))
+        tail = self.mesh.highest @ self.nodal_angles(z, p).T
+        return np.asarray(np.abs(tail, out=tail).max(axis=0))
 
     @abstractmethod
     def symmetries(self) -> tuple[Symmetry, ...]:
