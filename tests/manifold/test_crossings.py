@@ -6,11 +6,11 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from equimorph import lift, plotting, storage
-from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.manifold import EquilibriumSet, equilibrium_set, locate, refine, restricted
 from equimorph.manifold.topology import adjacency
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
-from oracles.complexes import assert_crossings, assert_faithful
+from oracles.complexes import assert_crossings, assert_faithful, assert_upright
 from oracles.polynomial import slaved
 from oracles.surfaces import (
     crossing_sheets,
@@ -280,3 +280,61 @@ def test_figure_names_the_branch_points(symmetric_slice):
     eset = symmetric_slice
     ax = plotting.surface(eset, eset.structure.height(1 / 3))
     assert "branch points" in [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+@pytest.fixture(scope="module")
+def refined_slice(symmetric_slice):
+    with unchecked():
+        return refine(symmetric_slice, 0.02)
+
+
+def test_symmetric_slice_is_refined(refined_slice):
+    eset = refined_slice
+    with unchecked():
+        assert_faithful(eset)
+        assert_crossings(eset)
+        assert_upright(eset)
+    assert eset.audit.deviation <= 0.02
+
+
+def test_slice_cut_at_an_end_angle_has_the_known_pitchfork_on_its_edge(refined_slice):
+    """(0.9, 0): q = 4.2439977594 (PHYSICS §5)."""
+    angle = Descriptor("angle", "rad", lambda z, p: p[:, 0] - 0.0)
+    assert refined_slice.structure.parameters[0].name == "Theta"
+    with unchecked():
+        below = restricted(refined_slice, angle <= 0.9)
+    assert below.audit.clean
+    assert_crossings(below)
+    ends = (below.kinds == 7) & (np.abs(below.points["Theta"] - 0.9) < 1e-12)
+    assert np.abs(below.points["q"][ends] - 4.2439977594).min() < 1e-9
+
+
+def test_queries_of_the_refined_slice_agree_with_those_of_the_coarse_one(
+    symmetric_slice, refined_slice, tmp_path
+):
+    generator = np.random.default_rng(5)
+    at = {"Theta": generator.uniform(0.5, 1.5, 60), "q": generator.uniform(0.0, 6.0, 60)}
+    with unchecked():
+        coarse, fine = symmetric_slice.over(**at), refined_slice.over(**at)
+        path = tmp_path / "slice.h5"
+        storage.save_set(path, refined_slice)
+        again = storage.load_set(path)
+    assert np.array_equal(coarse.point, fine.point)
+    for number in range(60):
+        energies = [np.sort(own[number].states.energy) for own in (coarse, fine)]
+        np.testing.assert_allclose(*energies, atol=1e-11)
+    assert all(map(np.array_equal, again.crossings, refined_slice.crossings))
+    assert again.audit == refined_slice.audit
+    # the upright arch above (0.9, 4.2) is told from both tilted ones by its shape
+    upright = refined_slice.at(Theta=0.9, q=4.2)
+    upright = upright[np.flatnonzero(upright.index == 0)]
+    state = upright[int(np.argmax(refined_slice.structure.height(0.5)(upright)))]
+    with unchecked():
+        found = locate(refined_slice, state.shape())
+    assert found.state["q"] == pytest.approx(4.2, abs=1e-6)
+
+
+def test_plane_of_the_slice_shows_where_the_upright_arch_tilts(refined_slice):
+    ax = plotting.parameter_plane(refined_slice, count="stable")
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert labels == ["stability boundary", "branch points"]

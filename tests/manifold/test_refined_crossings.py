@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from equimorph.manifold import (
     EquilibriumSet,
     cell_sizes,
+    cusps,
     equilibrium_set,
     level_set,
     part,
@@ -190,6 +191,23 @@ def test_folds_that_pass_a_crossing_keep_their_common_point(structure, box):
     assert (len(eset.crossings), len(eset.folds)) == (1, 1)
     hub = np.intersect1d(eset.folds[0], eset.crossings[0])
     np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
+
+
+@pytest.mark.parametrize("accuracy", [None, 0.02])
+def test_cusps_lie_where_pitchforks_change_their_criticality(accuracy):
+    """x (x⁴ − 0.7·b x² − a): at the origin the fold's image a = −(0.35·b)² turns back.
+
+    Where a fold passes a crossing straight, as at hilltops, there is none.
+    """
+    found = []
+    others = [(hilltop(1.0), BOX), (crossing_sheets(), Box(a=(-1, 1.1), b=(-1.03, 1.5)))]
+    for structure, box in ((tricritical(-0.7), BOX), *others):
+        eset = lifted(structure, (3, 4), box)
+        with unchecked():
+            found.append(cusps(refine(eset, accuracy) if accuracy else eset))
+    assert [(len(each.states), each.lost) for each in found] == [(1, 0), (0, 0), (0, 0)]
+    np.testing.assert_allclose(found[0].states.p, 0.0, atol=1e-9)
+    assert found[0].index.tolist() == [0]
 
 
 @few

@@ -14,6 +14,7 @@ from equimorph.manifold.fabric import ON_FOLD, Fabric, Vertices, fabric_of
 from equimorph.manifold.levels import fabric_setting, roots
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import lower_index
+from equimorph.manifold.points import CROSSING
 from equimorph.structures import States
 
 REACH = 1.5
@@ -39,7 +40,8 @@ def cusps(eset: EquilibriumSet) -> Cusps:
     """Cusps on the folds of a set over two parameters, polished.
 
     There ``φᵀF_zz[φ, φ] = 0``, which changes its sign with a null vector φ that is continuous along
-    the fold.
+    the fold. Where sheets cross, these are the points at which pitchforks change their criticality:
+    a fold passes the crossing there, and its image turns back.
 
     Raises
     ------
@@ -50,6 +52,8 @@ def cusps(eset: EquilibriumSet) -> Cusps:
         raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
     fabric = fabric_of(fabric_setting(eset), eset)
     ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    hubs = _turning_hubs(fabric, ends)
+    ends = ends[(fabric.vertices.kinds[ends] != CROSSING).all(axis=1)]
     turning = ends[_turning(fabric, ends)]
     lowest = fabric.vertices.index[turning].min(axis=1)
     states: list[tuple[np.ndarray, np.ndarray, int]] = []
@@ -60,12 +64,28 @@ def cusps(eset: EquilibriumSet) -> Cusps:
             states.append((*found, low))
     lost = len(turning) - len(states)
     store = fabric.vertices
+    states += [(store.z[at], store.p[at], int(store.index[at])) for at in hubs.tolist()]
     z, p = (
         np.array([each[k] for each in states]).reshape(len(states), column.shape[1])
         for k, column in enumerate((store.z, store.p))
     )
     index = np.array([low for *_, low in states], int)
     return Cusps(States(eset.structure, z, p), index, lost)
+
+
+def _turning_hubs(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " m"]:
+    """Vertices at which the image of a fold turns back as it passes a crossing."""
+    store = fabric.vertices
+    both = np.concatenate([ends, ends[:, ::-1]])
+    both = both[store.kinds[both[:, 0]] == CROSSING]
+    point = fabric.points[both[:, 0]]
+    order = np.argsort(point, kind="stable")
+    _, first, counts = np.unique(point[order], return_index=True, return_counts=True)
+    pair = both[order[first[counts == 2, None] + np.arange(2)]]
+    place = store.place[:, -2:]
+    ways = place[pair[:, :, 1]] - place[pair[:, :, 0]]
+    back = np.einsum("nk,nk->n", ways[:, 0], ways[:, 1]) > 0.0
+    return np.asarray(pair[back, 0, 0])
 
 
 def _turning(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " m"]:

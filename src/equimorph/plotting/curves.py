@@ -25,10 +25,21 @@ def fold_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]
     Vertices of each piece in order, and the lower index of its two sides: 0 on the boundary of
     stability.
     """
+    return _cut_by_index(eset, eset.folds)
+
+
+def crossing_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]:
+    """Curves of branch points, cut where the lowest index beside them changes; with that index."""
+    return _cut_by_index(eset, eset.crossings)
+
+
+def _cut_by_index(
+    eset: EquilibriumSet, curves: tuple[Int[np.ndarray, "..."], ...]
+) -> list[tuple[Int[np.ndarray, " _"], int]]:
     found = []
-    for fold in eset.folds:
-        low = _lowest_index_beside(eset, fold)
-        found += [(fold[a : b + 1], int(low[a])) for a, b in _runs(low)]
+    for curve in curves:
+        low = _lowest_index_beside(eset, curve)
+        found += [(curve[a : b + 1], int(low[a])) for a, b in _runs(low)]
     return found
 
 

@@ -25,6 +25,7 @@ from equimorph.plotting import style
 from equimorph.plotting.badges import number_way_points
 from equimorph.plotting.curves import (
     boundary_pieces,
+    crossing_pieces,
     fold_pieces,
     intended,
     limit_pieces,
@@ -37,6 +38,8 @@ from equimorph.tasks import Route
 
 _STABILITY_BOUNDARY: dict[str, Any] = {"color": style.INK, "linewidth": 1.4, "zorder": 4}
 _OTHER_FOLD: dict[str, Any] = {"color": style.INK, "linewidth": 0.6, "zorder": 3}
+_DASHES = {"linestyle": (0, (4, 1.2, 1, 1.2))}
+"""Of branch points, as in `surface`."""
 _CAP: dict[str, Any] = {
     "color": style.INK,
     "linewidth": 0.6,
@@ -163,7 +166,9 @@ def shade_regions(ax: Axes, eset: EquilibriumSet, regions: Regions) -> int:
 
 
 def draw_folds(ax: Axes, eset: EquilibriumSet, *, stable_only: bool = False) -> list[Line2D]:
-    """Draw the stability boundary, the other folds and the caps.
+    """Draw the stability boundary, the other folds, branch points and the caps.
+
+    Branch points are drawn boldly where stability ends there.
 
     Parameters
     ----------
@@ -179,16 +184,24 @@ def draw_folds(ax: Axes, eset: EquilibriumSet, *, stable_only: bool = False) -> 
     One labelled line of every kind drawn, for a legend.
     """
     cap = constraint_label(eset.constraints)
+    branches = "branch points"
     looks = {"stability boundary": _STABILITY_BOUNDARY, "other folds": _OTHER_FOLD, cap: _CAP}
+    looks |= {branches: {**_OTHER_FOLD, **_DASHES}}
     pieces = [
         ("stability boundary" if low == 0 else "other folds", line, low)
         for line, low in fold_pieces(eset)
     ]
     pieces += [(cap, line, index) for line, index in boundary_pieces(eset, box=False)]
+    # those where stability ends come last, so that the legend shows them
+    met = sorted(crossing_pieces(eset), key=lambda piece: -piece[1])
+    pieces += [(branches, line, low) for line, low in met]
     kinds: dict[str, Line2D] = {}
     for label, vertices, low in pieces:
         if low == 0 or not stable_only:
-            (kinds[label],) = ax.plot(*eset.coordinates[vertices].T, **looks[label], label=label)
+            look = looks[label]
+            if label == branches and low == 0:
+                look = {**_STABILITY_BOUNDARY, **_DASHES}
+            (kinds[label],) = ax.plot(*eset.coordinates[vertices].T, **look, label=label)
     return [kinds[label] for label in looks if label in kinds]
 
 
