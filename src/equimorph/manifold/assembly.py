@@ -1,6 +1,7 @@
 """Sheet lifting, part four: polygons become triangulated discs that fit together."""
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -20,7 +21,7 @@ from equimorph.manifold.embedding import embed
 from equimorph.manifold.meetings import join_crossings, pin_ends, put_hubs, split_crossings
 from equimorph.manifold.normals import existence_normals
 from equimorph.manifold.pairing import Pairing
-from equimorph.manifold.pins import pin
+from equimorph.manifold.pins import pin, recalled_pin
 from equimorph.manifold.plans import SINGULAR, Plan, chord_of, planes
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.polygons import Loops, Polygon
@@ -259,7 +260,12 @@ def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int
             continue
         pairs = [wanted[k][1] for k in own]
         span = planes(pairing, [wanted[k][0].polygon.triangle for k in own])
-        pinned = pin(pairing.setting, pairing.points, pairs, kind, span)
+        pinned = recalled_pin(
+            pairing.journal,
+            pairs,
+            kind,
+            partial(pin, pairing.setting, pairing.points, pairs, kind, span),
+        )
         good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
         lows = pairing.points.index[np.array(pairs)].min(axis=1)
         for lane, low in zip(np.flatnonzero(good).tolist(), lows[good].tolist(), strict=True):

@@ -15,7 +15,7 @@ from equimorph.manifold.assembly import Discs
 from equimorph.manifold.mesh import SLACK
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.parting import Parts, closed_surfaces, part
-from equimorph.manifold.pins import Pinned, pin
+from equimorph.manifold.pins import Pinned, pin, recalled_pin
 from equimorph.manifold.points import AMID, CAP, CORNER, FOLD
 from equimorph.manifold.spheres import Surfaces, find_spheres
 from equimorph.manifold.topology import distinct
@@ -185,7 +185,7 @@ def _pinned(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int) -> lis
     if not groups:
         return out
     setting, store = pairing.setting, pairing.points
-    pinned = _pin_inside(pairing, groups, kind)
+    pinned = recalled_pin(pairing.journal, groups, kind, lambda: _pin_inside(pairing, groups, kind))
     lanes, folded = np.flatnonzero(pinned.found), kind in {FOLD, CORNER}
     index = setting.structure.index(pinned.z[lanes], pinned.p[lanes]).tolist()
     for lane, own in zip(lanes.tolist(), index, strict=True):

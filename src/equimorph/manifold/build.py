@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Int
@@ -16,17 +17,22 @@ from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.flooding import flood
 from equimorph.manifold.mesh import Lines, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.pairing import Pairing, Setting, start_pairing
-from equimorph.manifold.refinement import check_accuracy, refine
+from equimorph.manifold.questions import question_of_set
+from equimorph.manifold.refinement import check_accuracy, refined
 from equimorph.manifold.seeds import Seeds, is_symmetric, seeds
 from equimorph.model import (
     Box,
     Constraint,
+    Forgetful,
+    Journal,
     Progress,
     Silent,
     parameter_vector,
     position,
+    recalled,
+    step_of,
 )
-from equimorph.structures import Structure
+from equimorph.structures import States, Structure
 
 COARSE = {1: 12, 2: 12, 3: 7}
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
@@ -56,6 +62,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     checks: int = 2,
     accuracy: float | None = None,
     progress: Progress | None = None,
+    journal: Journal | None = None,
 ) -> EquilibriumSet:
     """All equilibria over a box in one to three parameters that are connected to the seeds.
 
@@ -86,7 +93,11 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
         refined (see `refine`); it is left as it was lifted if not given. If some edges cannot be
         bisected the grid is too coarse: one of twice the intervals is lifted, at most twice.
     progress
-        Sink for progress reports.
+        Sink for progress reports; one that raises an exception cancels.
+    journal
+        Keeps all that costs much as soon as it is found, like `storage.open_journal`: called again
+        with the same journal, a lift that was cancelled or killed goes on where it was. The set is
+        the same, bit for bit.
 
     Returns
     -------
@@ -96,18 +107,22 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     ------
     InputError
         For a box in more than three parameters, unknown names, parameters both free and fixed,
-        values without meaning, or an accuracy that is not positive.
+        values without meaning, an accuracy that is not positive, or a journal of something else.
     """
     progress = progress or Silent()
     if accuracy is not None:
         check_accuracy(accuracy)
     intervals = _intervals(box, intervals)
     setting = _setting(structure, box, fixed or {}, tuple(within))
+    if journal is not None:
+        journal.begin(question_of_set(setting, box, intervals, (seed, checks, accuracy)))
+    journal = journal or Forgetful()
     for number in range(GRIDS):
-        eset = _of_grid(setting, (box, dict(fixed or {}), intervals), (seed, checks), progress)
+        given = (box, dict(fixed or {}), intervals)
+        eset = _of_grid(setting, given, (seed, checks), progress, journal)
         if accuracy is None:
             break
-        eset = refine(eset, accuracy, progress)
+        eset = refined(eset, accuracy, progress, journal)
         if eset.audit.unrefined == 0 or number == GRIDS - 1:
             break
         # odd numbers stay odd, which keeps lines of symmetry off the grid
@@ -120,6 +135,7 @@ def _of_grid(
     given: tuple[Box, Mapping[str, float], tuple[int, ...]],
     effort: tuple[int, int],
     progress: Progress,
+    journal: Journal,
 ) -> EquilibriumSet:
     """Set over a grid, with checks.
 
@@ -129,8 +145,8 @@ def _of_grid(
     seed, checks = effort
     lines = grid_lines(box, intervals, _off_zero(setting))
     progress.report("seeds", 0, 1)
-    pairing = start_pairing(setting, grid_mesh(lines))
-    pairing.points.over_vertices(*_spread(setting, lines, seed, progress))
+    pairing = start_pairing(setting, grid_mesh(lines), journal)
+    pairing.points.over_vertices(*_spread(pairing, lines, seed, progress))
     generator = np.random.default_rng([seed, 1])
     recovered = 0
     finder = CellFinder()
@@ -138,11 +154,11 @@ def _of_grid(
         pairing.fit()
         cells, bisected = _lifted(pairing, finder, progress)
         eset = account(pairing, cells, given, bisected)
-        found = check(eset, generator, _checks(checks, setting), progress)
+        found = check(eset, generator, _checks(checks, setting), progress, journal)
         if found.lacking == 0 or number == SEARCHES - 1:
             break
         recovered += found.lacking
-        pairing.points.over_vertices(*seeds_from(setting, pairing.mesh, found.missing))
+        pairing.points.over_vertices(*_recovered(pairing, found.missing))
     audit = replace(eset.audit, checked=found.found, missing=found.lacking, recovered=recovered)
     return replace(eset, audit=audit)
 
@@ -210,17 +226,27 @@ def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[C
     return cells, bisected
 
 
-def _spread(setting: Setting, lines: Lines, seed: int, progress: Progress) -> Seeds:
+def _recovered(pairing: Pairing, missing: tuple[States, ...]) -> Seeds:
+    """Equilibria over the corners of grid cells around states that were missing."""
+    step = step_of("recover", *(states.z for states in missing))
+    seek = partial(seeds_from, pairing.setting, pairing.mesh, missing)
+    vertices, z, p, index = recalled(pairing.journal, step, seek)
+    return vertices, z, p, index
+
+
+def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Seeds:
     """Seeds, spread over a coarse grid in a box somewhat larger than that of the fine grid.
 
     So the flood of the fine grid starts everywhere at once, with many edges at a time, and on
     pieces, too, that hang together only beyond the box.
     """
+    setting, journal = pairing.setting, pairing.journal
     mesh, number = coarse_grid(lines, COARSE[len(lines)], setting.limits)
-    pairing = start_pairing(setting, mesh)
-    pairing.points.over_vertices(*seeds(setting, mesh, np.flatnonzero(number >= 0), seed))
-    flood(pairing, progress)
-    store = pairing.points
+    coarse = start_pairing(setting, mesh, journal)
+    seek = partial(seeds, setting, mesh, np.flatnonzero(number >= 0), seed)
+    coarse.points.over_vertices(*recalled(journal, step_of("seeds", mesh.vertices), seek))
+    flood(coarse, progress)
+    store = coarse.points
     vertex = store.vertex[: store.count]
     found = np.flatnonzero((vertex >= 0) & (number[vertex] >= 0))
     return number[vertex[found]], store.z[found], store.p[found], store.index[found]

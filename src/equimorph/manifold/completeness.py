@@ -11,7 +11,7 @@ from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.over import lift_to
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.seeds import Seeds, polished
-from equimorph.model import Progress
+from equimorph.model import Findings, Journal, Progress, recalled, step_of
 from equimorph.structures import States
 
 APART = 1e-5
@@ -33,7 +33,11 @@ class Check:
 
 
 def check(
-    eset: EquilibriumSet, generator: np.random.Generator, points: int, progress: Progress
+    eset: EquilibriumSet,
+    generator: np.random.Generator,
+    points: int,
+    progress: Progress,
+    journal: Journal,
 ) -> Check:
     """Search at random points, half of them anywhere in the box, half below the set."""
     progress.report("independent checks", 0, points)
@@ -46,15 +50,31 @@ def check(
     places = [dict(zip(eset.names, point.tolist(), strict=True)) for point in chosen]
     if not places:
         return Check(0, ())
+    seed = int(generator.integers(2**31))
+    step = step_of("check", np.stack(chosen))
+    found, sizes, z, p = recalled(journal, step, lambda: _missing(eset, places, seed))
+    bounds = np.cumsum(sizes)[:-1]
+    parts = zip(np.split(z, bounds), np.split(p, bounds), strict=True)
+    missing = tuple(States(eset.structure, *part) for part in parts if len(part[0]))
+    return Check(int(found), missing)
+
+
+def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) -> Findings:
+    """How many equilibria a search finds, how many of each place the set lacks, and these."""
     found = search_points(
         eset.structure,
         np.stack([eset.parameters_at(at) for at in places]),
         within=eset.constraints,
         starts=STARTS,
-        seed=int(generator.integers(2**31)),
+        seed=seed,
     )
     lacking = [_lacking(states, eset.at(**at)) for states, at in zip(found, places, strict=True)]
-    return Check(sum(map(len, found)), tuple(states for states in lacking if len(states)))
+    return (
+        np.array(sum(map(len, found))),
+        np.array([len(states) for states in lacking]),
+        np.concatenate([states.z for states in lacking]),
+        np.concatenate([states.p for states in lacking]),
+    )
 
 
 def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:

@@ -18,8 +18,8 @@ from equimorph.manifold.flooding import flood
 from equimorph.manifold.hard import EFFORTS
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.pins import Aim
-from equimorph.manifold.seeds import polished
-from equimorph.model import Progress
+from equimorph.manifold.seeds import Seeds, polished
+from equimorph.model import Progress, recalled, step_of
 
 DISTANCES = (0.03, 0.003, 0.0003)
 """Lengths of the first step from a crossing, in the metric, tried one after the other."""
@@ -67,7 +67,15 @@ def _trace_again(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
 
 def _switch(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
     """Enter the equilibria over vertices that the curves through crossings lead to."""
+    step = step_of("switch", alone)
+    pairing.points.over_vertices(*recalled(pairing.journal, step, lambda: _beyond(pairing, alone)))
+    pairing.fit()
+
+
+def _beyond(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> Seeds:
+    """Equilibria over vertices that the curves through crossings lead to."""
     store, mesh, setting = pairing.points, pairing.mesh, pairing.setting
+    reached = []
     ends = setting.parameters(mesh.vertices[mesh.edges[store.edge[alone]].ravel()])
     ends = ends.reshape(len(alone), 2, -1)
     line = ParameterLine(setting.structure, ends[:, 0].copy(), ends[:, 1] - ends[:, 0])
@@ -83,13 +91,13 @@ def _switch(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
         )
         outcome = follow(ParameterLine(setting.structure, p, way), z, setting.constraints, options)
         there = outcome.code == ARRIVAL
-        seeds = polished(setting, mesh, goal[there], outcome.z[there])
-        store.over_vertices(*seeds)
+        reached.append(polished(setting, mesh, goal[there], outcome.z[there]))
         back = np.flatnonzero(outcome.code == RETURN)
         z, p, edges, towards = outcome.z[back], p[back], edges[back], 1 - towards[back]
         if len(back) == 0:
             break
-    pairing.fit()
+    vertices, z, p, index = (np.concatenate(column) for column in zip(*reached, strict=True))
+    return vertices, z, p, index
 
 
 def _starts(

@@ -3,7 +3,7 @@
 Through folds and points where two curves cross, to the other end or to constraints.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -17,6 +17,7 @@ from equimorph.manifold.pairing import ABANDONED, Pairing, Rays
 from equimorph.manifold.pins import Aim, Pinned, corrected, lower_index
 from equimorph.manifold.points import BETWEEN, CAP, CROSSING
 from equimorph.manifold.points import FOLD as ON_FOLD
+from equimorph.model import recalled, step_of
 
 EFFORTS = 4
 NOISE = 1e-6
@@ -24,6 +25,36 @@ NOISE = 1e-6
 
 Inner = tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"], int, int]
 """Unknowns, parameters, index and kind of a point inside an edge."""
+
+
+@dataclass(frozen=True)
+class Traced:
+    """What became of rays that were followed.
+
+    good: whether their curves are known; vertices: over which they end, −1 if they left through a
+    constraint; z, index: there, of those good ones that end over vertices; lanes, inner_z, ...: the
+    points inside their edges, in order along each lane.
+    """
+
+    good: Bool[np.ndarray, " rays"]
+    vertices: Int[np.ndarray, " rays"]
+    z: Float[np.ndarray, "n size"]
+    index: Int[np.ndarray, " n"]
+    lanes: Int[np.ndarray, " m"]
+    inner_z: Float[np.ndarray, "m size"]
+    inner_p: Float[np.ndarray, "m P"]
+    inner_index: Int[np.ndarray, " m"]
+    kinds: Int[np.ndarray, " m"]
+
+    @property
+    def inner(self) -> dict[int, list[Inner]]:
+        """Points inside the edge of each lane that has such."""
+        out: dict[int, list[Inner]] = {}
+        lanes, index, kinds = (each.tolist() for each in (self.lanes, self.inner_index, self.kinds))
+        for k, lane in enumerate(lanes):
+            point = (self.inner_z[k], self.inner_p[k], index[k], kinds[k])
+            out.setdefault(lane, []).append(point)
+        return out
 
 
 def trace(pairing: Pairing, rays: Rays) -> None:
@@ -48,15 +79,16 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
         turning=0.25 * finer,
         look_inside=False,
     )
-    outcome = follow(line, pairing.points.z[rays.points], pairing.setting.constraints, options)
-    good = np.isin(outcome.code, (ARRIVAL, RETURN, CONSTRAINT))
-    inner = _inner(pairing, rays, outcome, line, good)
-    np.add.at(pairing.effort, rays.edges[~good], 1)
-    ends = _ends(pairing, rays, outcome, good)
-    for lane, cap in _caps(pairing, outcome, line, good).items():
-        inner.setdefault(lane, []).append(cap)
+    step = step_of(f"trace {effort}", rays.points, rays.edges)
+    found = recalled(
+        pairing.journal, step, lambda: tuple(vars(_traced(pairing, rays, line, options)).values())
+    )
+    traced = Traced(*found)
+    np.add.at(pairing.effort, rays.edges[~traced.good], 1)
+    ends = _ends(pairing, traced)
+    inner = traced.inner
     points, edges = rays.points.tolist(), rays.edges.tolist()
-    for lane in np.flatnonzero(good).tolist():
+    for lane in np.flatnonzero(traced.good).tolist():
         point, edge, end = points[lane], edges[lane], int(ends[lane])
         known = pairing.ray(point, edge)
         if known >= 0 and (end < 0 or pairing.other_end(known, point) == end):
@@ -73,19 +105,34 @@ def _number(pairing: Pairing, point: Inner, edge: int) -> int:
     return pairing.points.add(*point, edge)
 
 
-def _ends(
-    pairing: Pairing, rays: Rays, outcome: Outcome, good: Bool[np.ndarray, " lanes"]
-) -> Int[np.ndarray, " lanes"]:
+def _traced(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOptions) -> Traced:
+    """Follow rays to their ends."""
+    mesh, setting = pairing.mesh, pairing.setting
+    outcome = follow(line, pairing.points.z[rays.points], setting.constraints, options)
+    good = np.isin(outcome.code, (ARRIVAL, RETURN, CONSTRAINT))
+    inner = _inner(pairing, rays, outcome, line, good)
+    for lane, cap in _caps(pairing, outcome, line, good).items():
+        inner.setdefault(lane, []).append(cap)
+    side = np.where(outcome.code == RETURN, rays.sides, 1 - rays.sides)
+    vertices = mesh.edges[rays.edges, side]
+    vertices[outcome.code == CONSTRAINT] = -1
+    there = np.flatnonzero(good & (vertices >= 0))
+    rows = [(lane, *each) for lane, own in inner.items() for each in own]
+    lanes, z, p, index, kind = zip(*rows, strict=True) if rows else 5 * ((),)
+    return Traced(
+        good, vertices, outcome.z[there], outcome.index[there], np.array(lanes, int),
+        np.array(z).reshape(-1, setting.structure.size), np.array(p).reshape(-1, len(setting.base)),
+        np.array(index, int), np.array(kind, int),
+    )  # fmt: skip
+
+
+def _ends(pairing: Pairing, traced: Traced) -> Int[np.ndarray, " lanes"]:
     """Points over the vertices at which lanes arrived or to which they returned; −1 for others."""
-    mesh = pairing.mesh
-    lanes = np.flatnonzero(good & (outcome.code != CONSTRAINT))
-    side = np.where(outcome.code[lanes] == RETURN, rays.sides[lanes], 1 - rays.sides[lanes])
-    vertices = mesh.edges[rays.edges[lanes], side]
-    p = pairing.setting.parameters(mesh.vertices[vertices])
-    ends = np.full(len(rays.points), -1)
-    ends[lanes], _ = pairing.points.over_vertices(
-        vertices, outcome.z[lanes], p, outcome.index[lanes]
-    )
+    lanes = np.flatnonzero(traced.good & (traced.vertices >= 0))
+    vertices = traced.vertices[lanes]
+    p = pairing.setting.parameters(pairing.mesh.vertices[vertices])
+    ends = np.full(len(traced.good), -1)
+    ends[lanes], _ = pairing.points.over_vertices(vertices, traced.z, p, traced.index)
     pairing.fit()
     return ends
 

@@ -19,7 +19,10 @@ from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import Aim, corrected, lower_index
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.tangents import Cubics, split_step
+from equimorph.model import Findings, Journal, recalled, step_of
 
+CHUNK = 4096
+"""Edges that are worked on together: their work arrays stay small."""
 REACH = 0.3
 """How far from its prediction a new vertex may be corrected, relative to its edge."""
 EXCESS = 0.35
@@ -27,6 +30,35 @@ EXCESS = 0.35
 it."""
 ALONG = 0.5
 """Least cosine of the angle between an edge and the set at its new vertex."""
+
+
+def chunks(
+    chosen: Int[np.ndarray, " n"], marks: Int[np.ndarray, " E"]
+) -> list[Int[np.ndarray, " k"]]:
+    """Edges in chunks of equal marks."""
+    parts: list[Int[np.ndarray, " k"]] = []
+    for mark in np.unique(marks[chosen]).tolist():
+        own = chosen[marks[chosen] == mark]
+        parts.extend(own[at : at + CHUNK] for at in range(0, len(own), CHUNK))
+    return parts
+
+
+def recalled_on_edges(
+    journal: Journal,
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    mark: int,
+    lowest: Int[np.ndarray, " n"],
+    t: Float[np.ndarray, " n"],
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Exact vertices on edges, from a journal if it has them; see `on_edges`."""
+
+    def compute() -> Findings:
+        found, vertices = on_edges(fabric, ends, mark, lowest, t)
+        return found, *vars(vertices).values()
+
+    found, *columns = recalled(journal, step_of(f"bisect {mark}", ends, t), compute)
+    return found, Vertices(*columns)
 
 
 def on_edges(

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.equilibria import ParameterLine
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.points import CROSSING, SAME, Points
-from equimorph.model import Constraint
+from equimorph.model import Constraint, Forgetful, Journal
 from equimorph.structures import Structure
 
 UNTRACED, ABANDONED, LONG, HARD = -1, -2, -3, -4
@@ -107,6 +107,7 @@ class Pairing:
     """Points of each edge at which two curves cross."""
     hubs: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points between two of these at which a fold of one of the sheets crosses, too."""
+    journal: Journal = field(default_factory=Forgetful)
 
     def ray(self, point: int, edge: int) -> int:
         """Curve at a point along an edge."""
@@ -247,7 +248,7 @@ def _incidence(mesh: BaseMesh) -> tuple[Int[np.ndarray, "V slots"], Int[np.ndarr
     return incident, place.reshape(-1, 2)
 
 
-def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
+def start_pairing(setting: Setting, mesh: BaseMesh, journal: Journal) -> Pairing:
     """Empty pairing on a mesh."""
     incident, slots = _incidence(mesh)
     pairing = Pairing(
@@ -259,6 +260,7 @@ def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
         slots,
         incident,
         np.zeros(len(mesh.edges), int),
+        journal=journal,
     )
     pairing.fit()
     return pairing

@@ -1,6 +1,6 @@
 """Exact points amid others: on a fold, on a constraint, on both, or just on the set."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -11,6 +11,7 @@ from equimorph.equilibria.critical import null_border
 from equimorph.manifold.embedding import embed, principal_directions
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.points import CAP, CORNER, FOLD, Points
+from equimorph.model import Journal, recalled, step_of
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -73,6 +74,14 @@ class Aim:
         dp = np.zeros((len(self.span), len(self.setting.base)))
         dp[:, self.setting.free] = self.span[:, k] * self.setting.scales
         return dp
+
+
+def recalled_pin(
+    journal: Journal, groups: Sequence[Sequence[int]], kind: int, pinned: Callable[[], Pinned]
+) -> Pinned:
+    """Points of a kind amid groups, from a journal if it has them."""
+    step = step_of(f"pin {kind}", np.array([point for group in groups for point in group], int))
+    return Pinned(*recalled(journal, step, lambda: tuple(vars(pinned()).values())))
 
 
 def pin(

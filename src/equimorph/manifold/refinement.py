@@ -17,20 +17,15 @@ from equimorph.manifold.collapsing import collapse_edges
 from equimorph.manifold.copies import copies, doubled, first_copies, with_copies
 from equimorph.manifold.cusp_points import with_cusps_beside
 from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.fabric import (
-    CURVES,
-    HOLE,
-    Fabric,
-    edges_of,
-    fabric_of,
-)
-from equimorph.manifold.on_edges import on_edges
+from equimorph.manifold.fabric import CURVES, HOLE, Fabric, edges_of, fabric_of
+from equimorph.manifold.on_edges import chunks, recalled_on_edges
 from equimorph.manifold.pairing import Setting
+from equimorph.manifold.questions import question_of_refinement
 from equimorph.manifold.reconnection import reconnect, smallest_dihedral
 from equimorph.manifold.surgery import collapse, flip, smallest_angle
 from equimorph.manifold.tangents import Cubics
 from equimorph.manifold.topology import keys_of
-from equimorph.model import Progress, Silent
+from equimorph.model import Forgetful, Journal, Progress, Silent
 
 ROUNDS = 200
 ALTERNATIONS, FEWER = 8, 0.98
@@ -51,8 +46,6 @@ BULGE = 0.5
 """How long edges on folds may be, relative to edges at their ends that could not be bisected."""
 FEW = 50
 """Fewer than one in so many edges are bisected all at once."""
-CHUNK = 4096
-"""Edges that are worked on together: their work arrays stay small."""
 PLACES = (0.5, 0.3, 0.7)
 """Where along an edge a vertex is tried, one place after the other."""
 HOPELESS = 60
@@ -62,7 +55,10 @@ MOST = 2_000_000
 
 
 def refine(
-    eset: EquilibriumSet, accuracy: float, progress: Progress | None = None
+    eset: EquilibriumSet,
+    accuracy: float,
+    progress: Progress | None = None,
+    journal: Journal | None = None,
 ) -> EquilibriumSet:
     """Return the set with cells so small that they are within a tolerance of it.
 
@@ -74,7 +70,9 @@ def refine(
         Largest distance, in the metric of the embedding (configuration and scaled parameters),
         between the straight cells and the set.
     progress
-        Sink for progress reports.
+        Sink for progress reports; one that raises an exception cancels.
+    journal
+        Keeps new vertices as soon as they are found, to go on from; see `equilibrium_set`.
 
     Returns
     -------
@@ -84,17 +82,26 @@ def refine(
     Raises
     ------
     InputError
-        If `accuracy` is not positive.
+        If `accuracy` is not positive, or the journal is of something else.
     """
     check_accuracy(accuracy)
+    if journal is not None:
+        journal.begin(question_of_refinement(eset, accuracy))
+    return refined(eset, accuracy, progress or Silent(), journal or Forgetful())
+
+
+def refined(
+    eset: EquilibriumSet, accuracy: float, progress: Progress, journal: Journal
+) -> EquilibriumSet:
+    """Return a refined set; a journal that has begun goes on."""
     free = np.array([[q.name for q in eset.structure.parameters].index(n) for n in eset.names])
     base = eset.points.p[0].copy() if len(eset.points) else np.zeros(0)
     setting = Setting(eset.structure, base, free, eset.constraints)
     if len(eset.cells) == 0:
         return eset
-    memory = _Memory()
+    memory = _Memory(journal)
     fabric = _tidied(fabric_of(setting, eset), memory)
-    fabric = _refined(fabric, SHARE[len(free)] * accuracy, memory, progress or Silent())
+    fabric = _refined(fabric, SHARE[len(free)] * accuracy, memory, progress)
     fabric = _told_apart(fabric, memory)
     edges = _known(fabric, memory)
     audit = eset.audit
@@ -154,6 +161,7 @@ class _Edges:
 class _Memory:
     """Deviations of edges that were measured before, and edges that could not be bisected."""
 
+    journal: Journal
     keys: Int[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, int))
     """Of the edges whose deviation is known; so numbered that they stay when vertices are added."""
     error: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
@@ -305,21 +313,10 @@ def _deviations(
 ) -> Float[np.ndarray, " E"]:
     """How far the set is from straight edges."""
     out = np.zeros(len(ends))
-    for own in _chunks(np.arange(len(ends)), marks):
+    for own in chunks(np.arange(len(ends)), marks):
         first, second = (fabric.end(ends[own], side, int(marks[own[0]])) for side in range(2))
         out[own] = Cubics(first, second).error
     return out
-
-
-def _chunks(
-    chosen: Int[np.ndarray, " n"], marks: Int[np.ndarray, " E"]
-) -> list[Int[np.ndarray, " k"]]:
-    """Edges in chunks of equal marks."""
-    chunks: list[Int[np.ndarray, " k"]] = []
-    for mark in np.unique(marks[chosen]).tolist():
-        own = chosen[marks[chosen] == mark]
-        chunks.extend(own[at : at + CHUNK] for at in range(0, len(own), CHUNK))
-    return chunks
 
 
 def _chosen(edges: _Edges, tolerance: float) -> Int[np.ndarray, " n"]:
@@ -372,11 +369,11 @@ def _bisect(
         np.minimum.at(lowest, side, fabric.cell_index)
 
     parts, done = [], []
-    for some in _chunks(chosen, edges.marks):
+    for some in chunks(chosen, edges.marks):
         own, mark = some, int(edges.marks[some[0]])
         for t in PLACES:
-            places = np.full(len(own), t)
-            found, vertices = on_edges(fabric, ends[own], mark, lowest[own], places)
+            given = (ends[own], mark, lowest[own], np.full(len(own), t))
+            found, vertices = recalled_on_edges(memory.journal, fabric, *given)
             parts.append(vertices)
             done.append(own[found])
             own = own[~found]

@@ -1,7 +1,8 @@
-"""Plain data: parameters, boxes, descriptors, constraints, schedules, progress sinks."""
+"""Plain data: parameters, boxes, descriptors, constraints, schedules; sinks and journals."""
 
 from equimorph.model.box import Box, Grid
 from equimorph.model.descriptor import Constraint, Descriptor, combined, eased, largest_of
+from equimorph.model.journal import Findings, Forgetful, Journal, recalled, step_of
 from equimorph.model.keeping import NOT_KEPT
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.parameter import (
@@ -22,8 +23,11 @@ __all__ = [
     "Constraint",
     "Descriptor",
     "Disc",
+    "Findings",
+    "Forgetful",
     "Grid",
     "HalfPlane",
+    "Journal",
     "Obstacle",
     "Parameter",
     "Progress",
@@ -38,4 +42,6 @@ __all__ = [
     "names_of",
     "parameter_vector",
     "position",
+    "recalled",
+    "step_of",
 ]

@@ -1,6 +1,7 @@
 """Results and schedules as files that other programs open."""
 
 from equimorph.storage.charts import load_chart, save_chart
+from equimorph.storage.journal import open_journal
 from equimorph.storage.map_table import write_map
 from equimorph.storage.results import (
     Results,
@@ -18,6 +19,7 @@ __all__ = [
     "append_results",
     "load_chart",
     "load_set",
+    "open_journal",
     "read_results",
     "read_schedule",
     "save_chart",

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from equimorph.errors import InputError
+from equimorph.model import Journal
+from equimorph.storage import open_journal
 from equimorph.storage.files import checksum, move_whole
 from equimorph.storage.parts import Part
 from equimorph.structures import Structure
@@ -62,7 +64,7 @@ class Checkpoints:
         InputError
             If the folder cannot be written.
         """
-        key = fingerprint({"part": part.kind, **question})
+        key = _key(question, part)
         self.asked.add(key)
         for file in self.results.checkpoints.glob(f"{key}-*"):
             answer = self._load(file, part)
@@ -72,8 +74,33 @@ class Checkpoints:
             file.unlink()
         return part.load(self._store(key, part.content(compute())), self.structure)
 
+    def long_answer(
+        self,
+        question: dict[str, Any],
+        part: Part[Answer],
+        compute: Callable[[Journal], Answer],
+    ) -> Answer:
+        """Return the answer of a computation that goes on from what it had found; see `answer`.
+
+        Parameters
+        ----------
+        question, part
+            As of any answer.
+        compute
+            Finds the answer, with a journal of its steps, which is removed at the end.
+        """
+        path = self.results.checkpoints / f"{_key(question, part)}.journal"
+
+        def resume() -> Answer:
+            with open_journal(path, replace=True) as journal:
+                return compute(journal)
+
+        answer = self.answer(question, part, resume)
+        path.unlink(missing_ok=True)
+        return answer
+
     def forget_others(self) -> None:
-        """Remove answers that were not asked for."""
+        """Remove answers that were not asked for, and journals of computations."""
         for file in self.results.checkpoints.iterdir():
             if file.name.partition("-")[0] not in self.asked:
                 file.unlink()
@@ -94,3 +121,7 @@ class Checkpoints:
             return part.load(file, self.structure)
         except InputError:
             return None
+
+
+def _key(question: dict[str, Any], part: Part[Any]) -> str:
+    return fingerprint({"part": part.kind, **question})

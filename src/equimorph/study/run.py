@@ -9,7 +9,7 @@ from typing import Any
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.model import Progress, Silent
+from equimorph.model import Journal, Progress, Silent
 from equimorph.storage.files import read_text
 from equimorph.storage.parts import STATES_PART, set_part
 from equimorph.storage.results import Answer, write_results
@@ -139,7 +139,7 @@ def _question(study: Study, *, of_set: bool) -> dict[str, Any]:
 def _equilibrium_set(
     study: Study, ground: Ground, extent: Extent, checkpoints: Checkpoints, progress: Progress
 ) -> EquilibriumSet:
-    def compute() -> EquilibriumSet:
+    def compute(journal: Journal) -> EquilibriumSet:
         with at_key("set"):
             return equilibrium_set(
                 ground.structure,
@@ -148,9 +148,10 @@ def _equilibrium_set(
                 within=extent.constraints,
                 intervals=extent.intervals,
                 progress=progress,
+                journal=journal,
             )
 
-    return checkpoints.answer(_question(study, of_set=True), set_part(ground.height), compute)
+    return checkpoints.long_answer(_question(study, of_set=True), set_part(ground.height), compute)
 
 
 def _equilibria(
