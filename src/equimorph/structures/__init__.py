@@ -14,6 +14,7 @@ from equimorph.structures.contract import (
 )
 from equimorph.structures.energy import EnergyStructure, Unknown
 from equimorph.structures.frame import Frame, Member
+from equimorph.structures.margin import stability_margin
 from equimorph.structures.quantities import (
     distance_to,
     effort_of,
@@ -73,6 +74,7 @@ __all__ = [
     "from_identity",
     "margin_of",
     "outside",
+    "stability_margin",
     "value_of",
 ]
 

@@ -6,19 +6,126 @@ from jaxtyping import Bool, Float
 from equimorph.structures.contract import Structure
 
 RELATIVE = 1e-11
+NEAR = 1e-3
+"""Distance of a shift below the eigenvalue, as a share of the second one, once that is known."""
+SWEEPS, CHUNK = 8, 256
+
+Values = Float[np.ndarray, " lanes"]
+Pairs = Float[np.ndarray, "lanes 2 unknowns"]
 
 
 def stability_margin(
     structure: Structure,
     z: Float[np.ndarray, "lanes size"],
     p: Float[np.ndarray, "lanes parameters"],
+    error: float = RELATIVE,
 ) -> Float[np.ndarray, " lanes"]:
     """Smallest σ of ``L_uu v + c_uᵀ μ = σ M v``, ``c_u v = 0``, per lane.
 
-    The inertia of F_z − σM counts the eigenvalues below σ. Bisection on that count isolates the
-    smallest one; inverse iteration with the Rayleigh quotient then converges to round-off.
+    Inverse iteration on pairs of vectors finds it for stable states in four or five solves, the
+    last of them so near below it that their inertia, which counts the eigenvalues below a shift,
+    proves that it is the smallest. For other states bisection on that count isolates it first.
+    A larger relative `error` than that of round-off saves a solve or two.
     Scale: energy over the metric's unit squared.
     """
+    value, proved = np.empty(len(z)), np.zeros(len(z), bool)
+    for begin in range(0, len(z), CHUNK):
+        part = slice(begin, begin + CHUNK)
+        value[part], proved[part] = _by_pairs(structure, z[part], p[part], error)
+    rest = np.flatnonzero(~proved)
+    if len(rest):
+        value[rest] = _by_bisection(structure, z[rest], p[rest])
+    return value
+
+
+def _by_pairs(
+    structure: Structure,
+    z: Float[np.ndarray, "lanes size"],
+    p: Float[np.ndarray, "lanes parameters"],
+    error: float,
+) -> tuple[Values, Bool[np.ndarray, " lanes"]]:
+    """Margins of stable states, and which of them are proved."""
+    value, proved = np.empty(len(z)), np.zeros(len(z), bool)
+    todo, vectors = np.arange(len(z)), np.tile(_first_pair(structure), (len(z), 1, 1))
+    shift, known = np.zeros(len(z)), np.full(len(z), np.inf)
+    for sweep in range(SWEEPS):
+        vectors, first, second, stable = _swept(structure, (z[todo], p[todo]), shift, vectors)
+        change = np.abs(known - first)
+        # one more sweep would shrink what is left so much
+        left = ((first - shift) / np.maximum(second - shift, NEAR * np.abs(second))) ** 2
+        tolerance = error * np.maximum(np.abs(first), 1e-3)
+        settled = stable & (sweep > 1) & (change * left <= tolerance)
+        value[todo[settled]], proved[todo[settled]] = first[settled], True
+        more = stable & ~settled
+        if not more.any():
+            break
+        arrays = (todo, vectors, first, second, change)
+        todo, vectors, known, second, change = (each[more] for each in arrays)
+        shift = known - np.maximum(change, NEAR * second) if sweep > 0 else np.zeros(len(todo))
+    return value, proved
+
+
+def _first_pair(structure: Structure) -> Float[np.ndarray, "2 unknowns"]:
+    """Vectors that are smooth along a chain, and orthogonal to no mode."""
+    n = structure.unknowns
+    at, count = np.arange(n), np.array([[2.0], [3.0]])
+    pair = np.sin(np.pi * count * (at + 1) / (n + 1)) + 0.1 * np.cos((count - 0.7) * at)
+    return np.asarray(pair / np.sqrt(pair**2 @ structure.mass)[:, None])
+
+
+def _swept(
+    structure: Structure,
+    lanes: tuple[Float[np.ndarray, "lanes size"], Float[np.ndarray, "lanes parameters"]],
+    shift: Values,
+    vectors: Pairs,
+) -> tuple[Pairs, Values, Values, Bool[np.ndarray, " lanes"]]:
+    """One solve for pairs of vectors, and their rotation to Ritz vectors.
+
+    Returns the next pairs, orthonormal; the Rayleigh quotient of the first; the Ritz value of the
+    second; and whether no eigenvalue lies below the shift.
+    """
+    n, mass = structure.unknowns, structure.mass
+    rhs = np.zeros((len(shift), 2, structure.size))
+    np.multiply(vectors, mass, out=rhs[:, :, :n])
+    solution = structure.solve(*lanes, rhs, shift=shift)
+    solved = solution.x[:, :, :n]
+    # Ritz values of the inverse: eigenvalues of Xᵀ M (K⁻¹ M X), 2 × 2
+    a, b, c = _products(rhs[:, :, :n], solved)
+    mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
+    angle = 0.5 * np.arctan2(2.0 * b, a - c)
+    cos, sin = np.cos(angle), np.sin(angle)
+    # products of the rotated vectors in the metric
+    e, f, g = _products(solved * mass, solved)
+    top, cross = cos**2 * e + 2.0 * cos * sin * f + sin**2 * g, cos * sin * (g - e)
+    cross += (cos**2 - sin**2) * f
+    low = sin**2 * e - 2.0 * cos * sin * f + cos**2 * g
+    with np.errstate(all="ignore"):
+        part = cross / top
+        one = 1.0 / np.sqrt(top)
+        two = 1.0 / np.sqrt(np.maximum(low - part * cross, 1e-14 * top))
+        mix = np.stack([cos * one, sin * one, -(sin + part * cos) * two, (cos - part * sin) * two])
+        # K y = M x: the Rayleigh quotient of y needs no product with K
+        first = shift + (mean + half) / top
+        second = shift + 1.0 / np.maximum(mean - half, NEAR * (mean + half))
+        good = (solution.negative == structure.constraints) & np.isfinite(first + second)
+        first, second = (np.where(good, each, 1.0) for each in (first, second))
+        pair = np.einsum("abl,lbi->lai", mix.reshape(2, 2, -1), solved)
+    return pair, first, second, np.asarray(good)
+
+
+def _products(left: Pairs, right: Pairs) -> tuple[Values, Values, Values]:
+    """Products of first and first, first and second, second and second vectors."""
+    ways = ((0, 0), (0, 1), (1, 1))
+    first, mixed, second = (np.einsum("li,li->l", left[:, i], right[:, j]) for i, j in ways)
+    return first, mixed, second
+
+
+def _by_bisection(
+    structure: Structure,
+    z: Float[np.ndarray, "lanes size"],
+    p: Float[np.ndarray, "lanes parameters"],
+) -> Float[np.ndarray, " lanes"]:
+    """Margins of any states: bisection, then inverse iteration with the Rayleigh quotient."""
     low, high = _bracket(structure, z, p)
     for _ in range(12):
         middle = 0.5 * (low + high)

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from equimorph.equilibria import ParameterLine, TraceOptions, newton
+from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.model import Constraint
@@ -60,28 +60,6 @@ def links(source: States, target: States, demands: Demands) -> tuple[Flags, Valu
     return linked, cost
 
 
-def chords(source: States, target: States, demands: Demands) -> tuple[Flags, Values]:
-    """Links as they seem to be from both ends and the state amid them, and what they cost so.
-
-    For comparing many near ways in little time; which of them can be lifted is for `links` to say.
-    """
-    structure, count = source.structure, len(source)
-    p = 0.5 * (source.p + target.p)
-    z, found = newton(structure, 0.5 * (source.z + target.z), p, iterations=8)
-    ways = States(
-        structure,
-        np.concatenate([source.z, z, target.z]),
-        np.concatenate([source.p, p, target.p]),
-    )
-    good = np.repeat(found[None], 2, axis=0)
-    some = np.flatnonzero(good.ravel())
-    good.ravel()[some] = demands.admissible(ways[count:][some])
-    here = np.arange(count)
-    cost = demands.objective.costs(ways, here, here + count)
-    cost += demands.objective.costs(ways, here + count, here + 2 * count)
-    return np.asarray(good.all(axis=0)), np.asarray(cost)
-
-
 def straight_lifts(
     source: States, p: Float[np.ndarray, "lanes parameters"], demands: Demands
 ) -> tuple[Lanes, Flags, Values]:
@@ -129,7 +107,7 @@ def _costs(source: States, line: ParameterLine, outcome: Outcome, objective: Obj
     lane, t = lane[order], t[order]
     states = States(line.structure, z, line.take(lane).parameters(t))
     pairs = np.flatnonzero(lane[1:] == lane[:-1])
-    costs = objective.costs(states, pairs, pairs + 1)
+    costs = objective.costs(states, pairs, pairs + 1, rough=True)
     return np.bincount(lane[pairs], costs, len(lanes))
 
 

@@ -60,7 +60,7 @@ class Network:
             # margins of unstable vertices would be for nothing
             used, pairs = np.unique(self.pairs, return_inverse=True)
             first, second = pairs.reshape(self.pairs.shape).T
-            self._costs[key] = objective.costs(eset.points[used], first, second)
+            self._costs[key] = objective.costs(eset.points[used], first, second, rough=True)
         return self._costs[key]
 
     def verdicts(self, demands: Demands) -> tuple[Flags, Flags]:

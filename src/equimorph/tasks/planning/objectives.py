@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Rates, names_of
-from equimorph.structures import States, Structure
+from equimorph.structures import States, Structure, stability_margin
 
 Values = Float[np.ndarray, " pairs"]
 Numbers = Int[np.ndarray, " pairs"]
@@ -21,6 +21,32 @@ Wish = Term | Sequence[tuple[float, Term]]
 NAMES: tuple[Name, ...] = get_args(Name)
 LEAST_MARGIN = 1e-6
 """Margin below which clearance counts no further."""
+ROUGH = 1e-4
+"""Relative error of margins where ways are only compared."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """States, with what an objective has to know at each of them.
+
+    Efforts of the parameters and reciprocal margins, empty where they do not count.
+    """
+
+    states: States
+    efforts: Float[np.ndarray, "lanes efforts"]
+    nearness: Float[np.ndarray, "lanes margins"]
+
+    def __getitem__(self, key: slice | Int[np.ndarray, " some"]) -> "Places":
+        """Some of them."""
+        return Places(self.states[key], self.efforts[key], self.nearness[key])
+
+    def replaced(self, at: Int[np.ndarray, " some"], new: "Places") -> "Places":
+        """Others in some places."""
+        z, p = self.states.z.copy(), self.states.p.copy()
+        efforts, nearness = self.efforts.copy(), self.nearness.copy()
+        z[at], p[at] = new.states.z, new.states.p
+        efforts[at], nearness[at] = new.efforts, new.nearness
+        return Places(States(self.states.structure, z, p), efforts, nearness)
 
 
 @dataclass(frozen=True)
@@ -58,12 +84,28 @@ class Objective:
         """Whether stability margins count."""
         return any(term == "clearance" for _, term in self.terms)
 
-    def costs(self, states: States, first: Numbers, second: Numbers) -> Values:
-        """Cost of the short way between pairs of states, by the trapezoidal rule."""
-        total = np.zeros(len(first))
+    def places(self, states: States, rough: bool = False) -> Places:
+        """States with what is to be known at each of them; `rough` for comparisons."""
+        count, structure = len(states), states.structure
+        efforts, nearness = np.zeros((count, 0)), np.zeros((count, 0))
+        if any(term == "work" for _, term in self.terms):
+            efforts = structure.effort(states.z, states.p) * structure.energy_scale
+        if self.needs_margins:
+            margins = _rough_margins(states) if rough else states.margin
+            nearness = 1.0 / np.maximum(margins, LEAST_MARGIN)[:, None]
+        return Places(states, efforts, nearness)
+
+    def between(self, first: Places, second: Places) -> Values:
+        """Cost of the short way from each of the first to each of the second, trapezoidal."""
+        total = np.zeros(len(first.states))
         for weight, term in self.terms:
-            total += weight * _costs(term, states, first, second)
+            total += weight * _cost(term, first, second)
         return total
+
+    def costs(self, states: States, first: Numbers, second: Numbers, rough: bool = False) -> Values:
+        """Cost of the short way between pairs of states, by the trapezoidal rule."""
+        places = self.places(states, rough)
+        return self.between(places[first], places[second])
 
     def along(self, states: States) -> float:
         """Cost of the way through states in turn."""
@@ -115,28 +157,30 @@ def _pair(entry: object) -> tuple[float, Term]:
     return number, term
 
 
-def _costs(term: Term, states: States, first: Numbers, second: Numbers) -> Values:
-    structure = states.structure
-    dp = (states.p[second] - states.p[first]) / structure.scales
+def _rough_margins(states: States) -> Float[np.ndarray, " lanes"]:
+    return stability_margin(states.structure, states.z, states.p, ROUGH)
+
+
+def _cost(term: Term, first: Places, second: Places) -> Values:
+    structure = first.states.structure
+    dp = second.states.p - first.states.p
     if isinstance(term, Rates):
-        return _times(term, states, first, second)
-    if term == "travel":
-        return np.asarray(np.linalg.norm(dp, axis=1))
+        return _times(term, names_of(structure.parameters), dp)
     if term == "work":
-        effort = structure.effort(states.z, states.p) * structure.energy_scale
-        mean = 0.5 * (effort[first] + effort[second])
-        return np.asarray(np.abs(mean * (states.p[second] - states.p[first])).sum(axis=1))
+        mean = 0.5 * (first.efforts + second.efforts)
+        return np.asarray(np.abs(mean * dp).sum(axis=1))
+    travel = ((dp / structure.scales) ** 2).sum(axis=1)
+    if term == "travel":
+        return np.asarray(np.sqrt(travel))
     n = structure.unknowns
-    dz = states.z[second, :n] - states.z[first, :n]
-    length = np.sqrt(dz**2 @ structure.mass + (dp**2).sum(axis=1))
+    dz = second.states.z[:, :n] - first.states.z[:, :n]
+    length = np.sqrt(dz**2 @ structure.mass + travel)
     if term == "length":
         return np.asarray(length)
-    nearness = 1.0 / np.maximum(states.margin, LEAST_MARGIN)
-    return np.asarray(length * 0.5 * (nearness[first] + nearness[second]))
+    return np.asarray(length * 0.5 * (first.nearness + second.nearness)[:, 0])
 
 
-def _times(rates: Rates, states: States, first: Numbers, second: Numbers) -> Values:
-    names = names_of(states.structure.parameters)
+def _times(rates: Rates, names: Sequence[str], dp: Float[np.ndarray, "pairs params"]) -> Values:
     at = [names.index(name) for name in rates.limits]
     bounds = np.array(list(rates.limits.values()), dtype=float)
-    return np.asarray((np.abs(states.p[second] - states.p[first])[:, at] / bounds).max(axis=1))
+    return np.asarray((np.abs(dp)[:, at] / bounds).max(axis=1))

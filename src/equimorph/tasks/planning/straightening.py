@@ -1,19 +1,14 @@
 """Paths over a mesh made straight, and drawn to where they cost least."""
 
-from collections.abc import Callable
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import ParameterLine, TraceOptions, newton
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
-from equimorph.model import Box
 from equimorph.structures import States
-from equimorph.tasks.planning.links import Demands, Flags, Values, chords, links, shortest
-
-Legs = Callable[[States, States, Demands], tuple[Flags, Values]]
-"""Whether states are linked, and at what cost."""
+from equimorph.tasks.planning.drawing import Room, drawn, drawn_by_lifts
+from equimorph.tasks.planning.links import Demands, links, shortest
 
 MOST_SHORTCUTS = 8000
 """Number of straight lifts that are tried to shorten a path within its class."""
@@ -24,13 +19,8 @@ CORNER = 1e-3
 LEGS = 12
 """Legs longer than this part of the way in the parameters are divided before corners move."""
 MOST_CORNERS = 32
-SIZES = (0.12, 0.04, 0.013)
-"""Moves of corners, in scaled parameters, that are tried one after the other."""
-ROUNDS, POLISHING = 6, 2
 MERGED = 8
 """Legs that may become one."""
-LEAST_GAIN = 2e-6
-"""Share of the cost that a move has to gain."""
 GAIN = 1e-4
 """Share of the cost that a shorter list of corners may cost more."""
 
@@ -84,7 +74,7 @@ def _swept(
 def relaxed(
     corners: States,
     demands: Demands,
-    room: tuple[Box, Int[np.ndarray, " d"]],
+    room: Room,
     same_class: bool = False,
 ) -> States:
     """Corners moved to where the chain of straight lifts costs least.
@@ -94,13 +84,12 @@ def relaxed(
     cannot be lifted. Then corners that are of no use are left out.
     """
     corners = _divided(corners, demands)
-    if not same_class:
-        drawn = _drawn(corners, demands, room, (chords, SIZES, ROUNDS))
-        corners, whole = _linked(corners, drawn, demands)
-        if not whole:
-            corners = _drawn(corners, demands, room, (links, SIZES[1:], POLISHING))
+    if same_class:
+        corners = drawn_by_lifts(corners, demands, room, quick=False)
     else:
-        corners = _drawn(corners, demands, room, (links, SIZES, ROUNDS))
+        corners, whole = _linked(corners, drawn(corners, demands, room), demands)
+        if not whole:
+            corners = drawn_by_lifts(corners, demands, room, quick=True)
     return _thinned(corners, demands, same_class)
 
 
@@ -115,24 +104,6 @@ def _linked(before: States, after: States, demands: Demands) -> tuple[States, bo
         if len(bad) == 0 or back[bad].all() & back[bad + 1].all():
             return corners, not back.any()
         back[bad], back[bad + 1] = True, True
-
-
-def _drawn(
-    corners: States,
-    demands: Demands,
-    room: tuple[Box, Int[np.ndarray, " d"]],
-    how: tuple[Legs, tuple[float, ...], int],
-) -> States:
-    """Corners moved as long as that makes their legs cheaper."""
-    legs, sizes, rounds = how
-    for size in sizes:
-        for _ in range(rounds):
-            before = corners
-            for odd in (1, 2):
-                corners = _moved(corners, (odd, size), demands, room, legs)
-            if corners is before:
-                break
-    return corners
 
 
 def _divided(corners: States, demands: Demands) -> States:
@@ -162,89 +133,6 @@ def _lifted(
     outcome = follow(line, states.z.copy(), demands.constraints, TraceOptions(record=False))
     z, found = newton(states.structure, outcome.z, p, iterations=4)
     return z, (outcome.code == ARRIVAL) & found
-
-
-def _moved(
-    corners: States,
-    move: tuple[int, float],
-    demands: Demands,
-    room: tuple[Box, Int[np.ndarray, " d"]],
-    legs: Legs,
-) -> States:
-    """Corners with every other one moved, if that makes its two legs cheaper."""
-    (odd, size), (box, free) = move, room
-    at = np.arange(odd, len(corners) - 1, 2)
-    if len(at) == 0:
-        return corners
-    structure = corners.structure
-    steps = size * structure.scales[free] * _directions(len(free))
-    tried, step = np.repeat(at, len(steps)), np.tile(steps, (len(at), 1))
-    p = corners.p[tried]
-    p[:, free] = np.clip(p[:, free] + step, box.lower, box.upper)
-    some = np.flatnonzero(np.abs(p - corners.p[tried]).max(axis=1) > 0.0)
-    tried, p = tried[some], p[some]
-    # whether these lie on the branch of the corner is what lifts from its neighbours show
-    z, there = newton(structure, corners.z[tried], p, iterations=8)
-    tried, p, z = tried[there], p[there], z[there]
-    if len(tried) == 0:
-        return corners
-    new, old = States(structure, z, p), chords(corners[:-1], corners[1:], demands)[1]
-    gain = _gain(corners, tried, new, demands, (chords, old))
-    if legs is links:  # lifts are for moves that look good: those that fail take longest
-        some = np.flatnonzero(gain > 0.0)
-        if len(some) == 0:
-            return corners
-        tried, new = tried[some], new[some]
-        old = links(corners[:-1], corners[1:], demands)[1]
-        gain = _gain(corners, tried, new, demands, (links, old))
-    return _taken(corners, tried, new, np.where(gain > LEAST_GAIN * old.sum(), gain, 0.0))
-
-
-def _gain(
-    corners: States,
-    tried: Int[np.ndarray, " n"],
-    new: States,
-    demands: Demands,
-    how: tuple[Legs, Values],
-) -> Float[np.ndarray, " n"]:
-    """What each move saves; −∞ where a leg is broken. `how` has the costs of the legs now."""
-    legs, old = how
-    sources = States(
-        corners.structure,
-        np.concatenate([corners.z[tried - 1], new.z]),
-        np.concatenate([corners.p[tried - 1], new.p]),
-    )
-    targets = States(
-        corners.structure,
-        np.concatenate([new.z, corners.z[tried + 1]]),
-        np.concatenate([new.p, corners.p[tried + 1]]),
-    )
-    good, cost = legs(sources, targets, demands)
-    both, total = good.reshape(2, -1).all(axis=0), cost.reshape(2, -1).sum(axis=0)
-    return np.where(both, old[tried - 1] + old[tried] - total, -np.inf)
-
-
-def _directions(d: int) -> Float[np.ndarray, "directions d"]:
-    """Both ways along every parameter, and amid each two of them."""
-    units = np.eye(d)
-    first, second = np.triu_indices(d, 1)
-    amid = [units[first] + sign * units[second] for sign in (1.0, -1.0)]
-    half = np.concatenate([units, *(0.5**0.5 * each for each in amid)])
-    return np.concatenate([half, -half])
-
-
-def _taken(
-    corners: States, tried: Int[np.ndarray, " n"], new: States, gain: Float[np.ndarray, " n"]
-) -> States:
-    """Corners with the best of the moves that gain something."""
-    best = np.full(len(corners), 0.0)
-    np.maximum.at(best, tried, gain)
-    chosen = np.flatnonzero((gain > 0.0) & (gain == best[tried]))
-    if len(chosen) == 0:
-        return corners
-    z, p = corners.z.copy(), corners.p.copy()
-    z[tried[chosen]], p[tried[chosen]] = new.z[chosen], new.p[chosen]
-    return States(corners.structure, z, p)
 
 
 def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
