@@ -14,6 +14,7 @@ from equimorph.equilibria.deflation import deflated_newton
 from equimorph.equilibria.imperfections import worst_named, worst_over
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
 from equimorph.equilibria.lifting.legs import Leg, Waypoint
+from equimorph.equilibria.lifting.paths import lift_legs
 from equimorph.equilibria.limit import LimitLoad, LimitLoads, limit_load
 from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import Outcome, follow
@@ -54,6 +55,7 @@ __all__ = [
     "grazing_curve",
     "held_over",
     "lift",
+    "lift_legs",
     "limit_load",
     "newton",
     "search_points",

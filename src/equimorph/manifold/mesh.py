@@ -69,7 +69,14 @@ class BaseMesh:
 
     def locate(self, point: Float[np.ndarray, " d"]) -> int:
         """Cell that contains a point; the nearest one by barycentric coordinates."""
-        return int(np.argmax(barycentric(self.vertices[self.cells], point).min(axis=1)))
+        corners = self.vertices[self.cells]
+        low, high = corners[:, 0], corners[:, 0]
+        for k in range(1, corners.shape[1]):
+            low, high = np.minimum(low, corners[:, k]), np.maximum(high, corners[:, k])
+        near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
+        if len(near) == 0:  # a little outside the box
+            near = np.arange(len(corners))
+        return int(near[np.argmax(barycentric(corners[near], point).min(axis=1))])
 
 
 def _lines(low: float, high: float, count: int, mirrored: bool) -> Float[np.ndarray, " lines"]:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift
+from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_legs
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure
@@ -74,9 +74,16 @@ def verified(
     way_points: Corners,
     within: tuple[Constraint, ...],
     monitor: Sequence[Descriptor] = (),
+    corners: States | None = None,
 ) -> Route:
-    """Lift the way-points once more, finely; the route if it ends in the goal, else the reason."""
-    path = lift(start, way_points, within=within, options=FINE)
+    """Lift the way-points once more, finely; the route if it ends in the goal, else the reason.
+
+    If the states at all `corners` are known, those of start and goal among them, legs are lifted
+    side by side; one after the other if that does not lead to the goal.
+    """
+    path = None if corners is None else lift_legs(corners, within, FINE)
+    if path is None:
+        path = lift(start, way_points, within=within, options=FINE)
     names = _moved(way_points)
     end = path.end
     if end.kind != "arrived":

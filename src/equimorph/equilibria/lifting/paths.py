@@ -1,22 +1,25 @@
 """What a lift of one state finds: a path with its events."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria.curves import Curve
+from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.hidden import with_hidden_events
 from equimorph.equilibria.lifting.legs import Leg, listed, prepared
 from equimorph.equilibria.march import UNRESOLVED
 from equimorph.equilibria.multiple import with_multiple_points
 from equimorph.equilibria.normal_form import criticality
 from equimorph.equilibria.outcome import KINDS, LOST, Outcome, follow
-from equimorph.equilibria.tracing import BRANCH, CONSTRAINT, FOLD, TraceOptions
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import State, States
+
+SAME = 1e-8
+"""Distance in the metric within which a leg ends where the next one begins."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,28 @@ def lift_one(
     return _joined(state, pieces)
 
 
+def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOptions) -> Path | None:
+    """Path through states that are known, its straight legs followed side by side.
+
+    As from the first of them in turn, in the time of the longest leg. None unless every leg leads
+    from one state to the next.
+    """
+    structure, begin, end = states.structure, states[:-1], states[1:]
+    options = replace(options, record=True, look_inside=False)
+    curve = ParameterLine(structure, begin.p.copy(), end.p - begin.p)
+    if not (curve.weight > 0.0).all():
+        return None
+    outcome = follow(curve, begin.z.copy(), within, options)
+    outcome = with_hidden_events(curve, begin.z, outcome, options)
+    outcome = with_multiple_points(curve, begin.z, outcome)
+    n = structure.unknowns
+    gap = np.sqrt((outcome.z[:, :n] - end.z[:, :n]) ** 2 @ structure.mass)
+    if not ((outcome.code == ARRIVAL) & (gap < SAME)).all():
+        return None
+    lanes = range(len(begin))
+    return _joined(states[0], [_segment(curve, outcome, lane, within, lane) for lane in lanes])
+
+
 @dataclass(frozen=True)
 class _Segment:
     """One leg of a path, without its first point."""
@@ -119,8 +144,11 @@ class _Segment:
 
 
 def _segment(
-    curve: Curve, outcome: Outcome, number: int, within: tuple[Constraint, ...]
+    curve: Curve, outcome: Outcome, number: int, within: tuple[Constraint, ...], lane: int = 0
 ) -> _Segment:
+    """One lane of an outcome, as leg number so much of a path."""
+    if len(outcome.code) > 1:
+        curve, outcome = curve.take(np.array([lane])), _lane(outcome, lane)
     events = (*_passed(curve, outcome, number), _end(curve, outcome, number, within))
     last = outcome.travelled[0] if outcome.code[0] != LOST else np.inf
     points = outcome.points.take(outcome.points.travelled < last)
@@ -130,6 +158,21 @@ def _segment(
     length = np.concatenate([points.travelled, outcome.travelled[ended]])
     index = np.concatenate([points.index, outcome.index[ended]])
     return _Segment(z, p, number + t, length, index, events)
+
+
+def _lane(outcome: Outcome, lane: int) -> Outcome:
+    """Outcome of one lane alone."""
+    one = slice(lane, lane + 1)
+    return Outcome(
+        outcome.code[one],
+        outcome.z[one],
+        outcome.t[one],
+        outcome.index[one],
+        outcome.travelled[one],
+        {0: outcome.why[lane]} if lane in outcome.why else {},
+        outcome.passed.take(outcome.passed.lanes == lane),
+        outcome.points.take(outcome.points.lanes == lane),
+    )
 
 
 def _states(

@@ -35,14 +35,27 @@ def checked_route(
     return kept_margin(verified(*ends, corners, demands.constraints, monitor), demands)
 
 
+def route_along(
+    eset: EquilibriumSet, corners: States, demands: Demands, monitor: Sequence[Descriptor]
+) -> Route:
+    """Return the route over corners from start to goal, verified, with its cost."""
+    ends, steps = (corners[0], corners[len(corners) - 1]), way_points_of(eset, corners)
+    found = verified(*ends, steps, demands.constraints, monitor, corners)
+    return kept_margin(found, demands)
+
+
+def way_points_of(eset: EquilibriumSet, corners: States) -> Corners:
+    """Way-points from the first of some corners over all others."""
+    return [{name: corner[name] for name in eset.names} for corner in list(corners)[1:]]
+
+
 def corners_of(
     eset: EquilibriumSet, path: States, demands: Demands, same_class: bool = False
-) -> Corners:
-    """Way-points of a straightened path."""
+) -> States:
+    """Corners of a straightened path, both ends among them."""
     corners = straightened(path, demands, same_class)
     free = np.array([position(eset.structure.parameters, name) for name in eset.names])
-    corners = relaxed(corners, demands, (eset.box, free), same_class)
-    return [{name: corner[name] for name in eset.names} for corner in list(corners)[1:]]
+    return relaxed(corners, demands, (eset.box, free), same_class)
 
 
 def kept_margin(route: Route, demands: Demands) -> Route:

@@ -13,8 +13,8 @@ from equimorph.model import Constraint, Descriptor, eased
 from equimorph.structures import State, States
 from equimorph.tasks.planning.admission import (
     check_ends,
-    checked_route,
     corners_of,
+    route_along,
     violation,
 )
 from equimorph.tasks.planning.homology import Edges, cocycles
@@ -80,7 +80,7 @@ def alternatives(  # noqa: PLR0913  # as `plan`
     if not paths:
         return (refused(no_route(eset, ends, demands)),)
     routes = [
-        checked_route(ends, corners_of(eset, path, demands, same_class=True), demands, monitor)
+        route_along(eset, corners_of(eset, path, demands, same_class=True), demands, monitor)
         for path in paths
     ]
     arrived = [route for route in routes if route.arrived]

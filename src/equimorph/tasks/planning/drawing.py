@@ -66,6 +66,14 @@ def drawn_by_lifts(corners: States, demands: Demands, room: Room, quick: bool) -
     )
 
 
+def chords(
+    corners: States, ways: tuple[Some, Some], demands: Demands
+) -> tuple[Bool[np.ndarray, " n"], Values]:
+    """Whether chords between some of the corners seem admissible, and what they cost."""
+    places = demands.objective.places(corners, rough=True)
+    return _chords(places[ways[0]], places[ways[1]], demands)
+
+
 def _drawn(
     corners: States, demands: Demands, room: Room, how: tuple[tuple[float, ...], int, bool]
 ) -> States:
@@ -167,7 +175,7 @@ def _directions(d: int) -> Float[np.ndarray, "directions d"]:
 
 
 def _gain(
-    old: Values, tried: Some, good: Bool[np.ndarray, " legs"], cost: Values
+    old: Values, tried: Some, good: Bool[np.ndarray, " legs"], cost: Float[np.ndarray, " legs"]
 ) -> Float[np.ndarray, " n"]:
     """What each move saves; −∞ where a leg is broken."""
     both, total = good.reshape(2, -1).all(axis=0), cost.reshape(2, -1).sum(axis=0)

@@ -11,7 +11,13 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, eased
 from equimorph.structures import State
 from equimorph.tasks.known import Start, known_state
-from equimorph.tasks.planning.admission import check_ends, checked_route, corners_of, violation
+from equimorph.tasks.planning.admission import (
+    check_ends,
+    checked_route,
+    corners_of,
+    route_along,
+    violation,
+)
 from equimorph.tasks.planning.links import Demands
 from equimorph.tasks.planning.network import Ends, cheapest_path, no_route
 from equimorph.tasks.planning.objectives import Wish, objective_of
@@ -121,7 +127,7 @@ def _free(
         tightened = replace(demands, margin=reserved)
         path = cheapest_path(eset, ends, tightened)
         if path is not None:
-            route = checked_route(ends, corners_of(eset, path, tightened), demands, monitor)
+            route = route_along(eset, corners_of(eset, path, tightened), demands, monitor)
             if route.arrived:
                 return route
     return route or refused(no_route(eset, ends, demands))

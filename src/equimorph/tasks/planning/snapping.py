@@ -13,7 +13,7 @@ from equimorph.equilibria import Landing, Path, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, snap_graph
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
-from equimorph.tasks.planning.admission import checked_route, corners_of
+from equimorph.tasks.planning.admission import corners_of, route_along, way_points_of
 from equimorph.tasks.planning.links import Demands, links
 from equimorph.tasks.planning.network import Ends, neighbours, network_of, own_links, with_ends
 from equimorph.tasks.prepared import kept
@@ -187,11 +187,10 @@ def _verified(
     """Lift every part finely; snaps start from where the lifts meet the folds."""
     stable, numbers = parts
     if not numbers:
-        corners = corners_of(eset, stable[0], demands)
-        return checked_route(ends, corners, demands, monitor)
+        return route_along(eset, corners_of(eset, stable[0], demands), demands, monitor)
     gates = gates_of(eset, demands)
-    here, corners, paths, snaps = ends[0], [], [], []
-    way_points: Corners = []
+    here, paths, snaps = ends[0], list[Path](), list[Landing]()
+    corners, way_points = Corners(), Corners()
     for part, number in zip(stable[:-1], numbers, strict=True):
         gate = gates[number]
         beyond = _beyond(eset, part[-1], gate.fold)
@@ -216,7 +215,7 @@ def _verified(
 
 
 def _corners(eset: EquilibriumSet, part: States, demands: Demands) -> Corners:
-    return corners_of(eset, part, demands) if len(part) > 1 else []
+    return way_points_of(eset, corners_of(eset, part, demands)) if len(part) > 1 else []
 
 
 def _beyond(eset: EquilibriumSet, before: State, fold: State) -> dict[str, float] | None:

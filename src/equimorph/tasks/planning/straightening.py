@@ -7,7 +7,7 @@ from equimorph.equilibria import ParameterLine, TraceOptions, newton
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.structures import States
-from equimorph.tasks.planning.drawing import Room, drawn, drawn_by_lifts
+from equimorph.tasks.planning.drawing import Room, chords, drawn, drawn_by_lifts
 from equimorph.tasks.planning.links import Demands, links, shortest
 
 MOST_SHORTCUTS = 8000
@@ -23,6 +23,8 @@ MERGED = 8
 """Legs that may become one."""
 GAIN = 1e-4
 """Share of the cost that a shorter list of corners may cost more."""
+UNSURE = 0.05
+"""Share of its cost by which a chord may mislead about a leg."""
 
 
 def straightened(states: States, demands: Demands, same_class: bool = False) -> States:
@@ -140,6 +142,9 @@ def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
     first, second = np.triu_indices(len(corners), 1)
     near = second - first <= (3 if demands.objective.needs_margins else MERGED)
     first, second = first[near], second[near]
+    if not same_class:
+        some = _promising(corners, (first, second), demands)
+        first, second = first[some], second[some]
     linked, cost = links(corners[first], corners[second], demands)
     if same_class:
         linked &= _swept(first, second, linked)
@@ -148,3 +153,18 @@ def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
     each = cost[linked] + GAIN * consecutive
     path = shortest(len(corners), pairs, each, (0, len(corners) - 1))
     return corners if path is None else corners[path]
+
+
+def _promising(
+    corners: States,
+    ways: tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]],
+    demands: Demands,
+) -> Int[np.ndarray, " some"]:
+    """Legs, and those unions of legs whose chords do not cost clearly more than these."""
+    first, second = ways
+    good, cost = chords(corners, ways, demands)
+    leg = second - first == 1
+    before = np.concatenate([[0.0], np.cumsum(cost[leg])])
+    apart = before[second] - before[first]
+    allowed = (1.0 + UNSURE) * apart + GAIN * before[-1] * (second - first - 1)
+    return np.flatnonzero(leg | (good & (cost <= allowed)))
