@@ -1,14 +1,19 @@
 """The stability margin: smallest eigenvalue of the constrained Hessian in the metric."""
 
+from functools import partial
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Bool, Float
 
+from equimorph.linalg.lanes import in_background, threads
 from equimorph.structures.contract import Structure
 
 RELATIVE = 1e-11
 NEAR = 1e-3
 """Distance of a shift below the eigenvalue, as a share of the second one, once that is known."""
-SWEEPS, CHUNK = 8, 256
+SWEEPS, CHUNK, SHARE = 8, 256, 1024
+"""Most solves; lanes at a time; least lanes that are worth a thread of their own."""
 
 Values = Float[np.ndarray, " lanes"]
 Pairs = Float[np.ndarray, "lanes 2 unknowns"]
@@ -29,9 +34,18 @@ def stability_margin(
     Scale: energy over the metric's unit squared.
     """
     value, proved = np.empty(len(z)), np.zeros(len(z), bool)
-    for begin in range(0, len(z), CHUNK):
-        part = slice(begin, begin + CHUNK)
-        value[part], proved[part] = _by_pairs(structure, z[part], p[part], error)
+
+    def run(begin: int, end: int) -> None:
+        for first in range(begin, end, CHUNK):
+            part = slice(first, min(first + CHUNK, end))
+            value[part], proved[part] = _by_pairs(structure, z[part], p[part], error)
+
+    shares = max(1, min(threads(), len(z) // SHARE)) if len(z) >= 2 * SHARE else 1
+    cuts = [len(z) * k // shares for k in range(shares + 1)]
+    jobs = in_background([partial(run, *cut) for cut in pairwise(cuts[1:])])
+    run(0, cuts[1])
+    for job in jobs:
+        job.result()
     rest = np.flatnonzero(~proved)
     if len(rest):
         value[rest] = _by_bisection(structure, z[rest], p[rest])
@@ -54,7 +68,7 @@ def _by_pairs(
         # one more sweep would shrink what is left so much
         left = ((first - shift) / np.maximum(second - shift, NEAR * np.abs(second))) ** 2
         tolerance = error * np.maximum(np.abs(first), 1e-3)
-        settled = stable & (sweep > 1) & (change * left <= tolerance)
+        settled = stable & (sweep > 0) & (change * left <= tolerance)
         value[todo[settled]], proved[todo[settled]] = first[settled], True
         more = stable & ~settled
         if not more.any():

@@ -70,7 +70,7 @@ def chords(
     corners: States, ways: tuple[Some, Some], demands: Demands
 ) -> tuple[Bool[np.ndarray, " n"], Values]:
     """Whether chords between some of the corners seem admissible, and what they cost."""
-    places = demands.objective.places(corners, rough=True)
+    places = demands.objective.places(corners)
     return _chords(places[ways[0]], places[ways[1]], demands)
 
 
@@ -78,7 +78,7 @@ def _drawn(
     corners: States, demands: Demands, room: Room, how: tuple[tuple[float, ...], int, bool]
 ) -> States:
     sizes, rounds, lifted = how
-    places = demands.objective.places(corners, rough=True)
+    places = demands.objective.places(corners)
     legs = _chords(places[:-1], places[1:], demands)[1]
     lifts = links(corners[:-1], corners[1:], demands)[1] if lifted else None
     chain = _Chain(places, legs, lifts)
@@ -101,7 +101,7 @@ def _chords(
     z, good = newton(a.structure, 0.5 * (a.z + b.z), p, iterations=8)
     some = np.flatnonzero(good)
     amid = States(a.structure, z[some], p[some])
-    middle, between = demands.objective.places(amid, rough=True), demands.objective.between
+    middle, between = demands.objective.places(amid), demands.objective.between
     cost = np.full(len(p), np.nan)
     cost[some] = between(first[some], middle) + between(middle, second[some])
     none = np.flatnonzero(~good)
@@ -116,7 +116,7 @@ def _moved(chain: _Chain, move: tuple[int, float], demands: Demands, room: Room)
     some = np.flatnonzero(demands.admissible(new)) if len(tried) else tried
     if len(some) == 0:
         return chain
-    tried, places = tried[some], demands.objective.places(new[some], rough=True)
+    tried, places = tried[some], demands.objective.places(new[some])
     before = _joined(chain.corners[tried - 1], places)
     after = _joined(places, chain.corners[tried + 1])
     good, cost = _chords(before, after, demands)

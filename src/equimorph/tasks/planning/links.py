@@ -107,7 +107,7 @@ def _costs(source: States, line: ParameterLine, outcome: Outcome, objective: Obj
     lane, t = lane[order], t[order]
     states = States(line.structure, z, line.take(lane).parameters(t))
     pairs = np.flatnonzero(lane[1:] == lane[:-1])
-    costs = objective.costs(states, pairs, pairs + 1, rough=True)
+    costs = objective.costs(states, pairs, pairs + 1)
     return np.bincount(lane[pairs], costs, len(lanes))
 
 

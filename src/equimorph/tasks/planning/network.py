@@ -10,7 +10,7 @@ from equimorph.manifold.topology import faces_of
 from equimorph.model import Constraint
 from equimorph.structures import State, States
 from equimorph.tasks.planning.links import Demands, Flags, Values, links, shortest
-from equimorph.tasks.planning.objectives import Objective
+from equimorph.tasks.planning.objectives import ROUGH, Objective
 from equimorph.tasks.prepared import kept
 
 CRITICAL = (1, 4, 7)
@@ -60,7 +60,7 @@ class Network:
             # margins of unstable vertices would be for nothing
             used, pairs = np.unique(self.pairs, return_inverse=True)
             first, second = pairs.reshape(self.pairs.shape).T
-            self._costs[key] = objective.costs(eset.points[used], first, second, rough=True)
+            self._costs[key] = objective.costs(eset.points[used], first, second, ROUGH)
         return self._costs[key]
 
     def verdicts(self, demands: Demands) -> tuple[Flags, Flags]:

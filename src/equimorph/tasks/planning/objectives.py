@@ -21,8 +21,8 @@ Wish = Term | Sequence[tuple[float, Term]]
 NAMES: tuple[Name, ...] = get_args(Name)
 LEAST_MARGIN = 1e-6
 """Margin below which clearance counts no further."""
-ROUGH = 1e-4
-"""Relative error of margins where ways are only compared."""
+EXACT, NEAR, ROUGH = 1e-11, 1e-4, 1e-2
+"""Relative errors of margins: of what is told, where ways are compared, and on a mesh."""
 
 
 @dataclass(frozen=True)
@@ -84,14 +84,14 @@ class Objective:
         """Whether stability margins count."""
         return any(term == "clearance" for _, term in self.terms)
 
-    def places(self, states: States, rough: bool = False) -> Places:
-        """States with what is to be known at each of them; `rough` for comparisons."""
+    def places(self, states: States, error: float = NEAR) -> Places:
+        """States with what is to be known at each of them, margins up to a relative error."""
         count, structure = len(states), states.structure
         efforts, nearness = np.zeros((count, 0)), np.zeros((count, 0))
         if any(term == "work" for _, term in self.terms):
             efforts = structure.effort(states.z, states.p) * structure.energy_scale
         if self.needs_margins:
-            margins = _rough_margins(states) if rough else states.margin
+            margins = states.margin if error == EXACT else _margins(states, error)
             nearness = 1.0 / np.maximum(margins, LEAST_MARGIN)[:, None]
         return Places(states, efforts, nearness)
 
@@ -102,15 +102,15 @@ class Objective:
             total += weight * _cost(term, first, second)
         return total
 
-    def costs(self, states: States, first: Numbers, second: Numbers, rough: bool = False) -> Values:
+    def costs(self, states: States, first: Numbers, second: Numbers, error: float = NEAR) -> Values:
         """Cost of the short way between pairs of states, by the trapezoidal rule."""
-        places = self.places(states, rough)
+        places = self.places(states, error)
         return self.between(places[first], places[second])
 
     def along(self, states: States) -> float:
         """Cost of the way through states in turn."""
         at = np.arange(len(states))
-        return float(self.costs(states, at[:-1], at[1:]).sum())
+        return float(self.costs(states, at[:-1], at[1:], EXACT).sum())
 
 
 def objective_of(wish: Wish, structure: Structure) -> Objective:
@@ -157,8 +157,8 @@ def _pair(entry: object) -> tuple[float, Term]:
     return number, term
 
 
-def _rough_margins(states: States) -> Float[np.ndarray, " lanes"]:
-    return stability_margin(states.structure, states.z, states.p, ROUGH)
+def _margins(states: States, error: float) -> Float[np.ndarray, " lanes"]:
+    return stability_margin(states.structure, states.z, states.p, error)
 
 
 def _cost(term: Term, first: Places, second: Places) -> Values:
