@@ -1,4 +1,4 @@
-"""Stability margins against dense eigenvalues of the Hessian on the tangent space of constraints."""
+"""Stability margins against dense eigenvalues of the Hessian where constraints allow to move."""
 
 import numpy as np
 import pytest
