@@ -74,10 +74,12 @@ _HOMES = {
     ),
     "equimorph.manifold": (
         "Audit",
+        "Components",
         "EquilibriumSet",
         "Location",
         "SnapGraph",
         "StabilityDistance",
+        "components",
         "equilibrium_set",
         "locate",
         "snap_graph",

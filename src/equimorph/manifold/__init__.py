@@ -2,6 +2,7 @@
 
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.build import INTERVALS, equilibrium_set
+from equimorph.manifold.components import Components, components
 from equimorph.manifold.cusp_points import Cusps, cusps
 from equimorph.manifold.equilibrium_set import (
     Boundary,
@@ -31,6 +32,7 @@ __all__ = [
     "Audit",
     "Boundary",
     "Component",
+    "Components",
     "Cusps",
     "Division",
     "EquilibriumSet",
@@ -43,6 +45,7 @@ __all__ = [
     "StatesOver",
     "Stratum",
     "cell_sizes",
+    "components",
     "cusps",
     "divided",
     "divided_by",

@@ -289,8 +289,10 @@ class Sheets:
         numbers = np.unique(near.point)
         lanes = [np.flatnonzero(point == number) for number in numbers]
         kept = np.concatenate([own[_firsts(self.structure, z[own])] for own in lanes])
-        z, point = z[kept], point[kept]
-        index = self.structure.index(z, p[point])
+        index = self.structure.index(z[kept], p[point[kept]])
+        # lifts from parts of sets leave them across folds
+        own = np.isin(index, self.cell_index)
+        z, point, index = z[kept[own]], point[kept[own]], index[own]
         for number in numbers:
             own, mine = point == number, near.point == number
             cell = self._nearest(z[own], index[own], guess[mine], near.take(mine))
