@@ -158,7 +158,7 @@ def test_the_page_without_a_set_says_what_was_asked(maps_alone):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"must ask for something: a \[set\], a \[\[map\]\] or a \[\[cal"),
+        ("", r"must ask for something: a \[set\], or one of the tables that need none"),
         (LIMIT + "[[equilibria]]\nat = { x_l = 1.0 }\n", r"must have a \[set\] to which its"),
     ],
 )

@@ -6,6 +6,8 @@ from equimorph.plotting.charts import chart_domain, parameterisation
 from equimorph.plotting.curvature_map import curvature_map
 from equimorph.plotting.diagram import diagram
 from equimorph.plotting.film import film
+from equimorph.plotting.followed import followed
+from equimorph.plotting.landscape import landscape
 from equimorph.plotting.level_plane import level_plane
 from equimorph.plotting.load_map import load_map
 from equimorph.plotting.margins import margins
@@ -14,21 +16,26 @@ from equimorph.plotting.portraits import portraits
 from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
 from equimorph.plotting.robustness import imperfection_laws, room, sensitivities, trials
 from equimorph.plotting.route_panels import route_panels
+from equimorph.plotting.schedule_strips import schedule_strips
 from equimorph.plotting.shapes import shapes
 from equimorph.plotting.snaps import snap_panels
 from equimorph.plotting.solutions import solutions
+from equimorph.plotting.strongest import beside_strongest, strongest_settings
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 
 __all__ = [
     "alternative_routes",
+    "beside_strongest",
     "calibration",
     "chart_domain",
     "curvature_map",
     "diagram",
     "film",
+    "followed",
     "house_style",
     "imperfection_laws",
+    "landscape",
     "level_plane",
     "load_map",
     "margins",
@@ -41,10 +48,12 @@ __all__ = [
     "room",
     "route_panels",
     "save",
+    "schedule_strips",
     "sensitivities",
     "shapes",
     "snap_panels",
     "solutions",
+    "strongest_settings",
     "surface",
     "trials",
 ]

@@ -35,12 +35,13 @@ _MARGIN = 0.06
 # From low (light) to high (dark), in even steps of lightness: it reads in grey.
 _ANCHORS = ("#f6f1e1", "#d3dfe6", "#a5c3db", "#719fc6", "#417aac", "#1d527f")
 _LEVELS = 9
-_GROUND: dict[str, Any] = {
+GROUND: dict[str, Any] = {
     "facecolor": "#f4f4f4",
     "edgecolor": "#c9c9c9",
     "hatch": "////",
     "linewidth": 0.0,
 }
+"""Where nothing is known."""
 _MARK: dict[str, Any] = {
     "facecolor": "none",
     "edgecolor": style.INK,
@@ -90,13 +91,18 @@ class Panel:
     from_zero: bool
 
 
+def new_map_axes(wider: float = 0.0) -> Axes:
+    """Empty axes for a map, one column wide; labels get so many inches more on both sides."""
+    height = _BOTTOM + _FRAME_HEIGHT + _TOP
+    room = (_LEFT + wider, _BOTTOM, _RIGHT + wider, _TOP)
+    return style.new_axes(style.SINGLE_COLUMN, height, room)
+
+
 def draw_map(amap: ActuatorMap, panel: Panel, ax: Axes | None) -> Axes:
     """Draw a map into axes, or into a figure of its own one column wide."""
     with style.house_style({"hatch.linewidth": 0.5}):
         own = ax is None
-        if ax is None:
-            height = _BOTTOM + _FRAME_HEIGHT + _TOP
-            ax = style.new_axes(style.SINGLE_COLUMN, height, (_LEFT, _BOTTOM, _RIGHT, _TOP))
+        ax = ax or new_map_axes()
         _frame(ax, amap)
         first, second = amap.grid.axes()
         axes, cuts = (first, second), _cuts(amap, panel)
@@ -107,8 +113,8 @@ def draw_map(amap: ActuatorMap, panel: Panel, ax: Axes | None) -> Axes:
             _mark(ax, faces(axes, panel.marked.astype(float), cuts), axes, panel.marked)
             entries.append(Patch(label=panel.mark_label, **_MARK))
         if not np.isfinite(amap.value).all():
-            entries.append(Patch(label=panel.ground_label, **_GROUND))
-        _write_legend(ax, entries, room=own)
+            entries.append(Patch(label=panel.ground_label, **GROUND))
+        write_legend(ax, entries, room=own)
     return ax
 
 
@@ -135,10 +141,11 @@ def _frame(ax: Axes, amap: ActuatorMap) -> None:
     ax.set_ylim(*limits[1])
     ax.set_xlabel(parameter_label(amap.structure, amap.grid.names[0]))
     ax.set_ylabel(parameter_label(amap.structure, amap.grid.names[1]))
-    ax.add_patch(Rectangle((low[0], low[1]), high[0] - low[0], high[1] - low[1], **_GROUND))
+    ax.add_patch(Rectangle((low[0], low[1]), high[0] - low[0], high[1] - low[1], **GROUND))
 
 
-def _colours() -> Colormap:
+def value_colours() -> Colormap:
+    """Colours from low to high values."""
     return LinearSegmentedColormap.from_list("load", list(_ANCHORS))
 
 
@@ -147,7 +154,12 @@ def _fill(ax: Axes, amap: ActuatorMap, panel: Panel, found: Faces) -> None:
     known = amap.value[np.isfinite(amap.value)]
     low, high = 0.0 if panel.from_zero else float(known.min()), float(known.max())
     norm = Normalize(low, high)
-    look: dict[str, Any] = {"cmap": _colours(), "norm": norm, "zorder": 1.5, "rasterized": True}
+    look: dict[str, Any] = {
+        "cmap": value_colours(),
+        "norm": norm,
+        "zorder": 1.5,
+        "rasterized": True,
+    }
     pieces = PolyCollection(found.pieces, array=found.values, **look)
     pieces.set(edgecolor="face", linewidth=0.3)
     ax.add_collection(pieces, autolim=False)
@@ -198,7 +210,7 @@ def _draw_curves(ax: Axes, amap: ActuatorMap, panel: Panel) -> list[Line2D]:
     return [kinds[kind] for kind in panel.looks if kind in kinds]
 
 
-def _write_legend(ax: Axes, entries: list[Line2D | Patch], *, room: bool) -> None:
+def write_legend(ax: Axes, entries: list[Line2D | Patch], *, room: bool) -> None:
     """Legend below the frame; with `room`, the figure grows by its height."""
     if not entries:
         return

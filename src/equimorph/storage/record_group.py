@@ -13,13 +13,14 @@ import h5py
 import numpy as np
 
 from equimorph import tasks
-from equimorph.equilibria import Event, Landing, Path, worst_named
+from equimorph.equilibria import Event, Landing, LimitLoad, Path, worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, StabilityDistance
-from equimorph.model import Box, Constraint, Descriptor, Schedule
-from equimorph.storage import set_group, states_group
+from equimorph.model import Box, Constraint, Descriptor, Grid, Schedule
+from equimorph.storage import map_group, set_group, states_group
 from equimorph.storage.hdf import get, get_json, put, put_json
 from equimorph.structures import State, States, Structure
+from equimorph.tasks import CurvatureMap, LimitLoadMap
 from equimorph.tasks.reach import Answer, Region
 
 ABOUT = "about"
@@ -30,8 +31,9 @@ def _known_records() -> dict[str, type]:
     """Dataclasses that are written field by field, by name."""
     ours = [getattr(tasks, name) for name in tasks.__all__]
     records = [each for each in ours if isinstance(each, type) and is_dataclass(each)]
-    others = (Answer, Event, Landing, Path, Region, Schedule, StabilityDistance)
-    return {each.__name__: each for each in (*others, *records)}
+    others = (Answer, Event, Landing, LimitLoad, Path, Region, Schedule, StabilityDistance)
+    maps = (CurvatureMap, LimitLoadMap)
+    return {each.__name__: each for each in (*others, *records) if each not in maps}
 
 
 RECORDS = _known_records()
@@ -102,20 +104,33 @@ def _put(group: h5py.Group, value: Any, place: str) -> Any:
             states_group.write(group.create_group(place), value.batch)
         case States():
             states_group.write(group.create_group(place), value)
+        case CurvatureMap() | LimitLoadMap():
+            map_group.write(group.create_group(place), value)
         case EquilibriumSet():
             set_group.write(group.create_group(place), value, value.structure.elevation)
+        case _:
+            return _named(value, place)
+    return {type(value).__name__: place}
+
+
+def _named(value: Any, place: str) -> Any:
+    """Plain data for what has names and numbers only."""
+    match value:
         case Descriptor():
             return {"descriptor": value.name}
         case Box():
-            sides = zip(value.lower.tolist(), value.upper.tolist(), strict=True)
-            return {"box": dict(zip(value.names, sides, strict=True))}
+            return {"box": _sides(value)}
+        case Grid():
+            counted = zip(_sides(value.box).items(), value.intervals, strict=True)
+            return {"grid": {name: [*side, count] for (name, side), count in counted}}
         case Constraint():
             return {"constraint": [value.descriptor.name, value.sense, value.bound]}
-        case _:
-            raise InputError(
-                f"`{place}` must be data that a file can hold; got {type(value).__name__}."
-            )
-    return {type(value).__name__: place}
+    raise InputError(f"`{place}` must be data that a file can hold; got {type(value).__name__}.")
+
+
+def _sides(box: Box) -> dict[str, tuple[float, float]]:
+    sides = zip(box.lower.tolist(), box.upper.tolist(), strict=True)
+    return dict(zip(box.names, sides, strict=True))
 
 
 def _decoded(group: h5py.Group, structure: Structure, plain: Any) -> Any:
@@ -140,6 +155,7 @@ _READERS: dict[str, Callable[[Inner, h5py.Group, Structure, Any], Any]] = {
     "record": _read_record,
     "constraint": _read_constraint,
     "box": lambda _, __, ___, sides: Box(**sides),
+    "grid": lambda _, __, ___, sides: Grid(**sides),
     "descriptor": lambda _, __, structure, name: worst_named(structure, name),
     "mapping": lambda inner, _, __, pairs: {inner(key): inner(each) for key, each in pairs},
     "tuple": lambda inner, _, __, entries: tuple(inner(each) for each in entries),
@@ -148,6 +164,8 @@ _READERS: dict[str, Callable[[Inner, h5py.Group, Structure, Any], Any]] = {
     "ndarray": lambda _, group, __, place: get(group, place),
     "State": lambda _, group, structure, place: states_group.read(group[place], structure)[0],
     "States": lambda _, group, structure, place: states_group.read(group[place], structure),
+    "CurvatureMap": lambda _, group, structure, place: map_group.read(group[place], structure),
+    "LimitLoadMap": lambda _, group, structure, place: map_group.read(group[place], structure),
     "EquilibriumSet": lambda _, group, structure, place: set_group.read(group[place], structure),
 }
 """How each kind of content is read, by the name that it was written under."""

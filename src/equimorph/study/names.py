@@ -17,6 +17,7 @@ class RouteFigures:
     """File names of the figures of one route, without extension; the film's with it."""
 
     plane: str
+    parameters: str
     shapes: str
     margins: str
     film: str
@@ -24,7 +25,13 @@ class RouteFigures:
 
 def route_figures(name: str) -> RouteFigures:
     """File names of the figures of the route called `name`."""
-    return RouteFigures(f"{name}-plane", f"{name}-shapes", f"{name}-margins", f"{name}-film.gif")
+    return RouteFigures(
+        f"{name}-plane",
+        f"{name}-parameters",
+        f"{name}-shapes",
+        f"{name}-margins",
+        f"{name}-film.gif",
+    )
 
 
 def map_files(name: str) -> str:

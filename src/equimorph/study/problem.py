@@ -11,21 +11,21 @@ from pydantic import Field, ValidationError, model_validator
 
 from equimorph.errors import InputError
 from equimorph.study.complaint import complaint
+from equimorph.study.sections.best import FollowSection, LandscapeSection, OptimumSection
 from equimorph.study.sections.extent import PointSection, SetSection
 from equimorph.study.sections.fields import Section, TaskSection, requirement
+from equimorph.study.sections.maps import MapSection, StrongestSection
 from equimorph.study.sections.robustness import (
     ImperfectionSection,
     RoomSection,
     SensitivitySection,
     SnapSection,
 )
-from equimorph.study.sections.routes import RouteSection
+from equimorph.study.sections.routes import RouteSection, SampledRouteSection
 from equimorph.study.sections.structures import StructureSection
 from equimorph.study.sections.tasks import (
     CalibrationSection,
     EstimateSection,
-    MapSection,
-    OptimumSection,
     ReachSection,
     ShapeSection,
     TrackSection,
@@ -44,7 +44,10 @@ class Study(Section):
     routes: list[RouteSection] = Field(default_factory=list, alias="route")
     shapes: list[ShapeSection] = Field(default_factory=list, alias="shape")
     optima: list[OptimumSection] = Field(default_factory=list, alias="optimum")
+    landscapes: list[LandscapeSection] = Field(default_factory=list, alias="landscape")
     tracks: list[TrackSection] = Field(default_factory=list, alias="track")
+    followed: list[FollowSection] = Field(default_factory=list, alias="follow")
+    sampled: list[SampledRouteSection] = Field(default_factory=list, alias="sampled_route")
     reaches: list[ReachSection] = Field(default_factory=list, alias="reach")
     checks: list[VerifySection] = Field(default_factory=list, alias="verify")
     sensitivities: list[SensitivitySection] = Field(default_factory=list, alias="sensitivity")
@@ -55,6 +58,7 @@ class Study(Section):
     estimates: list[EstimateSection] = Field(default_factory=list, alias="estimate")
     calibrations: list[CalibrationSection] = Field(default_factory=list, alias="calibration")
     maps: list[MapSection] = Field(default_factory=list, alias="map")
+    strongest: list[StrongestSection] = Field(default_factory=list, alias="strongest")
 
     @property
     def tasks(self) -> dict[str, list[TaskSection]]:
@@ -91,7 +95,10 @@ class Study(Section):
             if self.equilibria or any(section.needs_set for section in asked):
                 raise requirement("have a [set] to which its equilibria and questions belong")
             if not asked:
-                raise requirement("ask for something: a [set], a [[map]] or a [[calibration]]")
+                raise requirement(
+                    "ask for something: a [set], or one of the tables that need "
+                    "none, like [[map]], [[strongest]], [[calibration]] and [[sampled_route]]"
+                )
         return self
 
 

@@ -41,7 +41,7 @@ def report_of_states(  # what is told, piece by piece
 
 def heading(table: str, name: str) -> str:
     """Return the heading of an answer."""
-    return f"<h2>{table.capitalize()} {escape(name)}</h2>"
+    return f"<h2>{table.replace('_', ' ').capitalize()} {escape(name)}</h2>"
 
 
 def free_columns(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawn
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
@@ -19,6 +20,7 @@ from equimorph.study.sections.fields import TaskSection
 S = TypeVar("S", bound=TaskSection)
 T = TypeVar("T")
 A = TypeVar("A")
+Drawing = Axes | Drawn
 
 
 @dataclass(frozen=True)
@@ -85,10 +87,10 @@ class Asked:
         return self.section.name
 
 
-def still(name: str, draw: Callable[[], Axes]) -> Figure:
+def still(name: str, draw: Callable[[], Drawing]) -> Figure:
     """Figure that does not move, as PNG and SVG."""
     return Figure((f"{name}.png", f"{name}.svg"), partial(_save, draw, name))
 
 
-def _save(draw: Callable[[], Axes], name: str, folder: Path) -> None:
+def _save(draw: Callable[[], Drawing], name: str, folder: Path) -> None:
     plotting.save(draw(), folder, name)

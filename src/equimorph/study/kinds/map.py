@@ -4,29 +4,28 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from matplotlib.axes import Axes
 
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, Grid, Progress, position
+from equimorph.model import Constraint, Descriptor, Grid, Progress
 from equimorph.storage import write_map
 from equimorph.storage.parts import MAP_PART
 from equimorph.structures import Structure
 from equimorph.study import html
+from equimorph.study.kinds.actuator_grid import common_of, grid_of, unloaded_load
 from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.lookup import Extent, Ground, at_key, check_value, constraints_of
+from equimorph.study.lookup import Extent, Ground, at_key, constraints_of
 from equimorph.study.names import map_files
-from equimorph.study.sections.tasks import MapSection
+from equimorph.study.sections.maps import MapSection
 from equimorph.tasks import (
     ActuatorMap,
     CurvatureMap,
     LimitLoadMap,
     curvature_map,
     limit_load_map,
-    unloaded_base,
 )
 
 
@@ -51,9 +50,9 @@ class MapKind(Kind[MapSection, MapTask, ActuatorMap]):
     def prepared(self, ground: Ground, section: MapSection, key: str) -> MapTask:
         """Look up actuators, load and descriptor."""
         structure = ground.structure
+        grid = grid_of(structure, section, key)
         with at_key(key):
-            grid = _grid(structure, section)
-            _check_load(structure, section, grid)
+            _check_level(structure, section, grid)
             shown = "max_curvature" if section.descriptor is None else section.descriptor
             descriptor = structure.descriptor(shown) if section.at is not None else None
         constraints = constraints_of(structure, section.within, f"{key}.within")
@@ -69,12 +68,7 @@ class MapKind(Kind[MapSection, MapTask, ActuatorMap]):
     ) -> ActuatorMap:
         """Compute the map."""
         section, structure = task.section, ground.structure
-        common: dict[str, Any] = {
-            "within": task.constraints,
-            "fixed": section.fixed,
-            "bound": section.bound,
-            "progress": sink,
-        }
+        common = common_of(section, task.constraints, sink)
         with at_key(task.key):
             if section.at is None:
                 return limit_load_map(structure, task.grid, section.load, **common)
@@ -129,19 +123,8 @@ class MapKind(Kind[MapSection, MapTask, ActuatorMap]):
         return f"Map {task.section.name}: {counts}."
 
 
-def _grid(structure: Structure, section: MapSection) -> Grid:
-    for name, bounds in section.box.items():
-        for corner in bounds:
-            check_value(structure, name, corner)
-    sides = zip(section.box.items(), section.intervals, strict=True)
-    return Grid(**{name: (*bounds, count) for (name, bounds), count in sides})
-
-
-def _check_load(structure: Structure, section: MapSection, grid: Grid) -> None:
-    base = unloaded_base(structure, grid, section.load, section.fixed)
-    low = base[position(structure.parameters, section.load)]
-    if not low < section.bound:
-        raise InputError(f"`bound` must exceed {section.load} = {low:g}; got {section.bound}.")
+def _check_level(structure: Structure, section: MapSection, grid: Grid) -> None:
+    low = unloaded_load(structure, section, grid)
     if section.at is not None and not low < section.at < section.bound:
         raise InputError(
             f"`at` must lie between {section.load} = {low:g} and `bound` = "

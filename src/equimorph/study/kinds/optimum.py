@@ -21,7 +21,7 @@ from equimorph.study.kinds.found import (
 from equimorph.study.kinds.kind import Figure, Kind
 from equimorph.study.lookup import Ground, at_key, check_state, constraints_of, descriptor_at
 from equimorph.study.names import schedule_table, task_files
-from equimorph.study.sections.tasks import OptimumSection
+from equimorph.study.sections.best import OptimumSection
 from equimorph.tasks import Optima, optimise
 
 

@@ -9,18 +9,17 @@ import numpy as np
 from rich.markup import escape as plain
 
 from equimorph.equilibria import Leg
-from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, Progress, names_of
+from equimorph.model import Constraint, Progress
 from equimorph.storage import write_schedule
 from equimorph.storage.parts import RECORD_PART
-from equimorph.structures import Structure
 from equimorph.study import html
 from equimorph.study.choose import choose_state
 from equimorph.study.kinds.found import heading
 from equimorph.study.kinds.kind import Figure, Kind
+from equimorph.study.kinds.legs import Legs, legs_of, limits_of
 from equimorph.study.kinds.way import figures_of_way, pictures_of_way
-from equimorph.study.lookup import Ground, at_key, check_state, constraints_of, descriptor_at
+from equimorph.study.lookup import Ground, at_key, check_state, constraints_of
 from equimorph.study.names import schedule_table, task_files
 from equimorph.study.sections.tasks import TrackSection
 from equimorph.tasks import Route, Tracking, track
@@ -35,7 +34,7 @@ class TrackTask:
 
     key: str
     section: TrackSection
-    legs: tuple[Mapping[Descriptor | str, float], ...]
+    legs: Legs
     actuators: Mapping[str, tuple[float, float]]
     constraints: tuple[Constraint, ...]
 
@@ -53,20 +52,10 @@ class TrackKind(Kind[TrackSection, TrackTask, Tracking]):
 
     def prepared(self, ground: Ground, section: TrackSection, key: str) -> TrackTask:
         """Look up start, targets, actuators and constraints; limits are those of the box."""
-        structure, box = ground.structure, ground.box
+        structure = ground.structure
         check_state(ground, section.start, f"{key}.start")
-        sides = zip(box.names, box.lower.tolist(), box.upper.tolist(), strict=True)
-        limits = {name: (low, high) for name, low, high in sides}
-        unknown = [name for name in section.actuators if name not in limits]
-        if unknown:
-            raise InputError(
-                f"`{key}.actuators` must be free parameters of the set ({', '.join(limits)}); "
-                f"got {', '.join(unknown)}."
-            )
-        legs = tuple(
-            _leg(structure, leg, f"{key}.targets[{i}]") for i, leg in enumerate(section.targets)
-        )
-        actuators = {name: limits[name] for name in section.actuators}
+        legs = legs_of(structure, section.targets, f"{key}.targets")
+        actuators = limits_of(ground, section.actuators, f"{key}.actuators")
         constraints = constraints_of(structure, section.within, f"{key}.within")
         return TrackTask(key, section, legs, actuators, constraints)
 
@@ -127,15 +116,6 @@ class TrackKind(Kind[TrackSection, TrackTask, Tracking]):
                 f"legs. {plain(answer.why)}"
             )
         return f"{head}: [bold green]arrived[/], smallest margin {answer.margin:.3f}."
-
-
-def _leg(structure: Structure, leg: Mapping[str, float], key: str) -> dict[Descriptor | str, float]:
-    """Look up one leg: parameters stay names, all others are descriptors."""
-    names = names_of(structure.parameters)
-    return {
-        (text if text in names else descriptor_at(structure, text, key)): value
-        for text, value in leg.items()
-    }
 
 
 def _compromise(answer: Tracking) -> list[str]:

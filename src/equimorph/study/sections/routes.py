@@ -10,8 +10,10 @@ from equimorph.study.names import PLANE, STABLE_PLANE, route_name
 from equimorph.study.sections.extent import StateSection
 from equimorph.study.sections.fields import (
     ComparisonText,
+    Interval,
     Name,
     Point,
+    Section,
     TaskSection,
     is_number,
     requirement,
@@ -64,6 +66,36 @@ class PlannedSection(TaskSection):
         timed = "time" in ([self.objective] if isinstance(self.objective, str) else self.objective)
         if timed != (self.rates is not None):
             raise requirement("give the largest rates where its objective counts time, only there")
+        return self
+
+
+class NaturalSection(Section):
+    """A state without a set: the natural one at some parameters, and steps from there."""
+
+    at: Point = Field(default_factory=dict)
+    steps: list[Annotated[Point, Field(min_length=1)]] = Field(default_factory=list)
+
+
+class SampledRouteSection(PlannedSection):
+    """A route for many actuators, where no set can be computed; see `equimorph.plan_sampled`."""
+
+    start: NaturalSection
+    goal: NaturalSection | None = None
+    actuators: Annotated[dict[str, Interval], Field(min_length=1)]
+    loads: list[Annotated[Point, Field(min_length=1)]] = Field(default_factory=list)
+    lifts: Annotated[int, Field(ge=1, le=10_000_000)] = 40_000
+    reach: Positive = 0.5
+    seed: Annotated[int, Field(ge=0, le=2**31)] = 0
+
+    @property
+    def needs_set(self) -> bool:
+        """It begins with natural states."""
+        return False
+
+    @model_validator(mode="after")
+    def _ends_somewhere(self) -> "SampledRouteSection":
+        if self.goal is None and not self.loads:
+            raise requirement("give a goal, or loads under the last of which it ends")
         return self
 
 

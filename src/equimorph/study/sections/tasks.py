@@ -1,21 +1,18 @@
-"""Questions of a study file."""
+"""Questions of a study file: shapes, motions, what is reached, what was measured."""
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from equimorph.study.expressions import LARGEST
 from equimorph.study.sections.data import DataFile
 from equimorph.study.sections.extent import StateSection
 from equimorph.study.sections.fields import (
     ComparisonText,
-    Interval,
-    Intervals,
     Number,
     Point,
     TaskSection,
     requirement,
-    two,
 )
 
 
@@ -26,16 +23,6 @@ class ShapeSection(TaskSection):
     start: StateSection | None = None
     rank: Literal["route", "energy", "margin"] | None = None
     within: list[ComparisonText] = Field(default_factory=list)
-
-
-class OptimumSection(TaskSection):
-    """The best stable states; see `equimorph.optimise`."""
-
-    objective: str
-    sense: Literal["min", "max"] = "min"
-    start: StateSection | None = None
-    within: list[ComparisonText] = Field(default_factory=list)
-    margin: float = Field(default=0.0, ge=0, le=LARGEST)
 
 
 class TrackSection(TaskSection):
@@ -87,30 +74,3 @@ class CalibrationSection(TaskSection):
     def needs_set(self) -> bool:
         """It begins with natural states."""
         return False
-
-
-class MapSection(TaskSection):
-    """A map over two actuators, from the natural states of their settings on."""
-
-    kind: Literal["limit_load_map", "curvature_map"]
-    box: Annotated[dict[str, Interval], AfterValidator(two)]
-    intervals: Intervals
-    load: str
-    at: Number | None = None
-    descriptor: str | None = None
-    bound: float = Field(default=100.0, gt=0, le=LARGEST)
-    fixed: Point = Field(default_factory=dict)
-    within: list[ComparisonText] = Field(default_factory=list)
-
-    @property
-    def needs_set(self) -> bool:
-        """It begins with natural states."""
-        return False
-
-    @model_validator(mode="after")
-    def _level(self) -> "MapSection":
-        if (self.kind == "curvature_map") != (self.at is not None):
-            raise requirement("give the load `at` in a curvature_map, and only there")
-        if self.kind == "limit_load_map" and self.descriptor is not None:
-            raise requirement("give a descriptor in a curvature_map only")
-        return self

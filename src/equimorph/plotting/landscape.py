@@ -1,0 +1,113 @@
+"""The best stable state over two parameters, with barriers and gaps."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from mpl_toolkits.axes_grid1 import make_axes_locatable
+
+from equimorph.model import Descriptor
+from equimorph.plotting import style
+from equimorph.plotting.map_panel import GROUND, new_map_axes, value_colours, write_legend
+from equimorph.plotting.symbols import descriptor_label, parameter_label
+from equimorph.structures import Structure
+from equimorph.tasks import Landscape
+
+_LOOKS: dict[str, dict[str, Any]] = {
+    "stability": {"linewidths": 1.5, "linestyles": "-"},
+    "preference": {"linewidths": 1.0, "linestyles": (0, (2.4, 1.0))},
+}
+_LABELS = {"stability": "barrier: stability", "preference": "barrier: preference"}
+
+
+def landscape(
+    structure: Structure, found: Landscape, objective: Descriptor, ax: Axes | None = None
+) -> Axes:
+    """Values of an objective over two parameters, setting by setting; nothing is interpolated.
+
+    Barriers run between the settings whose best states are not connected; settings without an
+    allowed stable state are hatched.
+
+    Parameters
+    ----------
+    structure
+        Whose parameters they are.
+    found
+        The landscape.
+    objective
+        What was least or largest.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+    """
+    with style.house_style({"hatch.linewidth": 0.5}):
+        own = ax is None
+        ax = ax or new_map_axes(wider=0.12)
+        box = found.grid.box
+        ax.set_xlim(box.lower[0], box.upper[0])
+        ax.set_ylim(box.lower[1], box.upper[1])
+        ax.set_xlabel(parameter_label(structure, box.names[0]))
+        ax.set_ylabel(parameter_label(structure, box.names[1]))
+        ax.add_patch(Rectangle(tuple(box.lower), *(box.upper - box.lower), **GROUND))
+        known = found.value[~found.gaps]
+        if len(known):
+            _fill(ax, found, Normalize(known.min(), known.max()), descriptor_label(objective))
+        entries: list[Line2D | Patch] = list(_draw_barriers(ax, found))
+        if found.gaps.any():
+            entries.append(Patch(label="no stable state", **GROUND))
+        write_legend(ax, entries, room=own)
+    return ax
+
+
+def _fill(ax: Axes, found: Landscape, norm: Normalize, label: str) -> None:
+    """One cell around each setting, and the scale."""
+    x, y = found.grid.axes()
+    values = np.ma.masked_array(found.value, mask=found.gaps).T
+    look: dict[str, Any] = {"cmap": value_colours(), "norm": norm}
+    half = [0.5 * (line[1] - line[0]) for line in (x, y)]
+    ends = [(line[0] - room, line[-1] + room) for line, room in zip((x, y), half, strict=True)]
+    limits = ax.get_xlim(), ax.get_ylim()
+    ax.imshow(
+        values, extent=(*ends[0], *ends[1]), origin="lower", aspect="auto",
+        interpolation="nearest", zorder=1.5, **look,
+    )  # fmt: skip
+    ax.set(xlim=limits[0], ylim=limits[1])
+    beside = make_axes_locatable(ax).append_axes("right", size=0.08, pad=0.06)
+    bar = ax.figure.colorbar(ScalarMappable(norm, look["cmap"]), cax=beside)
+    bar.outline.set_linewidth(style.HAIRLINE)
+    bar.set_label(label)
+
+
+def _draw_barriers(ax: Axes, found: Landscape) -> list[Line2D]:
+    """Draw barriers along the rims of the cells; return one labelled line of each kind."""
+    lines = _rims(found)
+    kinds = np.array(found.barriers.kind, dtype=object)
+    entries = []
+    for kind, look in _LOOKS.items():
+        mine = lines[kinds == kind]
+        if len(mine):
+            ax.add_collection(
+                LineCollection(list(mine), colors=style.INK, zorder=4, capstyle="round", **look)
+            )
+            shown = {"linewidth": look["linewidths"], "linestyle": look["linestyles"]}
+            entries.append(Line2D([], [], color=style.INK, label=_LABELS[kind], **shown))
+    return entries
+
+
+def _rims(found: Landscape) -> Float[np.ndarray, "edges 2 2"]:
+    """Side between the cells of the two settings of each edge that crosses a barrier."""
+    ends = found.barriers.ends
+    box = found.grid.box
+    step = (box.upper - box.lower) / np.array(found.grid.intervals)
+    middle = ends.mean(axis=1)
+    across = np.where(np.abs(ends[:, 1] - ends[:, 0]) > 0.5 * step, 0.0, 0.5 * step)
+    return np.stack([middle - across, middle + across], axis=1)

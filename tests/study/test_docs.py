@@ -1,0 +1,28 @@
+"""The guide to study files names every table, and its pieces are sound."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from equimorph.study import parse_study, prepare
+from equimorph.study.kinds import KINDS
+
+GUIDE = (Path(__file__).parents[2] / "docs" / "studies.md").read_text(encoding="utf-8")
+PIECES = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)
+SPRING = '[structure]\nkind = "spring"\n[set]\nbox = { x_l = [0.5, 1.3], F = [-0.2, 0.2] }\n'
+ARCH = '[structure]\nkind = "rod"\nload = "uniform"\n'
+STRUCTURES = {"quick": SPRING, "uniform": ARCH}
+
+
+def test_the_guide_names_every_table():
+    assert all(f"`[[{kind.table}]]`" in GUIDE for kind in KINDS)
+
+
+@pytest.mark.parametrize("piece", PIECES, ids=lambda piece: piece.split('"')[1])
+def test_a_piece_of_the_guide_is_a_sound_study(piece: str):
+    name = piece.split('"')[1]
+    if name not in STRUCTURES:  # the bridge is long: its keys are checked, not its names
+        parse_study(ARCH + piece, "guide.toml")
+        return
+    assert prepare(parse_study(STRUCTURES[name] + piece, "guide.toml")).tasks
