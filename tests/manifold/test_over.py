@@ -89,6 +89,9 @@ def test_isola_over_one_parameter():
     for here, square in zip(eset.over(**at), inside, strict=True):
         root = np.sqrt([square]) if square > 0 else np.zeros(0)
         np.testing.assert_allclose(np.sort(here.states.z[:, 0]), [*-root, *root], atol=1e-10)
+    # just outside both folds, where cells are near, and far from all of them
+    for place in (-np.sqrt(0.91) - 1e-9, np.sqrt(0.91) + 1e-3, 1.5):
+        assert len(eset.at(a=place)) == 0
 
 
 def test_tilted_torus_has_up_to_four_sheets():

@@ -259,9 +259,9 @@ class Sheets:
         sign = self._sign[cell]
         # a state just beyond the straight edge of a constraint has no cell above the point
         paired = np.where(inside | ~capped, sign, 0)
-        surplus = np.bincount(hits.point[found], paired[found], count)
-        surplus -= np.bincount(
-            hits.point, np.where(self._overturned[cell], -sign, sign) * inside, count
+        above = np.where(self._overturned[cell], -sign, sign) * inside
+        surplus = np.bincount(hits.point[found], paired[found], count) - np.bincount(
+            hits.point, above, count
         )
         return np.asarray((surplus == 0.0) & (np.bincount(hits.point, failed, count) == 0.0))
 
