@@ -23,7 +23,11 @@ CLOSE = 1e-6
 """Distance from a curve, in scales, at which its sides are looked at."""
 ALIKE = 1e-7
 WIDEST, NARROW = 0.02, 1e-4
-"""Distances along a cliff between the values of the first and the last parabola."""
+"""Distances along a cliff between the values of the first and the last polynomial."""
+STENCIL, SURE = np.arange(-3.0, 4.0), 3e-5
+"""Places of these values; share of the last term in the bend of a polynomial that is trusted."""
+BESIDE = 10.0 ** -np.arange(2.0, 7.0)
+"""Distances from a ridge, in scales, at which both sides are looked at."""
 SLOPE = 1e-3
 """First step along a curve, to see how its slope changes."""
 MET = 1e-6
@@ -46,6 +50,8 @@ class Ridge:
         Direction across the curve in the plane of settings, of unit length in scales.
     cliff
         Whether the value is the limit from one side only.
+    sides
+        Of a cliff: limit loads on both sides, at distances `BESIDE`.
     """
 
     setting: Pair
@@ -53,6 +59,7 @@ class Ridge:
     slope: float
     across: Pair
     cliff: bool
+    sides: Float[np.ndarray, "2 distances"] | None = None
 
 
 def highest(lmap: LimitLoadMap, curve: MapCurve) -> Ridge | None:
@@ -108,31 +115,73 @@ def _top_of_ridge(lmap: LimitLoadMap, locus: Locus, spot: Spot | None) -> Ridge 
 
 
 def _top_of_cliff(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> Ridge | None:
-    """Climb the limit load on the higher side of a cliff along the curve, by parabolas."""
-    width, slope = WIDEST, np.nan
+    """Climb the limit load on the higher side of a cliff along the curve, by polynomials."""
+    width = WIDEST
     for _ in range(ITERATIONS):
-        around = [advance(locus, spot, -width), spot, advance(locus, spot, width)]
-        if any(each is None for each in around):
-            return None
-        known = [each for each in around if each is not None]
-        places = [e.x[-3:-1] + side * CLOSE * _aligned(lmap, e, spot) for e in known]
-        left, middle, right = lmap.rays(np.array(places)).tolist()
-        slope, bend = (right - left) / (2.0 * width), (left - 2.0 * middle + right) / width**2
-        step = -slope / bend if bend < 0.0 else 2.0 * width * float(np.sign(slope))
-        if not np.isfinite(step):
-            return None
-        ahead = advance(locus, spot, float(np.clip(step, -2.0 * width, 2.0 * width)))
-        if ahead is None:
-            return None
-        spot = ahead
-        if abs(step) < 0.3 * width:
+        values = _along(lmap, locus, spot, (side, width))
+        if values is None:  # the curve ends, or the cliff does
             width *= 0.2
+        else:
+            top, unsure = _top_of(values)
+            ahead = advance(locus, spot, top * width) if top != 0.0 else spot
+            if ahead is None:
+                return None
+            spot = ahead
+            if abs(top) < STENCIL[-1]:
+                if unsure < SURE:
+                    break
+                width *= 0.2
         if width < NARROW:
             break
-    across = normal_of(lmap, spot)
-    near = spot.x[-3:-1] + side * CLOSE * np.array([[1.0], [2.0]]) * across
-    one, two = lmap.rays(near).tolist()
-    return Ridge(spot.x[-3:-1], 2.0 * one - two, abs(float(slope)), across, True)
+    return _cliff_at(lmap, locus, spot, side)
+
+
+def _along(
+    lmap: LimitLoadMap, locus: Locus, spot: Spot, beside: tuple[float, float]
+) -> Float[np.ndarray, " stencil"] | None:
+    """Limit loads close to a curve, on one side of it, at steps of a width along it."""
+    side, width = beside
+    spots = [spot if step == 0.0 else advance(locus, spot, step * width) for step in STENCIL]
+    known = [each for each in spots if each is not None]
+    if len(known) < len(spots):
+        return None
+    places = [each.x[-3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
+    values = lmap.rays(np.array(places))
+    return values if np.isfinite(values).all() else None
+
+
+def _top_of(values: Float[np.ndarray, " stencil"]) -> tuple[float, float]:
+    """Where a polynomial through values is largest, in widths, and how large its last terms are.
+
+    As a share of its bend: what is left out moves the top by less than that.
+    """
+    powers = np.linalg.solve(np.vander(STENCIL, increasing=True), values)
+    polynomial = np.polynomial.Polynomial(powers)
+    roots = polynomial.deriv().roots()
+    real = roots.real[np.abs(roots.imag) < 1e-9]
+    tried = np.concatenate([STENCIL[[0, -1]], real[np.abs(real) < STENCIL[-1]]])
+    return float(tried[polynomial(tried).argmax()]), float(abs(powers[-1] / powers[2]))
+
+
+def _cliff_at(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> Ridge | None:
+    """Value, slope and sides of a cliff at a point of its curve."""
+    setting, across = spot.x[-3:-1], normal_of(lmap, spot)
+    ends = [advance(locus, spot, step) for step in (-NARROW, NARROW)]
+    known = [each for each in ends if each is not None]
+    if len(known) < len(ends):
+        return None
+    along = [each.x[-3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
+    near = setting + side * CLOSE * np.array([[1.0], [2.0]]) * across
+    values = lmap.rays(np.concatenate([near, along, settings_beside(setting, across)]))
+    one, two, left, right = values[:4].tolist()
+    slope = abs(right - left) / (2.0 * NARROW)
+    return Ridge(setting, 2.0 * one - two, slope, across, True, values[4:].reshape(2, -1))
+
+
+def settings_beside(setting: Pair, across: Pair) -> Float[np.ndarray, "settings 2"]:
+    """Settings on one side and on the other, at distances `BESIDE`."""
+    steps = BESIDE[:, None] * across
+    return np.concatenate([setting - steps, setting + steps])
 
 
 def _aligned(lmap: LimitLoadMap, spot: Spot, other: Spot) -> Pair:

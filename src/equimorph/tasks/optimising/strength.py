@@ -13,13 +13,11 @@ from equimorph.errors import InputError
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
 from equimorph.tasks.optimising.climbing import climb
 from equimorph.tasks.optimising.minimax import raised
-from equimorph.tasks.optimising.ridges import highest
+from equimorph.tasks.optimising.ridges import BESIDE, highest, settings_beside
 
 Settings = Float[np.ndarray, "lanes 2"]
 Values = Float[np.ndarray, " lanes"]
 
-BESIDE = 10.0 ** -np.arange(2.0, 7.0)
-"""Distances from a ridge, in scales, at which both sides are looked at."""
 CANDIDATES = 4
 ROBUST = 2
 """Local maxima of the worst case over the vertices from which robust optima are searched."""
@@ -188,7 +186,9 @@ def _sure(lmap: LimitLoadMap) -> list[Strongest]:
             continue
         if ridge.slope > LEVEL:  # the end of a curve
             continue
-        sides = _sides(lmap, ridge.setting, ridge.across)
+        sides = ridge.sides
+        if sides is None:
+            sides = _sides(lmap, ridge.setting, ridge.across)
         if np.isfinite(sides).any() and np.isfinite(ridge.value):
             kind = f"{curve.kind}, cliff" if ridge.cliff else curve.kind
             what = (ridge.value, kind, ridge.slope)
@@ -260,8 +260,7 @@ def _sides(
     lmap: LimitLoadMap, setting: Float[np.ndarray, " 2"], across: Float[np.ndarray, " 2"]
 ) -> Float[np.ndarray, "2 distances"]:
     """Limit loads on both sides of a setting."""
-    steps = BESIDE[:, None] * across
-    return lmap.rays(np.concatenate([setting - steps, setting + steps])).reshape(2, -1)
+    return lmap.rays(settings_beside(setting, across)).reshape(2, -1)
 
 
 def _strongest(
