@@ -33,6 +33,9 @@ class Snap:
         Vertices of the boundary that were tried, in order along it.
     landings
         Where each of them lands.
+    along
+        All vertices of the boundary from the first that was tried to the last; over three
+        parameters, where they have no order, those that were tried.
     """
 
     source: int
@@ -40,6 +43,7 @@ class Snap:
     status: str
     vertices: Int[np.ndarray, " tried"]
     landings: tuple[Landing, ...]
+    along: Int[np.ndarray, " n"]
 
     @property
     def released(self) -> tuple[float, float]:
@@ -175,7 +179,9 @@ class _Edge:
     def _snap(self, run: list[int]) -> Snap:
         landings = tuple(self.known[place][0] for place in run)
         status, target = self._outcome(run[0])
-        return Snap(self.source, target, status, self.vertices[run], landings)
+        ordered = len(self.eset.names) < 3
+        along = self.vertices[run[0] : run[-1] + 1] if ordered else self.vertices[run]
+        return Snap(self.source, target, status, self.vertices[run], landings, along)
 
     def _bisect(self, low: int, high: int) -> None:
         """Try places between two, as long as their outcomes differ."""

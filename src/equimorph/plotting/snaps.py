@@ -127,9 +127,11 @@ def _draw_along(ax: Axes, graph: SnapGraph, descriptor: Descriptor, shades: Scal
     total = sum(float(length[-1]) for length in lengths) or 1.0
     start, ticks = 0.0, []
     for number, (snap, length) in enumerate(zip(graph.snaps, lengths, strict=True), start=1):
-        at = (start + length) / total
-        before = descriptor(eset.points[snap.vertices])
-        ax.plot(at, before, color=style.INK, linewidth=1.4, zorder=3)
+        whole = (start + length) / total
+        ax.plot(
+            whole, descriptor(eset.points[snap.along]), color=style.INK, linewidth=1.4, zorder=3
+        )
+        at, before = whole[_tried(snap)], descriptor(eset.points[snap.vertices])
         if _kind(snap) == "held":
             ax.scatter(at, before, marker="x", color=style.INK, s=14, linewidths=0.8, zorder=5)
         for place, low, landing in zip(at, before, snap.landings, strict=True):
@@ -150,9 +152,18 @@ def _draw_along(ax: Axes, graph: SnapGraph, descriptor: Descriptor, shades: Scal
 def _length(graph: SnapGraph, snap: Snap) -> Float[np.ndarray, " n"]:
     """Length along a run, in ranges of the box."""
     eset = graph.eset
-    places = eset.coordinates[snap.vertices] / (eset.box.upper - eset.box.lower)
+    places = eset.coordinates[snap.along] / (eset.box.upper - eset.box.lower)
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _tried(snap: Snap) -> list[int]:
+    """Places of the tried vertices in the run; a closed one begins and ends at the same."""
+    places: list[int] = []
+    for vertex in snap.vertices:
+        first = places[-1] + 1 if places else 0
+        places.append(first + int(np.flatnonzero(snap.along[first:] == vertex)[0]))
+    return places
 
 
 def _entries(graph: SnapGraph) -> list[Line2D]:

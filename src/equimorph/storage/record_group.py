@@ -15,7 +15,7 @@ import numpy as np
 from equimorph import tasks
 from equimorph.equilibria import Event, Landing, LimitLoad, Path, worst_named
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet, StabilityDistance
+from equimorph.manifold import EquilibriumSet, Snap, StabilityDistance
 from equimorph.model import Box, Constraint, Descriptor, Grid, Schedule
 from equimorph.storage import map_group, set_group, states_group
 from equimorph.storage.hdf import get, get_json, put, put_json
@@ -31,7 +31,7 @@ def _known_records() -> dict[str, type]:
     """Dataclasses that are written field by field, by name."""
     ours = [getattr(tasks, name) for name in tasks.__all__]
     records = [each for each in ours if isinstance(each, type) and is_dataclass(each)]
-    others = (Answer, Event, Landing, LimitLoad, Path, Region, Schedule, StabilityDistance)
+    others = (Answer, Event, Landing, LimitLoad, Path, Region, Schedule, Snap, StabilityDistance)
     maps = (CurvatureMap, LimitLoadMap)
     return {each.__name__: each for each in (*others, *records) if each not in maps}
 

@@ -19,6 +19,7 @@ from equimorph.study.sections.robustness import (
     ImperfectionSection,
     RoomSection,
     SensitivitySection,
+    SnapGraphSection,
     SnapSection,
 )
 from equimorph.study.sections.routes import RouteSection, SampledRouteSection
@@ -54,6 +55,7 @@ class Study(Section):
     imperfections: list[ImperfectionSection] = Field(default_factory=list, alias="imperfection")
     rooms: list[RoomSection] = Field(default_factory=list, alias="room")
     snaps: list[SnapSection] = Field(default_factory=list, alias="snap")
+    snap_graphs: list[SnapGraphSection] = Field(default_factory=list, alias="snap_graph")
     trials: list[TrialsSection] = Field(default_factory=list, alias="trials")
     estimates: list[EstimateSection] = Field(default_factory=list, alias="estimate")
     calibrations: list[CalibrationSection] = Field(default_factory=list, alias="calibration")

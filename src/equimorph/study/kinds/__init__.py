@@ -17,6 +17,7 @@ from equimorph.study.kinds.sampled_route import SampledRouteKind
 from equimorph.study.kinds.sensitivity import SensitivityKind
 from equimorph.study.kinds.shape import ShapeKind
 from equimorph.study.kinds.snap import SnapKind
+from equimorph.study.kinds.snap_graph import SnapGraphKind
 from equimorph.study.kinds.strongest import StrongestKind
 from equimorph.study.kinds.track import TrackKind
 from equimorph.study.kinds.trials import TrialsKind
@@ -36,6 +37,7 @@ KINDS: tuple[Kind[Any, Any, Any], ...] = (
     ImperfectionKind(),
     RoomKind(),
     SnapKind(),
+    SnapGraphKind(),
     TrialsKind(),
     EstimateKind(),
     CalibrationKind(),

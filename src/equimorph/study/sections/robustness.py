@@ -43,3 +43,10 @@ class RoomSection(OfStateSection):
 
 class SnapSection(OfStateSection):
     """The least change of parameters to a snap; see `equimorph.least_snap`."""
+
+
+class SnapGraphSection(TaskSection):
+    """Where snaps lead from all of the stability boundary; see `equimorph.snap_graph`."""
+
+    samples: int = Field(default=9, ge=2, le=1000)
+    descriptor: str | None = None

@@ -1,0 +1,167 @@
+"""Where snaps lead from all of the stability boundary: ``[[snap_graph]]``."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from html import escape
+from pathlib import Path
+
+import numpy as np
+from rich.markup import escape as plain
+
+from equimorph import plotting
+from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
+from equimorph.model import Descriptor, Progress
+from equimorph.storage.parts import RECORD_PART
+from equimorph.structures import States
+from equimorph.study import html
+from equimorph.study.kinds.kind import Figure, Kind, still
+from equimorph.study.lookup import Ground, at_key, descriptor_at
+from equimorph.study.names import task_files
+from equimorph.study.sections.robustness import SnapGraphSection
+
+Snaps = tuple[tuple[int, ...], tuple[Snap, ...], tuple[States, ...]]
+"""Stable strata, runs of their boundaries, and the states from which the snaps of each begin."""
+CAPTION = (
+    "The stability boundary in runs from which all snaps lead to the same stratum, numbered as in "
+    "the table: over the parameters, and states before and after the snap along it."
+)
+
+
+@dataclass(frozen=True)
+class SnapGraphTask:
+    """Where snaps lead, with the descriptor that tells states apart."""
+
+    key: str
+    section: SnapGraphSection
+    descriptor: Descriptor
+
+    @property
+    def files(self) -> str:
+        """Beginning of the names of its files."""
+        return task_files(SnapGraphKind.table, self.section.name)
+
+
+class SnapGraphKind(Kind[SnapGraphSection, SnapGraphTask, Snaps]):
+    """Runs of the stability boundary, where snaps from them land, and the energy freed."""
+
+    table = "snap_graph"
+    part = RECORD_PART
+
+    def prepared(self, ground: Ground, section: SnapGraphSection, key: str) -> SnapGraphTask:
+        """Look up the descriptor."""
+        text = section.descriptor
+        named = (
+            ground.structure.elevation
+            if text is None
+            else descriptor_at(ground.structure, text, f"{key}.descriptor")
+        )
+        return SnapGraphTask(key, section, named)
+
+    def answer(
+        self, ground: Ground, eset: EquilibriumSet | None, task: SnapGraphTask, sink: Progress
+    ) -> Snaps:
+        """Follow the snaps; of their ways only the ends are kept."""
+        assert eset is not None
+        with at_key(task.key):
+            graph = snap_graph(eset, samples=task.section.samples, progress=sink)
+        snaps = tuple(_lean(snap) for snap in graph.snaps)
+        return graph.strata, snaps, tuple(eset.points[snap.vertices] for snap in snaps)
+
+    def write_tables(self, task: SnapGraphTask, answer: Snaps, folder: Path) -> None:
+        """Write every snap that was followed: from where, to where, and the energy freed."""
+        with (folder / f"{task.files}.csv").open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            head = ["run", "from stratum", "to stratum", "status", "energy freed"]
+            value, parameters = task.descriptor, self._parameters(answer)
+            table.writerow([*head, *parameters, f"{value.name} before", f"{value.name} after"])
+            for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1):
+                for state, landing in zip(states, snap.landings, strict=True):
+                    after = value(landing.state) if landing.landed else ""
+                    table.writerow([
+                        number, snap.source, snap.target, landing.status, landing.released,
+                        *state.parameters.values(), value(state), after,
+                    ])  # fmt: skip
+
+    def figures(
+        self, ground: Ground, eset: EquilibriumSet | None, task: SnapGraphTask, answer: Snaps
+    ) -> Sequence[Figure]:
+        """Two panels, over two parameters."""
+        assert eset is not None
+        if len(eset.names) != 2 or not answer[1]:
+            return []
+        draw = partial(plotting.snap_panels, SnapGraph(eset, *answer[:2]), task.descriptor)
+        return [still(task.files, draw)]
+
+    def report(self, task: SnapGraphTask, answer: Snaps, folder: Path) -> list[str]:
+        """Figure, and a table of the runs."""
+        title = f"<h2>Snap graph {escape(task.section.name)}</h2>"
+        words = f"<p>{escape(_extent(answer))}</p>"
+        if not answer[1]:
+            return [title, words]
+        varied = [
+            name
+            for name in self._parameters(answer)
+            if np.ptp(np.concatenate([states[name] for states in answer[2]])) > 0.0
+        ]
+        head = ["run", "from", "to", *map(escape, varied), "snaps followed", "energy freed"]
+        rows = [
+            [
+                str(number),
+                f"stratum {snap.source}",
+                escape(_goal(snap)),
+                *(_between(states[name].min(), states[name].max()) for name in varied),
+                str(len(snap.landings)),
+                _between(*snap.released),
+            ]
+            for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1)
+        ]
+        file = f"{task.files}.csv"
+        return [
+            title,
+            words,
+            html.pictures(folder, {f"{task.files}.png": CAPTION}, {}),
+            html.table(head, rows),
+            f'<p>Every snap that was followed: <a href="{file}">{file}</a>.</p>',
+        ]
+
+    @staticmethod
+    def _parameters(answer: Snaps) -> list[str]:
+        """Names of all parameters."""
+        return list(answer[2][0][0].parameters) if answer[2] else []
+
+    def verdict(self, task: SnapGraphTask, answer: Snaps) -> str:
+        """Strata, runs, and the most energy that is freed."""
+        return f"Snap graph {task.section.name}: {plain(_extent(answer))}"
+
+
+def _lean(snap: Snap) -> Snap:
+    ends = np.array([0, -1])
+    landings = (
+        replace(each, way=each.way[ends], time=each.time[ends]) if len(each.way) else each
+        for each in snap.landings
+    )
+    return replace(snap, landings=tuple(landings))
+
+
+def _goal(snap: Snap) -> str:
+    """Where the snaps of a run lead, in words."""
+    if snap.status == "held":
+        return "no snap: nothing moves"
+    return f"stratum {snap.target}" if snap.target >= 0 else f"out of the set ({snap.status})"
+
+
+def _extent(answer: Snaps) -> str:
+    strata, snaps, _ = answer
+    if not snaps:
+        return "no stability boundary in the box: nothing snaps."
+    most = max(snap.released[1] for snap in snaps)
+    stable = "1 stable stratum" if len(strata) == 1 else f"{len(strata)} stable strata"
+    runs = "1 run" if len(snaps) == 1 else f"{len(snaps)} runs"
+    return f"{stable}, {runs} of the stability boundary; a snap frees {most:.4g} at most."
+
+
+def _between(low: float, high: float) -> str:
+    one, other = html.number(low), html.number(high)
+    return one if one == other else f"{one} … {other}"
