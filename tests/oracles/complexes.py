@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.fabric import fabric_of
 from equimorph.manifold.levels import fabric_setting
+from equimorph.manifold.parted_sheets import parted
 from equimorph.manifold.simplices import volumes
 from equimorph.manifold.topology import (
     adjacency,
@@ -38,14 +39,17 @@ def assert_faithful(eset: EquilibriumSet) -> None:
 def assert_links(eset: EquilibriumSet) -> None:
     """Around every vertex of a set over three parameters, cells form a ball, or half of one.
 
-    Its link is a sphere, or a disc at the boundary of the set: vertices − edges + triangles.
+    Its link is a sphere, or a disc at the boundary of the set: vertices − edges + triangles. Where
+    sheets cross, that holds for each part of them.
     """
-    count = len(eset.points)
+    crossings = [np.zeros((0, 3), int), *eset.crossings]
+    cells, origin = parted(eset.cells, np.concatenate(crossings), len(eset.points))
+    count = len(origin)
     amounts = [
         np.bincount(faces.ravel(), minlength=count)
-        for faces in (faces_of(eset.cells, 2), faces_of(eset.cells, 3), eset.cells)
+        for faces in (faces_of(cells, 2), faces_of(cells, 3), cells)
     ]
-    whole = adjacency(eset.cells)
+    whole = adjacency(cells)
     rim = np.zeros(count, bool)
     rim[whole.facets[whole.counts == 1]] = True
     assert np.array_equal(amounts[0] - amounts[1] + amounts[2], np.where(rim, 1, 2))
@@ -190,20 +194,23 @@ def assert_boundaries(eset: EquilibriumSet) -> None:
         own = np.unique(loop.vertices)
         capped = np.abs(excess[own]) < 1e-8
         if not (eset.kinds[loop.vertices.flat[[0, -1]]] == CROSSED).all():
-            assert_closed(loop.vertices, len(eset.names))
+            assert_closed(loop.vertices, len(eset.names), eset.kinds == CROSSED)
         assert (on_box[own] | capped).all()
         assert loop.kind in {"box", "cap", "mixed"}
         assert loop.kind != "box" or on_box[own].all()
         assert loop.kind != "cap" or capped.all()
 
 
-def assert_closed(piece: np.ndarray, d: int) -> None:
-    """A point, a simple loop, or a surface without boundary."""
+def assert_closed(piece: np.ndarray, d: int, crossed: np.ndarray) -> None:
+    """A point, a simple loop, or a surface without boundary, which may cross itself."""
     if d == 2:
         assert piece[0] == piece[-1]
         assert len(np.unique(piece)) == len(piece) - 1
     if d == 3:
-        assert (adjacency(piece).counts == 2).all()
+        whole = adjacency(piece)
+        both = crossed[whole.facets].all(axis=1)
+        assert (whole.counts[~both] == 2).all()
+        assert np.isin(whole.counts, (2, 4)).all()
 
 
 def places(eset: EquilibriumSet) -> np.ndarray:

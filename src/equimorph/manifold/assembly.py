@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.crossing_curves import lonely
 from equimorph.manifold.cutting import (
@@ -25,6 +25,7 @@ from equimorph.manifold.pins import pin, recalled_pin
 from equimorph.manifold.plans import SINGULAR, Plan, chord_of, planes
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.polygons import Loops, Polygon
+from equimorph.manifold.topology import flags_of
 
 SAME_SIDE = 0.3
 """Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
@@ -36,12 +37,16 @@ class Discs:
 
     corners (n, 3): points; index: of each triangle; owner: the grid triangle below it; folds,
     caps, crossings: their sides on folds, on constraints, and where sheets cross; doubtful: grid
-    triangles whose polygons could not be closed and cut without doubt.
+    triangles whose polygons could not be closed and cut without doubt. met: which sides ab,
+    bc, ca of each triangle lie on crossings; sheet: number, over its grid triangle, of the smooth
+    sheet that it belongs to.
     """
 
     corners: Int[np.ndarray, "n 3"]
     index: Int[np.ndarray, " n"]
     owner: Int[np.ndarray, " n"]
+    met: Bool[np.ndarray, "n 3"]
+    sheet: Int[np.ndarray, " n"]
     folds: Int[np.ndarray, "f 2"]
     caps: Int[np.ndarray, "c 2"]
     crossings: Int[np.ndarray, "x 2"]
@@ -55,6 +60,7 @@ class _Found:
     corners: list[tuple[int, int, int]] = field(default_factory=list)
     index: list[int] = field(default_factory=list)
     owner: list[int] = field(default_factory=list)
+    sheet: list[int] = field(default_factory=list)
     folds: set[Chord] = field(default_factory=set)
     caps: set[Chord] = field(default_factory=set)
     crossings: set[Chord] = field(default_factory=set)
@@ -71,15 +77,27 @@ def assemble(pairing: Pairing, loops: Loops) -> Discs:
     plans = _join_folds(pairing, plans, found)
     _split_chords(pairing, plans, found)
     _fill(pairing, plans, found)
+    corners = np.concatenate([loops.plain, np.array(found.corners, int).reshape(-1, 3)])
+    crossings = np.array(sorted(found.crossings), int).reshape(-1, 2)
     return Discs(
-        np.concatenate([loops.plain, np.array(found.corners, int).reshape(-1, 3)]),
+        corners,
         np.concatenate([pairing.points.index[loops.plain[:, 0]], np.array(found.index, int)]),
         np.concatenate([loops.plain_triangle, np.array(found.owner, int)]),
+        _on(corners, crossings),
+        np.concatenate([np.zeros(len(loops.plain), int), np.array(found.sheet, int)]),
         np.array(sorted(found.folds), int).reshape(-1, 2),
         np.array(sorted(found.caps), int).reshape(-1, 2),
-        np.array(sorted(found.crossings), int).reshape(-1, 2),
+        crossings,
         np.array(sorted(found.undecided), int),
     )
+
+
+def _on(corners: Int[np.ndarray, "n 3"], chosen: Int[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n 3"]:
+    """Which sides ab, bc, ca of triangles are among the chosen ones."""
+    if len(chosen) == 0:
+        return np.zeros(corners.shape, bool)
+    sides = (corners[:, [k, (k + 1) % 3]] for k in range(3))
+    return np.stack([flags_of(side, chosen) for side in sides], axis=1)
 
 
 def _alone(pairing: Pairing) -> list[int]:
@@ -240,6 +258,14 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
         for plan, chord in wanted
         if plan.singular(chord[0]) == MEETING
     }
+    # beside a constraint the crossing might leave between the ends of its chord
+    met |= {
+        (plan.polygon.triangle, chord)
+        for plan in plans
+        for chord in plan.chords
+        if plan.polygon.open and plan.singular(chord[0]) == MEETING and chord not in plan.middle
+        if set(chord) <= set(plan.polygon.points)
+    }
     found.undecided.update(split_crossings(pairing, plans, met))
 
 
@@ -276,7 +302,8 @@ def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int
 def _fill(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     """Cut polygons and triangulate their pieces, all pieces with equally many corners together."""
     by_size: dict[int, list[tuple[Plan, Piece, int]]] = {}
-    for plan in plans:
+    for number, plan in enumerate(plans):
+        plan.sheet = number
         for chord in plan.chords:
             marked = found.crossings if plan.singular(chord[0]) == MEETING else found.folds
             if chord in plan.middle:
@@ -317,3 +344,4 @@ def _triangulate(pairing: Pairing, pieces: list[tuple[Plan, Piece, int]], found:
         found.corners.extend(own)
         found.index.extend([index] * len(own))
         found.owner.extend([plan.polygon.triangle] * len(own))
+        found.sheet.extend([plan.sheet] * len(own))

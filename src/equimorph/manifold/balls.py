@@ -9,24 +9,28 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.assembly import Discs
+from equimorph.manifold.crossing_points import pin_crossings
 from equimorph.manifold.mesh import SLACK
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.parting import Parts, closed_surfaces, part
 from equimorph.manifold.pins import Pinned, pin, recalled_pin
-from equimorph.manifold.points import AMID, CAP, CORNER, FOLD
+from equimorph.manifold.points import AMID, CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.spheres import Surfaces, find_spheres
 from equimorph.manifold.topology import distinct
+
+SHEETS = 2
+"""To each of which a crossing belongs."""
 
 
 @dataclass(frozen=True)
 class Balls:
-    """Tetrahedra with their index, and their facets on folds and on constraints.
+    """Tetrahedra with their index, their facets on folds, on constraints and where sheets cross.
 
-    owner, fold_owner, cap_owner: grid tetrahedra below them; doubtful: those over which a ball
-    could not be closed and cut without doubt.
+    owner, fold_owner, cap_owner, crossing_owner: grid tetrahedra below them; doubtful: those over
+    which a ball could not be closed and cut without doubt.
     """
 
     corners: Int[np.ndarray, "n 4"]
@@ -36,6 +40,8 @@ class Balls:
     fold_owner: Int[np.ndarray, " f"]
     caps: Int[np.ndarray, "c 3"]
     cap_owner: Int[np.ndarray, " c"]
+    crossings: Int[np.ndarray, "x 3"]
+    crossing_owner: Int[np.ndarray, " x"]
     doubtful: Int[np.ndarray, " k"]
 
 
@@ -46,7 +52,8 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     doubtful[spheres.doubtful] = True
     caps, lost = _caps(pairing, spheres.others)
     doubtful[spheres.others.owner[lost]] = True
-    closed = closed_surfaces(spheres.others, caps, ~doubtful[spheres.others.owner])
+    crossing = pairing.points.kind == CROSSING
+    closed = closed_surfaces(spheres.others, caps, ~doubtful[spheres.others.owner], crossing)
     parts = part(closed)
     doubtful[closed.owner[~parts.whole]] = True
     middles = _middles(pairing, parts, doubtful)
@@ -60,6 +67,8 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
         filled.fold_owner,
         filled.caps,
         filled.cap_owner,
+        filled.crossings,
+        filled.crossing_owner,
         np.flatnonzero(doubtful),
     )
 
@@ -75,16 +84,18 @@ def _caps(
     amount = np.bincount(surfaces.surface, minlength=count)
     around = np.bincount(surfaces.rim_surface, minlength=count)
     at, points = _grouped(surfaces.rim_surface, surfaces.rims, count)
-    ends = pairing.points.kind[points] == CORNER
-    ended = np.bincount(at[ends], minlength=count)
+    ends = {kind: pairing.points.kind[points] == kind for kind in (CORNER, CROSSING)}
+    ended = {kind: np.bincount(at[own], minlength=count) for kind, own in ends.items()}
+    every = sum(ended.values())
     # a fold runs from corner to corner, maybe far from the middle of the rim
-    folded, plain = ended == 2, (ended == 0) & (around > 0) & (amount > 3)
-    caps, lost = np.full(count, -1), (ended > 0) & (ended != 2)
-    for kind, own in ((CORNER, folded), (CAP, plain)):
-        used = own[at] & (ends | (kind == CAP))
+    singular = {kind: (own == 2) & (every == 2) for kind, own in ended.items()}
+    plain = (every == 0) & (around > 0) & (amount > 3)
+    caps, lost = np.full(count, -1), (every > 0) & ~np.logical_or(*singular.values())
+    for kind, own in (*singular.items(), (CAP, plain)):
+        used = own[at] & ends.get(kind, np.True_)
         groups = _groups(at[used], points[used], np.flatnonzero(own))
-        caps[own] = _pinned(pairing, groups, kind)
-        lost |= own & (caps < 0) & ((kind == CORNER) | (around > 3))
+        caps[own] = _pinned(pairing, groups, kind, cap=True)
+        lost |= own & (caps < 0) & ((kind != CAP) | (around > 3))
     return caps, lost
 
 
@@ -109,15 +120,18 @@ def _groups(
 def _middles(
     pairing: Pairing, parts: Parts, doubtful: Bool[np.ndarray, " N"]
 ) -> Int[np.ndarray, " curves"]:
-    """Fold point inside every fold curve; it can be the one on the constraint."""
+    """Exact point inside every curve: a fold, or a crossing; it can be on the constraint."""
     count = len(parts.curve_surface)
     at, points = _grouped(parts.curve, parts.folds, count)
     cap = parts.closed.cap[parts.curve_surface]
     middles = np.full(count, -1)
     own = points == cap[at]
     middles[at[own]] = points[own]
-    wanted = np.flatnonzero((middles < 0) & parts.whole[parts.curve_surface])
-    middles[wanted] = _pinned(pairing, _groups(at, points, wanted), FOLD)
+    left = (middles < 0) & parts.whole[parts.curve_surface]
+    for kind, own in ((FOLD, ~parts.curve_met), (CROSSING, parts.curve_met)):
+        chosen = np.flatnonzero(left & own)
+        middles[chosen] = _pinned(pairing, _groups(at, points, chosen), kind)
+    wanted = np.flatnonzero(left)
     owner = parts.closed.owner[parts.curve_surface[wanted]]
     doubtful[owner[middles[wanted] < 0]] = True
     return middles
@@ -167,39 +181,73 @@ def _coned(
     apex, surface = apexes[region], parts.region_surface[region]
     kept = wanted[surface] & (facets != apex[:, None]).all(axis=1)
     lids = closed.lid & wanted[closed.surface]
+    met = parts.curve_met[parts.curve[proper]]
     return Balls(
         np.concatenate([facets, apex[:, None]], axis=1)[kept],
         parts.region_index[region[kept]],
         closed.owner[surface[kept]],
-        fans,
-        closed.owner[fan_surface],
+        fans[~met],
+        closed.owner[fan_surface[~met]],
         closed.corners[lids],
         closed.owner[closed.surface[lids]],
+        fans[met],
+        closed.owner[fan_surface[met]],
         np.zeros(0, int),
     )
 
 
-def _pinned(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int) -> list[int]:
+def _pinned(
+    pairing: Pairing, groups: Sequence[Sequence[int]], kind: int, *, cap: bool = False
+) -> list[int]:
+    """Numbers of new exact points of a kind amid groups; −1 where none was found.
+
+    Crossings belong to two surfaces, whose groups are the same; `cap`: on a constraint.
+    """
+    if kind == CROSSING:
+        return _shared(pairing, groups, cap=cap)
+    return _new(pairing, groups, kind, cap=cap)
+
+
+def _shared(pairing: Pairing, groups: Sequence[Sequence[int]], *, cap: bool) -> list[int]:
+    """Numbers of new crossings amid groups that are given twice."""
+    keys = [tuple(group) for group in groups]
+    once = {key: keys.count(key) for key in keys}
+    found = dict(zip(once, _new(pairing, list(once), CROSSING, cap=cap), strict=True))
+    return [found[key] if once[key] == SHEETS else -1 for key in keys]
+
+
+def _new(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int, *, cap: bool) -> list[int]:
     """Numbers of new exact points of a kind amid groups; −1 where none was found."""
     out = [-1] * len(groups)
     if not groups:
         return out
     setting, store = pairing.setting, pairing.points
-    pinned = recalled_pin(pairing.journal, groups, kind, lambda: _pin_inside(pairing, groups, kind))
-    lanes, folded = np.flatnonzero(pinned.found), kind in {FOLD, CORNER}
+    pinned = recalled_pin(
+        pairing.journal, groups, kind, lambda: _pin_inside(pairing, groups, kind, cap=cap)
+    )
+    lanes, singular = np.flatnonzero(pinned.found), kind in {FOLD, CORNER, CROSSING}
     index = setting.structure.index(pinned.z[lanes], pinned.p[lanes]).tolist()
     for lane, own in zip(lanes.tolist(), index, strict=True):
-        # at folds the count is round-off
-        low = int(store.index[list(groups[lane])].min()) if folded else own
+        # at folds and crossings the count is round-off
+        low = int(store.index[list(groups[lane])].min()) if singular else own
         out[lane] = store.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out
 
 
-def _pin_inside(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int) -> Pinned:
+def _pin_inside(
+    pairing: Pairing, groups: Sequence[Sequence[int]], kind: int, *, cap: bool
+) -> Pinned:
     """Pin points in the box: where one would leave it, the parameter that leaves is held."""
     setting, store = pairing.setting, pairing.points
     axes = np.eye(len(setting.free))
-    pinned = pin(setting, store, groups, kind, np.tile(axes, (len(groups), 1, 1)))
+
+    def amid(groups: Sequence[Sequence[int]], axes: Float[np.ndarray, "k d"]) -> Pinned:
+        span = np.tile(axes, (len(groups), 1, 1))
+        if kind == CROSSING:
+            return pin_crossings(setting, store, groups, span, cap)
+        return pin(setting, store, groups, kind, span)
+
+    pinned = amid(groups, axes)
     low, high = pairing.mesh.vertices.min(axis=0), pairing.mesh.vertices.max(axis=0)
     for held in range(len(axes)):
         free = pinned.p[:, setting.free]
@@ -208,8 +256,7 @@ def _pin_inside(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int) ->
         lanes = np.flatnonzero(worst & (outside[:, held] > SLACK))
         if len(lanes) == 0:
             continue
-        span = np.tile(np.delete(axes, held, axis=0), (len(lanes), 1, 1))
-        again = pin(setting, store, [groups[lane] for lane in lanes.tolist()], kind, span)
+        again = amid([groups[lane] for lane in lanes.tolist()], np.delete(axes, held, axis=0))
         pinned.z[lanes], pinned.p[lanes], pinned.found[lanes] = again.z, again.p, again.found
     inside = pairing.mesh.covers(pinned.p[:, setting.free])
     return Pinned(pinned.z, pinned.p, pinned.found & inside)

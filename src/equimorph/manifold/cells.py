@@ -56,7 +56,7 @@ class CellFinder:
             return Cells(discs.corners, discs.index, *marked, discs.doubtful)
         self._known = volumes_over(pairing, self._known)
         discs, balls = self._known.discs, self._known.balls
-        marked = (balls.folds, balls.caps, np.zeros((0, 3), int))
+        marked = (balls.folds, balls.caps, balls.crossings)
         return Cells(balls.corners, balls.index, *marked, discs.doubtful, balls.doubtful)
 
 

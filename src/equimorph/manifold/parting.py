@@ -13,7 +13,8 @@ from equimorph.manifold.topology import distinct, keys_of, labels
 class Closed:
     """Triangles of closed surfaces: some with a lid on the constraint.
 
-    corners, index, surface, lid: of the triangles; owner, cap: of the surfaces, their grid
+    corners, index, surface, lid: of the triangles; met: which of their sides ab, bc, ca lie where
+    another sheet crosses; owner, cap: of the surfaces, their grid
     tetrahedron, and the point from which the lid was drawn (−1 if there is none).
     """
 
@@ -21,6 +22,7 @@ class Closed:
     index: Int[np.ndarray, " n"]
     surface: Int[np.ndarray, " n"]
     lid: Bool[np.ndarray, " n"]
+    met: Bool[np.ndarray, "n 3"]
     owner: Int[np.ndarray, " S"]
     cap: Int[np.ndarray, " S"]
 
@@ -30,8 +32,9 @@ class Parts:
     """How closed surfaces are parted.
 
     region: of each triangle; region_surface, region_index, first_curve: of the regions, one of the
-    curves around it (−1 if there is none); folds, curve, beside: sides between two indices, the
-    closed curve that they belong to, and the regions on both sides; curve_surface: of the curves;
+    curves around it (−1 if there is none); folds, curve, beside: sides between two indices, or
+    where another sheet crosses, the closed curve that they belong to, and the regions on both
+    sides; curve_surface, curve_met: of the curves, the surface and whether another sheet crosses;
     whole: surfaces that are spheres, parted without contradiction.
     """
 
@@ -44,13 +47,20 @@ class Parts:
     curve: Int[np.ndarray, " f"]
     beside: Int[np.ndarray, "f 2"]
     curve_surface: Int[np.ndarray, " curves"]
+    curve_met: Bool[np.ndarray, " curves"]
     whole: Bool[np.ndarray, " S"]
 
 
 def closed_surfaces(
-    surfaces: Surfaces, caps: Int[np.ndarray, " S"], wanted: Bool[np.ndarray, " S"]
+    surfaces: Surfaces,
+    caps: Int[np.ndarray, " S"],
+    wanted: Bool[np.ndarray, " S"],
+    crossing: Bool[np.ndarray, " points"],
 ) -> Closed:
-    """Close wanted surfaces along their rims: from a cap, or by one triangle."""
+    """Close wanted surfaces along their rims: from a cap, or by one triangle.
+
+    `crossing` tells which points are crossings: between two of them, lids are met.
+    """
     number = np.cumsum(wanted) - 1
     own, rim = wanted[surfaces.surface], wanted[surfaces.rim_surface]
     at, sides, index = surfaces.rim_surface[rim], surfaces.rims[rim], surfaces.rim_index[rim]
@@ -69,9 +79,18 @@ def closed_surfaces(
         np.concatenate([surfaces.index[own], index[capped], index[first]]),
         number[np.concatenate([surfaces.surface[own], at[capped], at[first]])],
         np.arange(own.sum() + len(lids)) >= own.sum(),
+        np.concatenate([surfaces.met[own], _met(lids, crossing)]),
         surfaces.owner[wanted],
         caps[wanted],
     )
+
+
+def _met(
+    corners: Int[np.ndarray, "n 3"], crossing: Bool[np.ndarray, " points"]
+) -> Bool[np.ndarray, "n 3"]:
+    """Which sides ab, bc, ca of lids join two crossings."""
+    at = crossing[corners]
+    return np.asarray(at & np.roll(at, -1, axis=1))
 
 
 def part(closed: Closed) -> Parts:
@@ -85,7 +104,8 @@ def part(closed: Closed) -> Parts:
     # on a closed surface every side has two triangles, one after the other
     first, second = order[::2], order[1::2]
     pairs = triangle[np.stack([first, second], axis=1)]
-    folded = index[pairs[:, 0]] != index[pairs[:, 1]]
+    met = closed.met.T.ravel()[first]
+    folded = (index[pairs[:, 0]] != index[pairs[:, 1]]) | met
     region = labels(len(corners), pairs[~folded])
     region_surface, region_index = _of_regions(region, surface, index)
     folds, beside = sides[first[folded]], region[pairs[folded]]
@@ -97,13 +117,16 @@ def part(closed: Closed) -> Parts:
     for side in range(2):
         np.minimum.at(first_curve, beside[:, side], curves.label)
     first_curve[first_curve == len(curve_surface)] = -1
-    jumps = np.abs(index[pairs[folded, 0]] - index[pairs[folded, 1]]) == 1
+    curve_met = np.zeros(len(curve_surface), bool)
+    curve_met[curves.label] = met[folded]
+    jumps = np.abs(index[pairs[folded, 0]] - index[pairs[folded, 1]])
+    fits = np.where(curve_met[curves.label], met[folded] & (jumps <= 1), jumps == 1)
     whole = curves.closed & (_characteristics(closed, base) == 2)
     whole &= np.bincount(region_surface, minlength=count) == curves.amount + 1
-    whole[fold_surface[~jumps]] = False
+    whole[fold_surface[~fits | (met[folded] != curve_met[curves.label])]] = False
     return Parts(
         closed, region, region_surface, region_index, first_curve,
-        folds, curves.label, beside, curve_surface, whole,
+        folds, curves.label, beside, curve_surface, curve_met, whole,
     )  # fmt: skip
 
 

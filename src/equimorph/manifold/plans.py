@@ -21,7 +21,7 @@ class Plan:
     """How a polygon will be cut: its points and chords, once extra points are found.
 
     sides: of the grid triangle, on which each point lies, one bit each; extra points inside it lie
-    on none. kinds: of the points, as in `Points`.
+    on none. kinds: of the points, as in `Points`. sheet: number of the polygon.
     """
 
     polygon: Polygon
@@ -30,6 +30,7 @@ class Plan:
     kinds: dict[int, int]
     chords: list[Chord] = field(default_factory=list)
     middle: dict[Chord, int] = field(default_factory=dict)
+    sheet: int = 0
 
     def singular(self, point: int) -> int:
         """Return what a point of the polygon is to `cutting`."""

@@ -14,7 +14,10 @@ from jaxtyping import Bool, Int
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.points import CROSSING
+from equimorph.manifold.tangents import placed_frames, tangent_frames
 
+ALONG, ASIDE = 0.1, 0.3
+"""Sines of angles between sheets and chords: along them at most, aside at least."""
 NEARER = 0.5
 """Most that the gap in a chain may be, relative to the distance from another chain."""
 
@@ -67,15 +70,40 @@ def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -
 def _closed(pairing: Pairing, chains: list[Polygon]) -> bool:
     """Whether each of several open chains must be closed by itself: two smooth sheets that cross.
 
-    Or its ends are near enough.
+    Or its ends are near enough. A crossing that leaves and comes back in between is found out when
+    its chord is given a point (see `assembly`).
     """
     crossings = [
         {point for point in chain.points if pairing.points.kind[point] == CROSSING}
         for chain in chains
     ]
-    if len(chains) == 2 and len(crossings[0]) == 1 and crossings[0] == crossings[1]:
+    if len(chains) == 2 and crossings[0] and crossings[0] == crossings[1]:
         return True
-    return _close_themselves(pairing, chains)
+    return _close_themselves(pairing, chains) or _on_own_sheets(pairing, chains)
+
+
+def _on_own_sheets(pairing: Pairing, chains: list[Polygon]) -> bool:
+    """Whether each chain's ends lie along the sheet at each other, but not along that of others.
+
+    So they do just beside a crossing that lies beyond the constraint, at every scale. One of two
+    sheets that cross is seen along the other, if that bends away from it, but not the other way.
+    """
+    ends = np.array([(chain.points[0], chain.points[-1]) for chain in chains]).ravel()
+    setting, store = pairing.setting, pairing.points
+    z, p = store.z[ends], store.p[ends]
+    place, d = embed(setting, z, p), len(setting.free)
+    rows = np.zeros((len(ends), d, place.shape[1]))
+    rows[:, :, -d:] = np.eye(d)
+    planes = placed_frames(setting, tangent_frames(setting, z, p, rows))
+    chord = place[None] - place[:, None]
+    flat = np.einsum("adc,abc->abd", planes, chord)
+    length = np.maximum(np.linalg.norm(chord, axis=2), 1e-300)
+    off = np.sqrt(np.maximum(1.0 - (np.linalg.norm(flat, axis=2) / length) ** 2, 0.0))
+    chain = np.arange(len(ends)) // 2
+    own = chain[:, None] == chain[None]
+    itself = np.eye(len(ends), dtype=bool)
+    aside = np.maximum(off, off.T)[~own]
+    return bool((off[own & ~itself] < ALONG).all() and (aside > ASIDE).all())
 
 
 def _close_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:

@@ -16,13 +16,15 @@ from equimorph.manifold.topology import keys_of, labels
 class Surfaces:
     """Triangles of surfaces over grid tetrahedra, closed or open along one loop at a constraint.
 
-    corners, index, surface: of the triangles, those of one surface in a row; owner: grid
-    tetrahedron of each surface; rims: open sides, with their surface and the index beside them.
+    corners, index, surface: of the triangles, those of one surface in a row; met: which of their
+    sides ab, bc, ca lie where another sheet crosses; owner: grid tetrahedron of each surface; rims:
+    open sides, with their surface and the index beside them.
     """
 
     corners: Int[np.ndarray, "n 3"]
     index: Int[np.ndarray, " n"]
     surface: Int[np.ndarray, " n"]
+    met: Bool[np.ndarray, "n 3"]
     owner: Int[np.ndarray, " S"]
     rims: Int[np.ndarray, "r 2"]
     rim_surface: Int[np.ndarray, " r"]
@@ -60,8 +62,10 @@ class _Copies:
     corners: Int[np.ndarray, "n 3"]
     index: Int[np.ndarray, " n"]
     owner: Int[np.ndarray, " n"]
+    met: Bool[np.ndarray, "n 3"]
     shares: Int[np.ndarray, "n 3"]
-    """How many triangles of the same tetrahedron share sides ab, bc, ca."""
+    """How many triangles of the same tetrahedron share sides ab, bc, ca; of the same sheet, where
+    another crosses."""
     starts: Int[np.ndarray, " pieces"]
     sizes: Int[np.ndarray, " pieces"]
 
@@ -106,6 +110,7 @@ def _surfaces(
         copies.corners[own],
         copies.index[own],
         number[piece[own]],
+        copies.met[own],
         copies.owner[copies.starts[good]],
         sides[row[rim], side[rim]],
         number[piece[row[rim]]],
@@ -140,22 +145,29 @@ def _copies(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> _Co
     offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     triangle = by_owner[np.repeat(first[faces], count) + offset]
     owner = np.repeat(np.repeat(clear, 4), count)
-    shares, piece = _pieces(discs.corners[triangle], owner)
+    met = discs.met[triangle]
+    shares, piece = _pieces(
+        discs.corners[triangle], owner, np.where(met, 1 + discs.sheet[triangle, None], 0)
+    )
     order = np.argsort(piece, kind="stable")
     sizes = np.bincount(piece)
     starts = np.cumsum(sizes) - sizes
     corners, index = discs.corners[triangle[order]], discs.index[triangle[order]]
-    return _Copies(corners, index, owner[order], shares[order], starts, sizes)
+    return _Copies(corners, index, owner[order], met[order], shares[order], starts, sizes)
 
 
 def _pieces(
-    corners: Int[np.ndarray, "n 3"], owner: Int[np.ndarray, " n"]
+    corners: Int[np.ndarray, "n 3"], owner: Int[np.ndarray, " n"], sheet: Int[np.ndarray, "n 3"]
 ) -> tuple[Int[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
-    """How many triangles share each side within a tetrahedron, and the pieces that they form."""
+    """How many triangles share each side within a tetrahedron, and the pieces that they form.
+
+    Sides of different sheets are different, but for sheet 0.
+    """
     base = int(corners.max(initial=0)) + 1
     keys = np.stack([keys_of(corners[:, [k, (k + 1) % 3]], base) for k in range(3)], axis=1)
     _, edges = np.unique(keys.ravel(), return_inverse=True)
     local = np.repeat(owner, 3) * (edges.max(initial=0) + 1) + edges.ravel()
+    local = local * (sheet.max(initial=0) + 1) + sheet.ravel()
     _, inverse, counts = np.unique(local, return_inverse=True, return_counts=True)
     order = np.argsort(inverse, kind="stable")
     same = np.flatnonzero(inverse[order[1:]] == inverse[order[:-1]])

@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.manifold.copies import copies
 from equimorph.manifold.fabric import Fabric, edges_of, squared_sides
 from equimorph.manifold.kernels import flip_edges
 from equimorph.manifold.topology import keys_of
@@ -120,16 +121,43 @@ def _moves(fabric: Fabric) -> Int[np.ndarray, "m 2"]:
     if len(corners) == 0:
         return np.zeros((0, 2), int)
     around = [corners[:, [i, j]] for i in range(3) for j in range(3) if i != j]
-    moves = np.unique(np.concatenate(around), axis=0)
+    moves = np.concatenate(around)
+    _, others = copies(fabric, moves)
+    moves = np.unique(np.concatenate([moves, others, others[:, ::-1]]), axis=0)
     near = np.zeros(base, bool)
-    near[corners] = True
+    near[moves] = True
     # all cells around the ends of moves
     edges, _ = edges_of(cells[near[cells].any(axis=1)], base)
     moves = moves[_free_to_move(fabric, moves, edges)]
-    gain = _gains(fabric, moves)
-    moves, gain = moves[gain > 0], gain[gain > 0]
-    moves = moves[np.argsort(-gain, kind="stable")]
-    return _apart(moves, edges, base)
+    gain, bundle = _in_all_sheets(fabric, moves, _gains(fabric, moves))
+    order = np.lexsort((bundle, -gain))
+    order = order[gain[order] > 0]
+    return _apart(moves[order], bundle[order], edges, base)
+
+
+def _in_all_sheets(
+    fabric: Fabric, moves: Int[np.ndarray, "m 2"], gain: Float[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+    """Gains of moves along crossings, in all sheets at once; and which moves go together.
+
+    Minus infinity where one is not possible on each of them.
+    """
+    shared, gain, bundle = fabric.vertices.shared, gain.copy(), np.arange(len(moves))
+    own = np.flatnonzero(shared[moves[:, 0]] >= 0)
+    if len(own) == 0:
+        return gain, bundle
+    at = shared[moves[own]]
+    keys = at[:, 0] * (shared.max() + 2) + at[:, 1] + 1
+    _, first, label, counts = np.unique(
+        keys, return_index=True, return_inverse=True, return_counts=True
+    )
+    used = np.unique(fabric.cells)
+    copies_of = np.bincount(shared[used][shared[used] >= 0], minlength=shared.max() + 1)
+    total = np.bincount(label, weights=gain[own])
+    whole = counts[label] == copies_of[at[:, 0]]
+    gain[own] = np.where(whole, total[label], -np.inf)
+    bundle[own] = own[first[label]]
+    return gain, bundle
 
 
 def _free_to_move(
@@ -142,8 +170,6 @@ def _free_to_move(
     along = fabric.edge_marks(np.sort(moves, axis=1))
     ends = np.bincount(fabric.facets.ravel(), minlength=base)[moves[:, 0]]
     good = (own == along) & ((own == 0) | (ends == 2))
-    # what sheets have in common stays
-    good &= fabric.vertices.shared[moves[:, 0]] < 0
     # common neighbours of both ends: only those across the triangles beside the edge
     starts, around = _neighbours(edges, base)
     row, at = _spread(starts, moves[:, 0])
@@ -176,8 +202,8 @@ def _spread(
 def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, " m"]:
     """How many slender or overturned triangles fewer there are if vertices go into neighbours.
 
-    And, less than one, by how much the smallest angle around it grows. Minus one where a triangle
-    would fold over, get much more slender or much longer.
+    And, less than one, by how much the smallest angle around it grows. Minus infinity where a
+    triangle would fold over, get much more slender or much longer.
     """
     base = len(fabric.vertices)
     going = np.zeros(base, bool)
@@ -206,7 +232,7 @@ def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, "
     np.maximum.at(reach, row, _longest(fabric, old))
     np.maximum.at(longest, row[stays], _longest(fabric, new[stays]))
     good &= (longest <= LONGER * reach) & np.isfinite(after) & (after >= WORSE * before)
-    return np.where(good, fewer + (after - before) / np.pi, -1.0)
+    return np.where(good, fewer + (after - before) / np.pi, -np.inf)
 
 
 def _turned(fabric: Fabric, old: Triangles, new: Triangles) -> Bool[np.ndarray, " n"]:
@@ -225,17 +251,21 @@ def _longest(fabric: Fabric, triangles: Triangles) -> Float[np.ndarray, " T"]:
 
 
 def _apart(
-    moves: Int[np.ndarray, "m 2"], edges: Int[np.ndarray, "E 2"], base: int
+    moves: Int[np.ndarray, "m 2"],
+    bundle: Int[np.ndarray, " m"],
+    edges: Int[np.ndarray, "E 2"],
+    base: int,
 ) -> Int[np.ndarray, "k 2"]:
-    """Moves in order, without those that touch the star of an earlier one."""
+    """Moves in order, without those that touch the star of an earlier one; bundles as a whole."""
     starts, around = _neighbours(edges, base)
     touched = np.zeros(base, bool)
     kept = []
-    for gone, into in moves.tolist():
-        star = around[starts[gone] : starts[gone + 1]]
-        if touched[gone] or touched[star].any():
+    first = np.flatnonzero(np.diff(bundle, prepend=-1))
+    for own in np.split(moves, first[1:]) if len(moves) else ():
+        stars = [around[starts[gone] : starts[gone + 1]] for gone in own[:, 0]]
+        taken = np.concatenate([own[:, 0], *stars])
+        if touched[taken].any():
             continue
-        touched[gone] = True
-        touched[star] = True
-        kept.append((gone, into))
-    return np.array(kept, int).reshape(-1, 2)
+        touched[taken] = True
+        kept.append(own)
+    return np.concatenate([np.zeros((0, 2), int), *kept])

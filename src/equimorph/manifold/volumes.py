@@ -79,6 +79,8 @@ def _with_discs(new: Discs, known: Discs, same: Bool[np.ndarray, " T"]) -> Discs
         corners=np.concatenate([new.corners, known.corners[kept]]),
         index=np.concatenate([new.index, known.index[kept]]),
         owner=np.concatenate([new.owner, known.owner[kept]]),
+        met=np.concatenate([new.met, known.met[kept]]),
+        sheet=np.concatenate([new.sheet, known.sheet[kept]]),
     )
 
 
@@ -94,4 +96,5 @@ def _with_balls(new: Balls, known: Balls, kept: Bool[np.ndarray, " N"]) -> Balls
         **{name: joined(name, "owner") for name in ("corners", "index", "owner")},
         **{name: joined(name, "fold_owner") for name in ("folds", "fold_owner")},
         **{name: joined(name, "cap_owner") for name in ("caps", "cap_owner")},
+        **{name: joined(name, "crossing_owner") for name in ("crossings", "crossing_owner")},
     )
