@@ -11,7 +11,7 @@ from equimorph.equilibria.critical_curves import (
 )
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
 from equimorph.equilibria.deflation import deflated_newton
-from equimorph.equilibria.imperfections import worst_named, worst_over
+from equimorph.equilibria.imperfections import Corner, corners_of, worst_named, worst_over
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
 from equimorph.equilibria.lifting.legs import Leg, Waypoint
 from equimorph.equilibria.lifting.paths import lift_legs
@@ -28,6 +28,7 @@ from equimorph.equilibria.tracing import TraceOptions
 __all__ = [
     "Branch",
     "Completeness",
+    "Corner",
     "CriticalCurve",
     "Event",
     "FoundStates",
@@ -46,6 +47,7 @@ __all__ = [
     "branches",
     "check_start",
     "constraint_curve",
+    "corners_of",
     "cusp_curve",
     "deflated_newton",
     "distinct",

@@ -21,6 +21,9 @@ Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
 
+TWICE = 2.0
+"""Ways to a corner that are gone beyond it."""
+
 _WORST = re.compile(r"\s*worst\((.*) for (.*)\)\s*", re.DOTALL)
 _OFFSET = re.compile(r"\s*(\w+)\s*(?:±|\+-)\s*([\d.eE+-]+)\s*")
 
@@ -44,6 +47,60 @@ def worst_over(
     InputError
         For unknown names, none, or sizes that are not positive.
     """
+    box = _Corners(structure, descriptor, _corners(structure, offsets))
+    sizes = ", ".join(f"{name} ± {float(size)!r}" for name, size in offsets.items())
+    name = f"worst({descriptor.name} for {sizes})"
+    symbol = f"worst {descriptor.symbol or descriptor.name}"
+    unit, origin = descriptor.unit, structure.signature
+    return Descriptor(name, unit, box.worst, symbol, origin, branches=box.branches)
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A corner of a box of imperfections, and where stability is lost on the way to it and beyond.
+
+    Parameters
+    ----------
+    offsets
+        Errors of the parameters, by name.
+    room
+        Share of the straight way at which stability is lost: 1 where the corner itself is critical,
+        at most 2. Unlike the values at the corner it goes on smoothly where these end.
+    limit
+        The descriptor where stability is lost: its one-sided limit at the corner where `room` is 1.
+    """
+
+    offsets: Mapping[str, float]
+    room: Descriptor
+    limit: Descriptor
+
+
+def corners_of(
+    structure: Structure, descriptor: Descriptor, offsets: Mapping[str, float]
+) -> tuple[Corner, ...]:
+    """Corners of a box of imperfections, in the order of the branches of `worst_over`.
+
+    Raises
+    ------
+    InputError
+        As for `worst_over`.
+    """
+    found = []
+    for corner in _corners(structure, offsets)[1:]:
+        ray = _Ray(structure, descriptor, corner)
+        own = {name: float(corner[position(structure.parameters, name)]) for name in offsets}
+        text = ", ".join(f"{name} {size:+.9g}" for name, size in own.items())
+        room = Descriptor(f"room({text})", "1", ray.room, "room", structure.signature)
+        name = f"limit({descriptor.name} for {text})"
+        limit = Descriptor(name, descriptor.unit, ray.limit, "limit", structure.signature)
+        found.append(Corner(own, room, limit))
+    return tuple(found)
+
+
+def _corners(
+    structure: Structure, offsets: Mapping[str, float]
+) -> Float[np.ndarray, "corners parameters"]:
+    """Errors of all parameters: none, then those at the corners of the box."""
     if not offsets:
         raise InputError("`offsets` must name at least one parameter; got none.")
     for name, size in offsets.items():
@@ -53,12 +110,38 @@ def worst_over(
     corners = np.zeros((1 + 2 ** len(places), len(structure.parameters)))
     signs = np.array(list(product((-1.0, 1.0), repeat=len(places))))
     corners[1:, places] = signs * np.array(list(offsets.values()))
-    box = _Corners(structure, descriptor, corners)
-    sizes = ", ".join(f"{name} ± {float(size)!r}" for name, size in offsets.items())
-    name = f"worst({descriptor.name} for {sizes})"
-    symbol = f"worst {descriptor.symbol or descriptor.name}"
-    unit, origin = descriptor.unit, structure.signature
-    return Descriptor(name, unit, box.worst, symbol, origin, branches=box.branches)
+    return corners
+
+
+@dataclass(frozen=True)
+class _Ray:
+    """The straight way from states to a corner and as far again."""
+
+    structure: Structure
+    descriptor: Descriptor
+    corner: Float[np.ndarray, " parameters"]
+
+    def room(self, z: Lanes, p: Parameters) -> Values:
+        """Share of the way at which stability is lost; −1 where there is none to lose."""
+        return self._ended(z, p)[0]
+
+    def limit(self, z: Lanes, p: Parameters) -> Values:
+        """The descriptor there."""
+        share, end, at = self._ended(z, p)
+        return np.where(share >= 0.0, self.descriptor.function(end, at), np.inf)
+
+    def _ended(self, z: Lanes, p: Parameters) -> tuple[Values, Lanes, Parameters]:
+        share = np.full(len(z), -1.0)
+        end, alive = newton(self.structure, z, p)
+        alive &= self.structure.index(end, p) == 0
+        lanes, at = np.flatnonzero(alive), p.copy()
+        if len(lanes):
+            velocity = np.tile(TWICE * self.corner, (len(lanes), 1))
+            line = ParameterLine(self.structure, p[lanes], velocity)
+            ended = follow(line, end[lanes], (), TraceOptions(record=False))
+            share[lanes], end[lanes] = TWICE * ended.t, ended.z
+            at[lanes] += ended.t[:, None] * velocity
+        return share, end, at
 
 
 def worst_named(structure: Structure, text: str) -> Descriptor:

@@ -4,6 +4,7 @@ from equimorph.tasks.optimising.certificates import Certificate
 from equimorph.tasks.optimising.following import FollowedOptimum, Jump, follow_optimum
 from equimorph.tasks.optimising.landscapes import Barriers, Landscape, landscape
 from equimorph.tasks.optimising.optimum import Optima, Optimum, optimise
+from equimorph.tasks.optimising.robust import RobustOptimum, robust_optimum
 from equimorph.tasks.optimising.strength import Strongest, StrongestSettings, strongest
 
 __all__ = [
@@ -14,10 +15,12 @@ __all__ = [
     "Landscape",
     "Optima",
     "Optimum",
+    "RobustOptimum",
     "Strongest",
     "StrongestSettings",
     "follow_optimum",
     "landscape",
     "optimise",
+    "robust_optimum",
     "strongest",
 ]

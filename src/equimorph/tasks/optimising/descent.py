@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.manifold.embedding import embed
-from equimorph.tasks.optimising.plane import Frames, Spots, frames_of, settled, stepped
+from equimorph.tasks.optimising.plane import Frames, Spots, frames_of, settled, stepped, together
 from equimorph.tasks.optimising.programme import Expansion, Programme
 from equimorph.tasks.optimising.quadratic import Answer, Quadratic, solve
 
@@ -68,7 +68,7 @@ def descend(programme: Programme, starts: Spots) -> list[Settled]:
         todo = [lane for lane in lanes if lane.done is None and lane.reach > 0.0]
         if not todo:
             break
-        here = _together([lane.spot for lane in todo])
+        here = together([lane.spot for lane in todo])
         alone = _first_of_each(programme, here)
         for k in set(range(len(todo))) - set(alone):
             todo[k].reach = 0.0
@@ -78,14 +78,6 @@ def descend(programme: Programme, starts: Spots) -> list[Settled]:
         answers = [_answer(expansion, k, lane) for k, lane in enumerate(todo)]
         _advance(programme, todo, here, (frames, expansion), answers)
     return [lane.done for lane in lanes if lane.done is not None]
-
-
-def _together(parts: list[Spots]) -> Spots:
-    return Spots(
-        np.concatenate([each.z for each in parts]),
-        np.concatenate([each.p for each in parts]),
-        np.concatenate([each.rows for each in parts]),
-    )
 
 
 def _first_of_each(programme: Programme, here: Spots) -> list[int]:

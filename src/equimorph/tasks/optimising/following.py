@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.equilibria import Leg
-from equimorph.equilibria.steering import answers
 from equimorph.errors import InputError
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Setting
@@ -19,7 +18,7 @@ from equimorph.tasks.motion.course import Course
 from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.descent import Settled, descend
 from equimorph.tasks.optimising.objectives import Objective
-from equimorph.tasks.optimising.plane import Spots, settled, stepped
+from equimorph.tasks.optimising.plane import Spots, rows_at, settled, stepped
 from equimorph.tasks.optimising.programme import Programme
 from equimorph.tasks.optimising.stability import stability
 
@@ -256,7 +255,7 @@ class _Found:
 def followed(problem: Problem, start: State, time: float) -> FollowedOptimum:
     """Follow the optimum near a state from a time on."""
     legs = problem.course.legs
-    begin = Spots(start.z[None], start.p[None], _rows(problem, start))
+    begin = Spots(start.z[None], start.p[None], rows_at(problem.programme(time).setting, start))
     first = None
     for later in LATER:
         first = first or _solved(problem, begin, min(time + later, legs))
@@ -284,15 +283,6 @@ def followed(problem: Problem, start: State, time: float) -> FollowedOptimum:
             track.append(after)
             step = FIRST
     return _result(problem, track, jumps, "", start)
-
-
-def _rows(problem: Problem, start: State) -> Float[np.ndarray, "1 d coordinates"]:
-    """Plane near the tangent space of a state."""
-    structure, free = problem.course.structure, problem.course.free
-    dz, dp = answers(structure, start.z[None], start.p[None], free)
-    u = dz[0][:, : structure.unknowns] * np.sqrt(structure.mass)
-    both = np.concatenate([u, dp[0][:, free] / structure.scales[free]], axis=1)
-    return np.ascontiguousarray(np.linalg.qr(both.T)[0].T[None])
 
 
 def _predicted(

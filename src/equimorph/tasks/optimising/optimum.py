@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from equimorph.equilibria import check_start, newton
 from equimorph.errors import InputError
@@ -15,14 +15,23 @@ from equimorph.model import Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.descent import Settled, descend
+from equimorph.tasks.optimising.feasible import Thin, between_vertices, least_violation
 from equimorph.tasks.optimising.objectives import Objective
-from equimorph.tasks.optimising.plane import Spots, plane_of, settled, spots_of, stepped
+from equimorph.tasks.optimising.plane import (
+    Spots,
+    plane_of,
+    rows_at,
+    settled,
+    spots_of,
+    stepped,
+    together,
+)
 from equimorph.tasks.optimising.programme import Programme
 from equimorph.tasks.optimising.stability import is_stability, stability
+from equimorph.tasks.pieces import stable_piece
 from equimorph.tasks.planning import plan
 from equimorph.tasks.prepared import (
     feasible_vertices,
-    pieces_of_vertices,
     stable_edges,
     stable_vertices,
     vertex_values,
@@ -178,14 +187,25 @@ def optimise(  # the knobs of the public face, all by keyword
     if fault:
         return Optima("refused", fault, sense, ())
     programme = Programme.over(eset, goal, (*constraints, stability(eset.structure, margin)))
-    starts = _starts(eset, programme, _watched(programme, constraints, margin), start)
-    ends = _optima(programme, descend(programme, spots_of(eset, starts)))
+    watched = _watched(programme, constraints, margin)
+    ground, least = None, None
+    if start is None:
+        starts, least = _starts(eset, programme, watched)
+    else:
+        # those of the set hold on its cells
+        further = tuple(each for each in watched if each not in eset.constraints)
+        ground = stable_piece(eset, start, further)
+        starts = _starts_around(ground, programme, start)
+    ends = _optima(programme, descend(programme, starts))
     found = [_optimum(programme, end) for end in ends]
     if start is not None:
         pairs = list(zip(ends, found, strict=True))
-        found = _reached(eset, programme, start, (within, margin), pairs)
+        reached = _reached((eset, ground), programme, start, (within, margin), pairs)
+        if found and not reached:
+            return Optima("refused", f"no route was found to {found[0]}", sense, ())
+        found = reached
     if not found:
-        return Optima("refused", _nothing(start, within), sense, ())
+        return Optima("refused", _nothing(within, least), sense, ())
     return Optima("found", "", sense, tuple(found))
 
 
@@ -212,10 +232,12 @@ def _check(eset: EquilibriumSet, sense: str, margin: float, start: State | None)
         )
 
 
-def _nothing(start: State | None, within: Sequence[Constraint]) -> str:
-    where = "" if start is None else " that can be reached from the start without a snap"
+def _nothing(within: Sequence[Constraint], least: Thin | None) -> str:
     asked = f" within {', '.join(map(str, within))}" if within else ""
-    return f"no stable optimum{asked}{where} was found"
+    why = f"no stable optimum{asked} was found"
+    if least is None or not np.isfinite(least.least):
+        return why
+    return f"{why}; the least largest excess over the bounds is {least.least:.3g}"
 
 
 def _violation(start: State, constraints: tuple[Constraint, ...], margin: float) -> str:
@@ -229,27 +251,6 @@ def _violation(start: State, constraints: tuple[Constraint, ...], margin: float)
     return ""
 
 
-def _same_piece(
-    eset: EquilibriumSet,
-    piece: Int[np.ndarray, " V"],
-    allowed: Bool[np.ndarray, " V"],
-    start: State,
-) -> Bool[np.ndarray, " V"]:
-    """Vertices on the piece of the start: that of the cell below it, or of the nearest vertex."""
-    here = eset.over(**{name: np.array([start[name]]) for name in eset.names})
-    n, mass = eset.structure.unknowns, eset.structure.mass
-    gap = (here.states.z - start.z)[:, :n] ** 2 @ mass
-    cell = int(here.cell[gap.argmin()]) if len(gap) else -1
-    corners = eset.cells[cell] if cell >= 0 else np.zeros(0, int)
-    corners = corners[allowed[corners]]
-    if len(corners) == 0:
-        some = np.flatnonzero(allowed)
-        away = (eset.points.z[some] - start.z)[:, :n] ** 2 @ mass
-        away += (((eset.points.p[some] - start.p) / eset.structure.scales) ** 2).sum(axis=1)
-        corners = some[[away.argmin()]] if len(some) else some
-    return np.isin(piece, piece[corners])
-
-
 def _watched(
     programme: Programme, constraints: tuple[Constraint, ...], margin: float
 ) -> tuple[Constraint, ...]:
@@ -258,35 +259,44 @@ def _watched(
 
 
 def _starts(
-    eset: EquilibriumSet,
-    programme: Programme,
-    constraints: tuple[Constraint, ...],
-    start: State | None,
-) -> Int[np.ndarray, " n"]:
-    """Allowed vertices that no allowed neighbour beats, the best first.
+    eset: EquilibriumSet, programme: Programme, constraints: tuple[Constraint, ...]
+) -> tuple[Spots, Thin | None]:
+    """Allowed states that no allowed neighbour beats, vertices and others between them.
 
-    Where no vertex is allowed, those that violate the constraints least.
+    Where there are none, what the search for the least violation found.
     """
+    parts = _best_vertices(eset, programme, feasible_vertices(eset, constraints))
+    # those of the set hold on its cells
+    constraints = tuple(each for each in constraints if each not in eset.constraints)
+    if constraints:
+        cells = eset.cells[eset.cell_index == 0]
+        thin = between_vertices(eset, programme, constraints, cells)
+        some = programme.objective.values(thin.z, thin.p).argsort(kind="stable")[:CANDIDATES]
+        parts = together([parts, thin.take(some)])
+        if not len(parts):
+            least = least_violation(eset, programme, constraints, cells)
+            return least.spots, least
+    return parts, None
+
+
+def _starts_around(ground: EquilibriumSet | None, programme: Programme, start: State) -> Spots:
+    """Vertices of the feasible piece around the start that no neighbour beats; else the start."""
+    if ground is None or not len(ground.cells):
+        return Spots(start.z[None], start.p[None], rows_at(programme.setting, start))
+    return _best_vertices(ground, programme, stable_vertices(ground))
+
+
+def _best_vertices(
+    eset: EquilibriumSet, programme: Programme, allowed: Bool[np.ndarray, " V"]
+) -> Spots:
+    """Allowed vertices that no allowed neighbour beats, the best first."""
     goal = programme.objective
-    allowed = feasible_vertices(eset, constraints)
     value = goal.sign * vertex_values(eset, goal.descriptor)
-    if start is not None:
-        allowed &= _same_piece(eset, pieces_of_vertices(eset, allowed), allowed, start)
-    if not allowed.any():
-        allowed = stable_vertices(eset)
-        value = np.sum([_excess(eset, each) for each in constraints], axis=0)
     edges = stable_edges(eset)
     edges = edges[allowed[edges].all(axis=1)]
     alone = np.setdiff1d(np.flatnonzero(allowed), edges)
     both = np.concatenate([local_minima(edges, value), alone])
-    return np.asarray(both[np.argsort(value[both], kind="stable")][:CANDIDATES])
-
-
-def _excess(eset: EquilibriumSet, constraint: Constraint) -> Float[np.ndarray, " V"]:
-    """Relative violation of a constraint at the vertices."""
-    sign = 1.0 if constraint.sense == "<=" else -1.0
-    over = sign * (vertex_values(eset, constraint.descriptor) - constraint.bound)
-    return np.asarray(np.maximum(over, 0.0) / max(1.0, abs(constraint.bound)))
+    return spots_of(eset, both[np.argsort(value[both], kind="stable")][:CANDIDATES])
 
 
 def _optima(programme: Programme, ends: list[Settled]) -> list[Settled]:
@@ -316,17 +326,20 @@ def _optimum(programme: Programme, end: Settled) -> Optimum:
 
 
 def _reached(
-    eset: EquilibriumSet,
+    grounds: tuple[EquilibriumSet, EquilibriumSet | None],
     programme: Programme,
     start: State,
     demands: tuple[Sequence[Constraint], float],
     found: list[tuple[Settled, Optimum]],
 ) -> list[Optimum]:
     """Optima from the first on to which a route leads."""
-    within, margin = demands
+    (eset, ground), (within, margin) = grounds, demands
     for number, (end, optimum) in enumerate(found):
         goal = _in_the_box(eset, _before_the_edge(programme, end) or optimum.state)
         route = plan(eset, start, goal, within=within, margin=0.99 * margin)
+        if not route.arrived and within and ground is not None and len(ground.cells):
+            # a corridor between the vertices of the whole set
+            route = plan(ground, start, goal, within=within, margin=0.99 * margin)
         if route.arrived:
             first = Optimum(optimum.state, optimum.value, optimum.certificate, route)
             return [first, *(other for _, other in found[number + 1 :])]

@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.equilibria.steering import answers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.nearest import setting_of, spots
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import Aim, corrected
 from equimorph.manifold.tangents import placed_frames, split_step, tangent_frames
+from equimorph.structures import State
 
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
@@ -39,10 +41,28 @@ class Spots:
         return Spots(self.z[some], self.p[some], self.rows[some])
 
 
+def together(parts: list[Spots]) -> Spots:
+    """All points of several batches."""
+    return Spots(
+        np.concatenate([each.z for each in parts]),
+        np.concatenate([each.p for each in parts]),
+        np.concatenate([each.rows for each in parts]),
+    )
+
+
 def spots_of(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> Spots:
     """Vertices of a set, with the planes of cells around them."""
     found = spots(eset, vertices)
     return Spots(found.z, found.p, found.rows)
+
+
+def rows_at(setting: Setting, state: State) -> Float[np.ndarray, "1 d coordinates"]:
+    """Plane near the tangent space of a stable state."""
+    structure, free = setting.structure, setting.free
+    dz, dp = answers(structure, state.z[None], state.p[None], free)
+    u = dz[0][:, : structure.unknowns] * np.sqrt(structure.mass)
+    both = np.concatenate([u, dp[0][:, free] / structure.scales[free]], axis=1)
+    return np.ascontiguousarray(np.linalg.qr(both.T)[0].T[None])
 
 
 def plane_of(eset: EquilibriumSet) -> Setting:

@@ -117,6 +117,16 @@ class Programme:
             _slopes(g[1]), _bends(g[0], g[2], known), known,
         )  # fmt: skip
 
+    def linearised(
+        self, at: Spots, frames: Frames
+    ) -> tuple[Float[np.ndarray, "lanes k"], Float[np.ndarray, "lanes k d"]]:
+        """Excess over all bounds, and its slopes along orthonormal tangents."""
+        d = frames.shape[1]
+        flat = self._moved(at, frames, DIFFERENCE * np.concatenate([np.eye(d), -np.eye(d)]))
+        excess = self.excess(np.concatenate([at.z, flat[0]]), np.concatenate([at.p, flat[1]]))
+        around = excess[len(at) :].reshape(len(at), 2 * d, -1)
+        return excess[: len(at)], _slopes(around)
+
     def _moved(
         self, at: Spots, frames: Frames, steps: Float[np.ndarray, "n d"]
     ) -> tuple[Float[np.ndarray, "many size"], Float[np.ndarray, "many parameters"]]:

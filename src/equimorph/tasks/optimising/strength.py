@@ -21,6 +21,8 @@ Values = Float[np.ndarray, " lanes"]
 CANDIDATES = 4
 ROBUST = 2
 """Local maxima of the worst case over the vertices from which robust optima are searched."""
+EXCHANGES = 5
+"""Rounds in which offsets are added at which the limit load is smallest."""
 HOPELESS = 0.9
 """Curves whose values stay below this share of what was found are left out."""
 LEVEL = 1e-3
@@ -97,6 +99,8 @@ class StrongestSettings:
     at_risk
         Of a robust optimum: the smallest limit load over the imperfections at the best sure
         setting.
+    nominal
+        The best sure setting.
     """
 
     status: Literal["found", "refused"]
@@ -106,6 +110,7 @@ class StrongestSettings:
     guaranteed: float
     price: float
     at_risk: float
+    nominal: Strongest | None = None
 
     def __repr__(self) -> str:
         """The best, and its guarantee."""
@@ -140,8 +145,9 @@ def strongest(
     lmap
         Map of limit loads; rays are its functions.
     offsets
-        Largest errors of the settings, by name: the smallest limit load over their box (its centre,
-        corners and middles of sides) is made as large as possible.
+        Largest errors of the settings, by name: the smallest limit load over their box is made as
+        large as possible. The box is looked at in its centre, corners and middles of sides, and
+        where it is smallest of 21 × 21 settings, until that changes nothing.
 
     Raises
     ------
@@ -171,7 +177,7 @@ def strongest(
     sure = _sure(lmap)
     if not given:
         value = sure[0].value
-        return StrongestSettings("found", "", tuple(sure), {}, value, 0.0, value)
+        return StrongestSettings("found", "", tuple(sure), {}, value, 0.0, value, sure[0])
     return _robust(lmap, sure[0], given)
 
 
@@ -278,7 +284,33 @@ def _strongest(
 def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -> StrongestSettings:
     """Setting whose worst case is best."""
     size = np.array([offsets.get(name, 0.0) for name in lmap.grid.names])
-    around = np.unique(np.array(list(product((-1.0, 0.0, 1.0), repeat=2))) * size, axis=0)
+    around, everywhere = (
+        np.unique(np.array(list(product(np.linspace(-1.0, 1.0, count), repeat=2))) * size, axis=0)
+        for count in (3, 21)
+    )
+    for _ in range(EXCHANGES):
+        setting, guaranteed = _raised(lmap, around)
+        values = np.nan_to_num(lmap.rays(setting + everywhere), nan=0.0)
+        lowest = int(values.argmin())
+        if values[lowest] >= guaranteed - LEVEL:
+            break
+        # a jump passes through the box between the settings that are looked at
+        around = np.concatenate([around, everywhere[[lowest]]])
+    nominal, guaranteed = float(lmap.rays(setting[None])[0]), min(guaranteed, values[lowest])
+    sides = _sides(lmap, setting, size / np.linalg.norm(size))
+    found = _strongest(lmap, setting, (nominal, "robust", np.nan), sides)
+    best = np.array(list(sure.setting.values()))
+    at_risk = float(np.nan_to_num(lmap.rays(best + everywhere), nan=0.0).min())
+    price = sure.value - nominal
+    return StrongestSettings(
+        "found", "", (found,), dict(offsets), float(guaranteed), price, at_risk, sure
+    )
+
+
+def _raised(
+    lmap: LimitLoadMap, around: Float[np.ndarray, "offsets 2"]
+) -> tuple[Float[np.ndarray, " 2"], float]:
+    """Setting whose smallest limit load at some offsets is largest, and that."""
 
     def pieces(settings: Settings) -> Float[np.ndarray, "lanes m"]:
         many = (settings[:, None] + around).reshape(-1, 2)
@@ -296,13 +328,7 @@ def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -
         # across a jump the search goes on in all directions
         top = climb(worst, raised_to, 0.1 * radius, box)
         ends.append(raised(pieces, top.setting, 0.1 * radius, box))
-    setting, guaranteed = max(ends, key=lambda end: end[1])
-    nominal = float(lmap.rays(setting[None])[0])
-    sides = _sides(lmap, setting, size / np.linalg.norm(size))
-    found = _strongest(lmap, setting, (nominal, "robust", np.nan), sides)
-    at_risk = float(worst(np.array([list(sure.setting.values())]))[0])
-    price = sure.value - nominal
-    return StrongestSettings("found", "", (found,), dict(offsets), guaranteed, price, at_risk)
+    return max(ends, key=lambda end: end[1])
 
 
 def _lattice(lmap: LimitLoadMap) -> Settings:

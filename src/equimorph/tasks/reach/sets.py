@@ -9,13 +9,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
-from equimorph.manifold import Division, EquilibriumSet, divided, part, refine, restricted
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.locate import cell_of, pieces_of
-from equimorph.manifold.nearest import setting_of
+from equimorph.manifold import Division, EquilibriumSet, divided, part, refine
 from equimorph.manifold.topology import adjacency, labels
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
+from equimorph.tasks.pieces import cell_near, stable_piece
 from equimorph.tasks.reach.regions import BoundaryPiece, Region
 from equimorph.tasks.reach.towards import Answer, towards
 
@@ -148,7 +146,7 @@ def reachable(
         if not cut.lost:
             break
     label = _parted(cut)
-    own = label[_cell(cut.eset, state)]
+    own = label[cell_near(cut.eset, state)]
     order = [own, *(k for k in range(label.max() + 1) if k != own)]
     regions = tuple(
         _region(cut.eset, label == k, tuple(descriptors), cut.side, cut.on_level) for k in order
@@ -188,29 +186,13 @@ def _stable_piece(
         raise InputError("`eset` must have cells; got an empty set.")
     if not state.stable:
         raise InputError(f"`state` must be stable; got a state of index {state.index}.")
-    stratum, _ = pieces_of(eset, state)
-    if stratum < 0:
-        raise InputError(f"`state` must be a state of the set; got {state}, which is not.")
     for constraint in within:
         if constraint.excess(state.z[None], state.p[None])[0] > 0.0:
             raise InputError(f"`state` must obey {constraint}; got {state}, which does not.")
-    piece = part(eset, eset.stratum == stratum)
-    for constraint in within:
-        piece = restricted(piece, constraint)
-    if not within:
-        return piece
-    return part(piece, piece.component == piece.component[_cell(piece, state)])
-
-
-def _cell(eset: EquilibriumSet, state: State) -> int:
-    """Cell of a state; the one with the nearest middle where a curved boundary leaves it out."""
-    found = cell_of(eset, state)
-    if found >= 0:
-        return found
-    setting = setting_of(eset)
-    middles = embed(setting, eset.points.z, eset.points.p)[eset.cells].mean(axis=1)
-    here = embed(setting, state.z[None], state.p[None])[0]
-    return int(np.argmin(np.linalg.norm(middles - here, axis=1)))
+    piece = stable_piece(eset, state, within)
+    if piece is None:
+        raise InputError(f"`state` must be a state of the set; got {state}, which is not.")
+    return piece
 
 
 def _parted(cut: Division) -> Int[np.ndarray, " C"]:

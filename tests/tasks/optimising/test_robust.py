@@ -1,0 +1,127 @@
+"""Robust optima: closed forms of the spring, brute force over the box of imperfections."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import equimorph as em
+from typecheck import unchecked
+
+LOAD = 0.01
+
+
+@pytest.fixture(scope="module")
+def spring_at_load():
+    with unchecked():
+        return em.equilibrium_set(em.Spring(), em.Box(x_l=(0.5, 1.2)), fixed={"F": LOAD}, checks=0)
+
+
+def turned(x, force):
+    """δ > 0 of the stable state, F/k = (1 − x/cos δ) sin δ; nan beyond the fold [PHYSICS 2]."""
+    if force >= (1.0 - x ** (2 / 3)) ** 1.5:
+        return np.nan
+    fold = np.arccos(np.cbrt(x))
+    return brentq(lambda d: (1.0 - x / np.cos(d)) * np.sin(d) - force, fold, 1.5)
+
+
+def edge_of(force):
+    """x_l at which the fold is met under a load: F/k = (1 − x_l^⅔)^(3/2)."""
+    return (1.0 - force ** (2 / 3)) ** 1.5
+
+
+def ask(eset, objective, offsets, **options):
+    angle = eset.structure.angle
+    with unchecked():
+        return em.robust_optimum(eset, objective, offsets, within=[angle >= 0.1], **options)
+
+
+def test_the_flattest_spring_keeps_its_box_stable(spring_at_load):
+    """Nominal on the fold of F, robust on that of F + 0.005; the worst angle is that at F − 0.005.
+
+    The worst corner is another one than that which is critical.
+    """
+    found = ask(spring_at_load, spring_at_load.structure.angle, {"F": 0.005})
+    x = edge_of(LOAD + 0.005)
+    assert found.state["x_l"] == pytest.approx(x, abs=1e-8)
+    assert found.guaranteed == pytest.approx(turned(x, LOAD - 0.005), abs=1e-7)
+    assert found.value == pytest.approx(turned(x, LOAD), abs=1e-7)
+    assert found.nominal.value == pytest.approx(np.arcsin(np.cbrt(LOAD)), abs=1e-7)
+    assert found.price == pytest.approx(found.value - found.nominal.value)
+    assert found.at_risk == np.inf
+    assert found.edge == {"F": 0.005}
+
+
+def test_a_worst_case_that_ends_at_a_fold_is_its_limit(spring_at_load):
+    """δ + 100 F is worst at F + 0.005, and least where that corner is a fold, slope infinite."""
+    spring = spring_at_load.structure
+    load = em.value_of(spring, "F")
+    tilted = em.combined("tilted", lambda angle, f: angle + 100.0 * f, spring.angle, load)
+    found = ask(spring_at_load, tilted, {"F": 0.005})
+    corner = LOAD + 0.005
+    assert found.state["x_l"] == pytest.approx(edge_of(corner), abs=1e-8)
+    assert found.guaranteed == pytest.approx(np.arcsin(np.cbrt(corner)) + 100 * corner, abs=1e-7)
+    # from inside it is approached, like the square root of the distance
+    worst = em.worst_over(spring, tilted, {"F": 0.005})
+    gaps = [
+        worst(em.lift(found.state, {"x_l": found.state["x_l"] - h}).end.state) - found.guaranteed
+        for h in (1e-4, 1e-6)
+    ]
+    assert gaps[0] > gaps[1] > 0.0
+    assert gaps[0] / gaps[1] == pytest.approx(10.0, rel=0.1)
+
+
+@pytest.mark.parametrize("sense", ["min", "max"])
+def test_no_setting_is_better_over_the_whole_box(spring_at_load, sense):
+    """Brute force: 193 settings with 11 × 11 imperfections of x_l and F each, in closed form."""
+    offsets = {"x_l": 0.01, "F": 0.005}
+    found = ask(spring_at_load, spring_at_load.structure.angle, offsets, sense=sense)
+    sign = 1.0 if sense == "min" else -1.0
+    shifts = np.linspace(-1, 1, 11)
+
+    def worst(x):
+        values = [
+            sign * turned(x + i * offsets["x_l"], LOAD + j * offsets["F"])
+            for i in shifts
+            for j in shifts
+        ]
+        return max(np.nan_to_num(values, nan=np.inf))
+
+    x = np.linspace(0.5, 0.98, 193)
+    best = min(map(worst, x))
+    assert sign * found.guaranteed <= best + 1e-9
+    assert sign * found.guaranteed >= best - 0.03
+    inside = found.state["x_l"] - 1e-9
+    assert worst(inside) == pytest.approx(sign * found.guaranteed, abs=1e-5)
+
+
+def test_what_cannot_be_kept_stable_is_refused(spring_at_load):
+    """With F off by 0.5 no δ > 0.1 stays stable."""
+    found = ask(spring_at_load, spring_at_load.structure.angle, {"F": 0.5})
+    assert found.status == "refused"
+    assert "room(F -0.5)" in found.why or "room(F +0.5)" in found.why
+    assert np.isnan(found.guaranteed)
+    assert found.nominal is not None
+
+
+@pytest.mark.slow
+def test_the_best_load_at_a_cliff_is_given_up_for_a_safe_one():
+    """Left-half load, ±0.02: nominal 3.9908, the guarantee by 41 × 41 imperfections around it."""
+    arch = em.Rod("left-half")
+    with unchecked():
+        grid = em.Grid(Theta=(0.8, 1.1, 6), Delta=(0.5, 0.7, 8))
+        lmap = em.limit_load_map(arch, grid, "q", within=[arch.max_curvature <= 10])
+        found = em.strongest(lmap, offsets={"Theta": 0.02, "Delta": 0.02})
+        assert found.nominal.value == pytest.approx(3.990785, abs=2e-6)
+        assert found.price == pytest.approx(found.nominal.value - found.best.value)
+        steps = 0.02 * np.linspace(-1, 1, 41)
+        box = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+
+        def worst(setting):
+            return np.nan_to_num(lmap.rays(setting + box), nan=0.0).min()
+
+        here = np.array(list(found.best.setting.values()))
+        assert worst(here) == pytest.approx(found.guaranteed, abs=2e-3)
+        sure = np.array(list(found.nominal.setting.values()))
+        assert worst(sure) < found.guaranteed - 0.2
+        for step in np.random.default_rng(3).uniform(-0.03, 0.03, (12, 2)):
+            assert worst(here + step) <= found.guaranteed + 2e-3
