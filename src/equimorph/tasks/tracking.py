@@ -16,7 +16,8 @@ from equimorph.tasks.known import Start, known_state
 from equimorph.tasks.motion.course import Course
 from equimorph.tasks.motion.followed import DENSE, dense_path, path_of, uniform
 from equimorph.tasks.motion.redundant import steer
-from equimorph.tasks.optimising.following import FollowedOptimum, Problem, bounds_of, followed
+from equimorph.tasks.optimising.followed_optimum import FollowedOptimum
+from equimorph.tasks.optimising.following import Problem, bounds_of, followed
 from equimorph.tasks.optimising.objectives import Objective
 from equimorph.tasks.optimising.stability import stability
 from equimorph.tasks.route import FINE, place, scheduled

@@ -53,6 +53,7 @@ def test_double_well_jumps_where_its_minimum_ends():
     smooth = np.abs(3 * u**2 - 1) > 1e-2
     assert (u**3 - u + load)[smooth] == pytest.approx(0, abs=1e-7)
     assert len(found.certificates) == len(found.at) == len(found.values)
+    assert found.schedule is None
 
 
 def test_a_branching_minimum_goes_on_without_a_jump():
@@ -106,6 +107,11 @@ def test_least_angle_of_the_spring_slides_along_the_stability_boundary():
     assert np.sin(found.values) ** 3 == pytest.approx(found.states["F"], abs=1e-9)
     assert {each.kind for each in found.certificates} == {"stability boundary"}
     assert kept.margin == pytest.approx(0.05, abs=1e-7)
+    schedule = kept.schedule
+    assert schedule.values == pytest.approx(kept.states.p)
+    assert schedule.margins == pytest.approx(kept.margin)
+    assert schedule.descriptors["angle"] == pytest.approx(kept.values)
+    assert (schedule.progress[0], schedule.progress[-1]) == (0.0, 1.0)
     x, delta = kept.states["x_l"], kept.values
     assert x * (x - np.cos(delta) ** 3) / np.cos(delta) ** 4 == pytest.approx(0.05, abs=1e-7)
 

@@ -1,7 +1,8 @@
 """Optimisation over equilibrium sets and maps."""
 
 from equimorph.tasks.optimising.certificates import Certificate
-from equimorph.tasks.optimising.following import FollowedOptimum, Jump, follow_optimum
+from equimorph.tasks.optimising.followed_optimum import FollowedOptimum, Jump
+from equimorph.tasks.optimising.following import follow_optimum
 from equimorph.tasks.optimising.landscapes import Barriers, Landscape, landscape
 from equimorph.tasks.optimising.optimum import Optima, Optimum, optimise
 from equimorph.tasks.optimising.robust import RobustOptimum, robust_optimum

@@ -61,10 +61,10 @@ class _Lane:
     done: Settled | None = None
 
 
-def descend(programme: Programme, starts: Spots) -> list[Settled]:
+def descend(programme: Programme, starts: Spots, rounds: int = ITERATIONS) -> list[Settled]:
     """Local minima from starts; those that lead nowhere are left out."""
     lanes = [_Lane(starts.take(np.array([k]))) for k in range(len(starts))]
-    for _ in range(ITERATIONS):
+    for _ in range(rounds):
         todo = [lane for lane in lanes if lane.done is None and lane.reach > 0.0]
         if not todo:
             break

@@ -1,13 +1,13 @@
 """`follow_optimum`: a local optimum while loads and targets vary, and where it jumps."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.equilibria import Leg
+from equimorph.equilibria import Event, Leg
 from equimorph.errors import InputError
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Setting
@@ -15,12 +15,16 @@ from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States, Structure, value_of
 from equimorph.tasks.known import Start, known_state
 from equimorph.tasks.motion.course import Course
+from equimorph.tasks.motion.followed import path_of
 from equimorph.tasks.optimising.certificates import Certificate, certificate
-from equimorph.tasks.optimising.descent import Settled, descend
+from equimorph.tasks.optimising.descent import ITERATIONS, Settled, descend
+from equimorph.tasks.optimising.followed_optimum import FollowedOptimum, Jump
+from equimorph.tasks.optimising.jumps import expected_end, extrapolated, tried_next
 from equimorph.tasks.optimising.objectives import Objective
 from equimorph.tasks.optimising.plane import Spots, rows_at, settled, stepped
 from equimorph.tasks.optimising.programme import Programme
-from equimorph.tasks.optimising.stability import stability
+from equimorph.tasks.optimising.stability import is_stability, stability
+from equimorph.tasks.route import scheduled
 
 FIRST, LARGEST = 0.02, 0.1
 """Share of a leg of the first step, and of the longest."""
@@ -32,8 +36,12 @@ NEAR = 4e-3
 """Way, in the metric and scaled parameters, that no jump is as short as."""
 FAR = 0.15
 """Longest way between successive optima."""
+SHORTER = 0.4
+"""Share of a step in vain that is tried next."""
 LATER = (0.0, 1e-4, 1e-3, 1e-2)
 """Shares of a leg after which a first optimum is tried: it is flat where targets get lost."""
+SHORT = 10
+"""Steps of a descent from a prediction."""
 FLAT = -1e-6
 """Least curvature of a minimum."""
 NUDGE = 1e-3
@@ -41,72 +49,6 @@ FEASIBLE = 1e-7
 
 Where = Callable[[Float[np.ndarray, " columns"]], Objective]
 """Objective at given parameters and targets."""
-
-
-@dataclass(frozen=True, eq=False)
-class Jump:
-    """Where an optimum ceases to be one, and where the descent from there ends.
-
-    Parameters
-    ----------
-    at
-        Number of the leg + share of it.
-    before, after
-        States on both sides; `after` is None if there is no optimum beyond.
-    values
-        Objective on both sides; nan where there is none.
-    """
-
-    at: float
-    before: State
-    after: State | None
-    values: tuple[float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class FollowedOptimum:
-    """Answer to "how does the best state move".
-
-    Parameters
-    ----------
-    status
-        "arrived", or "refused" with the reason in `why` where no optimum is left.
-    states
-        Optima along the way, the first for the start's parameters.
-    at
-        Number of the leg + share of it, of each; twice at jumps.
-    values
-        The objective.
-    certificates
-        Where each sits: interior, constraint, box or stability boundary; see `Certificate`.
-    jumps
-        Where the optimum moves at once.
-    """
-
-    status: Literal["arrived", "refused"]
-    why: str
-    states: States
-    at: Float[np.ndarray, " points"]
-    values: Float[np.ndarray, " points"]
-    certificates: tuple[Certificate, ...]
-    jumps: tuple[Jump, ...]
-
-    def __repr__(self) -> str:
-        """Values at both ends, and how many jumps."""
-        if self.status == "refused":
-            return f"FollowedOptimum(refused at {self.at[-1]:.6g}: {self.why})"
-        ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}"
-        return f"FollowedOptimum({ends}; {len(self.jumps)} jumps)"
-
-    @property
-    def arrived(self) -> bool:
-        """Whether there is an optimum all the way."""
-        return self.status == "arrived"
-
-    @property
-    def margin(self) -> Float[np.ndarray, " points"]:
-        """Stability margin of each."""
-        return self.states.margin
 
 
 def follow_optimum(  # noqa: PLR0913  # the knobs of the public face, all by keyword
@@ -262,50 +204,88 @@ def followed(problem: Problem, start: State, time: float) -> FollowedOptimum:
     if first is None:
         why = "the descent from the start ends at no optimum"
         return _result(problem, [], [], why, start)
-    track, jumps, step = [first], list[Jump](), FIRST
+    track, jumps = [first], list[Jump]()
+    step, failure = FIRST, np.inf
     while track[-1].time < legs:
         here = track[-1]
-        corner = min(np.floor(here.time) + 1.0, legs)
-        ahead = min(here.time + step, corner)
-        guess = _predicted(problem, track, ahead, jumps)
-        there = None if guess is None else _solved(problem, guess, ahead)
-        if there is not None and guess is not None and _goes_on(here, there, guess):
-            track.append(there)
-            step = min(1.5 * step, LARGEST)
-        elif ahead - here.time > CLOSEST * (1.0 + here.time):
-            step = 0.4 * (ahead - here.time)
-        else:
-            after = _beyond(problem, here, ahead)
+        if failure - here.time <= CLOSEST * (1.0 + here.time):
+            after = _beyond(problem, here, failure)
             if after is None or np.linalg.norm(after.place - here.place) > NEAR:
                 jumps.append(_jump(here, after))
             if after is None:
                 return _result(problem, track, jumps, "no optimum is left", start)
             track.append(after)
-            step = FIRST
+            step, failure = FIRST, np.inf
+            continue
+        corner = min(np.floor(here.time) + 1.0, legs)
+        there, ahead = _onward(problem, (track, jumps), (step, failure), corner)
+        if there is None:
+            failure, step = ahead, SHORTER * (ahead - here.time)
+        else:
+            step = min(1.5 * (ahead - here.time), LARGEST)
+            track.append(there)
+            failure = failure if there.time < failure else np.inf
     return _result(problem, track, jumps, "", start)
 
 
+def _onward(
+    problem: Problem,
+    past: tuple[list[_Found], list[Jump]],
+    reach: tuple[float, float],
+    corner: float,
+) -> tuple[_Found | None, float]:
+    """Next optimum, if the last one leads to it; and the time that was tried."""
+    (track, jumps), (step, failure) = past, reach
+    here = track[-1]
+    end = _end(track, jumps) if failure < np.inf else np.nan
+    known = here.time < end < failure
+    ahead = tried_next(here.time, end, failure) if known else here.time + step
+    ahead = min(ahead, corner)
+    guess = _predicted(problem, track, ahead, jumps, end)
+    there = None if guess is None else _solved(problem, guess, ahead, SHORT)
+    if there is None or guess is None or not _goes_on(here, there, guess):
+        return None, ahead
+    return there, ahead
+
+
+def _pair(track: list[_Found], jumps: list[Jump]) -> tuple[_Found, _Found] | None:
+    """Last two optima, if the way between them is smooth."""
+    if len(track) < 2 or (jumps and jumps[-1].at >= track[-2].time):
+        return None
+    first, second = track[-2:]
+    return (first, second) if first.time >= np.floor(second.time - 1e-12) else None
+
+
+def _end(track: list[_Found], jumps: list[Jump]) -> float:
+    """Time at which the optimum is expected to end, if it is."""
+    pair = _pair(track, jumps)
+    if pair is None:
+        return np.nan
+    bends = (pair[0].certificate.curvature, pair[1].certificate.curvature)
+    return expected_end((pair[0].time, pair[1].time), bends)
+
+
 def _predicted(
-    problem: Problem, track: list[_Found], ahead: float, jumps: list[Jump]
+    problem: Problem, track: list[_Found], ahead: float, jumps: list[Jump], end: float
 ) -> Spots | None:
-    """State of the set at a time ahead, on the line through the last two optima."""
+    """State of the set at a time ahead, where the last two optima lead to."""
     here, course = track[-1], problem.course
     z, p = here.end.spot.z.copy(), here.end.spot.p.copy()
-    smooth = len(track) > 1 and not (jumps and jumps[-1].at >= track[-2].time)
-    if smooth and track[-2].time >= np.floor(here.time - 1e-12):
-        share = (ahead - here.time) / (here.time - track[-2].time)
-        z += share * (z - track[-2].end.spot.z)
-        p += share * (p - track[-2].end.spot.p)
+    pair = _pair(track, jumps)
+    if pair is not None:
+        share = extrapolated((pair[0].time, pair[1].time), ahead, end)
+        z += share * (z - pair[0].end.spot.z)
+        p += share * (p - pair[0].end.spot.p)
     given = course.split(course.at(np.array([ahead])))[0]
     given[:, course.free] = p[:, course.free]
     found, good = settled(problem.programme(ahead).setting, z, given, here.end.spot.rows)
     return found if good[0] else None
 
 
-def _solved(problem: Problem, guess: Spots, time: float) -> _Found | None:
+def _solved(problem: Problem, guess: Spots, time: float, rounds: int = ITERATIONS) -> _Found | None:
     """Optimum near a guess; None where the descent does not end at one."""
     programme = problem.programme(time)
-    ends = descend(programme, guess)
+    ends = descend(programme, guess, rounds)
     if not ends or not ends[0].converged or ends[0].expansion.g.max() > FEASIBLE:
         return None
     end = ends[0]
@@ -366,12 +346,21 @@ def _result(
         float(each.programme.objective.descriptor.function(each.end.spot.z, each.end.spot.p)[0])
         for each in track
     ]
-    return FollowedOptimum(
+    states, times = States(structure, z, p), np.array([each.time for each in track])
+    found = FollowedOptimum(
         "refused" if why else "arrived",
         why,
-        States(structure, z, p),
-        np.array([each.time for each in track]),
+        states,
+        times,
         np.array(values),
         tuple(each.certificate for each in track),
         tuple(jumps),
     )
+    if why or jumps or len(track) < 2:
+        return found
+    path = path_of(states, times, Event("arrived", states[-1], times[-1]))
+    if not path.length[-1] > 0.0:
+        return found
+    rules = [each.descriptor for each in problem.rules if not is_stability(each)]
+    goal = track[0].programme.objective.descriptor
+    return replace(found, schedule=scheduled(path, found.margin, (goal, *rules)))

@@ -22,6 +22,7 @@ from equimorph.tasks.optimising.stability import stability
 Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, " lanes"]
+Branches = Float[np.ndarray, "lanes m"]
 
 ROOMS = (1.1, 1.02, 1.005)
 """Shares of the box around which it is stable in the first searches; values at the very edge have
@@ -224,7 +225,7 @@ def _edge_programme(question: _Question, number: int) -> Programme:
     branches = question.worst.branches
     assert branches is not None
 
-    def each(z: Lanes, p: Parameters) -> tuple[Lanes, Lanes]:
+    def each(z: Lanes, p: Parameters) -> tuple[Branches, Branches]:
         values, places = branches(z, p)
         values = values.copy()
         values[:, 1 + number] = edge.limit.function(z, p)

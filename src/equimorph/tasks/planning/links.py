@@ -13,6 +13,7 @@ from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.model import Constraint
 from equimorph.structures import States
 from equimorph.tasks.planning.objectives import Objective
+from equimorph.tasks.route import FINE
 
 Lanes = Float[np.ndarray, "lanes size"]
 Flags = Bool[np.ndarray, " lanes"]
@@ -27,15 +28,22 @@ MATCH = 1e-5
 
 @dataclass(frozen=True)
 class Demands:
-    """What a route has to obey, and what it should have least of."""
+    """What a route has to obey, and what it should have least of.
+
+    `closely`: whether every lift is as fine as the final one; else it may step over the corner of a
+    keep-out region.
+    """
 
     objective: Objective
     constraints: tuple[Constraint, ...] = ()
     margin: float = 0.0
+    closely: bool = False
 
     @property
     def options(self) -> TraceOptions:
         """Step control of the lifts."""
+        if self.closely:
+            return FINE
         if self.margin > 0.0:
             return TraceOptions(largest_step=CLOSE)
         step = 0.5 if self.objective.is_length else BROAD

@@ -39,8 +39,8 @@ class Network:
         pairs = faces_of(cells, 2)
         self.pairs = pairs[stable[pairs].all(axis=1)]
         self._allowed: dict[tuple[tuple[Constraint, ...], float], Flags] = {}
-        self._broken: dict[tuple[tuple[Constraint, ...], float], Flags] = {}
-        self._lifted: dict[tuple[tuple[Constraint, ...], float], Flags] = {}
+        self._broken: dict[tuple[tuple[Constraint, ...], float, bool], Flags] = {}
+        self._lifted: dict[tuple[tuple[Constraint, ...], float, bool], Flags] = {}
         self._costs: dict[str, Values] = {}
 
     def allowed(self, eset: EquilibriumSet, demands: Demands) -> Bool[np.ndarray, " V"]:
@@ -65,7 +65,7 @@ class Network:
 
     def verdicts(self, demands: Demands) -> tuple[Flags, Flags]:
         """Which links were lifted in vain, and which with success, in earlier searches."""
-        key = demands.constraints, demands.margin
+        key = demands.constraints, demands.margin, demands.closely
         for known in (self._broken, self._lifted):
             known.setdefault(key, np.zeros(len(self.pairs), bool))
         return self._broken[key], self._lifted[key]

@@ -121,6 +121,17 @@ def _free(
 
     What leaves no room for a reserve is searched without one before it is refused.
     """
+    route = _with_reserves(eset, ends, demands, monitor)
+    if route is not None and not route.arrived and demands.constraints:
+        # coarse lifts step over corners of what is forbidden
+        route = _with_reserves(eset, ends, replace(demands, closely=True), monitor) or route
+    return route or refused(no_route(eset, ends, demands))
+
+
+def _with_reserves(
+    eset: EquilibriumSet, ends: Ends, demands: Demands, monitor: Sequence[Descriptor]
+) -> Route | None:
+    """Route, the last one that was refused, or None where no path leads to the goal."""
     least, route = min(end.margin for end in ends), None
     for factor, share in (*RESERVES, EXACT) if demands.margin > 0.0 else (EXACT, *RESERVES):
         reserved = min(demands.margin * factor + least * share, least)
@@ -130,7 +141,7 @@ def _free(
             route = route_along(eset, corners_of(eset, path, tightened), demands, monitor)
             if route.arrived:
                 return route
-    return route or refused(no_route(eset, ends, demands))
+    return route
 
 
 def _checked_corners(

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import check_start, way_points
 from equimorph.errors import InputError
-from equimorph.model import Box, Constraint, Descriptor, position
+from equimorph.model import Box, Constraint, Descriptor, eased, position
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.planning.links import Demands, links, straight_lifts
 from equimorph.tasks.planning.objectives import Wish, objective_of
@@ -98,7 +98,7 @@ def plan_sampled(  # noqa: PLR0913  # all but three by keyword
         raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
     options = options or SamplingOptions()
     wish = objective_of(objective, start.structure)
-    demands = Demands(wish, tuple(dict.fromkeys(within)), margin)
+    demands = Demands(wish, tuple(eased(each) for each in dict.fromkeys(within)), margin)
     course = _course(start, actuators, loads)
     ends = _checked_ends(start, goal, course)
     for name, state in ends.items():
@@ -114,9 +114,26 @@ def plan_sampled(  # noqa: PLR0913  # all but three by keyword
             return refused(
                 f"no route was found with {options.lifts} lifts, which is no proof that none exists"
             )
-        corners = _corners(course, path, tightened)
         last = goal or path[0][-1]
-        route = _kept(verified(start, last, corners, demands.constraints, monitor), demands)
+        route = _drawn(course, path, (start, last), (demands, tightened), monitor)
+        if route.arrived:
+            break
+    return route
+
+
+def _drawn(
+    course: Course,
+    path: tuple[States, Float[np.ndarray, " nodes"]],
+    ends: tuple[State, State],
+    demands: tuple[Demands, Demands],
+    monitor: Sequence[Descriptor],
+) -> Route:
+    """Route along a straightened path, by fine lifts where coarse ones step over a corner."""
+    own, tightened = demands
+    rules, route = own.constraints, refused("")
+    for closely in (False, True) if rules else (False,):
+        corners = _corners(course, path, replace(tightened, closely=closely))
+        route = _kept(verified(*ends, corners, rules, monitor), own)
         if route.arrived:
             break
     return route
