@@ -107,6 +107,7 @@ def test_functions_are_refused_by_the_place_they_stand_at(tmp_path):
         "distance(disc(0.5, 0.2, 0.1))",
         "distance(half_plane(0, 0, 0, 1))",
         "outside(x_l 1 to 2, F 0 to 0.1)",
+        "shape_y(0.28)",
         "angle",
     ],
 )
@@ -123,6 +124,8 @@ def test_descriptors_by_name(spring, text):
         ("distance(disc(1, 2, r))", "must be that from half_plane"),
         ("outside(x_l 1)", "must read like outside"),
         ("outside(x_l 2 to 1)", "lower < upper"),
+        ("shape_y(2)", "at s from 0 to 1; got y at 2"),
+        ("shape_y(s)", "must be at a number"),
         ("curl", "curl"),
     ],
 )

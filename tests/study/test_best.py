@@ -136,11 +136,16 @@ def test_a_landscape_has_values_where_the_piece_of_the_start_has_states(run):
 
 
 def test_a_landscape_has_its_barriers(run):
-    """Least energy: that of the two mirror images that the force pushes on, up to the cusp."""
+    """Least energy: that of the two mirror images that the force pushes on, up to the cusp.
+
+    Both go on to the other's force, 0.2/11, where that is below the fold's, (1 − x_l^⅔)^(3/2).
+    """
     found = run[0].of("landscape")["least"]
     middles = found.barriers.ends.mean(axis=1)
     np.testing.assert_allclose(middles[:, 1], 0.0, atol=1e-12)
     assert middles[:, 0].max() <= 1.0
+    both = (1.0 - middles[:, 0] ** (2 / 3)) ** 1.5 > 0.2 / 11
+    assert found.barriers.kind == tuple("preference" if go else "stability" for go in both)
     table = rows(run[1] / "least-landscape-barriers.csv")
     assert len(table) == 1 + len(found.barriers)
     assert {row[0] for row in table[1:]} <= {"stability", "preference"}

@@ -54,7 +54,7 @@ def test_both_branches_explain_their_parameters(spring_set):
     assert found.status == "ambiguous"
     assert found.weight[:2] == pytest.approx([0.5, 0.5], abs=1e-4)
     assert np.sort(np.abs(found.states.z[:2, 0])) == pytest.approx(2 * [np.arccos(0.8)], abs=1e-9)
-    assert found.next_measurement.descriptor.name == "y of the shape at s = 1"
+    assert found.next_measurement.descriptor.name == "shape_y(1)"
     assert found.next_measurement.separation == pytest.approx(1.2, abs=1e-9)
     assert "2 states explain" in found.why
     every = em.estimate_state(spring_set, {"x_l": 0.8, "F": 0.0}, error, unstable=True)

@@ -14,6 +14,7 @@ from equimorph.tasks import FollowedOptimum
 
 _ROOM = (0.6, 0.38, 0.1, 0.1)
 _PANEL, _GAP = 1.05, 0.1  # inches
+_ROUNDING = 1e-9
 _COLOURS = {"objective": style.ROUTE_COLOUR, "actuator": style.INDEX_COLOURS[0]}
 
 
@@ -69,7 +70,7 @@ def _draw(
     for leg in range(1, int(np.ceil(at.max()))):
         ax.axvline(leg, color="#c4c4c4", linewidth=0.5, zorder=1)
     places = [jump.at for jump in found.jumps if jump.after is not None]
-    cuts = np.array([int(np.flatnonzero(at == place).max()) + 1 for place in places], dtype=int)
+    cuts = np.array([int(np.flatnonzero(at == place)[0]) + 1 for place in places], dtype=int)
     x, y = (np.insert(each, cuts, np.nan) for each in (at, values))
     ax.plot(x, y, color=colour, linewidth=1.4, zorder=3)
     for cut in cuts[cuts < len(values)].tolist():
@@ -78,3 +79,6 @@ def _draw(
         ax.plot(*sides, "o", color=colour, ms=3.5, mec="white", mew=0.6, zorder=4)
     ax.yaxis.set_major_locator(style.few_ticks())
     ax.margins(y=0.12)
+    middle, size = float(values.mean()), max(1.0, float(np.abs(values).max()))
+    if np.ptp(values) < _ROUNDING * size:
+        ax.set_ylim(middle - 0.1 * size, middle + 0.1 * size)

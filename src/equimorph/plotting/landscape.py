@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
+from equimorph.manifold.topology import chains
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.map_panel import GROUND, new_map_axes, value_colours, write_legend
@@ -93,14 +94,24 @@ def _draw_barriers(ax: Axes, found: Landscape) -> list[Line2D]:
     kinds = np.array(found.barriers.kind, dtype=object)
     entries = []
     for kind, look in _LOOKS.items():
-        mine = lines[kinds == kind]
-        if len(mine):
-            ax.add_collection(
-                LineCollection(list(mine), colors=style.INK, zorder=4, capstyle="round", **look)
-            )
+        mine = _joined(lines[kinds == kind])
+        if mine:
+            ax.add_collection(LineCollection(mine, colors=style.INK, zorder=4, **look))
             shown = {"linewidth": look["linewidths"], "linestyle": look["linestyles"]}
             entries.append(Line2D([], [], color=style.INK, label=_LABELS[kind], **shown))
     return entries
+
+
+def _joined(
+    lines: Float[np.ndarray, "edges 2 2"],
+) -> list[Float[np.ndarray, "points 2"]]:
+    """Short lines joined at their ends, so that dashes run through."""
+    size = np.ptp(lines.reshape(-1, 2), axis=0).max(initial=0.0) if len(lines) else 0.0
+    if not size > 0.0:
+        return list(lines)
+    rounded = np.round(lines.reshape(-1, 2) / size, 9)
+    places, number = np.unique(rounded, axis=0, return_inverse=True)
+    return [places[chain] * size for chain in chains(number.reshape(-1, 2))]
 
 
 def _rims(found: Landscape) -> Float[np.ndarray, "edges 2 2"]:

@@ -18,7 +18,6 @@ _CURVATURE_COLOUR = "#a1561a"
 _GAP = 0.1  # inches
 _ROOM = (0.46, 0.38, 0.1, 0.2)
 _MOST_NUMBERS = 12
-_ROUNDING = 1e-9
 
 
 def margins(route: Route, ax: Axes | None = None) -> Axes:
@@ -54,7 +53,8 @@ def margins(route: Route, ax: Axes | None = None) -> Axes:
         _draw(ax, schedule, schedule.margins, _MARGIN_COLOUR, snaps)
         ax.set_ylabel("stability margin")
         ax.set_ylim(0.0, 1.15 * schedule.margins.max())
-        _mark(ax, schedule, int(np.argmin(schedule.margins)), schedule.margins)
+        if not len(snaps):  # else it is zero at the snap, as the dotted line says
+            _mark(ax, schedule, int(np.argmin(schedule.margins)), schedule.margins)
         if curvature is not None:
             # Both share the room that the axes had, whatever laid it out.
             divider = make_axes_locatable(ax)
@@ -103,12 +103,10 @@ def _mark(
     above = not is_low or values[step] < 0.15 * ax.get_ylim()[1]
     place = (float(schedule.progress[step]), float(values[step]))
     ax.plot(*place, "o", markersize=3.5, color=style.INK, zorder=4, clip_on=False)
-    # At a fold from which the structure snaps the margin is zero up to rounding.
-    shown = 0.0 if abs(place[1]) < _ROUNDING * np.abs(values).max() else place[1]
     # Text near the end of the route is set to the left of its mark, to stay inside the frame.
     side = "right" if place[0] > 0.8 else "left" if place[0] < 0.2 else "center"
     ax.annotate(
-        f"{shown:.3g}", place, (0, 4 if above else -4), textcoords="offset points", ha=side,
+        f"{place[1]:.3g}", place, (0, 4 if above else -4), textcoords="offset points", ha=side,
         va="bottom" if above else "top", zorder=5,
     )  # fmt: skip
 

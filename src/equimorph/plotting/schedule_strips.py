@@ -103,8 +103,7 @@ def _name_scale(
     """Scale of a family, at the right of its last strip."""
     ax = figure.axes[-1]
     ax.yaxis.tick_right()
-    unit = with_unit("", schedule.units[group[0]]).strip(" ()")
-    low, high = (f"{end:.2g}".replace("-", "−") for end in ends)
-    ax.set_yticks(list(ends), [low, f"{high} {unit}".rstrip()])
+    low, high = (f"{end + 0.0:.2g}".replace("-", "−") for end in ends)
+    ax.set_yticks(list(ends), [low, with_unit(high, schedule.units[group[0]])])
     ax.tick_params(axis="y", length=2.5, labelsize=6.5)
     ax.spines["right"].set_visible(True)

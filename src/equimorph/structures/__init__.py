@@ -20,6 +20,7 @@ from equimorph.structures.quantities import (
     effort_of,
     margin_of,
     outside,
+    shape_coordinate,
     value_of,
 )
 from equimorph.structures.rod import (
@@ -74,6 +75,7 @@ __all__ = [
     "from_identity",
     "margin_of",
     "outside",
+    "shape_coordinate",
     "stability_margin",
     "value_of",
 ]

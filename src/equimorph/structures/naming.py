@@ -2,12 +2,20 @@
 
 import re
 from collections.abc import Callable
+from functools import partial
 
 from equimorph.errors import InputError
 from equimorph.model import Box, Descriptor
 from equimorph.model.obstacle import Disc, HalfPlane
 from equimorph.structures.contract import Structure
-from equimorph.structures.quantities import distance_to, effort_of, margin_of, outside, value_of
+from equimorph.structures.quantities import (
+    distance_to,
+    effort_of,
+    margin_of,
+    outside,
+    shape_coordinate,
+    value_of,
+)
 
 _CALL = re.compile(r"\s*(\w+)\((.*)\)\s*", re.DOTALL)
 _RANGE = re.compile(r"\s*(\w+)\s+(\S+)\s+to\s+(\S+)\s*")
@@ -18,7 +26,8 @@ def descriptor_named(structure: Structure, text: str) -> Descriptor:
 
     Beside those of the structure: ``Theta`` (any parameter), ``effort(Theta)``,
     ``stability_margin``, ``distance(half_plane(x, y, nx, ny))``, ``distance(disc(x, y, r))``,
-    ``distance(room(x, y, r))`` and ``outside(Theta 1 to 2, Delta 0 to 1)``.
+    ``distance(room(x, y, r))``, ``outside(Theta 1 to 2, Delta 0 to 1)`` and, of the drawn shape,
+    ``shape_y(0.3)``.
 
     Raises
     ------
@@ -79,8 +88,21 @@ def _outside(structure: Structure, inner: str) -> Descriptor:
     return outside(structure, Box(**sides))
 
 
+def _shape(axis: str, structure: Structure, inner: str) -> Descriptor:
+    try:
+        s = float(inner)
+    except ValueError:
+        raise InputError(
+            f"`shape_{axis}` must be at a number from 0 to 1; got {inner!r}."
+        ) from None
+    return shape_coordinate(structure, axis, s)
+
+
 _FORMS: dict[str, Callable[[Structure, str], Descriptor]] = {
     "effort": _effort,
     "distance": _distance,
     "outside": _outside,
+    "shape_x": partial(_shape, "x"),
+    "shape_y": partial(_shape, "y"),
+    "shape_z": partial(_shape, "z"),
 }

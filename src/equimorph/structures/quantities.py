@@ -34,6 +34,27 @@ def value_of(structure: Structure, name: str) -> Descriptor:
     return Descriptor(name, structure.parameters[at].unit, value, name, structure.signature)
 
 
+def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
+    """Coordinate of the drawn shape at a share of its points: ``shape_coordinate(arch, "y", 0.3)``.
+
+    Raises
+    ------
+    InputError
+        For another axis than x, y or z, or `s` outside 0 to 1.
+    """
+    if axis not in ("x", "y", "z") or not 0.0 <= s <= 1.0:
+        raise InputError(f"`shape` must be x, y or z at s from 0 to 1; got {axis} at {s:g}.")
+    k, place = "xyz".index(axis), np.array([s])
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        shape = structure.shape(z, p, place)
+        if k >= shape.shape[2]:
+            raise InputError("`shape` must be x or y: this structure lies in a plane; got z.")
+        return np.asarray(shape[:, 0, k])
+
+    return Descriptor(f"shape_{axis}({s:g})", structure.length_unit, value, "", structure.signature)
+
+
 def effort_of(structure: Structure, name: str) -> Descriptor:
     """Effort ∂L/∂p of a parameter: the couple or force of an actuator, the way of a load.
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -24,7 +23,7 @@ from equimorph.manifold.nearest import (
 from equimorph.manifold.tangents import fold_slopes, split_step
 from equimorph.manifold.topology import faces_of
 from equimorph.model import Descriptor
-from equimorph.structures import State, States
+from equimorph.structures import State, States, shape_coordinate
 
 STARTS = 16
 """Local minima over the vertices from which the best fits are searched."""
@@ -305,18 +304,10 @@ def _resolving(
 
 def _coordinates(states: States) -> dict[Descriptor, float]:
     """Coordinates of the drawn shape at some places, each with error one."""
-    structure, unit = states.structure, states.structure.length_unit
+    structure = states.structure
     dims = states[:1].shape(PLACES[:1]).shape[2]
-
-    def value(
-        s: float, axis: int, z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes P"]
-    ) -> Float[np.ndarray, " lanes"]:
-        return structure.shape(z, p, np.array([s]))[:, 0, axis]
-
     return {
-        Descriptor(f"{'xyz'[axis]} of the shape at s = {s:g}", unit, partial(value, s, axis)): 1.0
-        for s in PLACES.tolist()
-        for axis in range(dims)
+        shape_coordinate(structure, axis, s): 1.0 for s in PLACES.tolist() for axis in "xyz"[:dims]
     }
 
 

@@ -22,10 +22,12 @@ from equimorph.study.kinds.legs import Legs, legs_of, limits_of
 from equimorph.study.lookup import Ground, at_key, check_state, constraints_of, descriptor_at
 from equimorph.study.names import task_files
 from equimorph.study.sections.best import FollowSection
-from equimorph.tasks import FollowedOptimum, follow_optimum
+from equimorph.tasks import Certificate, FollowedOptimum, follow_optimum
 
 MOST_ROWS = 12
 """Optima that a page shows."""
+ROUNDING = 1e-9
+"""Margin on the stability boundary, where it is zero."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,11 @@ def _jumps(task: FollowTask, found: FollowedOptimum) -> list[str]:
     return [html.table(["jump at leg", f"{value} before", "after", *map(escape, names)], rows)]
 
 
+def _limits(certificate: Certificate) -> list[str]:
+    """Active constraints; stability is told by the kind."""
+    return [each for each in certificate.active if not each.startswith("stable ")]
+
+
 def _table(task: FollowTask, found: FollowedOptimum) -> str:
     """Optima along the way, some of many."""
     names = list(task.actuators)
@@ -158,8 +165,8 @@ def _table(task: FollowTask, found: FollowedOptimum) -> str:
             html.number(found.at[k], 4),
             *(html.number(states[name][k], 6) for name in names),
             html.number(found.values[k], 6),
-            html.number(margins[k]),
-            escape(", ".join([found.certificates[k].kind, *found.certificates[k].active])),
+            html.number(margins[k] if abs(margins[k]) > ROUNDING else 0.0),
+            escape(", ".join([found.certificates[k].kind, *_limits(found.certificates[k])])),
         ]
         for k in shown.tolist()
     ]

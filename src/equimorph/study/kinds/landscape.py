@@ -31,6 +31,9 @@ from equimorph.study.names import task_files
 from equimorph.study.sections.best import LandscapeSection
 from equimorph.tasks import Landscape, landscape
 
+NO_JUMP = 1e-9
+"""Jump relative to the values that is rounding."""
+
 
 @dataclass(frozen=True)
 class LandscapeTask:
@@ -111,7 +114,11 @@ class LandscapeKind(Kind[LandscapeSection, LandscapeTask, Landscape]):
         files = task.files
         rows = [[escape(what), escape(value)] for what, value in _summary(task, answer)]
         jumps = np.abs(np.diff(answer.barriers.values, axis=1)).ravel()
-        highest = f" The largest jump across one: {html.number(jumps.max())}." if len(jumps) else ""
+        highest = ""
+        if len(jumps):
+            real = jumps.max() > NO_JUMP * np.abs(answer.barriers.values).max()
+            size = f"at most {html.number(jumps.max())}" if real else "nowhere"
+            highest = f" The value itself jumps there by {size}.".replace("by nowhere", "nowhere")
         caption = f"The {_word(task)} {task.objective.name} of stable states at each setting."
         return [
             heading(self.table, task.section.name),

@@ -135,7 +135,7 @@ def _in_words(task: StrongestTask, answer: Answer) -> str:
 
 
 def _place(setting: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} = {value:.6g}" for name, value in setting.items())
+    return ", ".join(f"{name} = {round(value, 12) + 0.0:.6g}" for name, value in setting.items())
 
 
 def _table(task: StrongestTask, answer: Answer) -> str:
@@ -148,7 +148,7 @@ def _table(task: StrongestTask, answer: Answer) -> str:
     rows = [
         [
             mark,
-            *(html.number(value, 6) for value in each.setting.values()),
+            *(html.number(round(value, 12), 6) for value in each.setting.values()),
             html.number(each.value, 7),
             escape(each.kind),
             *(html.number(limit, 6) if np.isfinite(limit) else "none" for limit in each.one_sided),

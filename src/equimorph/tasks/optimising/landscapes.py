@@ -172,12 +172,20 @@ def _barriers(
     ends = place.ravel()[pairs]
     structure, n = states.structure, states.structure.unknowns
     a, b = states[ends[:, 0]], states[ends[:, 1]]
-    line = ParameterLine(structure, a.p.copy(), b.p - a.p)
-    ended = follow(line, a.z.copy(), (), TraceOptions(record=False))
-    arrived = ended.code == ARRIVAL
-    gap = np.sqrt((ended.z - b.z)[:, :n] ** 2 @ structure.mass)
+    arrived, z = _lifted(a, b)
+    gap = np.sqrt((z - b.z)[:, :n] ** 2 @ structure.mass)
     apart = np.flatnonzero(~(arrived & (gap < SAME)))
+    back, _ = _lifted(b[apart], a[apart])
     kind: tuple[BarrierKind, ...] = tuple(
-        "preference" if arrived[k] else "stability" for k in apart
+        "preference" if both else "stability" for both in arrived[apart] & back
     )
     return Barriers(settings[pairs[apart]], value[pairs[apart]], kind)
+
+
+def _lifted(
+    a: States, b: States
+) -> tuple[Bool[np.ndarray, " lanes"], Float[np.ndarray, "lanes size"]]:
+    """Whether states stay stable on the way to the parameters of others, and where they end."""
+    line = ParameterLine(a.structure, a.p.copy(), b.p - a.p)
+    ended = follow(line, a.z.copy(), (), TraceOptions(record=False))
+    return np.asarray(ended.code == ARRIVAL), ended.z

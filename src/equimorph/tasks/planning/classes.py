@@ -1,7 +1,7 @@
 """`alternatives`: the best routes that pass the holes of the stable set in different ways."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 
 import numpy as np
@@ -21,6 +21,7 @@ from equimorph.tasks.planning.homology import Edges, cocycles
 from equimorph.tasks.planning.links import Demands, links
 from equimorph.tasks.planning.network import Ends, network_of, no_route, own_links, with_ends
 from equimorph.tasks.planning.objectives import Wish, objective_of
+from equimorph.tasks.planning.planner import EXACT, RESERVES
 from equimorph.tasks.route import Route, refused
 
 MOST_TURNS = 2
@@ -76,15 +77,20 @@ def alternatives(  # noqa: PLR0913  # as `plan`
     why = violation(ends, demands)
     if why:
         return (refused(why),)
-    paths = _Classes(eset, ends, demands).paths(count)
-    if not paths:
+    best, failed = list[Route](), list[Route]()
+    least = min(end.margin for end in ends)
+    for factor, share in (*RESERVES, EXACT) if margin > 0.0 else (EXACT, *RESERVES):
+        tightened = replace(demands, margin=min(margin * factor + least * share, least))
+        paths = _Classes(eset, ends, tightened).paths(count)
+        corners = [corners_of(eset, path, tightened, same_class=True) for path in paths]
+        routes = [route_along(eset, each, demands, monitor) for each in corners]
+        best = max(best, [route for route in routes if route.arrived], key=len)
+        failed += routes
+        if routes and len(best) == len(routes):
+            break
+    if not failed:
         return (refused(no_route(eset, ends, demands)),)
-    routes = [
-        route_along(eset, corners_of(eset, path, demands, same_class=True), demands, monitor)
-        for path in paths
-    ]
-    arrived = [route for route in routes if route.arrived]
-    return tuple(sorted(arrived, key=lambda route: route.cost)) or (routes[0],)
+    return tuple(sorted(best, key=lambda route: route.cost)) or (failed[0],)
 
 
 @dataclass(frozen=True)
