@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from equimorph.cli.app import Kind
 from equimorph.errors import InputError
 from equimorph.study import parse_study, prepare, read_problem
 from equimorph.study.template import KINDS, template, write_template
@@ -18,6 +19,10 @@ def test_a_template_is_a_sound_study(kind: str):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_examples_are_the_templates(kind: str):
     assert (EXAMPLES / f"{kind}.toml").read_text() == template(kind)
+
+
+def test_every_template_can_be_asked_for():
+    assert sorted(kind.value for kind in Kind) == sorted(KINDS)
 
 
 def test_a_file_that_exists_is_kept(tmp_path: Path):

@@ -16,7 +16,7 @@ _CURVATURE = "max_curvature"
 _MARGIN_COLOUR = style.INDEX_COLOURS[0]
 _CURVATURE_COLOUR = "#a1561a"
 _GAP = 0.1  # inches
-_ROOM = (0.46, 0.38, 0.1, 0.2)
+_ROOM = (0.58, 0.38, 0.1, 0.2)
 _MOST_NUMBERS = 12
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from equimorph.errors import InputError
 
 KINDS = (
-    *("arch", "arm", "beam", "bridge", "calibration", "column", "deep_arch", "lee", "maps"),
-    *("network", "spring", "stack", "strip", "tasks", "truss"),
+    *("arch", "arm", "beam", "bridge", "calibration", "column", "deep_arch", "drive", "lee"),
+    *("maps", "network", "spring", "stack", "strip", "tasks", "truss"),
 )
 
 
