@@ -103,8 +103,8 @@ def new(
         Kind,
         typer.Option(
             help="What to begin with: a rod (arch, arm, beam, deep_arch, strip), a frame (lee, "
-            "network), a truss (bridge, drive, stack, truss), an energy (column), maps, the spring, "
-            "measured shapes (calibration), or every question that there is (tasks)."
+            "network), a truss (bridge, drive, stack, truss), an energy (column), maps, "
+            "the spring, measured shapes (calibration), or every question that there is (tasks)."
         ),
     ] = Kind.arch,
 ) -> None:

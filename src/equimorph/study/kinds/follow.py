@@ -13,6 +13,7 @@ from equimorph import plotting
 from equimorph.equilibria import Leg
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress
+from equimorph.storage import write_schedule
 from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.choose import choose_state
@@ -20,7 +21,7 @@ from equimorph.study.kinds.found import heading
 from equimorph.study.kinds.kind import Figure, Kind, still
 from equimorph.study.kinds.legs import Legs, legs_of, limits_of
 from equimorph.study.lookup import Ground, at_key, check_state, constraints_of, descriptor_at
-from equimorph.study.names import task_files
+from equimorph.study.names import schedule_table, task_files
 from equimorph.study.sections.best import FollowSection
 from equimorph.tasks import Certificate, FollowedOptimum, follow_optimum
 
@@ -85,6 +86,11 @@ class FollowKind(Kind[FollowSection, FollowTask, FollowedOptimum]):
                 margin=section.margin,
             )
 
+    def write_tables(self, task: FollowTask, answer: FollowedOptimum, folder: Path) -> None:
+        """Write the schedule."""
+        if answer.schedule is not None:
+            write_schedule(answer.schedule, folder / schedule_table(task.files))
+
     def figures(
         self, ground: Ground, eset: EquilibriumSet | None, task: FollowTask, answer: FollowedOptimum
     ) -> Sequence[Figure]:
@@ -108,7 +114,10 @@ class FollowKind(Kind[FollowSection, FollowTask, FollowedOptimum]):
         )
         caption = "Objective and actuators along the legs; dotted where the optimum jumps."
         pictures = html.pictures(folder, {}, {f"{task.files}.png": caption})
-        return [head, words, pictures, *_jumps(task, answer), _table(task, answer)]
+        links = (
+            [html.schedule_links(schedule_table(task.files))] if answer.schedule is not None else []
+        )
+        return [head, words, *links, pictures, *_jumps(task, answer), _table(task, answer)]
 
     def verdict(self, task: FollowTask, answer: FollowedOptimum) -> str:
         """Say how far it could be followed."""
