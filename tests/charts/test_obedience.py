@@ -99,3 +99,21 @@ def test_a_barrier_over_three_parameters_is_a_surface():
     assert barrier.facets.shape[1] == 3
     assert found.states.z[0, 0] > 2.9
     assert found.states.z[1, 0] < -2.9
+
+
+def test_reaching_sampling_and_following_stop_at_the_barrier(by_energy):
+    """From δ at (0.5, −0.05) nothing leads to F > 0, where −δ has less energy."""
+    spring = by_energy.whole.structure
+    within, force = [by_energy.constraint], em.value_of(spring, "F")
+    with unchecked():
+        start = by_energy.state(np.array([[0.5, -0.05]])).states[0]
+        goal = em.lift(start, {"F": 0.05}).end.state
+        reach = em.reachable(by_energy.whole, start, [spring.angle, force], within=within)
+        few = em.SamplingOptions(lifts=200)
+        room = em.Box(x_l=(0.4, 0.9), F=(-0.2, 0.2))
+        sampled = em.plan_sampled(start, goal, room, within=within, options=few)
+        pull = em.combined("pull", lambda f: (f - 0.1) ** 2, force)
+        moved = em.follow_optimum(start, pull, {"x_l": 0.55}, actuators=["F"], within=within)
+    assert reach.states["F"].max() <= 1e-6
+    assert sampled.status == "refused"
+    assert moved.states["F"].max() <= 1e-6

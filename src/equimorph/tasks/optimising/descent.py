@@ -19,6 +19,8 @@ STALLED = 1e-6
 """Length of a step below which a merit that no longer falls is round-off."""
 MERGED = 0.01
 """Distance in the metric and scaled parameters below which two lanes are one."""
+FEASIBLE = 1e-7
+"""Relative excess over a bound that counts as none."""
 PENALTY = 2.0
 """Of a violated constraint, relative to its multiplier."""
 FLAT = 1e-4
@@ -59,10 +61,15 @@ class _Lane:
     penalty: float = 1.0
     answer: Answer | None = None
     done: Settled | None = None
+    best: Spots | None = None
+    least: float = np.inf
 
 
 def descend(programme: Programme, starts: Spots, rounds: int = ITERATIONS) -> list[Settled]:
-    """Local minima from starts; those that lead nowhere are left out."""
+    """Local minima from starts; those that lead nowhere are left out.
+
+    Those that still move after all rounds end at their best feasible points, not converged.
+    """
     lanes = [_Lane(starts.take(np.array([k]))) for k in range(len(starts))]
     for _ in range(rounds):
         todo = [lane for lane in lanes if lane.done is None and lane.reach > 0.0]
@@ -75,9 +82,38 @@ def descend(programme: Programme, starts: Spots, rounds: int = ITERATIONS) -> li
         todo, here = [todo[k] for k in alone], here.take(np.array(alone))
         frames, here = frames_of(programme.setting, here)
         expansion = programme.expanded(here, frames)
+        _remember(todo, here, expansion)
         answers = [_answer(expansion, k, lane) for k, lane in enumerate(todo)]
         _advance(programme, todo, here, (frames, expansion), answers)
+    _stop(programme, lanes)
     return [lane.done for lane in lanes if lane.done is not None]
+
+
+def _remember(todo: list[_Lane], here: Spots, expansion: Expansion) -> None:
+    """Keep the best feasible point of each lane."""
+    for k, lane in enumerate(todo):
+        value = float(expansion.f[k].max())
+        if value < lane.least and expansion.g[k].max() <= FEASIBLE:
+            lane.best, lane.least = here.take(np.array([k])), value
+
+
+def _stop(programme: Programme, lanes: list[_Lane]) -> None:
+    """Leave lanes at their best feasible points: at kinks of constraints steps never end.
+
+    Lanes that were merged with others count only where no other has ended.
+    """
+    ended = any(lane.done is not None for lane in lanes)
+    left = [lane for lane in lanes if lane.done is None and (lane.reach > 0.0 or not ended)]
+    left = [lane for lane in left if lane.best is not None]
+    if not left:
+        return
+    best = [lane.best for lane in left if lane.best is not None]
+    frames, here = frames_of(programme.setting, together(best))
+    expansion = programme.expanded(here, frames)
+    for k, lane in enumerate(left):
+        answer = _answer(expansion, k, lane)
+        if answer is not None:
+            lane.done = _settled(here, (frames, expansion), k, answer, False)
 
 
 def _first_of_each(programme: Programme, here: Spots) -> list[int]:

@@ -121,13 +121,13 @@ class Optima:
 
     @property
     def margin(self) -> float:
-        """Stability margin of the best; zero on the stability boundary."""
-        return self.best.state.margin
+        """Stability margin of the best; zero on the stability boundary; nan if refused."""
+        return self.best.state.margin if self.all else np.nan
 
     @property
     def schedule(self) -> Schedule | None:
         """How to get to the best one, if there is a start."""
-        return self.best.route.schedule if self.best.route else None
+        return self.best.route.schedule if self.all and self.best.route else None
 
 
 def optimise(  # the knobs of the public face, all by keyword
