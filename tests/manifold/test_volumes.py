@@ -110,6 +110,20 @@ def test_constraint_cuts_the_three_sphere_to_a_ball(slope):
     np.testing.assert_allclose(slant(eset.points)[own], 0.4, rtol=0, atol=1e-8)
 
 
+def test_a_constraint_with_a_kink_closes_balls():
+    """Flat arches of index 6 have several equal extrema of curvature: the largest has a kink.
+
+    No tetrahedron needs division: lids are drawn from their rims where no point is found inside.
+    """
+    arch = Rod()
+    box = Box(Theta=(0.2, 0.26), Delta=(-0.13, 0.14), q=(0, 0.3))
+    eset = lifted(arch, box, (2, 3, 2), within=[arch.max_curvature <= 20])
+    assert_faithful(eset)
+    assert eset.audit.bisected == 0
+    assert "mixed" in {piece.kind for piece in eset.boundaries}
+    assert {piece.euler_characteristic for piece in eset.components} == {1}
+
+
 def test_curve_of_cusps_is_no_edge_of_the_fold_surface():
     """Folds a + c²/2 = −3x², b = 2x³: a disc, smooth in (x, a, b, c)."""
     eset = lifted(ridge(), Box(a=(-1.1, 0.6), b=(-0.7, 0.8), c=(-0.9, 1.0)), (4, 5, 4))
@@ -172,7 +186,8 @@ def test_every_surface_around_a_grid_cell_of_the_arch_is_a_sphere(monkeypatch):
     monkeypatch.setattr(cells, "volumes_over", kept)
     arch = Rod()
     box = Box(Theta=(0.2, 2.5), Delta=(-2, 2), q=(0, 6))
-    eset = lifted(arch, box, (12, 15, 8), within=[arch.max_curvature <= 20])
+    eset = lifted(arch, box, (19, 29, 10), within=[arch.max_curvature <= 20])
+    assert len(eset.points) > 25_000
     assert_faithful(eset)
     balls = last[-1].balls
     count, base = len(balls.corners), int(balls.corners.max()) + 1

@@ -7,6 +7,7 @@ amid all its vertices. Several closed fold curves on a sphere each bound a disc 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -23,6 +24,8 @@ from equimorph.manifold.topology import distinct
 
 SHEETS = 2
 """To each of which a crossing belongs."""
+ON_FACE = 1e-9
+"""Barycentric coordinate below which a point lies on a face of a grid tetrahedron."""
 
 
 @dataclass(frozen=True)
@@ -95,8 +98,39 @@ def _caps(
         used = own[at] & ends.get(kind, np.True_)
         groups = _groups(at[used], points[used], np.flatnonzero(own))
         caps[own] = _pinned(pairing, groups, kind, cap=True)
+        if kind == CAP:
+            for surface in np.flatnonzero(own & (caps < 0) & (around > 3)).tolist():
+                caps[surface] = _rim_apex(pairing, surfaces, surface)
         lost |= own & (caps < 0) & ((kind != CAP) | (around > 3))
     return caps, lost
+
+
+def _rim_apex(pairing: Pairing, surfaces: Surfaces, surface: int) -> int:
+    """Point of a rim from which a lid can be drawn without any other point; −1 if there is none.
+
+    A constraint may have a kink, like the largest of several extrema that are equal: then Newton's
+    method finds no point on it amid the rim. Chords of the lid must be no sides of the surface, nor
+    lie in a face of the grid tetrahedron, where its neighbour could draw the same.
+    """
+    mesh, store = pairing.mesh, pairing.points
+    sides = surfaces.rims[surfaces.rim_surface == surface]
+    corners = surfaces.corners[surfaces.surface == surface]
+    known = {frozenset(pair) for each in corners.tolist() for pair in combinations(each, 2)}
+    rim = np.unique(sides)
+    frame = mesh.vertices[mesh.tetrahedra[surfaces.owner[surface]]]
+    place = store.p[rim][:, pairing.setting.free] - frame[0]
+    shares = np.linalg.solve((frame[1:] - frame[0]).T, place.T)
+    faces = np.abs(np.vstack([shares, 1.0 - shares.sum(axis=0)])) < ON_FACE
+    beside = {frozenset(pair) for pair in sides.tolist()}
+    for a, apex in enumerate(rim.tolist()):
+        chords = [
+            (b, frozenset((apex, other)))
+            for b, other in enumerate(rim.tolist())
+            if b != a and frozenset((apex, other)) not in beside
+        ]
+        if all(each not in known and not (faces[:, a] & faces[:, b]).any() for b, each in chords):
+            return int(apex)
+    return -1
 
 
 def _grouped(

@@ -57,12 +57,13 @@ def closed_surfaces(
     wanted: Bool[np.ndarray, " S"],
     crossing: Bool[np.ndarray, " points"],
 ) -> Closed:
-    """Close wanted surfaces along their rims: from a cap, or by one triangle.
+    """Close wanted surfaces along their rims: from a cap, maybe on the rim, or by one triangle.
 
     `crossing` tells which points are crossings: between two of them, lids are met.
     """
     number = np.cumsum(wanted) - 1
     own, rim = wanted[surfaces.surface], wanted[surfaces.rim_surface]
+    rim &= (surfaces.rims != caps[surfaces.rim_surface, None]).all(axis=1)
     at, sides, index = surfaces.rim_surface[rim], surfaces.rims[rim], surfaces.rim_index[rim]
     capped = caps[at] >= 0
     fans = np.concatenate([np.sort(sides[capped], axis=1), caps[at[capped], None]], axis=1)
