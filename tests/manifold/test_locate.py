@@ -6,7 +6,7 @@ import pytest
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, locate
 from equimorph.model import Box
-from equimorph.structures import Spring
+from equimorph.structures import Rod, Spring
 from typecheck import unchecked
 
 
@@ -100,7 +100,39 @@ def test_wrong_measurements_are_refused(spring_set):
         locate(spring_set, {"G": 0.3, "F": 0.0})
     with pytest.raises(InputError, match="finite numbers; got angle: nan"):
         locate(spring_set, {spring.angle: np.nan, "F": 0.0})
+    with pytest.raises(InputError, match=r"free parameters.*got 'k', which is fixed"):
+        locate(spring_set, {"x_l": 0.8, "k": 2.0})
+    with pytest.raises(InputError, match=r"descriptors of the set's structure; got height\(0.5\)"):
+        locate(spring_set, {Rod().height(0.5): 0.1, "F": 0.0})
+    with unchecked(), pytest.raises(InputError, match="finite numbers; got F: 'none'"):
+        locate(spring_set, {spring.angle: 0.1, "F": "none"})
     with pytest.raises(InputError, match=r"`errors` must be positive.*got F: 0"):
         locate(spring_set, {spring.angle: 0.1, "F": 0.0}, errors={"F": 0.0})
     with pytest.raises(InputError, match=r"shape \(5, 2\)"):
         locate(spring_set, np.zeros((5, 2)))
+
+
+@pytest.mark.slow
+def test_states_of_the_arch_are_located_by_descriptors_and_shapes():
+    """Random vertices of all indices from two heights and max |κ|, and from 21 points."""
+    arch = Rod()
+    with unchecked():
+        eset = equilibrium_set(
+            arch,
+            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
+            fixed={"q": 2.5},
+            within=[arch.max_curvature <= 20],
+            intervals=(24, 41),
+            checks=0,
+        )
+        descriptors = (arch.height(1 / 3), arch.height(2 / 3), arch.max_curvature)
+        s = np.linspace(0, 1, 21)
+        for vertex in np.random.default_rng(2).integers(len(eset.points), size=12):
+            state = eset.points[int(vertex)]
+            for found in (
+                locate(eset, {each: each(state) for each in descriptors}),
+                locate(eset, state.shape(s), s=s),
+            ):
+                np.testing.assert_allclose(found.state.z, state.z, rtol=0, atol=1e-5)
+                assert found.best.misfit < 1e-8
+                assert found.gap >= 0.0

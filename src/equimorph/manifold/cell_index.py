@@ -96,14 +96,17 @@ class CellIndex:
     def near(self, points: Float[np.ndarray, "n d"]) -> Hits:
         """Cells that contain points or that these miss by at most their overhang."""
         unit = (points - self.lower) / self.width
-        place = np.clip((unit * self.counts).astype(int), 0, self.counts - 1)
-        bins = np.ravel_multi_index(tuple(place.T), tuple(self.counts))
-        number = self.starts[bins + 1] - self.starts[bins]
+        place = np.minimum(np.maximum((unit * self.counts).astype(int), 0), self.counts - 1)
+        bins = place[:, 0]
+        for k in range(1, len(self.counts)):
+            bins = bins * self.counts[k] + place[:, k]
+        start = self.starts[bins]
+        number = self.starts[bins + 1] - start
         point = np.repeat(np.arange(len(points)), number)
-        cell = self.cells[_ranges(self.starts[bins], number)]
+        cell = self.cells[_ranges(start, number)]
         # all cells of the bin, then the few that are near
-        maps, at = self.maps[cell], np.append(unit, np.ones((len(unit), 1)), axis=1)
-        weights = np.einsum("nij,nj->ni", maps, at[point])
+        maps = self.maps[cell]
+        weights = np.einsum("nij,nj->ni", maps[:, :, :-1], unit[point]) + maps[:, :, -1]
         close = (weights > -self.overhang[cell, None] - NUDGE).all(axis=1)
         point, cell, weights = point[close], cell[close], weights[close]
         push = np.einsum("nij,nj->ni", maps[close, :, :-1], _inward(unit)[point])

@@ -31,25 +31,30 @@ def exact_states(
     still, fixed = np.zeros((count, structure.size)), np.zeros((count, p.shape[1]))
     none, one = np.zeros((2, count))
     one[:] = 1.0
-    # numbers of the lanes that are left, their states and parameters, and their last corrections
-    lane, z, before = np.arange(count), z.copy(), none
+    # lanes at work, their states and parameters, last corrections, and which are not yet done
+    lane, z, before, left = np.arange(count), z.copy(), none, np.ones(count, bool)
     for number in range(ITERATIONS if count else 0):
         m = len(lane)
         step = structure.advance(z, p, fixed[:m], still[:m], one[:m], none[:m])
         size = np.sqrt(np.square(step.dz[:, :n]) @ structure.mass)
-        alive = size < 1.0  # and no nan
+        left &= size < 1.0  # and no nan
         if wanted is not None and number >= SETTLED:
-            alive &= (step.index == wanted[lane]) | (size < 0.5 * before)
-        step.dz[~alive] = 0.0
+            left &= (step.index == wanted[lane]) | (size < 0.5 * before)
+        whole = bool(left.all())
+        if not whole:
+            step.dz[~left] = 0.0
         z += step.dz
-        bound = size * (size / np.maximum(before, np.maximum(size, 1e-300))) ** 2
-        done = alive & (bound < ROUND_OFF) & ~good[lane]
-        some = lane[done]
-        out[some], good[some], index[some] = z[done], True, step.index[done]
-        left = alive & ~good[lane]
-        if not left.any():
-            break
+        bound = size * (size / np.maximum(np.maximum(before, size), 1e-300)) ** 2
+        done = left & (bound < ROUND_OFF)
+        if done.any():
+            some = lane[done]
+            out[some], good[some], index[some] = z[done], True, step.index[done]
+            left &= ~done
+            whole = False
         before = size
-        if m > FEW and not left.all():
+        if not whole and not left.any():
+            break
+        if m > FEW and not whole:
             lane, z, p, before = lane[left], z[left], p[left], before[left]
+            left = left[left]
     return out, good, index

@@ -109,8 +109,9 @@ def locate(
     Raises
     ------
     InputError
-        For fewer values than free parameters, values that are no numbers, shapes with other numbers
-        of points than the structure draws, or an empty set.
+        For fewer values than free parameters, values that are no numbers, fixed parameters,
+        descriptors of other structures, shapes with other numbers of points than the structure
+        draws, or an empty set.
     """
     if len(eset.cells) == 0:
         raise InputError("`eset` must have states to compare with; got an empty set.")
@@ -147,7 +148,7 @@ class ValueFit:
         spread = np.ptp(known.residuals(eset.points.z, eset.points.p), axis=0)
         units = dict(zip(measured, np.where(spread > 0.0, spread, 1.0).tolist(), strict=True))
         for what, error in errors.items():
-            if what not in measured or not float(error) > 0.0:
+            if what not in measured or not 0.0 < float(error) < np.inf:
                 raise InputError(
                     "`errors` must be positive and of measured values; "
                     f"got {_name(what)}: {error!r}."
@@ -208,7 +209,18 @@ def _check_values(eset: EquilibriumSet, measured: Mapping[Descriptor | str, floa
                 f"`measured` must name parameters ({', '.join(names)}) or have descriptors; "
                 f"got {what!r}."
             )
-        if not np.isfinite(value):
+        if isinstance(what, str) and what not in eset.names:
+            raise InputError(
+                f"`measured` must name free parameters ({', '.join(eset.names)}); got {what!r}, "
+                "which is fixed in the set."
+            )
+        signature = eset.structure.signature
+        if isinstance(what, Descriptor) and what.origin not in (None, signature):
+            raise InputError(
+                f"`measured` must have descriptors of the set's structure; got {what.name} of "
+                "another one."
+            )
+        if not isinstance(value, int | float | np.number) or not np.isfinite(value):
             raise InputError(f"`measured` must give finite numbers; got {_name(what)}: {value!r}.")
 
 

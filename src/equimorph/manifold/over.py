@@ -159,7 +159,7 @@ class Sheets:
         """
         chunks = self._in_chunks(p)
         parts = [found for found, _ in chunks]
-        doubtful = [near for _, near in chunks if len(near)]
+        doubtful = [near for _, near in chunks if near is not None]
         if doubtful:
             parts.extend(self._searched(p, Hits.joined(doubtful)))
         z, point, cell = (
@@ -171,10 +171,12 @@ class Sheets:
             z, point, cell = z[order], point[order], cell[order]
         return States(self.structure, z, p[point]), point, cell
 
-    def _in_chunks(self, p: Points) -> list[tuple[Found, Hits]]:
+    def _in_chunks(self, p: Points) -> list[tuple[Found, Hits | None]]:
         """States and doubtful cells as `_some` finds them, chunk by chunk, on all threads."""
-        starts = range(0, max(len(p), 1), CHUNK)
-        out: dict[int, tuple[Found, Hits]] = {}
+        if len(p) <= CHUNK:
+            return [self._some(p, 0)]
+        starts = range(0, len(p), CHUNK)
+        out: dict[int, tuple[Found, Hits | None]] = {}
 
         def serve(own: range) -> None:
             for at in own:
@@ -188,21 +190,23 @@ class Sheets:
                 task.result()
         return [out[at] for at in starts]
 
-    def _some(self, p: Points, first: int) -> tuple[Found, Hits]:
+    def _some(self, p: Points, first: int) -> tuple[Found, Hits | None]:
         """States over points that are sure, and the cells near the others; `first` is added."""
         near = self.above.near(p[:, self.free])
         beyond = (self._brims[near.cell] & (near.weights < 0.0)).any(axis=1)
         hits = near.take(near.inside | beyond)
-        z, good = self._polished(self._guess(hits), p, hits)
+        at = p[hits.point]
+        z, good = self._polished(self._guess(hits), at, hits.cell)
         found = np.flatnonzero(good)
         found = found[_one_of_each(self.structure, z[found], hits.take(found))]
         sure = self._sure(hits, good, found, len(p))
+        doubtful = None
         if not sure.all():
             found = found[sure[hits.point[found]]]
-        kept = found[self._allowed(z[found], p[hits.point[found]])]
-        doubtful = near.take(~sure[near.point])
-        states = z[kept], first + hits.point[kept], hits.cell[kept]
-        return states, replace(doubtful, point=first + doubtful.point)
+            doubtful = near.take(~sure[near.point])
+            doubtful = replace(doubtful, point=first + doubtful.point)
+        kept = found[self._allowed(z[found], at[found])]
+        return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
 
     def _guess(self, hits: Hits) -> Lanes:
         """Interpolation between the corners, at the nearest point of the cell.
@@ -214,7 +218,8 @@ class Sheets:
         corners = self.cells[hits.cell]
         folded = self.folded[corners]
         some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
-        weights[some] = rooted(weights[some], folded[some])
+        if len(some):
+            weights[some] = rooted(weights[some], folded[some])
         z = weights[:, :1] * self.points.z[corners[:, 0]]
         for k in range(1, corners.shape[1]):
             z += weights[:, k : k + 1] * self.points.z[corners[:, k]]
@@ -230,16 +235,15 @@ class Sheets:
         return np.sqrt(longest)
 
     def _polished(
-        self, guess: Lanes, p: Points, hits: Hits
+        self, guess: Lanes, p: Points, cell: Int[np.ndarray, " hits"]
     ) -> tuple[Lanes, Bool[np.ndarray, " hits"]]:
         """Exact states of the cells' own index near the guesses, where there are any."""
-        structure = self.structure
-        wanted = self.cell_index[hits.cell]
-        z, good, index = exact_states(structure, guess, p[hits.point], wanted)
+        structure, wanted = self.structure, self.cell_index[cell]
+        z, good, index = exact_states(structure, guess, p, wanted)
         good &= index == wanted
-        moved = np.sqrt((z - guess)[:, : structure.unknowns] ** 2 @ structure.mass)
-        good &= moved <= 2.0 * self._size[hits.cell] + SAME
-        good[good] = structure.resolved(z[good], p[hits.point[good]])
+        moved = np.sqrt(np.square((z - guess)[:, : structure.unknowns]) @ structure.mass)
+        good &= moved <= 2.0 * self._size[cell] + SAME
+        good[good] = structure.resolved(z[good], p[good])
         return z, good
 
     def _sure(
