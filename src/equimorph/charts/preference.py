@@ -21,7 +21,8 @@ from equimorph.manifold.fabric import (
     fabric_of,
     vertices_of,
 )
-from equimorph.manifold.levels import About, Ends, cut_between, fabric_setting, part_of
+from equimorph.manifold.level_cuts import About, Ends, cut_between
+from equimorph.manifold.levels import fabric_setting, part_of
 from equimorph.manifold.on_edges import on_edges
 from equimorph.manifold.over import rooted
 from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
