@@ -29,6 +29,8 @@ DIFFERENCE = 1e-5
 CURVING = 1e-3
 """Step along the set by which the change of the gradient is measured."""
 ITERATIONS, HALVINGS = 40, 12
+SHORTER = 0.5 ** np.arange(4.0)
+"""Shares of a step that are tried at once."""
 LONGEST = 0.3
 """Longest step in the metric."""
 STILL = 1e-9
@@ -158,13 +160,14 @@ class Ground:
         self, spot: Spot, frames: Frames, residuals: Residuals
     ) -> tuple[Float[np.ndarray, "lanes k"], Float[np.ndarray, "lanes m k"]]:
         """Gradient of ½‖r‖² along frames, and the derivative of r."""
-        columns = []
-        for k in range(frames.shape[1]):
-            dz, dp = split_step(self.setting, DIFFERENCE * frames[:, k])
-            ahead, behind = (residuals(spot.z + s * dz, spot.p + s * dp) for s in (1.0, -1.0))
-            columns.append((ahead - behind) / (2.0 * DIFFERENCE))
-        slope = np.stack(columns, axis=2)
-        return np.einsum("lmk,lm->lk", slope, residuals(spot.z, spot.p)), slope
+        lanes, k = frames.shape[:2]
+        # all sides at once: a call costs more than its lanes
+        steps = [split_step(self.setting, DIFFERENCE * frames[:, i]) for i in range(k)]
+        sides = [(spot.z + s * dz, spot.p + s * dp) for dz, dp in steps for s in (1.0, -1.0)]
+        z, p = (np.concatenate(each) for each in zip((spot.z, spot.p), *sides, strict=True))
+        values = residuals(z, p).reshape(1 + 2 * k, lanes, -1)
+        slope = np.moveaxis(values[1::2] - values[2::2], 0, 2) / (2.0 * DIFFERENCE)
+        return np.einsum("lmk,lm->lk", slope, values[0]), slope
 
     def _newton_step(
         self, spot: Spot, residuals: Residuals
@@ -191,17 +194,16 @@ class Ground:
     ) -> tuple[Float[np.ndarray, "lanes k k"], Bool[np.ndarray, " lanes"]]:
         """Second derivatives along the set, from gradients on both sides; and where there are."""
         lanes, k = frames.shape[:2]
-        curved, measured = np.zeros((lanes, k, k)), np.ones(lanes, bool)
-        for i in range(k):
-            for sign in (1.0, -1.0):
-                step = np.zeros((lanes, k))
-                step[:, i] = sign * CURVING
-                there, good = self.moved(spot, frames, step)
-                measured &= good
-                there = spot.replaced(np.flatnonzero(good), there.take(good))
-                own = self._aligned(self.frames(there)[0], frames)
-                gradient, _ = self._gradient(there, own, residuals)
-                curved[:, i] += sign * gradient / (2.0 * CURVING)
+        sides = np.concatenate([np.eye(k), -np.eye(k)])
+        step = np.repeat(CURVING * sides, lanes, axis=0)
+        each = np.tile(np.arange(lanes), 2 * k)
+        many, own = spot.take(each), frames[each]
+        there, good = self.moved(many, own, step)
+        there = many.replaced(np.flatnonzero(good), there.take(good))
+        turned = self._aligned(self.frames(there)[0], own)
+        gradient = self._gradient(there, turned, residuals)[0].reshape(2, k, lanes, k)
+        curved = np.moveaxis(gradient[0] - gradient[1], 0, 1) / (2.0 * CURVING)
+        measured = good.reshape(2 * k, lanes).all(axis=0)
         return curved, measured & np.isfinite(curved).all(axis=(1, 2))
 
     def _aligned(self, frames: Frames, others: Frames) -> Frames:
@@ -221,17 +223,21 @@ class Ground:
         """Points after steps, halved until the norm falls; the norms, and where it does."""
         best, norm = spot, value.copy()
         better, share = np.zeros(len(value), bool), np.ones(len(value))
-        for _ in range(HALVINGS):
+        for _ in range(1 + HALVINGS // len(SHORTER)):
             todo = np.flatnonzero(~better)
             if len(todo) == 0 or frames.shape[1] == 0:
                 break
-            there, good = self.moved(spot.take(todo), frames[todo], share[todo, None] * step[todo])
+            # most steps gain at once; of others several lengths are tried side by side
+            lengths = share[todo] * (SHORTER[:1] if share[todo[0]] == 1.0 else SHORTER)[:, None]
+            each = np.tile(todo, len(lengths))
+            tried = lengths.reshape(-1, 1) * step[each]
+            there, good = self.moved(spot.take(each), frames[each], tried)
             size = np.linalg.norm(residuals(there.z, there.p), axis=1)
-            good &= size < value[todo]
-            best, norm[todo[good]], better[todo[good]] = (
-                best.replaced(todo[good], there.take(good)),
-                size[good],
-                True,
-            )
-            share[todo] *= 0.5
+            good &= size < value[each]
+            longest = good.reshape(lengths.shape).argmax(axis=0) * len(todo) + np.arange(len(todo))
+            some = np.flatnonzero(good[longest])
+            at, taken = todo[some], longest[some]
+            best = best.replaced(at, there.take(taken))
+            norm[at], better[at] = size[taken], True
+            share[todo] = 0.5 * lengths[-1]
         return best, norm, better
