@@ -75,8 +75,8 @@ class Bounds:
         )
 
 
-def segment_bounds(first: States, last: States) -> Bounds:
-    """Bounds on the segments between pairs of equilibria."""
+def segment_bounds(first: States, last: States, wanted: float = 0.0) -> Bounds:
+    """Bounds on the segments between pairs of equilibria; a `wanted` margin is tried as well."""
     structure = first.structure
     middle = States(structure, 0.5 * (first.z + last.z), 0.5 * (first.p + last.p))
     half = 0.5 * np.abs(last.z - first.z), 0.5 * np.abs(last.p - first.p)
@@ -101,7 +101,8 @@ def segment_bounds(first: States, last: States) -> Bounds:
     ends = np.stack([_norm(each, weights) for each in np.moveaxis(defects, 1, 0)], axis=1)
     at_ends = 2.0 * ends / np.maximum(1.0 - turn, 1e-300)[:, None]
     tube = half[0] + np.where(proved, error, 0.0)[:, None] * weights, half[1]
-    margin = _margins(structure, (first, last), middle, matrix, (bound, tube))
+    least = np.minimum(first.margin, last.margin)
+    margin = _margins(middle, matrix, (bound, tube), (least, wanted))
     return Bounds(proved, error, unique, at_ends, index, weights, np.where(proved, margin, 0.0))
 
 
@@ -179,29 +180,38 @@ def _defect(
 
 
 def _margins(
-    structure: Structure,
-    ends: tuple[States, States],
-    middle: States,
-    matrix: Matrices,
-    around: tuple[Majorant, Direction],
+    middle: States, matrix: Matrices, around: tuple[Majorant, Direction], most: tuple[Values, float]
 ) -> Values:
-    """Largest tried σ for which F_z − σ·mass keeps index 0 in the tubes."""
-    bound, tube = around
-    least = np.minimum(ends[0].margin, ends[1].margin)
-    kept, still = np.zeros(len(middle)), np.zeros_like(tube[1])
-    mass = np.zeros(structure.size)
-    mass[: structure.unknowns] = structure.mass
+    """Largest tried σ for which F_z − σ·mass keeps index 0 in the tubes.
+
+    Tried are shares of the least margin of the ends; where the wanted margin lies between the best
+    share and that, the wanted one itself.
+    """
+    least, wanted = most
+    kept = np.zeros(len(middle))
     for share in SHARES:
         shift = np.where(least > 0.0, share * least, 0.0)
-        inverse, index = _inverse(structure, middle, shift)
-        weights = _weights(inverse, bound, tube)
-        moved = matrix - np.eye(structure.size) * mass * shift[:, None, None]
-        off = np.abs(_unity_gap(inverse, moved)) @ weights[:, :, None]
-        turn = _norm(off, weights) + _norm(
-            _applied(inverse, bound(tube, (weights, still))), weights
-        )
-        good = (turn < 1.0) & (index == 0) & (kept == 0.0)
+        good = _keeps(middle, matrix, around, shift) & (kept == 0.0)
         kept = np.where(good, shift, kept)
         if (kept > 0.0).all():
             break
+    near = (kept < wanted) & (least > wanted)
+    if near.any():
+        good = _keeps(middle, matrix, around, np.where(near, wanted, 0.0)) & near
+        kept = np.where(good, wanted, kept)
     return kept
+
+
+def _keeps(
+    middle: States, matrix: Matrices, around: tuple[Majorant, Direction], shift: Values
+) -> Bool[np.ndarray, " lanes"]:
+    """Whether segments keep more than a margin in their tubes."""
+    (bound, tube), structure = around, middle.structure
+    still, mass = np.zeros_like(tube[1]), np.zeros(structure.size)
+    mass[: structure.unknowns] = structure.mass
+    inverse, index = _inverse(structure, middle, shift)
+    weights = _weights(inverse, bound, tube)
+    moved = matrix - np.eye(structure.size) * mass * shift[:, None, None]
+    off = np.abs(_unity_gap(inverse, moved)) @ weights[:, :, None]
+    change = _applied(inverse, bound(tube, (weights, still)))
+    return np.asarray((_norm(off, weights) + _norm(change, weights) < 1.0) & (index == 0))

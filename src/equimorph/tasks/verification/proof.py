@@ -73,7 +73,7 @@ def prove(states: States, margin: float = 0.0) -> Proof:
         )
         return Proof("unproved", why, states, np.zeros(0), 0.0, "sampled")
     states = _without_repeats(states)
-    bounds = _all_bounds(states[:-1], states[1:])
+    bounds = _all_bounds(states[:-1], states[1:], margin)
     for _ in range(MOST_BISECTIONS):
         bad = np.flatnonzero(_wrong(bounds, margin))
         if len(bad) == 0:
@@ -82,7 +82,7 @@ def prove(states: States, margin: float = 0.0) -> Proof:
         if divided is None:
             break
         states, new = divided
-        bounds = _renewed(bounds, states, bad, new)
+        bounds = _renewed(bounds, states, (bad, new), margin)
     bad = np.flatnonzero(_wrong(bounds, margin))
     if len(bad) == 0:
         return _concluded(states, bounds, kind)
@@ -104,14 +104,14 @@ def _without_repeats(states: States) -> States:
     return states[np.flatnonzero(np.concatenate([[True], moved]))]
 
 
-def _all_bounds(first: States, last: States) -> Bounds:
+def _all_bounds(first: States, last: States, margin: float) -> Bounds:
     structure = first.structure
     entries = structure.size**2
     if _kind(first) == "sampled":
         entries *= structure.size
     count = max(1, ENTRIES_AT_ONCE // entries)
     parts = [
-        segment_bounds(first[k : k + count], last[k : k + count])
+        segment_bounds(first[k : k + count], last[k : k + count], margin)
         for k in range(0, len(first), count)
     ]
     return Bounds.joined(parts)
@@ -119,7 +119,7 @@ def _all_bounds(first: States, last: States) -> Bounds:
 
 def _wrong(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
     """Segments without a bound, of another index, or whose curve need not go on in the next."""
-    wrong = ~bounds.proved | (bounds.margin <= margin) | (bounds.index != 0)
+    wrong = ~bounds.proved | ~_keeps(bounds, margin) | (bounds.index != 0)
     # the equilibrium at a shared end must lie where the next segment has only one
     reach = bounds.at_ends.max(axis=1)[:, None] * bounds.weights
     alone = bounds.unique[:, None] * bounds.weights
@@ -127,6 +127,11 @@ def _wrong(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
         apart = (one > other).any(axis=1)
         wrong[:-1] |= apart
     return np.asarray(wrong)
+
+
+def _keeps(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
+    """Whether segments keep a margin; a bound σ > 0 says that all eigenvalues lie above σ."""
+    return np.asarray((bounds.margin >= margin) & (bounds.margin > 0.0))
 
 
 def _bisected(
@@ -154,11 +159,15 @@ def _bisected(
 
 
 def _renewed(
-    bounds: Bounds, states: States, bad: Int[np.ndarray, " bad"], new: Int[np.ndarray, " bad"]
+    bounds: Bounds,
+    states: States,
+    segments: tuple[Int[np.ndarray, " bad"], Int[np.ndarray, " bad"]],
+    margin: float,
 ) -> Bounds:
     """Bounds of all segments: those of the halves are computed."""
+    bad, new = segments
     halves = np.sort(np.concatenate([new - 1, new]))
-    fresh = _all_bounds(states[halves], states[halves + 1])
+    fresh = _all_bounds(states[halves], states[halves + 1], margin)
     kept = np.setdiff1d(np.arange(len(bounds.proved)), bad)
     place = np.setdiff1d(np.arange(len(states) - 1), halves)
     order = np.argsort(np.concatenate([place, halves]))
@@ -178,6 +187,6 @@ def _why(bounds: Bounds, k: int, margin: float) -> str:
         return f"the bound fails on a segment after {MOST_BISECTIONS} bisections"
     if bounds.index[k] != 0:
         return f"the index is {bounds.index[k]} on a segment"
-    if bounds.margin[k] <= margin:
+    if not _keeps(bounds, margin)[k]:
         return f"a margin of {max(margin, 0.0):g} could not be proved on a segment"
     return "neighbouring segments could not be joined"
