@@ -16,8 +16,8 @@ ELSEWHERE = (0.5, 0.25, 0.75, 0.1, 0.9)
 """Where between the bounds of a root a vertex is tried if there is none where it is expected."""
 ROUND_OFF = 1e-12
 """Part of the range of a function below which its values count as zero."""
-STILL = 1e-9
-"""Share of an edge by which the last step moves at most: the next would move by round-off."""
+STILL = 1e-11
+"""Share of an edge by which the last step moves at most."""
 
 Values = Float[np.ndarray, " V"]
 Function = Callable[[Vertices], Values]
