@@ -69,7 +69,6 @@ def cut_between(
         # cuts lead from new vertices, where the function vanishes: most edges that are crossed
         # at all are so from the beginning, and their vertices are found side by side
         fresh = np.flatnonzero(crossed & ~np.isin(keys, found.asked))
-        fresh = fresh[first_copies(fabric, ends[fresh], marks[fresh])]
         for mark in np.unique(marks[fresh]).tolist():
             own = fresh[marks[fresh] == mark]
             done, more = between(fabric, ends[own], (mark, lowest[own]), values[ends[own]])
