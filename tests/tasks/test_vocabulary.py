@@ -67,3 +67,28 @@ def test_trials_say_how_many_fail_and_of_what(start):
     assert risky.status == "failed"
     assert risky.why == f"{np.sum(~risky.arrived)} fold"
     assert risky.margin[~risky.arrived] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_optima_that_do_not_exist_say_so(spring, eset):
+    angle = spring.descriptor("angle")
+    found = em.optimise(eset, angle)
+    assert found.states[0].p == pytest.approx(found.best.state.p)
+    none = em.optimise(eset, angle, within=[angle >= 2])
+    assert none.status == "refused"
+    assert none.why.startswith("no stable optimum within angle >= 2")
+    assert none.states is None
+    assert none.schedule is None
+    assert np.isnan(none.margin)
+    with pytest.raises(em.InputError, match=r"got none: no stable optimum"):
+        none.best  # noqa: B018
+
+
+def test_landscapes_have_a_status(spring, eset):
+    angle, grid = spring.descriptor("angle"), em.Grid(x_l=(0.4, 1.4, 4), F=(-0.3, 0.3, 4))
+    found = em.landscape(eset, angle, grid)
+    assert (found.status, found.why) == ("found", "")
+    assert len(found.margin) == len(found.states)
+    none = em.landscape(eset, angle, grid, within=[angle >= 2])
+    assert none.status == "refused"
+    assert none.why
+    assert len(none.margin) == 0

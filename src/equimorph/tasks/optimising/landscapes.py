@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -69,6 +70,21 @@ class Landscape:
     states: States
     gaps: Bool[np.ndarray, "rows columns"]
     barriers: Barriers
+
+    @property
+    def status(self) -> Literal["found", "refused"]:
+        """Whether any setting has an allowed stable state."""
+        return "found" if len(self.states) else "refused"
+
+    @property
+    def why(self) -> str:
+        """Why it is refused."""
+        return "" if len(self.states) else "no setting of the grid has an allowed stable state"
+
+    @cached_property
+    def margin(self) -> Float[np.ndarray, " states"]:
+        """Stability margin of each state."""
+        return self.states.margin if len(self.states) else np.zeros(0)
 
     def __repr__(self) -> str:
         """Size, gaps, barriers."""

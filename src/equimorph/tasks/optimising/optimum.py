@@ -109,14 +109,23 @@ class Optima:
 
     @property
     def best(self) -> Optimum:
-        """The best one."""
+        """The best one.
+
+        Raises
+        ------
+        InputError
+            If there is none; ask for `status` first.
+        """
+        if not self.found:
+            raise InputError(f"`best` is that of optima that were found; got none: {self.why}.")
         return self.all[0]
 
     @property
-    def states(self) -> States:
-        """States of all optima."""
-        each = [optimum.state.batch for optimum in self.all]
-        z, p = np.concatenate([one.z for one in each]), np.concatenate([one.p for one in each])
+    def states(self) -> States | None:
+        """States of all optima; None if there are none."""
+        if not self.found:
+            return None
+        z, p = (np.array([getattr(each.state, key) for each in self.all]) for key in "zp")
         return States(self.best.state.structure, z, p)
 
     @property
