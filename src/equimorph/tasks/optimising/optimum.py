@@ -85,12 +85,15 @@ class Optima:
         "found", or "refused" with the reason in `why`.
     all
         Local optima that were found, the best first.
+    states
+        Their states.
     """
 
     status: Literal["found", "refused"]
     why: str
     sense: Sense
     all: tuple[Optimum, ...]
+    states: States
 
     def __repr__(self) -> str:
         """The best, or why there is none."""
@@ -119,14 +122,6 @@ class Optima:
         if not self.found:
             raise InputError(f"`best` is that of optima that were found; got none: {self.why}.")
         return self.all[0]
-
-    @property
-    def states(self) -> States | None:
-        """States of all optima; None if there are none."""
-        if not self.found:
-            return None
-        z, p = (np.array([getattr(each.state, key) for each in self.all]) for key in "zp")
-        return States(self.best.state.structure, z, p)
 
     @property
     def margin(self) -> float:
@@ -194,7 +189,7 @@ def optimise(  # the knobs of the public face, all by keyword
     goal = Objective(objective, sign)
     fault = "" if start is None else _violation(start, constraints, margin)
     if fault:
-        return Optima("refused", fault, sense, ())
+        return _refused(fault, sense, eset)
     programme = Programme.over(eset, goal, (*constraints, stability(eset.structure, margin)))
     watched = _watched(programme, constraints, margin)
     ground, least = None, None
@@ -211,11 +206,16 @@ def optimise(  # the knobs of the public face, all by keyword
         pairs = list(zip(ends, found, strict=True))
         reached = _reached((eset, ground), programme, start, (within, margin), pairs)
         if found and not reached:
-            return Optima("refused", f"no route was found to {found[0]}", sense, ())
+            return _refused(f"no route was found to {found[0]}", sense, eset)
         found = reached
     if not found:
-        return Optima("refused", _nothing(within, least), sense, ())
-    return Optima("found", "", sense, tuple(found))
+        return _refused(_nothing(within, least), sense, eset)
+    z, p = (np.array([getattr(each.state, key) for each in found]) for key in "zp")
+    return Optima("found", "", sense, tuple(found), States(eset.structure, z, p))
+
+
+def _refused(why: str, sense: Sense, eset: EquilibriumSet) -> Optima:
+    return Optima("refused", why, sense, (), eset.points[:0])
 
 
 def _check(eset: EquilibriumSet, sense: str, margin: float, start: State | None) -> None:
