@@ -113,12 +113,11 @@ def assert_orientation_alternates(eset: EquilibriumSet) -> None:
         assert (own < 0).sum() < 0.05 * len(own)
 
 
-def assert_upright(eset: EquilibriumSet, turned: int = 0) -> None:
+def assert_upright(eset: EquilibriumSet) -> None:
     """No cell is folded over, neither over the parameters nor in the tangent planes at its corners.
 
     Coherently oriented, all cells project with the sign of their index's parity; and, on average
-    over their corners, they look the same way as the tangent planes, which cells around orient;
-    but for so many of them.
+    over their corners, they look the same way as the tangent planes, which cells around orient.
     """
     assert eset.audit.overturned == 0
     whole = adjacency(eset.cells)
@@ -138,8 +137,7 @@ def assert_upright(eset: EquilibriumSet, turned: int = 0) -> None:
         total += volumes(flat) * signs
     for k in range(patch.max(initial=-1) + 1):
         own = total[patch == k]
-        turned -= int((own * np.sign(own.sum()) <= 0.0).sum())
-    assert turned >= 0
+        assert (own * np.sign(own.sum()) > 0.0).all()
 
 
 def facets_of(piece: np.ndarray, d: int) -> np.ndarray:

@@ -16,17 +16,11 @@ from equimorph.charts.untangling import untangled
 from equimorph.charts.walking import Walker, Way, straightened
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.exact import exact_states
-from equimorph.manifold.fabric import (
-    Fabric,
-    Vertices,
-    check_sheets_do_not_cross,
-    fabric_of,
-    squared_sides,
-    vertices_of,
-)
+from equimorph.manifold.fabric import Fabric, check_sheets_do_not_cross, fabric_of, squared_sides
 from equimorph.manifold.levels import fabric_setting, part_of
 from equimorph.manifold.points import REFINED
 from equimorph.manifold.topology import chains, flags_of, keys_of, labels
+from equimorph.manifold.vertices import Vertices, vertices_of
 from equimorph.structures import States
 
 RINGS = 3

@@ -15,11 +15,9 @@ from equimorph.manifold.fabric import (
     ON_CAP,
     ON_FOLD,
     Fabric,
-    Vertices,
     check_sheets_do_not_cross,
     edges_of,
     fabric_of,
-    vertices_of,
 )
 from equimorph.manifold.level_cuts import About, Ends, cut_between
 from equimorph.manifold.levels import fabric_setting, part_of
@@ -27,6 +25,7 @@ from equimorph.manifold.on_edges import on_edges
 from equimorph.manifold.over import rooted
 from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
 from equimorph.manifold.topology import adjacency, flags_of, keys_of
+from equimorph.manifold.vertices import Vertices, vertices_of
 from equimorph.structures import States
 
 Lanes = Float[np.ndarray, "lanes size"]

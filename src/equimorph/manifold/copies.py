@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.manifold.fabric import ON_CROSSING, Fabric, Vertices, edges_of, vertices_of
+from equimorph.manifold.fabric import ON_CROSSING, Fabric, edges_of
 from equimorph.manifold.topology import keys_of
+from equimorph.manifold.vertices import Vertices, vertices_of
 
 Ends = Int[np.ndarray, "_ 2"]
 Rows = Int[np.ndarray, " _"]

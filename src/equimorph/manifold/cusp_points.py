@@ -10,12 +10,13 @@ from equimorph.equilibria.locus import Locus, settle
 from equimorph.errors import InputError
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.fabric import ON_FOLD, Fabric, Vertices, fabric_of
+from equimorph.manifold.fabric import ON_FOLD, Fabric, fabric_of
 from equimorph.manifold.level_cuts import roots
 from equimorph.manifold.levels import fabric_setting
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import lower_index
 from equimorph.manifold.points import CROSSING
+from equimorph.manifold.vertices import Vertices
 from equimorph.structures import States
 
 REACH = 1.5

@@ -12,23 +12,18 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Complex
-from equimorph.manifold.crossing_frames import crossing_frames
-from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.kernels import square_sides
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.parted_sheets import parted
-from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.points import CAP, CORNER, CROSSING
 from equimorph.manifold.simplices import volumes
 from equimorph.manifold.tangents import (
     Ends,
     best_corners,
-    cap_slopes,
-    fold_slopes,
-    placed_frames,
-    tangent_frames,
 )
 from equimorph.manifold.topology import adjacency, flags_of, keys_of, rows_of, senses
+from equimorph.manifold.vertices import Vertices, on_constraints, vertices_of
 from equimorph.structures import States
 
 ON_FOLD, ON_CAP, SIDES = 1, 2, 4
@@ -36,45 +31,12 @@ ON_FOLD, ON_CAP, SIDES = 1, 2, 4
 ON_CROSSING = 1 << 19
 """Mark of facets at which another sheet crosses."""
 CURVES = ON_FOLD | ON_CAP | ON_CROSSING
-HOLE = 1 << 20
-"""Mark of facets on the boundary that lie on nothing: the set is incomplete there."""
+HOLE, RIM = 1 << 20, 1 << 21
+"""Marks of facets on the boundary that lie on nothing: the set is incomplete there, or cells beyond
+are set apart."""
 TRIANGLES = 2
 """Dimension of their cells."""
 ON_BOX = 1e-9
-ON_BOUND = 1e-7
-
-
-@dataclass(frozen=True)
-class Vertices:
-    """Exact points with their tangent frames."""
-
-    z: Float[np.ndarray, "V size"]
-    p: Float[np.ndarray, "V P"]
-    kinds: Int[np.ndarray, " V"]
-    index: Int[np.ndarray, " V"]
-    grid_vertex: Int[np.ndarray, " V"]
-    place: Float[np.ndarray, "V coordinates"]
-    frame: Float[np.ndarray, "V d full"]
-    rows: Float[np.ndarray, "V d coordinates"]
-    fold_slope: Float[np.ndarray, "V d"]
-    """Slope, along the frame, of what vanishes on folds; zero off folds. So for the others."""
-    cap_slope: Float[np.ndarray, "V d"]
-    crossing_slope: Float[np.ndarray, "V d"]
-    shared: Int[np.ndarray, " V"]
-    """Number that vertices have in common which are the same point of several sheets; else −1."""
-
-    def __len__(self) -> int:
-        """Return the number of vertices."""
-        return len(self.z)
-
-    def take(self, some: Int[np.ndarray, " some"]) -> "Vertices":
-        """Return some of the vertices."""
-        return Vertices(*(column[some] for column in vars(self).values()))
-
-    def joined(self, *more: "Vertices") -> "Vertices":
-        """Return these vertices and more."""
-        columns = zip(*(vars(each).values() for each in (self, *more)), strict=True)
-        return Vertices(*(np.concatenate(column) for column in columns))
 
 
 @dataclass(frozen=True)
@@ -173,6 +135,13 @@ class Fabric:
         flat = place[:, place.shape[1] - self.dimension :]
         return np.asarray(volumes(flat[cells]) * sense < 0.0)
 
+    def backward(self) -> Bool[np.ndarray, " C"]:
+        """Which triangles look backwards, on average, in the tangent planes at their corners."""
+        place, rows = self.vertices.place[self.cells], self.vertices.rows[self.cells]
+        sides = place[:, 1:] - place[:, :1]
+        total = np.linalg.det(np.einsum("ckdx,cex->ckde", rows, sides)).sum(axis=1)
+        return np.asarray(total * self.sense * np.where(self.cell_index % 2 == 0, 1, -1) <= 0.0)
+
     def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
         """Cut edges at new vertices, and all cells and facets around them.
 
@@ -219,14 +188,14 @@ class Fabric:
         """Return what is needed to describe the set; vertices without cells are left out."""
         number = self.numbers
         _, used = np.unique(number, return_index=True)
-        own = self.vertices.take(used[number[used] >= 0])
+        own, used = self.vertices, used[number[used] >= 0]
         facets = [number[self.facets[(self.marks & m) > 0]] for m in (ON_FOLD, ON_CAP, ON_CROSSING)]
         folds, caps, crossings = (each[(each >= 0).all(axis=1)] for each in facets)
         return Complex(
-            States(self.setting.structure, own.z, own.p),
-            own.kinds,
-            own.index,
-            own.grid_vertex,
+            States(self.setting.structure, own.z[used], own.p[used]),
+            own.kinds[used],
+            own.index[used],
+            own.grid_vertex[used],
             number[self.cells],
             self.cell_index,
             folds,
@@ -248,48 +217,6 @@ def squared_sides(
 def held(mark: int, dimension: int) -> list[int]:
     """Free parameters that sides of the box hold."""
     return [k for k in range(dimension) if mark & (3 * SIDES << 2 * k)]
-
-
-def vertices_of(
-    setting: Setting,
-    states: tuple[Float[np.ndarray, "V size"], Float[np.ndarray, "V P"]],
-    kinds: Int[np.ndarray, " V"],
-    others: tuple[Int[np.ndarray, " V"], Int[np.ndarray, " V"]],
-    rows: Float[np.ndarray, "V d coordinates"],
-) -> Vertices:
-    """Vertices with their frames; `others` are index and grid vertex, `rows` nearby planes."""
-    z, p = states
-    crossing = kinds == CROSSING
-    d = len(setting.free)
-    frame = np.empty((len(z), d, z.shape[1] + d))
-    folds, caps, crossings = (np.zeros((len(z), d)) for _ in range(3))
-    plain, met = np.flatnonzero(~crossing), np.flatnonzero(crossing)
-    frame[plain] = tangent_frames(setting, z[plain], p[plain], rows[plain])
-    if len(met):
-        frame[met], crossings[met] = crossing_frames(setting, z[met], p[met], rows[met])
-    capped = np.isin(kinds, (CAP, CORNER))
-    capped[met] = on_constraints(setting, z[met], p[met])
-    for out, function, wanted in (
-        (folds, fold_slopes, np.isin(kinds, (FOLD, CORNER))),
-        (caps, cap_slopes, capped),
-    ):
-        own = np.flatnonzero(wanted)
-        if len(own):
-            out[own] = function(setting, z[own], p[own], frame[own])
-    place = embed(setting, z, p)
-    placed = placed_frames(setting, frame)
-    alone = np.full(len(z), -1)
-    return Vertices(z, p, kinds, *others, place, frame, placed, folds, caps, crossings, alone)
-
-
-def on_constraints(
-    setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
-) -> Bool[np.ndarray, " n"]:
-    """Whether states lie on the bound of a constraint."""
-    out = np.zeros(len(z), bool)
-    for constraint in setting.constraints if len(z) else ():
-        out |= np.abs(constraint.excess(z, p)) < ON_BOUND
-    return out
 
 
 def check_sheets_do_not_cross(eset: EquilibriumSet) -> None:
@@ -363,7 +290,10 @@ def _bisected(
     keys = keys_of(edges, whole)
     order = np.argsort(keys)
     keys = keys[order]
-    rows, owner, active = rows.copy(), np.arange(len(rows)), np.arange(len(rows))
+    near = np.zeros(base, bool)
+    near[edges] = True
+    active = np.flatnonzero(near[rows].sum(axis=1) > 1)
+    rows, owner = rows.copy(), np.arange(len(rows))
     while len(active) and len(edges):
         which = np.full(len(active), len(edges))
         for pair in combinations(range(rows.shape[1]), 2):

@@ -7,9 +7,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.copies import first_copies, with_copies
-from equimorph.manifold.fabric import Fabric, Vertices, edges_of
+from equimorph.manifold.fabric import Fabric, edges_of
 from equimorph.manifold.on_edges import on_edges
 from equimorph.manifold.topology import keys_of
+from equimorph.manifold.vertices import Vertices
 
 TRIALS = 60
 ELSEWHERE = (0.5, 0.25, 0.75, 0.1, 0.9)

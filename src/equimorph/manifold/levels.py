@@ -10,7 +10,7 @@ from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.fabric import HOLE, ON_CAP, Fabric, Vertices, fabric_of
+from equimorph.manifold.fabric import HOLE, ON_CAP, Fabric, fabric_of
 from equimorph.manifold.level_cuts import (
     ROUND_OFF,
     About,
@@ -25,6 +25,7 @@ from equimorph.manifold.pairing import Setting
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.tangents import split_step
 from equimorph.manifold.topology import adjacency, pieces
+from equimorph.manifold.vertices import Vertices
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
 

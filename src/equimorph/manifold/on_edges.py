@@ -6,19 +6,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.crossing_points import corrected_crossings
-from equimorph.manifold.fabric import (
-    ON_CAP,
-    ON_CROSSING,
-    ON_FOLD,
-    Fabric,
-    Vertices,
-    held,
-    vertices_of,
-)
+from equimorph.manifold.fabric import ON_CAP, ON_CROSSING, ON_FOLD, Fabric, held
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import Aim, corrected, lower_index
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.tangents import Cubics, split_step
+from equimorph.manifold.vertices import Vertices, vertices_of
 from equimorph.model import Findings, Journal, recalled, step_of
 
 CHUNK = 4096
@@ -55,7 +48,7 @@ def recalled_on_edges(
 
     def compute() -> Findings:
         found, vertices = on_edges(fabric, ends, mark, lowest, t)
-        return found, *vars(vertices).values()
+        return found, *vertices.columns.values()
 
     found, *columns = recalled(journal, step_of(f"bisect {mark}", ends, t), compute)
     return found, Vertices(*columns)

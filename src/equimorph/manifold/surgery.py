@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.copies import copies
-from equimorph.manifold.fabric import Fabric, edges_of, squared_sides
+from equimorph.manifold.fabric import RIM, Fabric, edges_of, squared_sides
 from equimorph.manifold.kernels import flip_edges
 from equimorph.manifold.topology import keys_of
 
@@ -21,8 +21,11 @@ GAIN = 1e-3
 """Least gain of a flip: minus the sum of the cotangents of both opposite angles."""
 LONGER = 1.5
 """How much longer than the longest edge around a vertex edges may get that replace them."""
-WORSE = 0.7
-"""Least share of the smallest angle around a vertex that must remain when it goes."""
+SHORT = 0.05
+"""Edges shorter than this share of the longest one around a vertex are worth losing."""
+WORSE, MUCH_WORSE = 0.7, 0.2
+"""Least share of the smallest angle around a vertex that must remain when it goes; and when it goes
+a short way."""
 
 Triangles = Int[np.ndarray, "T 3"]
 
@@ -40,6 +43,11 @@ def smallest_angle(fabric: Fabric) -> float:
     return float(np.degrees(min(angles)))
 
 
+def angles(fabric: Fabric) -> Float[np.ndarray, " C"]:
+    """Smallest angle of each triangle."""
+    return _smallest(fabric.squared)
+
+
 def flip(fabric: Fabric, but: Int[np.ndarray, "m 2"] | None = None) -> Fabric:
     """Flip edges whose opposite angles add up to more than π, as far as nothing folds over.
 
@@ -47,7 +55,11 @@ def flip(fabric: Fabric, but: Int[np.ndarray, "m 2"] | None = None) -> Fabric:
     Edges between the pairs of vertices `but` do not come into being.
     """
     cells, squared, sense = fabric.cells.copy(), fabric.squared.copy(), fabric.sense.copy()
-    fixed = fabric.facets if but is None else np.concatenate([fabric.facets, but])
+    fixed = fabric.facets
+    if but is not None:
+        near = np.zeros(len(fabric.vertices), bool)
+        near[cells] = True
+        fixed = np.concatenate([fixed, but[near[but].all(axis=1)]])
     store = fabric.vertices
     parts = (fabric.cell_index, sense, np.ascontiguousarray(fixed), store.place, store.rows)
     count = flip_edges(cells, squared, *parts, GAIN)
@@ -85,28 +97,36 @@ def _smallest(squared: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, " T"]:
     return np.asarray(np.arctan2(1.0, largest))
 
 
-def collapse(fabric: Fabric, passes: int) -> Fabric:
-    """Draw vertices of slender triangles into a neighbour, where all angles around get larger."""
+def collapse(fabric: Fabric, passes: int, short: float = 0.0) -> Fabric:
+    """Draw vertices of slender triangles into a neighbour, where all angles around get larger.
+
+    Edges shorter than a share `short` of the longest one around count as one bad triangle.
+    """
     for _ in range(passes):
-        moves = _moves(fabric)
+        moves = _moves(fabric, short)
         if len(moves) == 0:
             break
-        target = np.arange(len(fabric.vertices))
-        target[moves[:, 0]] = moves[:, 1]
-        cells, facets = target[fabric.cells], target[fabric.facets]
-        kept, whole = _proper(cells), _proper(facets)
-        moved, squared = kept & (cells != fabric.cells).any(axis=1), fabric.squared.copy()
-        squared[moved] = squared_sides(fabric.vertices.place, cells[moved])
-        fabric = replace(
-            fabric,
-            cells=cells[kept],
-            squared=squared[kept],
-            cell_index=fabric.cell_index[kept],
-            sense=fabric.sense[kept],
-            facets=facets[whole],
-            marks=fabric.marks[whole],
-        )
+        fabric = moved(fabric, moves)
     return fabric
+
+
+def moved(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Fabric:
+    """Replace vertices by others; triangles that vanish are left out."""
+    target = np.arange(len(fabric.vertices))
+    target[moves[:, 0]] = moves[:, 1]
+    cells, facets = target[fabric.cells], target[fabric.facets]
+    kept, whole = _proper(cells), _proper(facets)
+    changed, squared = kept & (cells != fabric.cells).any(axis=1), fabric.squared.copy()
+    squared[changed] = squared_sides(fabric.vertices.place, cells[changed])
+    return replace(
+        fabric,
+        cells=cells[kept],
+        squared=squared[kept],
+        cell_index=fabric.cell_index[kept],
+        sense=fabric.sense[kept],
+        facets=facets[whole],
+        marks=fabric.marks[whole],
+    )
 
 
 def _proper(rows: Int[np.ndarray, "n k"]) -> Bool[np.ndarray, " n"]:
@@ -114,7 +134,7 @@ def _proper(rows: Int[np.ndarray, "n k"]) -> Bool[np.ndarray, " n"]:
     return np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))
 
 
-def _moves(fabric: Fabric) -> Int[np.ndarray, "m 2"]:
+def _moves(fabric: Fabric, short: float) -> Int[np.ndarray, "m 2"]:
     """Vertices that go, and into which neighbours; stars of those that go do not overlap."""
     cells, base = fabric.cells, len(fabric.vertices)
     corners = cells[(_smallest(fabric.squared) < SLENDER) | fabric.overturned(cells, fabric.sense)]
@@ -129,10 +149,23 @@ def _moves(fabric: Fabric) -> Int[np.ndarray, "m 2"]:
     # all cells around the ends of moves
     edges, _ = edges_of(cells[near[cells].any(axis=1)], base)
     moves = moves[_free_to_move(fabric, moves, edges)]
-    gain, bundle = _in_all_sheets(fabric, moves, _gains(fabric, moves))
+    return best_apart(fabric, moves, edges, short)
+
+
+def best_apart(
+    fabric: Fabric,
+    moves: Int[np.ndarray, "m 2"],
+    edges: Int[np.ndarray, "E 2"],
+    short: float = 0.0,
+) -> Int[np.ndarray, "k 2"]:
+    """Moves that better the triangles around, the best first, with stars that do not overlap.
+
+    Ways shorter than that share of the longest edge around are worth one bad triangle less.
+    """
+    gain, bundle = _in_all_sheets(fabric, moves, _gains(fabric, moves, short))
     order = np.lexsort((bundle, -gain))
     order = order[gain[order] > 0]
-    return _apart(moves[order], bundle[order], edges, base)
+    return _apart(moves[order], bundle[order], edges, len(fabric.vertices))
 
 
 def _in_all_sheets(
@@ -166,10 +199,11 @@ def _free_to_move(
     """Whether what the vertex lies on goes on along the edge, and the surface stays one."""
     base = len(fabric.vertices)
     keys = keys_of(edges, base)
-    own = fabric.vertex_marks[moves[:, 0]]
+    marks = fabric.vertex_marks
+    own = marks[moves[:, 0]]
     along = fabric.edge_marks(np.sort(moves, axis=1))
     ends = np.bincount(fabric.facets.ravel(), minlength=base)[moves[:, 0]]
-    good = (own == along) & ((own == 0) | (ends == 2))
+    good = (own == along) & ((own == 0) | (ends == 2)) & ~(marks[moves] & RIM).any(axis=1)
     # common neighbours of both ends: only those across the triangles beside the edge
     starts, around = _neighbours(edges, base)
     row, at = _spread(starts, moves[:, 0])
@@ -199,7 +233,7 @@ def _spread(
     return row, starts[chosen][row] + offset
 
 
-def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, " m"]:
+def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"], short: float) -> Float[np.ndarray, " m"]:
     """How many slender or overturned triangles fewer there are if vertices go into neighbours.
 
     And, less than one, by how much the smallest angle around it grows. Minus infinity where a
@@ -231,8 +265,11 @@ def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"]) -> Float[np.ndarray, "
     reach, longest = np.zeros(len(moves)), np.zeros(len(moves))
     np.maximum.at(reach, row, _longest(fabric, old))
     np.maximum.at(longest, row[stays], _longest(fabric, new[stays]))
-    good &= (longest <= LONGER * reach) & np.isfinite(after) & (after >= WORSE * before)
-    return np.where(good, fewer + (after - before) / np.pi, -np.inf)
+    place = fabric.vertices.place
+    tiny = np.linalg.norm(place[moves[:, 0]] - place[moves[:, 1]], axis=1) < short * reach
+    good &= (longest <= LONGER * reach) & np.isfinite(after)
+    good &= after >= np.where(tiny, MUCH_WORSE, WORSE) * before
+    return np.where(good, fewer + tiny + (after - before) / np.pi, -np.inf)
 
 
 def _turned(fabric: Fabric, old: Triangles, new: Triangles) -> Bool[np.ndarray, " n"]:

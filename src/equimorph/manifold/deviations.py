@@ -1,0 +1,178 @@
+"""Edges of a complex that is being refined: how far they deviate, and which are to be bisected."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.fabric import CURVES, HOLE, RIM, Fabric, edges_of
+from equimorph.manifold.on_edges import chunks
+from equimorph.manifold.tangents import Cubics
+from equimorph.manifold.topology import keys_of
+from equimorph.model import Journal
+
+PREFERENCE = 1.6
+"""How much longer an edge must be than those that deviate to be bisected before them."""
+COARSE = 4.0
+"""Deviation, in tolerances, of edges whose halves are likely to deviate too much as well."""
+BULGE = 0.5
+"""How long edges on folds may be, relative to edges at their ends that could not be bisected."""
+FEW = 50
+"""Fewer than one in so many edges are bisected all at once."""
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Edges of a fabric, those of each cell, their marks, length and deviation from the set.
+
+    stuck: cannot be bisected; pressing: must be, whatever they deviate.
+    """
+
+    ends: Int[np.ndarray, "E 2"]
+    of_cells: Int[np.ndarray, "C sides"]
+    marks: Int[np.ndarray, " E"]
+    length: Float[np.ndarray, " E"]
+    error: Float[np.ndarray, " E"]
+    stuck: Bool[np.ndarray, " E"]
+    pressing: Bool[np.ndarray, " E"]
+
+    def deviating(self, tolerance: float) -> Bool[np.ndarray, " E"]:
+        """Edges that should be bisected now, and can be.
+
+        Where folds and constraints bulge far out between their vertices, they come first: edges
+        beside them would cross them.
+        """
+        first = (self.error > COARSE * tolerance) & ((self.marks & CURVES) > 0)
+        first = (first | self.pressing) & ~self.stuck
+        return first if first.any() else np.asarray((self.error > tolerance) & ~self.stuck)
+
+
+@dataclass
+class Memory:
+    """Deviations of edges that were measured before, and edges that could not be bisected."""
+
+    journal: Journal
+    keys: Int[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, int))
+    """Of the edges whose deviation is known; so numbered that they stay when vertices are added."""
+    error: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
+    stuck: set[tuple[int, int]] = field(default_factory=set)
+    cut: Int[np.ndarray, "m 2"] = field(default_factory=lambda: np.zeros((0, 2), int))
+    """Edges that were bisected: flips must not bring them back."""
+    failures: int = 0
+
+    def among(self, inside: Bool[np.ndarray, " V"]) -> "Memory":
+        """What is remembered of edges between some of the vertices; deviations all."""
+        stuck = {(a, b) for a, b in self.stuck if inside[a] and inside[b]}
+        return Memory(
+            self.journal, self.keys, self.error, stuck, self.cut[inside[self.cut].all(axis=1)]
+        )
+
+    def copy(self) -> "Memory":
+        """What is remembered by now."""
+        return replace(self, stuck=set(self.stuck))
+
+    def learn(self, inner: "Memory", inside: Bool[np.ndarray, " V"]) -> None:
+        """Take over what came to be known among some of the vertices, and those added since."""
+        keys, at = np.unique(np.concatenate([self.keys, inner.keys]), return_index=True)
+        self.keys, self.error = keys, np.concatenate([self.error, inner.error])[at]
+        beyond = {(a, b) for a, b in self.stuck if not (inside[a] and inside[b])}
+        self.stuck = beyond | inner.stuck
+        self.cut = np.concatenate([self.cut[~inside[self.cut].all(axis=1)], inner.cut])
+        self.failures += inner.failures
+
+
+def known(fabric: Fabric, memory: Memory) -> Edges:
+    """Edges with their deviations; only those that are new are measured."""
+    base = len(fabric.vertices)
+    ends, of_cells = edges_of(fabric.cells, base)
+    marks = fabric.edge_marks(ends)
+    keys = _keys(ends)
+    at = np.minimum(np.searchsorted(memory.keys, keys), max(len(memory.keys) - 1, 0))
+    old = memory.keys[at] == keys if len(memory.keys) else np.zeros(len(keys), bool)
+    error = np.empty(len(keys))
+    error[old] = memory.error[at[old]]
+    new = np.flatnonzero(~old)
+    error[new] = _deviations(fabric, ends[new], marks[new])
+    order = np.argsort(keys)
+    memory.keys, memory.error = keys[order], error[order]
+    length = np.empty(len(ends))
+    length[of_cells] = np.sqrt(fabric.squared)
+    stuck = (marks & (HOLE | RIM)) > 0
+    failed = np.zeros(len(ends), bool)
+    if memory.stuck:
+        refused = np.array(sorted(memory.stuck))
+        failed = np.isin(keys_of(ends, base), keys_of(refused, base))
+    pressing = _pressing(ends, marks, length, failed)
+    return Edges(ends, of_cells, marks, length, error, stuck | failed, pressing)
+
+
+def _pressing(
+    ends: Int[np.ndarray, "E 2"],
+    marks: Int[np.ndarray, " E"],
+    length: Float[np.ndarray, " E"],
+    failed: Bool[np.ndarray, " E"],
+) -> Bool[np.ndarray, " E"]:
+    """Longer edges on folds and constraints next to edges that could not be bisected.
+
+    Those may cross a fold that bulges out between its vertices.
+    """
+    reach = np.full(int(ends.max(initial=0)) + 1, np.inf)
+    for side in range(2):
+        np.minimum.at(reach, ends[failed, side], length[failed])
+    short = np.minimum(reach[ends[:, 0]], reach[ends[:, 1]])
+    return np.asarray(((marks & CURVES) > 0) & (length > BULGE * short))
+
+
+def _keys(ends: Int[np.ndarray, "E 2"]) -> Int[np.ndarray, " E"]:
+    """Numbers of edges with sorted ends that stay the same while vertices are added."""
+    return np.asarray(ends[:, 1] * (ends[:, 1] - 1) // 2 + ends[:, 0])
+
+
+def _deviations(
+    fabric: Fabric, ends: Int[np.ndarray, "E 2"], marks: Int[np.ndarray, " E"]
+) -> Float[np.ndarray, " E"]:
+    """How far the set is from straight edges."""
+    out = np.zeros(len(ends))
+    for own in chunks(np.arange(len(ends)), marks):
+        first, second = (fabric.end(ends[own], side, int(marks[own[0]])) for side in range(2))
+        out[own] = Cubics(first, second).error
+    return out
+
+
+def chosen(edges: Edges, tolerance: float) -> Int[np.ndarray, " n"]:
+    """Edges to be bisected now, those first that cells with several are to be cut at first.
+
+    Those that deviate so much that their halves may, too; of the others, those that all cells
+    around them want to be cut at first: the rest may then be within the tolerance, or flipped.
+    """
+    deviating = edges.deviating(tolerance)
+    few = np.count_nonzero(deviating) * FEW < len(deviating)
+    coarse, _ = _closed(edges, deviating & (few | (edges.error > COARSE * tolerance)))
+    wanted, weight = _closed(edges, coarse | deviating)
+    cells = edges.of_cells[wanted[edges.of_cells].any(axis=1)]
+    longest = cells[np.arange(len(cells)), weight[cells].argmax(axis=1)]
+    around = np.bincount(edges.of_cells.ravel(), minlength=len(weight))
+    agreed = np.bincount(longest, minlength=len(weight)) == around
+    out = np.flatnonzero(coarse | (agreed & wanted))
+    return out[np.argsort(-weight[out], kind="stable")]
+
+
+def _closed(
+    edges: Edges, wanted: Bool[np.ndarray, " E"]
+) -> tuple[Bool[np.ndarray, " E"], Float[np.ndarray, " E"]]:
+    """Wanted edges and what follows; and by how much cells prefer to be cut at each edge.
+
+    In every cell with a wanted edge the longest one is wanted, too, if that is longer by more than
+    `PREFERENCE`.
+    """
+    wanted = wanted & ~edges.stuck
+    weight = np.where(wanted, PREFERENCE, 1.0) * edges.length
+    weight[edges.stuck] = -1.0
+    while True:
+        cells = edges.of_cells[wanted[edges.of_cells].any(axis=1)]
+        longest = cells[np.arange(len(cells)), weight[cells].argmax(axis=1)]
+        more = longest[~wanted[longest]]
+        if len(more) == 0:
+            return wanted, weight
+        wanted[more] = True
+        weight[more] = PREFERENCE * edges.length[more]

@@ -1,0 +1,70 @@
+"""Parts of a complex that are worked on alone: what is beyond stays, and so does the rim between.
+
+Vertices keep their numbers, and new ones are appended, so that a part goes back as it is.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.manifold.fabric import RIM, Fabric
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Some cells of a fabric with all facets between their vertices, and the rest of it.
+
+    inside: vertices of the patch. Edges of the rest between its vertices are marked as its `RIM`:
+    they are not bisected, no vertex of them goes, and flips do not make them a second time.
+    """
+
+    fabric: Fabric
+    rest: Fabric
+    inside: Bool[np.ndarray, " V"]
+
+    def replaced(self, by: Fabric) -> Fabric:
+        """Return the whole fabric, with another one in place of the patch."""
+        kept, rest = (by.marks & RIM) == 0, self.rest
+        return replace(
+            by,
+            cells=np.concatenate([rest.cells, by.cells]),
+            cell_index=np.concatenate([rest.cell_index, by.cell_index]),
+            squared=np.concatenate([rest.squared, by.squared]),
+            sense=np.concatenate([rest.sense, by.sense]),
+            facets=np.concatenate([rest.facets, by.facets[kept]]),
+            marks=np.concatenate([rest.marks, by.marks[kept]]),
+        )
+
+
+def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Patch:
+    """Triangles around some vertices, and so many rings more; all of them if sheets cross."""
+    near = near | (fabric.vertices.shared >= 0).any()
+    for _ in range(rings + 1):
+        own = near[fabric.cells].any(axis=1)
+        near = np.zeros_like(near)
+        near[fabric.cells[own]] = True
+    rest = fabric.only(~own)
+    beyond = np.zeros_like(near)
+    beyond[rest.cells] = True
+    rim = _pairs_between(rest.cells, near & beyond)
+    shared = near[fabric.facets].all(axis=1)
+    facets, marks = fabric.facets[shared], fabric.marks[shared]
+    patch = replace(
+        fabric.only(own),
+        facets=np.concatenate([facets, rim]),
+        marks=np.concatenate([marks, np.full(len(rim), RIM)]),
+    )
+    rest = replace(rest, facets=fabric.facets[~shared], marks=fabric.marks[~shared])
+    return Patch(patch, rest, near)
+
+
+def _pairs_between(
+    cells: Int[np.ndarray, "n corners"], chosen: Bool[np.ndarray, " V"]
+) -> Int[np.ndarray, "m 2"]:
+    """Edges of cells, sorted, both of whose ends are chosen."""
+    cells = cells[np.count_nonzero(chosen[cells], axis=1) > 1]
+    pairs = [cells[:, list(pair)] for pair in combinations(range(cells.shape[1]), 2)]
+    edges = np.concatenate(pairs)
+    return np.unique(np.sort(edges[chosen[edges].all(axis=1)], axis=1), axis=0)

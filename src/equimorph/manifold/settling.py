@@ -1,0 +1,150 @@
+"""Bisection of edges until none deviates, flips and collapses in between."""
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.manifold.collapsing import collapse_edges
+from equimorph.manifold.copies import copies, doubled, first_copies, with_copies
+from equimorph.manifold.deviations import Edges, Memory, chosen, known
+from equimorph.manifold.fabric import CURVES, Fabric
+from equimorph.manifold.on_edges import chunks, recalled_on_edges
+from equimorph.manifold.patches import patch_around
+from equimorph.manifold.reconnection import reconnect
+from equimorph.manifold.smoothing import SHARP, smooth
+from equimorph.manifold.surgery import SHORT, angles, collapse, flip
+from equimorph.manifold.topology import keys_of
+from equimorph.model import Progress, Silent
+
+ROUNDS = 200
+ALTERNATIONS, FEWER = 8, 0.98
+"""How often tetrahedra are reconnected and vertices taken out, as long as cells get fewer."""
+GROWN = 1.6
+"""How much more tetrahedra there are when slivers are taken away anew."""
+PLACES = (0.5, 0.3, 0.7)
+"""Where along an edge a vertex is tried, one place after the other."""
+HOPELESS = 60
+"""Failed bisections, and a fiftieth of all edges, beyond which refinement ends."""
+MOST = 2_000_000
+"""Vertices beyond which refinement ends."""
+LOCAL = 40
+"""Where one in so many edges deviates at most, what is around these is worked on alone."""
+RINGS = 4
+"""Rings of cells around edges that deviate, which longer ones to be cut first may lie in."""
+
+
+def settled(
+    fabric: Fabric, tolerance: float, memory: Memory, progress: Progress | None = None
+) -> Fabric:
+    """Bisect and flip until no edge deviates that can be bisected.
+
+    Without a sink for progress all at once, even if little is to be done.
+    """
+    cells = len(fabric.cells)
+    for _ in range(ROUNDS):
+        edges = known(fabric, memory)
+        hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
+        todo = ((edges.error > tolerance) | edges.pressing) & ~edges.stuck
+        if hopeless or len(fabric.vertices) > MOST or not todo.any():
+            break
+        if progress is not None and _few(fabric, todo):
+            fabric = _settled_around(fabric, edges.ends[todo], tolerance, memory)
+            continue
+        (progress or Silent()).report(
+            "refining", int((edges.error <= tolerance).sum()), len(edges.error)
+        )
+        fabric = bisected(fabric, edges, chosen(edges, tolerance), memory)
+        if fabric.dimension == 2:
+            fabric = flip(fabric, memory.cut)
+        elif fabric.dimension == 3 and len(fabric.cells) > GROWN * cells:
+            fabric = tidied(fabric, memory)
+            cells = len(fabric.cells)
+    return fabric
+
+
+def _few(fabric: Fabric, todo: Bool[np.ndarray, " E"]) -> bool:
+    """Whether so few edges deviate that it is worth while to work around them alone."""
+    few = int(np.count_nonzero(todo)) * LOCAL < len(todo)
+    return few and fabric.dimension == 2 and not (fabric.vertices.shared >= 0).any()
+
+
+def _settled_around(
+    fabric: Fabric, ends: Int[np.ndarray, "n 2"], tolerance: float, memory: Memory
+) -> Fabric:
+    """Bisect and flip around some edges until none deviates there."""
+    near = np.zeros(len(fabric.vertices), bool)
+    near[ends] = True
+    patch = patch_around(fabric, near, RINGS)
+    inner = memory.among(patch.inside)
+    out = patch.replaced(settled(patch.fabric, tolerance, inner))
+    memory.learn(inner, patch.inside)
+    return out
+
+
+def told_apart(fabric: Fabric, memory: Memory) -> Fabric:
+    """Vertices on edges of several sheets that join the same two points of their crossing."""
+    ends = doubled(fabric)
+    if len(ends) == 0:
+        return fabric
+    edges, base = known(fabric, memory), len(fabric.vertices)
+    those = np.flatnonzero(np.isin(keys_of(edges.ends, base), keys_of(ends, base)))
+    return bisected(fabric, edges, those, memory)
+
+
+def tidied(fabric: Fabric, memory: Memory, fine: bool = False) -> Fabric:
+    """Take slivers away; of triangles that are `fine` already also by moving vertices.
+
+    Where cells are coarse, short edges may be all that keeps two folds apart.
+    """
+    if fabric.dimension == 3:
+        for _ in range(ALTERNATIONS):
+            cells = len(fabric.cells)
+            fabric = collapse_edges(reconnect(fabric, memory.cut), memory.cut)
+            if len(fabric.cells) > FEWER * cells:
+                break
+        return reconnect(fabric, memory.cut)
+    if fabric.dimension == 1:
+        return fabric
+    short = SHORT if fine else 0.0
+    fabric = flip(collapse(flip(fabric, memory.cut), passes=4, short=short), memory.cut)
+    if not fine:
+        return fabric
+    return flip(smooth(fabric, angles(fabric) < SHARP), memory.cut)
+
+
+def bisected(
+    fabric: Fabric, edges: Edges, at_once: Int[np.ndarray, " n"], memory: Memory
+) -> Fabric:
+    """Put exact vertices on edges; remember where that failed."""
+    ends = edges.ends
+    at_once = at_once[first_copies(fabric, ends[at_once], edges.marks[at_once])]
+    lowest = np.full(len(ends), np.iinfo(int).max)
+    for side in edges.of_cells.T:
+        np.minimum.at(lowest, side, fabric.cell_index)
+
+    parts, done = [], []
+    for some in chunks(at_once, edges.marks):
+        own, mark = some, int(edges.marks[some[0]])
+        for t in PLACES:
+            given = (ends[own], mark, lowest[own], np.full(len(own), t))
+            found, vertices = recalled_on_edges(memory.journal, fabric, *given)
+            parts.append(vertices)
+            done.append(own[found])
+            own = own[~found]
+            if len(own) == 0:
+                break
+        _, others = copies(fabric, ends[own])
+        memory.stuck.update(map(tuple, np.concatenate([ends[own], others]).tolist()))
+        memory.failures += len(own)
+    if not done:
+        return fabric
+    more = parts[0].joined(*parts[1:])
+    at = np.concatenate(done)
+    rank = np.empty(len(ends), int)
+    rank[at_once] = np.arange(len(at_once))
+    order = np.argsort(rank[at])
+    at, more = at[order], more.take(order)
+    if ((edges.marks[at] & CURVES) > 0).any():
+        memory.stuck.clear()  # beside a fold that is better known they may succeed
+    whole, more = with_copies(fabric, ends[at], more)
+    memory.cut = np.concatenate([memory.cut, whole])
+    return fabric.bisected(whole, more) if len(at) else fabric
