@@ -16,6 +16,7 @@ from equimorph.manifold.smoothing import smooth
 from equimorph.manifold.surgery import angles, collapse, flip, smallest_angle
 from equimorph.manifold.topology import adjacency, euler_characteristic
 from equimorph.model import Box, Descriptor
+from equimorph.structures import Rod
 from oracles.complexes import (
     assert_faithful,
     assert_folds_are_singular,
@@ -169,14 +170,31 @@ def fine_arch(refined_arch):
     ids="{0[0]}x{0[1]}".format,
 )
 def test_refined_arch_does_not_depend_on_the_grid(intervals, refined_arch, fine_arch):
-    """Surfaces within 0.01 of the set: twice that from each other, with the same pieces."""
+    """Surfaces within 0.01 of the set, and of each other, with the same pieces."""
     eset = refined_arch(intervals, 0.01)
     assert_faithful(eset)
     assert_upright(eset)
     assert eset.audit.smallest_angle > 10.0
     assert_folds_are_singular(eset, 1e-8)
     assert topology(eset) == topology(fine_arch)
-    assert max(farthest(eset, fine_arch), farthest(fine_arch, eset)) <= 0.02
+    assert max(farthest(eset, fine_arch), farthest(fine_arch, eset)) <= 0.01
+
+
+@pytest.mark.slow
+def test_a_grid_too_coarse_for_the_accuracy_is_made_finer():
+    """Between its folds near (0.87, 0) edges of 6 × 11 intervals cannot be bisected."""
+    arch = Rod()
+    kappa, box = arch.max_curvature, Box(Theta=(0.2, 2.5), Delta=(-2, 2))
+    given = {"fixed": {"q": 2.5}, "within": [kappa <= 20], "checks": 0, "intervals": (6, 11)}
+    with unchecked():
+        alone = refine(equilibrium_set(arch, box, **given), 0.002)
+        eset = equilibrium_set(arch, box, accuracy=0.002, **given)
+    assert alone.audit.unrefined > 0
+    assert not alone.audit.clean
+    assert_faithful(eset)
+    assert_upright(eset)
+    assert eset.audit.unrefined == 0
+    assert eset.intervals > (6, 11)
 
 
 def test_refined_arch_is_faithful(refined_arch):

@@ -35,6 +35,8 @@ HOLE, RIM = 1 << 20, 1 << 21
 """Marks of facets on the boundary that lie on nothing: the set is incomplete there, or cells beyond
 are set apart."""
 TRIANGLES = 2
+AT_ONCE = 2048
+"""Triangles whose tangent planes are looked at together."""
 """Dimension of their cells."""
 ON_BOX = 1e-9
 
@@ -137,9 +139,13 @@ class Fabric:
 
     def backward(self) -> Bool[np.ndarray, " C"]:
         """Which triangles look backwards, on average, in the tangent planes at their corners."""
-        place, rows = self.vertices.place[self.cells], self.vertices.rows[self.cells]
-        sides = place[:, 1:] - place[:, :1]
-        total = np.linalg.det(np.einsum("ckdx,cex->ckde", rows, sides)).sum(axis=1)
+        total = np.empty(len(self.cells))
+        for first in range(0, len(self.cells), AT_ONCE):
+            own = self.cells[first : first + AT_ONCE]
+            place, rows = self.vertices.place[own], self.vertices.rows[own]
+            seen = rows @ np.swapaxes(place[:, 1:] - place[:, :1], 1, 2)[:, None]
+            areas = seen[..., 0, 0] * seen[..., 1, 1] - seen[..., 0, 1] * seen[..., 1, 0]
+            total[first : first + AT_ONCE] = areas.sum(axis=1)
         return np.asarray(total * self.sense * np.where(self.cell_index % 2 == 0, 1, -1) <= 0.0)
 
     def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":

@@ -14,6 +14,10 @@ from equimorph.manifold.surgery import angles, flip
 PLANS = (3 * (False, True), 6 * (True,))
 """Whether all edges around overturned cells are cut, round by round, or only folds and constraints;
 another plan if one fails."""
+GROWN = 4
+"""How much more cells a patch may get: where edges cannot be bisected, cuts around them go on."""
+TANGLED = 8
+"""Edges that deviate and cannot be bisected, beyond which a patch is left alone."""
 RINGS = 8
 """Rings of cells around overturned ones that may be changed."""
 
@@ -24,9 +28,9 @@ def righted(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     One group after the other, with what is around it.
     """
     tried = np.zeros(len(fabric.vertices), bool)
+    bad = fabric.cells[_bad(fabric)]
     while True:
-        bad = fabric.cells[_bad(fabric)]
-        bad = bad[~tried[bad].all(axis=1)]
+        bad = bad[~tried[bad].all(axis=1)]  # the others stay as they are
         if len(bad) == 0:
             return fabric
         near = np.zeros(len(fabric.vertices), bool)
@@ -35,19 +39,21 @@ def righted(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
         out, inner = _best(patch, tolerance, memory)
         fabric = patch.replaced(out)
         memory.learn(inner, patch.inside)
-        tried = np.concatenate([tried, np.zeros(len(fabric.vertices) - len(tried), bool)])
-        tried[out.cells] = True
+        tried |= patch.inside[: len(tried)]
 
 
 def _best(patch: Patch, tolerance: float, memory: Memory) -> tuple[Fabric, Memory]:
     """What the plans make of a patch: that with the fewest faults, and what was learnt."""
     inner = memory.among(patch.inside)
     best, fewest = (patch.fabric, inner), _faults(patch.fabric, tolerance, inner)
-    for plan in PLANS:
+    plans = PLANS if fewest[0] <= TANGLED else ()
+    for plan in plans:
         fabric, inner = patch.fabric, memory.among(patch.inside)
         for widely in plan:
             if not any(fewest[1:]):
                 return best
+            if len(fabric.cells) > GROWN * len(patch.fabric.cells):
+                break
             fabric = with_cusps_beside(fabric, _bad(fabric))
             fabric = settled(tidied(fabric, inner, fine=True), tolerance, inner)
             faults = _faults(fabric, tolerance, inner)
