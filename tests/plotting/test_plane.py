@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 from scipy.integrate import quad
 
 from equimorph import plotting
 from equimorph.charts.regions import count_regions
 from equimorph.errors import InputError
+from equimorph.plotting.contour_labels import label_contours
 from equimorph.tasks import Route
+from equimorph.tasks.planning import smoothed
 
 
 def fold_load(x_l):
@@ -18,6 +21,15 @@ def fold_load(x_l):
 
 def texts(ax):
     return [text.get_text() for text in ax.texts]
+
+
+def distance_from(line, place):
+    along = np.diff(line, axis=0)
+    share = np.sum((place - line[:-1]) * along, axis=1) / np.maximum(
+        np.sum(along**2, axis=1), 1e-300
+    )
+    nearest = line[:-1] + np.clip(share, 0.0, 1.0)[:, None] * along
+    return np.linalg.norm(nearest - place, axis=1).min()
 
 
 def line_labelled(ax, label):
@@ -89,3 +101,24 @@ def test_drawing_into_given_axes_makes_no_other_figure(spring_set):
 def test_an_unknown_count_is_named(spring_set):
     with pytest.raises(InputError, match='`count` must be "all" or "stable"; got \'some\''):
         plotting.parameter_plane(spring_set, count="some")
+
+
+def test_arrow_heads_lie_on_the_drawn_line_where_corners_are_rounded(spring_set, route):
+    """They would lie beside it on the chords between way-points."""
+    ax = plotting.parameter_plane(spring_set, smoothed(route, 0.05))
+    heads = [each for each in ax.texts if isinstance(each, Annotation) and each.arrow_patch]
+    line = np.column_stack(line_labelled(ax, "route").get_data())
+    places = np.array([head.xy for head in heads if not head.get_text()])
+    assert len(places) == 2
+    assert max(distance_from(line, place) for place in places) < 1e-9
+
+
+def test_labels_of_one_level_keep_apart():
+    """A straight level across the frame has room for two labels, a short one for one."""
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 41))
+    for width, count in ((1.0, 2), (0.4, 1)):
+        ax = Figure().add_subplot()
+        ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        lines = ax.contour(width * x, y, y, levels=[0.5])
+        label_contours(ax, lines, np.empty((0, 2)))
+        assert [text.get_text() for text in ax.texts] == count * ["0.5"]

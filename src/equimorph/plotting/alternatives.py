@@ -60,7 +60,7 @@ def alternative_routes(
             (line,) = ax.plot(*places.T, **look, linewidth=1.7, zorder=6, label=label)
             line.set_path_effects([withStroke(linewidth=3.0, foreground="white")])
             lines.append(line)
-        for at, face in ((0, style.ROUTE_COLOUR), (-1, "white")):
+        for at, face in ((0, "white"), (-1, style.ROUTE_COLOUR)):
             ax.plot(*places[at : at + 1 or None].T, "o", mfc=face, **_ENDS)
         legend_below(ax, lines, room=own)
     return ax

@@ -10,6 +10,8 @@ Points = Float[np.ndarray, "_ 2"]
 _LABELS_PER_LEVEL = 2
 _ROOM, _SHORTEST = 0.05, 0.15
 """Distance from other things and labels, and shortest line with a label, in widths of the frame."""
+_APART = 0.35
+"""Least distance of two labels of one level, in widths of the frame."""
 
 
 def label_contours(ax: Axes, lines: ContourSet, taken: Points) -> None:
@@ -26,6 +28,7 @@ def label_contours(ax: Axes, lines: ContourSet, taken: Points) -> None:
                 break
             full = np.concatenate([full, place[None]])
             found.append(tuple(corner + place * size))
+            choices = choices[np.linalg.norm(choices - place, axis=1) > _APART]
     if found:
         for text in ax.clabel(lines, fontsize=6, fmt="%g", inline_spacing=2, manual=found):
             text.set_zorder(6)

@@ -99,6 +99,14 @@ def way_points(eset: EquilibriumSet, route: Route) -> Float[np.ndarray, "corners
     return np.asarray(route.schedule.values[corner_steps(route)][:, columns])
 
 
+def legs(eset: EquilibriumSet, route: Route) -> list[Float[np.ndarray, "_ 2"]]:
+    """Free parameters along a route from corner to corner; nothing of one that did not arrive."""
+    if route.path is None or route.schedule is None:
+        return []
+    places = track(eset, route.path.states)
+    return [places[first : last + 1] for first, last in pairwise(corner_steps(route))]
+
+
 def intended(eset: EquilibriumSet, route: Route) -> Float[np.ndarray, "corners 2"]:
     """Free parameters at the corners that a route was asked to pass, reached or not."""
     if route.path is None:

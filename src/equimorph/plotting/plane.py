@@ -1,7 +1,6 @@
 """The plane of free parameters: how many equilibria where, the folds between, and the route."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from equimorph.plotting.curves import (
     crossing_pieces,
     fold_pieces,
     intended,
+    legs,
     limit_pieces,
     snap_steps,
     track,
@@ -65,8 +65,8 @@ _INVISIBLE = 1e-4
 _RASTER = 160
 # A number needs this much room around it, as a share of the picture.
 _ROOM = 0.03
-# Legs shorter than this share of the picture get no arrow head.
-_LONG_LEG = 0.12
+# Legs shorter than this share of the picture get no arrow head; between two of one leg.
+_LONG_LEG, _BETWEEN = 0.12, 0.6
 
 
 def parameter_plane(
@@ -122,7 +122,7 @@ def parameter_plane(
         if route is not None and route.path is not None:
             lines += [draw_track(ax, eset, route, route.path), *_mark_snaps(ax, eset, route)]
             corners = way_points(eset, route)[: None if route.status == "arrived" else -1]
-            _draw_directions(ax, corners)
+            _draw_directions(ax, legs(eset, route))
             covered = np.concatenate([_covered(eset, route.path), number_way_points(ax, corners)])
         _write_counts(ax, regions, largest, covered)
         _count_bar(ax, largest, "equilibria" if count == "all" else "stable equilibria")
@@ -246,14 +246,17 @@ def _mark_snaps(ax: Axes, eset: EquilibriumSet, route: Route) -> list[Line2D]:
     return ax.plot(*places.T, **_SNAP, zorder=8, label="snap")
 
 
-def _draw_directions(ax: Axes, corners: Float[np.ndarray, "corners 2"]) -> None:
-    """Arrow heads in the middle of the longer legs of a route."""
+def _draw_directions(ax: Axes, ways: Sequence[Float[np.ndarray, "_ 2"]]) -> None:
+    """Arrow heads at even distances along the longer ones of some lines."""
     size = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
     look = {"arrowstyle": "-|>,head_width=0.22,head_length=0.4", "color": style.ROUTE_COLOUR}
-    for here, there in pairwise(corners):
-        if np.hypot(*((there - here) / size)) > _LONG_LEG:
-            middle = here + 0.5 * (there - here)
-            tip = middle + 0.01 * (there - here)
+    for way in ways:
+        steps = np.linalg.norm(np.diff(way, axis=0) / size, axis=1)
+        done = np.concatenate([[0.0], np.cumsum(steps)])
+        count = max(1, round(done[-1] / _BETWEEN)) if done[-1] > _LONG_LEG else 0
+        for share in (np.arange(count) + 0.5) / max(count, 1):
+            shares = np.array([share, share + 0.01]) * done[-1]
+            middle, tip = np.stack([np.interp(shares, done, column) for column in way.T], axis=1)
             ax.annotate(
                 "", tip, middle, zorder=6.5,
                 arrowprops=look | {"lw": 0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 12},

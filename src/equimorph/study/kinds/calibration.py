@@ -137,7 +137,10 @@ class CalibrationKind(Kind[CalibrationSection, CalibrationTask, Calibration]):
         if not answer.fitted:
             return f"{head}: [bold red]{answer.status}[/]. {plain(answer.why)}"
         triples = zip(answer.names, answer.values, answer.deviations, strict=True)
-        values = ", ".join(f"{plain(name)} = {x:.6g} ± {error:.2g}" for name, x, error in triples)
+        values = ", ".join(
+            f"{plain(name)} = {html.number(x, 6)} ± {html.number(error, 2)}"
+            for name, x, error in triples
+        )
         return f"{head}: [bold green]fitted[/], {values}."
 
 
@@ -214,7 +217,7 @@ def _loaded(structure: Structure, measured: Measured) -> States:
     short = np.flatnonzero(~lifts.arrived)
     if len(short):
         lane = int(short[0])
-        reached = ", ".join(f"{name} = {lifts.states[name][lane]:.4g}" for name in to)
+        reached = ", ".join(f"{name} = {html.number(lifts.states[name][lane])}" for name in to)
         raise InputError(
             f"`at` must be loads that the natural state carries; got state {lane + 1}, which ends "
             f"at {reached} ({lifts.kind[lane]})."

@@ -93,9 +93,7 @@ class EstimateKind(Kind[EstimateSection, EstimateTask, StateEstimate]):
         head = f"Estimate {task.section.name}"
         if answer.status == "refused":
             return f"{head}: [bold red]refused[/]. {plain(answer.why)}"
-        where = ", ".join(f"{name} = {answer.state[name]:.6g}" for name in task.free)
+        where = ", ".join(f"{name} = {html.number(answer.state[name], 6)}" for name in task.free)
         colour = "green" if answer.known else "yellow"
-        return (
-            f"{head}: [bold {colour}]{answer.status}[/], {where} with weight "
-            f"{answer.weight[0]:.3g}. {plain(answer.why)}"
-        )
+        best = f"{where} with weight {html.number(answer.weight[0])}. {plain(answer.why)}"
+        return f"{head}: [bold {colour}]{answer.status}[/], {best}".rstrip()

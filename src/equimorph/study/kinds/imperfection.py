@@ -89,5 +89,16 @@ class ImperfectionKind(Kind[ImperfectionSection, ImperfectionTask, Mapping[str, 
 
     def verdict(self, task: ImperfectionTask, answer: Mapping[str, ImperfectionLaw]) -> str:
         """Return the formulas."""
-        laws = "; ".join(f"{name}: {law!r}" for name, law in answer.items())
+        load = task.section.load
+        laws = "; ".join(_in_words(load, name, law) for name, law in answer.items())
         return plain(f"Imperfection {task.section.name}: {laws}.")
+
+
+def _in_words(load: str, name: str, law: ImperfectionLaw) -> str:
+    """Return the limit load as a formula in an imperfection."""
+    if law.status != "fitted":
+        return f"{name}: {law.status}, {law.why.rstrip('.')}"
+    sign = "−" if law.coefficient < 0 else "+"
+    power = "" if law.power == 1 else f"^{html.number(law.power, 3)}"
+    change = f"{sign} {html.number(abs(law.coefficient))} |{name}|{power}"
+    return f"limit {load} = {html.number(law.perfect)} {change} ({law.law})"

@@ -13,7 +13,8 @@ def snaps_in_words(route: Route) -> str:
         return ""
     count = len(route.snaps)
     freed = html.number(sum(each.released for each in route.snaps))
-    return f"by {count} {'snap' if count == 1 else 'snaps'} that free {freed} of energy"
+    snaps = "1 snap that frees" if count == 1 else f"{count} snaps that free"
+    return f"by {snaps} {freed} of energy"
 
 
 def report_of_snaps(route: Route) -> list[str]:

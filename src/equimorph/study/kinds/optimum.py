@@ -100,11 +100,9 @@ class OptimumKind(Kind[OptimumSection, OptimumTask, Optima]):
         if not answer.found:
             return f"{head}: [bold red]refused[/]. {plain(answer.why)}"
         best = answer.best
-        where = ", ".join(f"{name} = {best.state[name]:.6g}" for name in task.free)
-        return (
-            f"{head}: [bold green]found[/], {plain(task.objective.name)} = {best.value:.6g} at "
-            f"{where} ({best.certificate.kind})."
-        )
+        where = ", ".join(f"{name} = {html.number(best.state[name], 6)}" for name in task.free)
+        value = f"{plain(task.objective.name)} = {html.number(best.value, 6)}"
+        return f"{head}: [bold green]found[/], {value} at {where} ({best.certificate.kind})."
 
     def _table(self, task: OptimumTask) -> str:
         return schedule_table(task_files(self.table, task.section.name))

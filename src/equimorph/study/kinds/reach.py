@@ -8,6 +8,7 @@ from html import escape
 from itertools import groupby
 from pathlib import Path
 
+import numpy as np
 from rich.markup import escape as plain
 
 from equimorph import plotting
@@ -26,6 +27,9 @@ from equimorph.tasks.reach import Answer
 
 Reached = tuple[Reach, tuple[Answer, ...]]
 """What is reached, and answers to the queries in their order."""
+
+ROUNDING = 1e-9
+"""What of a range is shown as zero."""
 
 
 @dataclass(frozen=True)
@@ -135,11 +139,11 @@ class ReachKind(Kind[ReachSection, ReachTask, Reached]):
 def _extent(task: ReachTask, reach: Reach) -> str:
     """Size of the image and how often it is covered."""
     home = reach.home
+    ends = np.stack([home.values.min(axis=0), home.values.max(axis=0)])
+    ends[np.abs(ends) < ROUNDING * np.ptp(ends, axis=0)] = 0.0
     ranges = ", ".join(
         f"{each.name} from {html.number(low)} to {html.number(high)}"
-        for each, low, high in zip(
-            task.descriptors, home.values.min(axis=0), home.values.max(axis=0), strict=True
-        )
+        for each, (low, high) in zip(task.descriptors, ends.T, strict=True)
     )
     times = {0: "", 1: ""}.get(home.multiplicity, f", covered up to {home.multiplicity} times")
     regions = len(reach.regions)

@@ -81,7 +81,7 @@ class RoomKind(Kind[RoomSection, RoomTask, tuple[State, Room]]):
 
 
 def _room_in_words(task: RoomTask, room: Room) -> str:
-    shape = task.section.shape
+    stable = f"the {task.section.shape} of {html.number(room.least, 6)} tolerances"
     if room.kind[0] == "arrived":
-        return f"the {shape} of {room.least:.6g} tolerances is stable, the largest that was tried."
-    return f"stable up to the {shape} of {room.least:.6g} tolerances; then {room.kind[0]}."
+        return f"{stable} is stable, the largest that was tried."
+    return f"stable up to {stable}; then {room.kind[0]}."

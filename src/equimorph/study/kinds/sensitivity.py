@@ -93,5 +93,5 @@ class SensitivityKind(Kind[SensitivitySection, SensitivityTask, Sensitivity]):
         lines = []
         for each in answer.descriptors:
             name = max(answer.names, key=lambda one: abs(answer[each, one]) * scales[one])
-            lines.append(f"d {plain(each)}/d {name} = {answer[each, name]:.6g}")
+            lines.append(f"d {plain(each)}/d {name} = {html.number(answer[each, name], 6)}")
         return f"Sensitivity {task.section.name}: largest are {', '.join(lines)}."

@@ -95,5 +95,7 @@ class ShapeKind(Kind[ShapeSection, ShapeTask, Shapes]):
         if not len(answer):
             return f"{head}: [bold red]refused[/]. {plain(answer.why)}"
         stable = len(answer.stable)
-        states = "1 state" if len(answer) == 1 else f"{len(answer)} states"
-        return f"{head}: [bold green]{answer.status}[/] by {states}, {stable} of them stable."
+        states = f"{len(answer)} states, {stable} of them stable"
+        if len(answer) == 1:
+            states = f"1 {'stable' if stable else 'unstable'} state"
+        return f"{head}: [bold green]{answer.status}[/] by {states}."

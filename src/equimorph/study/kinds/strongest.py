@@ -121,21 +121,25 @@ class StrongestKind(Kind[StrongestSection, StrongestTask, Answer]):
 def _in_words(task: StrongestTask, answer: Answer) -> str:
     _, sure, robust = answer
     load, best = task.section.load, sure.best
-    words = f"Largest limit load {load} = {best.value:.6g} at {_place(best.setting)} ({best.kind})."
+    largest = html.number(best.value, 6)
+    words = f"Largest limit load {load} = {largest} at {_place(best.setting)} ({best.kind})."
     if robust is None:
         return words
     if robust.status == "refused":
         return f"{words} No robust setting: {robust.why}."
     errors = ", ".join(f"{name} ± {size:g}" for name, size in robust.offsets.items())
+    loads = (robust.at_risk, robust.guaranteed, robust.best.value)
+    at_risk, guaranteed, nominal = (html.number(each, 6) for each in loads)
     return (
-        f"{words} With errors {errors} as little as {robust.at_risk:.6g} is left of it. The robust "
-        f"setting {_place(robust.best.setting)} carries {robust.guaranteed:.6g} at least, and "
-        f"{robust.best.value:.6g} without errors: its price is {robust.price:.4g}."
+        f"{words} With errors {errors} as little as {at_risk} is left of it. The robust setting "
+        f"{_place(robust.best.setting)} carries {guaranteed} at least, and {nominal} without "
+        f"errors: its price is {html.number(robust.price)}."
     )
 
 
 def _place(setting: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} = {round(value, 12) + 0.0:.6g}" for name, value in setting.items())
+    numbers = {name: html.number(round(value, 12), 6) for name, value in setting.items()}
+    return ", ".join(f"{name} = {each}" for name, each in numbers.items())
 
 
 def _table(task: StrongestTask, answer: Answer) -> str:

@@ -77,5 +77,5 @@ def _share(trials: Trials) -> str:
     low, high = trials.interval
     return (
         f"{int(trials.arrived.sum())} of {len(trials.kind)} arrived; with 95 % confidence the "
-        f"probability lies between {low:.3g} and {high:.3g}."
+        f"probability lies between {html.number(low, 3)} and {html.number(high, 3)}."
     )

@@ -13,7 +13,7 @@ from equimorph.model import Constraint, Descriptor, Spline, names_of
 from equimorph.structures import State
 from equimorph.tasks.route import FINE, Route, distance, refused, scheduled
 
-Places = Float[np.ndarray, "points parameters"]
+Places = Float[np.ndarray, "_ parameters"]
 
 DENSE = 2000
 KNOTS = 120
@@ -46,8 +46,8 @@ def smoothed(
 
     Returns
     -------
-    The smooth route; its way-points are those of the polygon, and its cost is known for lengths
-    only. Refused if even small roundings are.
+    The smooth route; its schedule passes no corner between its ends, and its cost is known for
+    lengths only. Refused if even small roundings are.
 
     Raises
     ------
