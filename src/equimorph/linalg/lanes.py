@@ -2,11 +2,11 @@
 
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from equimorph.linalg.simd import LANES
 
 SMALLEST_SHARE = 256
 """Lanes below which handing a share to another thread costs more than it saves."""
+
+Result = TypeVar("Result")
 
 
 @lru_cache(maxsize=1)
@@ -32,6 +34,24 @@ def _mark() -> None:
 def in_background(tasks: Sequence[Callable[[], None]]) -> list[Future[None]]:
     """Start tasks on threads of the pool, one on each."""
     return [_pool().submit(task) for task in tasks]
+
+
+def results_of(tasks: Sequence[Callable[[], Result]]) -> Iterator[Result]:
+    """Results of tasks in their order, as soon as they are there; run on all threads of the pool.
+
+    Tasks must not wait for each other.
+    """
+    if len(tasks) < 2 or threads() < 2:
+        for task in tasks:
+            yield task()
+        return
+    jobs = [_pool().submit(task) for task in tasks]
+    try:
+        for job in jobs:
+            yield job.result()
+    finally:
+        for job in jobs:
+            job.cancel()
 
 
 def threads() -> int:

@@ -1,10 +1,12 @@
 """Edges of a complex that is being refined: how far they deviate, and which are to be bisected."""
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.linalg.lanes import results_of
 from equimorph.manifold.fabric import CURVES, HOLE, RIM, Fabric, edges_of
 from equimorph.manifold.on_edges import chunks
 from equimorph.manifold.tangents import Cubics
@@ -132,10 +134,14 @@ def _deviations(
     fabric: Fabric, ends: Int[np.ndarray, "E 2"], marks: Int[np.ndarray, " E"]
 ) -> Float[np.ndarray, " E"]:
     """How far the set is from straight edges."""
-    out = np.zeros(len(ends))
-    for own in chunks(np.arange(len(ends)), marks):
+
+    def of(own: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         first, second = (fabric.end(ends[own], side, int(marks[own[0]])) for side in range(2))
-        out[own] = Cubics(first, second).error
+        return Cubics(first, second).error
+
+    out, parts = np.zeros(len(ends)), chunks(np.arange(len(ends)), marks)
+    for own, error in zip(parts, results_of([partial(of, own) for own in parts]), strict=True):
+        out[own] = error
     return out
 
 

@@ -1,6 +1,8 @@
 """Exact vertices on the edges of a complex."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -12,10 +14,10 @@ from equimorph.manifold.pins import Aim, corrected, lower_index
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.tangents import Cubics, split_step
 from equimorph.manifold.vertices import Vertices, vertices_of
-from equimorph.model import Findings, Journal, recalled, step_of
+from equimorph.model import Findings, Journal, all_recalled, step_of
 
-CHUNK = 4096
-"""Edges that are worked on together: their work arrays stay small."""
+CHUNK = 512
+"""Edges that are worked on together: their work arrays stay small, and threads share the chunks."""
 REACH = 0.3
 """How far from its prediction a new vertex may be corrected, relative to its edge."""
 EXCESS = 0.35
@@ -36,22 +38,31 @@ def chunks(
     return parts
 
 
+@dataclass(frozen=True)
+class Places:
+    """Edges with a mark in common, and where along them vertices are wanted.
+
+    lowest: index of the cells around; of those with the lowest one, where they differ.
+    """
+
+    ends: Int[np.ndarray, "n 2"]
+    mark: int
+    lowest: Int[np.ndarray, " n"]
+    t: Float[np.ndarray, " n"]
+
+
 def recalled_on_edges(
-    journal: Journal,
-    fabric: Fabric,
-    ends: Int[np.ndarray, "n 2"],
-    mark: int,
-    lowest: Int[np.ndarray, " n"],
-    t: Float[np.ndarray, " n"],
-) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    journal: Journal, fabric: Fabric, parts: Sequence[Places]
+) -> list[tuple[Bool[np.ndarray, " n"], Vertices]]:
     """Exact vertices on edges, from a journal if it has them; see `on_edges`."""
 
-    def compute() -> Findings:
-        found, vertices = on_edges(fabric, ends, mark, lowest, t)
+    def compute(part: Places) -> Findings:
+        found, vertices = on_edges(fabric, part.ends, part.mark, part.lowest, part.t)
         return found, *vertices.columns.values()
 
-    found, *columns = recalled(journal, step_of(f"bisect {mark}", ends, t), compute)
-    return found, Vertices(*columns)
+    steps = [step_of(f"bisect {part.mark}", part.ends, part.t) for part in parts]
+    findings = all_recalled(journal, steps, [partial(compute, part) for part in parts])
+    return [(found, Vertices(*columns)) for found, *columns in findings]
 
 
 def on_edges(

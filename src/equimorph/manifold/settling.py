@@ -7,13 +7,14 @@ from equimorph.manifold.collapsing import collapse_edges
 from equimorph.manifold.copies import copies, doubled, first_copies, with_copies
 from equimorph.manifold.deviations import Edges, Memory, chosen, known
 from equimorph.manifold.fabric import CURVES, Fabric
-from equimorph.manifold.on_edges import chunks, recalled_on_edges
+from equimorph.manifold.on_edges import Places, chunks, recalled_on_edges
 from equimorph.manifold.patches import patch_around
 from equimorph.manifold.reconnection import reconnect
 from equimorph.manifold.smoothing import SHARP, smooth
 from equimorph.manifold.surgery import SHORT, angles, collapse, flip
 from equimorph.manifold.topology import keys_of
-from equimorph.model import Progress, Silent
+from equimorph.manifold.vertices import Vertices
+from equimorph.model import Journal, Progress, Silent
 
 ROUNDS = 200
 ALTERNATIONS, FEWER = 8, 0.98
@@ -121,20 +122,10 @@ def bisected(
     for side in edges.of_cells.T:
         np.minimum.at(lowest, side, fabric.cell_index)
 
-    parts, done = [], []
-    for some in chunks(at_once, edges.marks):
-        own, mark = some, int(edges.marks[some[0]])
-        for t in PLACES:
-            given = (ends[own], mark, lowest[own], np.full(len(own), t))
-            found, vertices = recalled_on_edges(memory.journal, fabric, *given)
-            parts.append(vertices)
-            done.append(own[found])
-            own = own[~found]
-            if len(own) == 0:
-                break
-        _, others = copies(fabric, ends[own])
-        memory.stuck.update(map(tuple, np.concatenate([ends[own], others]).tolist()))
-        memory.failures += len(own)
+    done, parts, left = _found(fabric, edges, at_once, lowest, memory.journal)
+    _, others = copies(fabric, ends[left])
+    memory.stuck.update(map(tuple, np.concatenate([ends[left], others]).tolist()))
+    memory.failures += len(left)
     if not done:
         return fabric
     more = parts[0].joined(*parts[1:])
@@ -148,3 +139,28 @@ def bisected(
     whole, more = with_copies(fabric, ends[at], more)
     memory.cut = np.concatenate([memory.cut, whole])
     return fabric.bisected(whole, more) if len(at) else fabric
+
+
+def _found(
+    fabric: Fabric,
+    edges: Edges,
+    wanted: Int[np.ndarray, " n"],
+    lowest: Int[np.ndarray, " E"],
+    journal: Journal,
+) -> tuple[list[Int[np.ndarray, " _"]], list[Vertices], Int[np.ndarray, " m"]]:
+    """Edges with vertices on them, part by part, and those on which none was found."""
+    done: list[Int[np.ndarray, " _"]] = []
+    parts: list[Vertices] = []
+    left = wanted
+    for t in PLACES:
+        own = chunks(left, edges.marks)
+        places = [
+            Places(edges.ends[some], int(edges.marks[some[0]]), lowest[some], np.full(len(some), t))
+            for some in own
+        ]
+        tried = recalled_on_edges(journal, fabric, places)
+        done.extend(some[found] for some, (found, _) in zip(own, tried, strict=True))
+        parts.extend(vertices for _, vertices in tried)
+        failed = [some[~found] for some, (found, _) in zip(own, tried, strict=True)]
+        left = np.concatenate([left[:0], *failed])
+    return done, parts, left

@@ -2,7 +2,14 @@
 
 from equimorph.model.box import Box, Grid
 from equimorph.model.descriptor import Constraint, Descriptor, combined, eased, largest_of
-from equimorph.model.journal import Findings, Forgetful, Journal, recalled, step_of
+from equimorph.model.journal import (
+    Findings,
+    Forgetful,
+    Journal,
+    all_recalled,
+    recalled,
+    step_of,
+)
 from equimorph.model.keeping import NOT_KEPT
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.parameter import (
@@ -36,6 +43,7 @@ __all__ = [
     "Schedule",
     "Silent",
     "Spline",
+    "all_recalled",
     "combined",
     "eased",
     "largest_of",

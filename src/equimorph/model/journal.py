@@ -6,11 +6,13 @@ where it was.
 """
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from jaxtyping import Shaped
+
+from equimorph.linalg.lanes import results_of
 
 Findings: TypeAlias = tuple[Shaped[np.ndarray, "..."], ...]
 """Arrays of numbers that a step has found."""
@@ -70,3 +72,23 @@ def recalled(journal: Journal, step: str, compute: Callable[[], Findings]) -> Fi
         found = compute()
         journal.keep(step, found)
     return found
+
+
+def all_recalled(
+    journal: Journal, steps: Sequence[str], compute: Sequence[Callable[[], Findings]]
+) -> list[Findings]:
+    """Findings of steps that do not depend on each other: from the journal as far as it goes.
+
+    The others are computed, several at the same time, and kept in their order.
+    """
+    out: list[Findings] = []
+    for step in steps:
+        found = journal.recall(step)
+        if found is None:
+            break
+        out.append(found)
+    known = len(out)
+    for step, found in zip(steps[known:], results_of(compute[known:]), strict=True):
+        journal.keep(step, found)
+        out.append(found)
+    return out
