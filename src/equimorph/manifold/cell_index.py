@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.manifold.querying.kernels import cells_near
 from equimorph.manifold.simplices import volumes
 
 MOST_BINS = 4
@@ -95,22 +96,9 @@ class CellIndex:
 
     def near(self, points: Float[np.ndarray, "n d"]) -> Hits:
         """Cells that contain points or that these miss by at most their overhang."""
-        unit = (points - self.lower) / self.width
-        place = np.minimum(np.maximum((unit * self.counts).astype(int), 0), self.counts - 1)
-        bins = place[:, 0]
-        for k in range(1, len(self.counts)):
-            bins = bins * self.counts[k] + place[:, k]
-        start = self.starts[bins]
-        number = self.starts[bins + 1] - start
-        point = np.repeat(np.arange(len(points)), number)
-        cell = self.cells[_ranges(start, number)]
-        # all cells of the bin, then the few that are near
-        maps = self.maps[cell]
-        weights = np.einsum("nij,nj->ni", maps[:, :, :-1], unit[point]) + maps[:, :, -1]
-        close = (weights > -self.overhang[cell, None] - NUDGE).all(axis=1)
-        point, cell, weights = point[close], cell[close], weights[close]
-        push = np.einsum("nij,nj->ni", maps[close, :, :-1], _inward(unit)[point])
-        return Hits(point, cell, weights, (weights + push >= 0.0).all(axis=1))
+        bins = self.lower, self.width, self.counts, self.starts, self.cells
+        points = np.ascontiguousarray(points, dtype=float)
+        return Hits(*cells_near(points, bins, self.maps, self.overhang, NUDGE))
 
 
 def _bins(extent: Float[np.ndarray, "C d"]) -> Int[np.ndarray, " d"]:
@@ -120,12 +108,6 @@ def _bins(extent: Float[np.ndarray, "C d"]) -> Int[np.ndarray, " d"]:
     share = MOST_BINS * max(len(extent), 1) / counts.prod()
     fitting = np.maximum(counts * min(1.0, share ** (1.0 / len(counts))), 1)
     return np.asarray(fitting.astype(int))
-
-
-def _inward(unit: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
-    """Small shifts towards the middle of the box, in directions that no grid line has."""
-    generic = 0.1 * np.cos(1.0 + np.arange(unit.shape[1]))
-    return np.asarray(NUDGE * (0.5 + generic - unit))
 
 
 def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "C corners corners"]:

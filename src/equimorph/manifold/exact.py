@@ -3,6 +3,8 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.linalg.simd import LANES
+from equimorph.manifold.querying.kernels import settle
 from equimorph.structures import Structure
 
 ITERATIONS = 12
@@ -10,8 +12,6 @@ ROUND_OFF = 1e-14
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
 SETTLED = 2
 """Corrections after which a lane whose index is not the wanted one is given up."""
-FEW = 16
-"""Lanes that are corrected together to the end: to sort out the exact ones would cost more."""
 
 Points = Float[np.ndarray, "points P"]
 Lanes = Float[np.ndarray, "lanes size"]
@@ -26,35 +26,23 @@ def exact_states(
     no state beyond a fold, Newton leaps over the fold again and again: lanes that do not get nearer
     and do not have the `wanted` index, if one is given, are given up.
     """
-    n, count = structure.unknowns, len(z)
+    count, mass = len(z), structure.mass
     out, good, index = z.copy(), np.zeros(count, bool), np.full(count, -1)
-    still, fixed = np.zeros((count, structure.size)), np.zeros((count, p.shape[1]))
-    none, one = np.zeros((2, count))
-    one[:] = 1.0
-    # lanes at work, their states and parameters, last corrections, and which are not yet done
-    lane, z, before, left = np.arange(count), z.copy(), none, np.ones(count, bool)
-    for number in range(ITERATIONS if count else 0):
-        m = len(lane)
-        step = structure.advance(z, p, fixed[:m], still[:m], one[:m], none[:m])
-        size = np.sqrt(np.square(step.dz[:, :n]) @ structure.mass)
-        left &= size < 1.0  # and no nan
-        if wanted is not None and number >= SETTLED:
-            left &= (step.index == wanted[lane]) | (size < 0.5 * before)
-        whole = bool(left.all())
-        if not whole:
-            step.dz[~left] = 0.0
-        z += step.dz
-        bound = size * (size / np.maximum(np.maximum(before, size), 1e-300)) ** 2
-        done = left & (bound < ROUND_OFF)
-        if done.any():
-            some = lane[done]
-            out[some], good[some], index[some] = z[done], True, step.index[done]
-            left &= ~done
-            whole = False
-        before = size
-        if not whole and not left.any():
+    # structures compute whole blocks of lanes: the rest of one goes with the first lane
+    rows = max(count, LANES) if count else 0
+    lane = np.arange(rows)
+    z, p = z[lane % count], p[lane % count]
+    before, goal = np.zeros(rows), index if wanted is None else wanted
+    still, fixed = np.zeros((rows, structure.size)), np.zeros((rows, p.shape[1]))
+    none, one = np.zeros(rows), np.ones(rows)
+    left = count
+    for number in range(ITERATIONS):
+        if left == 0:
             break
-        if m > FEW and not whole:
-            lane, z, p, before = lane[left], z[left], p[left], before[left]
-            left = left[left]
+        m = max(left, LANES)
+        step = structure.advance(z[:m], p[:m], fixed[:m], still[:m], one[:m], none[:m])
+        rule = left, wanted is not None and number >= SETTLED, ROUND_OFF
+        left = settle(
+            (step.dz, step.index), (lane, z, p, before), (out, good, index), goal, mass, rule
+        )
     return out, good, index

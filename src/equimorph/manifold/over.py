@@ -14,6 +14,13 @@ from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.cell_index import CellIndex, Hits
 from equimorph.manifold.exact import Lanes, Points, exact_states
+from equimorph.manifold.querying.kernels import (
+    balanced,
+    guesses,
+    one_of_each,
+    root_shares,
+    worth_trying,
+)
 from equimorph.manifold.topology import adjacency, senses
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
@@ -24,7 +31,7 @@ SAME = 1e-6
 """Distance in the metric below which two states over one point are the same."""
 CLOSEST = 1e-3
 """Least share of a cell between its fold and a guess: at the fold Newton's matrix is singular."""
-CHUNK = 2048
+CHUNK = 512
 """Points that are served together: their work arrays stay small."""
 
 Found = tuple[Float[np.ndarray, "n size"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]]
@@ -134,12 +141,10 @@ class Sheets:
         return np.asarray((self.folded | self.capped)[self.cells].any(axis=1))
 
     @cached_property
-    def _at_a_cap(self) -> Bool[np.ndarray, " C"]:
-        return np.asarray(self.capped[self.cells].any(axis=1))
-
-    @cached_property
-    def _sign(self) -> Int[np.ndarray, " C"]:
-        return 1 - 2 * (self.cell_index % 2)
+    def _of_cells(self) -> tuple[np.ndarray, ...]:
+        """Sign by index, and whether cells are overturned, at an edge, at a constraint."""
+        capped = np.asarray(self.capped[self.cells].any(axis=1))
+        return 1 - 2 * (self.cell_index % 2), self._overturned, self._at_an_edge, capped
 
     @cached_property
     def _overturned(self) -> Bool[np.ndarray, " C"]:
@@ -193,13 +198,16 @@ class Sheets:
     def _some(self, p: Points, first: int) -> tuple[Found, Hits | None]:
         """States over points that are sure, and the cells near the others; `first` is added."""
         near = self.above.near(p[:, self.free])
-        beyond = (self._brims[near.cell] & (near.weights < 0.0)).any(axis=1)
-        hits = near.take(near.inside | beyond)
+        hits = near.take(worth_trying((near.cell, near.weights), near.inside, self._brims))
         at = p[hits.point]
-        z, good = self._polished(self._guess(hits), at, hits.cell)
-        found = np.flatnonzero(good)
-        found = found[_one_of_each(self.structure, z[found], hits.take(found))]
-        sure = self._sure(hits, good, found, len(p))
+        guess = self._guess(hits)
+        wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
+        z, good, index = exact_states(self.structure, guess, at, wanted)
+        good &= (index == wanted) & self.structure.resolved(z, at)
+        mass = self.structure.mass
+        found = one_of_each((hits.point, hits.inside), (z, good), guess, room, mass, SAME)
+        of_hits = hits.point, hits.cell, hits.inside
+        sure = balanced(of_hits, good, found, self._of_cells, len(p))
         doubtful = None
         if not sure.all():
             found = found[sure[hits.point[found]]]
@@ -213,61 +221,17 @@ class Sheets:
 
         From a fold on, states move like the root of the way in the parameters.
         """
-        weights = np.maximum(hits.weights, 0.0)
-        weights /= weights.sum(axis=1, keepdims=True)
-        corners = self.cells[hits.cell]
-        folded = self.folded[corners]
-        some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
-        if len(some):
-            weights[some] = rooted(weights[some], folded[some])
-        z = weights[:, :1] * self.points.z[corners[:, 0]]
-        for k in range(1, corners.shape[1]):
-            z += weights[:, k : k + 1] * self.points.z[corners[:, k]]
-        return np.asarray(z)
+        of_hits = hits.cell, hits.weights
+        return np.asarray(guesses(of_hits, self.cells, self.folded, self.points.z, CLOSEST))
 
     @cached_property
-    def _size(self) -> Float[np.ndarray, " C"]:
-        """Longest side of each cell from its first corner, in the metric."""
+    def _room(self) -> Float[np.ndarray, " C"]:
+        """How far states may be from their guess: twice the longest side from the first corner."""
         u = self.points.z[:, : self.structure.unknowns]
         first, longest = u[self.cells[:, 0]], np.zeros(len(self.cells))
         for corner in self.cells.T[1:]:
             np.maximum(longest, (u[corner] - first) ** 2 @ self.structure.mass, out=longest)
-        return np.sqrt(longest)
-
-    def _polished(
-        self, guess: Lanes, p: Points, cell: Int[np.ndarray, " hits"]
-    ) -> tuple[Lanes, Bool[np.ndarray, " hits"]]:
-        """Exact states of the cells' own index near the guesses, where there are any."""
-        structure, wanted = self.structure, self.cell_index[cell]
-        z, good, index = exact_states(structure, guess, p, wanted)
-        good &= index == wanted
-        moved = np.sqrt(np.square((z - guess)[:, : structure.unknowns]) @ structure.mass)
-        good &= moved <= 2.0 * self._size[cell] + SAME
-        good[good] = structure.resolved(z[good], p[good])
-        return z, good
-
-    def _sure(
-        self,
-        hits: Hits,
-        good: Bool[np.ndarray, " hits"],
-        found: Int[np.ndarray, " found"],
-        count: int,
-    ) -> Bool[np.ndarray, " points"]:
-        """Points over which the states cannot be other than those found.
-
-        Constraints take single states away, others are not yet told apart from those beyond.
-        """
-        cell, inside = hits.cell, hits.inside
-        capped = self._at_a_cap[cell]
-        failed = ~good & (inside & ~self._at_an_edge[cell] | capped)
-        sign = self._sign[cell]
-        # a state just beyond the straight edge of a constraint has no cell above the point
-        paired = np.where(inside | ~capped, sign, 0)
-        above = np.where(self._overturned[cell], -sign, sign) * inside
-        surplus = np.bincount(hits.point[found], paired[found], count) - np.bincount(
-            hits.point, above, count
-        )
-        return np.asarray((surplus == 0.0) & (np.bincount(hits.point, failed, count) == 0.0))
+        return 2.0 * np.sqrt(longest) + SAME
 
     def _allowed(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
         good = np.ones(len(z), bool)
@@ -329,12 +293,9 @@ def rooted(
     weights: Float[np.ndarray, "n corners"], folded: Bool[np.ndarray, "n corners"]
 ) -> Float[np.ndarray, "n corners"]:
     """Weights of corners with the root of the share of those off the fold as their share."""
-    # all of them count where the share is zero
-    off = np.where(folded, 0.0, weights + 1e-12)
-    share = off.sum(axis=1, keepdims=True)
-    root = np.sqrt(np.maximum(share, CLOSEST))
-    on = np.where(folded, weights + 1e-12, 0.0)
-    return np.asarray(off / share * root + on / on.sum(axis=1, keepdims=True) * (1.0 - root))
+    weights = weights.copy()
+    root_shares(weights, folded, CLOSEST)
+    return weights
 
 
 def _firsts(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
@@ -358,20 +319,3 @@ def lift_to(
     arrived = outcome.code == ARRIVAL
     which = np.concatenate([np.flatnonzero(still), moving[arrived]])
     return np.concatenate([states.z[still], outcome.z[arrived]]), which
-
-
-def _one_of_each(structure: Structure, z: Lanes, hits: Hits) -> Int[np.ndarray, " kept"]:
-    """One of the equal states over each point, rather one from a cell that contains the point.
-
-    Equal states have equal products with any vector, so that they are neighbours in its order.
-    """
-    n, mass = structure.unknowns, structure.mass
-    product = z[:, :n] @ (mass * np.cos(1.0 + np.arange(n)))
-    order = np.lexsort((product, hits.point))
-    point, rank = hits.point[order], np.arange(len(order))
-    gap = np.diff(z[order, :n], axis=0) ** 2 @ mass
-    new = np.flatnonzero(np.append(True, (gap > SAME**2) | (point[1:] > point[:-1]))[: len(rank)])
-    # of each group the first, those from cells that do not contain the point last
-    rank = np.where(hits.inside[order], rank, rank + len(rank))
-    best = np.minimum.reduceat(rank, new) % max(len(rank), 1) if len(new) else new
-    return np.sort(order[best])

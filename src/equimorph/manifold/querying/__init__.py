@@ -1,0 +1,1 @@
+"""Compiled kernels of queries for the states of a set over points."""

@@ -1,0 +1,226 @@
+"""Compiled kernels of queries: cells near points, guesses on them, Newton, and what was found."""
+
+import numpy as np
+
+from equimorph.linalg.compiled import njit
+
+ACCURATE = {"nogil": True, "error_model": "numpy"}
+"""Flags: no sum is reordered, so that what is found of a point does not depend on its batch."""
+
+
+@njit(**ACCURATE)
+def cells_near(points, bins, maps, overhang, nudge):
+    """Pairs of a point and a cell near it; see `CellIndex.near`.
+
+    points (n, d); bins: lower, width (d,), counts (d,), starts and cells of the bins.
+    Returns point, cell, weights (hits, d + 1), inside.
+    """
+    lower, width, counts, starts, cells = bins
+    n, d = points.shape
+    unit, own, most = np.empty((n, d)), np.empty(n, np.int64), 0
+    for i in range(n):
+        number = 0
+        for k in range(d):
+            unit[i, k] = (points[i, k] - lower[k]) / width[k]
+            place = min(max(int(unit[i, k] * counts[k]), 0), counts[k] - 1)
+            number = number * counts[k] + place
+        own[i] = number
+        most += starts[number + 1] - starts[number]
+    point, cell = np.empty(most, np.int64), np.empty(most, np.int64)
+    weights, inside = np.empty((most, d + 1)), np.empty(most, np.bool_)
+    count = 0
+    for i in range(n):
+        for entry in range(starts[own[i]], starts[own[i] + 1]):
+            c = cells[entry]
+            near, within = True, True
+            for r in range(d + 1):
+                weight, push = maps[c, r, d], 0.0
+                for k in range(d):
+                    weight += maps[c, r, k] * unit[i, k]
+                    # towards the middle of the box, in a direction that no grid line has
+                    push += maps[c, r, k] * nudge * (0.5 + 0.1 * np.cos(1.0 + k) - unit[i, k])
+                weights[count, r] = weight
+                if not weight > -overhang[c] - nudge:
+                    near = False
+                    break
+                if not weight + push >= 0.0:
+                    within = False
+            if near:
+                point[count], cell[count], inside[count] = i, c, within
+                count += 1
+    return point[:count], cell[:count], weights[:count], inside[:count]
+
+
+@njit(**ACCURATE)
+def root_shares(weights, folded, closest):
+    """Give corners off a fold the root of their share as their share, if there are both kinds.
+
+    weights (n, corners), changed in place; `closest` is the least share that counts.
+    """
+    n, corners = weights.shape
+    for i in range(n):
+        number = 0
+        for k in range(corners):
+            number += folded[i, k]
+        if not 0 < number < corners:
+            continue
+        on, off = 0.0, 0.0
+        for k in range(corners):
+            weights[i, k] += 1e-12  # all corners count where the share is zero
+            if folded[i, k]:
+                on += weights[i, k]
+            else:
+                off += weights[i, k]
+        root = np.sqrt(max(off, closest))
+        for k in range(corners):
+            weights[i, k] *= (1.0 - root) / on if folded[i, k] else root / off
+
+
+@njit(**ACCURATE)
+def guesses(hits, cells, folded, z, closest):
+    """Interpolation between the corners of cells, at their points nearest to those of hits.
+
+    hits: cell, weights.
+    """
+    cell, weights = hits
+    count, corners, size = len(cell), cells.shape[1], z.shape[1]
+    out = np.empty((count, size))
+    share, at_fold = np.empty((1, corners)), np.empty((1, corners), np.bool_)
+    for i in range(count):
+        own, total = cells[cell[i]], 0.0
+        for k in range(corners):
+            share[0, k] = max(weights[i, k], 0.0)
+            at_fold[0, k] = folded[own[k]]
+            total += share[0, k]
+        for k in range(corners):
+            share[0, k] /= total
+        root_shares(share, at_fold, closest)
+        for j in range(size):
+            entry = share[0, 0] * z[own[0], j]
+            for k in range(1, corners):
+                entry += share[0, k] * z[own[k], j]
+            out[i, j] = entry
+    return out
+
+
+@njit(**ACCURATE)
+def worth_trying(hits, inside, brims):
+    """Hits on cells that contain their point, or that it lies beyond across a brim."""
+    cell, weights = hits
+    out, count = np.empty(len(cell), np.int64), 0
+    for i in range(len(cell)):
+        good = inside[i]
+        for k in range(weights.shape[1]):
+            good = good or (brims[cell[i], k] and weights[i, k] < 0.0)
+        if good:
+            out[count] = i
+            count += 1
+    return out[:count]
+
+
+@njit(**ACCURATE)
+def settle(step, work, result, wanted, mass, rule):
+    """Apply Newton corrections; return how many lanes go on, which move to the front.
+
+    step: dz, index; work, one row a lane at work: number, z, p, size of the correction before;
+    result, one row a lane: z, whether it is exact, index. rule: number of lanes, whether their
+    index has to be the wanted one, round-off.
+    """
+    dz, index = step
+    lane, z, p, before = work
+    out, good, found = result
+    count, strict, round_off = rule
+    left = 0
+    for i in range(count):
+        total = 0.0
+        for j in range(mass.shape[0]):
+            total += mass[j] * dz[i, j] * dz[i, j]
+        size, own = np.sqrt(total), lane[i]
+        if not size < 1.0:  # nor if it is not a number
+            continue
+        if strict and index[i] != wanted[own] and not size < 0.5 * before[i]:
+            continue
+        share = size / max(before[i], size, 1e-300)
+        if size * share * share < round_off:
+            for j in range(z.shape[1]):
+                out[own, j] = z[i, j] + dz[i, j]
+            good[own], found[own] = True, index[i]
+            continue
+        for j in range(z.shape[1]):
+            z[left, j] = z[i, j] + dz[i, j]
+        for j in range(p.shape[1]):
+            p[left, j] = p[i, j]
+        lane[left], before[left] = own, size
+        left += 1
+    if left:
+        # structures compute eight lanes at once: the rows behind the last one go on with the first
+        for i in range(left, min(len(z), 8)):
+            z[i], p[i] = z[0], p[0]
+    return left
+
+
+@njit(**ACCURATE)
+def one_of_each(hits, states, guess, room, mass, same):
+    """Hits that found a state that no other one of the same point found, sorted.
+
+    Of several the one on a cell that contains the point. States farther from their guess than
+    there is room are not good: changes `good`. hits: point (sorted), inside; states: z, good.
+    """
+    point, inside = hits
+    z, good = states
+    kept, count, first = np.empty(len(point), np.int64), 0, 0
+    for i in range(len(point)):
+        if i > 0 and point[i] != point[i - 1]:
+            first = count
+        if not good[i]:
+            continue
+        good[i] = _distance(z[i], guess[i], mass, room[i]) <= room[i]
+        if not good[i]:
+            continue
+        twin = first
+        while twin < count and _distance(z[i], z[kept[twin]], mass, same) > same:
+            twin += 1
+        if twin == count:
+            kept[count] = i
+            count += 1
+        elif inside[i] and not inside[kept[twin]]:
+            for m in range(twin, count - 1):
+                kept[m] = kept[m + 1]
+            kept[count - 1] = i
+    return kept[:count]
+
+
+@njit(**ACCURATE)
+def _distance(one, other, mass, limit):
+    """Distance in the metric, or a part of it that is beyond the limit."""
+    total = 0.0
+    for j in range(mass.shape[0]):
+        total += mass[j] * (one[j] - other[j]) ** 2
+        if total > limit * limit:
+            break
+    return np.sqrt(total)
+
+
+@njit(**ACCURATE)
+def balanced(hits, good, kept, sheets, count):
+    """Points over which states and cells have the same sum of (−1)^index, and no cell failed.
+
+    hits: point, cell, inside; kept: hits whose states are different; sheets, one entry a cell: sign
+    of its index, whether it is overturned, at an edge, at a constraint.
+    """
+    point, cell, inside = hits
+    sign, overturned, edge, capped = sheets
+    surplus, sure = np.zeros(count, np.int64), np.ones(count, np.bool_)
+    for i in range(len(point)):
+        c = cell[i]
+        if inside[i]:
+            surplus[point[i]] -= -sign[c] if overturned[c] else sign[c]
+        if not good[i] and (capped[c] or (inside[i] and not edge[c])):
+            sure[point[i]] = False
+    for i in kept:
+        # a state just beyond the straight edge of a constraint has no cell above the point
+        if inside[i] or not capped[cell[i]]:
+            surplus[point[i]] += sign[cell[i]]
+    for i in range(count):
+        sure[i] = sure[i] and surplus[i] == 0
+    return sure

@@ -1,0 +1,139 @@
+"""Compiled kernels of queries against plain numpy: the same pairs, guesses and choices."""
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+from equimorph.manifold.cell_index import NUDGE, CellIndex
+from equimorph.manifold.exact import exact_states
+from equimorph.manifold.over import CLOSEST, rooted
+from equimorph.manifold.querying.kernels import balanced, guesses, one_of_each, worth_trying
+from equimorph.structures import Spring
+
+
+def sheets(d: int) -> tuple[np.ndarray, np.ndarray]:
+    """Corners and cells of two triangulations of the unit cube, one over the other."""
+    generator = np.random.default_rng(d)
+    cube = np.stack(np.meshgrid(*[[0.0, 1.0]] * d), axis=-1).reshape(-1, d)
+    first, second = (
+        np.concatenate([cube, generator.uniform(size=(number, d))]) for number in (14, 9)
+    )
+    cells = np.concatenate([simplices(first), len(first) + simplices(second)])
+    return np.concatenate([first, second]), cells
+
+
+def simplices(points: np.ndarray) -> np.ndarray:
+    if points.shape[1] > 1:
+        return Delaunay(points).simplices
+    order = np.argsort(points[:, 0])
+    return np.stack([order[:-1], order[1:]], axis=1)
+
+
+def barycentric(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
+    matrix = np.concatenate([corners.T, np.ones((1, len(corners)))])
+    return np.linalg.solve(matrix, np.append(point, 1.0))
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_cells_near_points_are_those_whose_barycentric_coordinates_say_so(d):
+    """Every cell and point by themselves; every point lies inside one cell of each sheet."""
+    x, cells = sheets(d)
+    overhang = np.random.default_rng(0).choice([0.0, 0.3], len(cells))
+    points = np.concatenate([np.random.default_rng(1).uniform(size=(60, d)), x])
+    hits = CellIndex.of(x[cells], overhang).near(points)
+    weights = np.array([[barycentric(x[own], point) for own in cells] for point in points])
+    near = weights.min(axis=2) > -overhang - NUDGE
+    found = np.zeros(near.shape, bool)
+    found[hits.point, hits.cell] = True
+    assert near[found].all()
+    assert found.sum() == len(hits)
+    assert (np.diff(hits.point) >= 0).all()
+    # bins list cells up to their overhang beyond the box around them
+    low, high = x[cells].min(axis=1), x[cells].max(axis=1)
+    room = overhang[:, None] * (high - low)
+    beside = ((points[:, None] >= low - room) & (points[:, None] <= high + room)).all(axis=2)
+    assert found[near & beside].all()
+    np.testing.assert_allclose(hits.weights, weights[hits.point, hits.cell], rtol=0, atol=1e-10)
+    number = np.bincount(hits.point[hits.inside], minlength=len(points))
+    assert np.array_equal(number, np.full(len(points), 2))
+
+
+def test_guesses_interpolate_and_follow_the_root_from_folds():
+    """The formulas of both, hit by hit."""
+    x, cells = sheets(2)
+    generator = np.random.default_rng(0)
+    z, folded = generator.normal(size=(len(x), 5)), generator.uniform(size=len(x)) < 0.4
+    cell = generator.integers(len(cells), size=50)
+    weights = generator.normal(0.3, 0.3, size=(50, 3))
+    found = guesses((cell, weights), cells, folded, z, CLOSEST)
+    within = np.maximum(weights, 0.0)
+    within /= within.sum(axis=1, keepdims=True)
+    for guess, own, share in zip(found, cells[cell], within, strict=True):
+        np.testing.assert_allclose(guess, plain_root(share, folded[own]) @ z[own], atol=1e-9)
+        again = rooted(share[None], folded[own][None])[0] @ z[own]
+        np.testing.assert_allclose(again, guess, rtol=0, atol=1e-14)
+
+
+def plain_root(share: np.ndarray, folded: np.ndarray) -> np.ndarray:
+    """Shares off the fold add up to the root of what they added up to."""
+    if folded.all() or not folded.any():
+        return share
+    share = share + 1e-12
+    root = np.sqrt(max(share[~folded].sum(), CLOSEST))
+    return np.where(
+        folded,
+        share / share[folded].sum() * (1.0 - root),
+        share / share[~folded].sum() * root,
+    )
+
+
+def test_of_equal_states_that_on_a_cell_that_contains_the_point_is_taken():
+    point, inside = np.array([0, 0, 0, 0, 1, 1]), np.array([False, True, True, False, True, True])
+    z = np.array([[1.0], [2.0], [1.0], [3.0], [1.0], [1.0]])
+    good, room = np.array([True] * 5 + [False]), np.array([1.0, 1.0, 1.0, 1e-3, 1.0, 1.0])
+    kept = one_of_each((point, inside), (z, good), z + 0.1, room, np.ones(1), 1e-6)
+    assert kept.tolist() == [1, 2, 4]
+    assert good.tolist() == [True, True, True, False, True, False]  # one went too far
+
+
+def test_points_are_sure_where_states_and_cells_have_the_same_parity():
+    """Two cells of opposite sign over each point: both, one, or none of them found a state."""
+    point, cell = np.repeat(np.arange(4), 2), np.tile([0, 1], 4)
+    inside = np.ones(8, bool)
+    nothing = np.zeros(2, bool)
+    good = np.array([True, True, True, False, False, False, True, True])
+    of_cells = np.array([1, -1]), nothing, nothing, nothing
+    sure = balanced((point, cell, inside), good, np.flatnonzero(good), of_cells, 4)
+    assert sure.tolist() == [True, False, False, True]
+    # at a fold both may be missing; next to a constraint nothing may
+    edge = np.array([1, -1]), nothing, ~nothing, nothing
+    sure = balanced((point, cell, inside), good, np.flatnonzero(good), edge, 4)
+    assert sure.tolist() == [True, False, True, True]
+    capped = np.array([1, -1]), nothing, ~nothing, ~nothing
+    sure = balanced((point, cell, inside), good, np.flatnonzero(good), capped, 4)
+    assert sure.tolist() == [True, False, False, True]
+
+
+def test_points_beyond_a_brim_are_tried():
+    cell, inside = np.array([0, 0, 0]), np.array([True, False, False])
+    weights = np.array([[0.2, 0.3, 0.5], [-0.1, 0.6, 0.5], [0.6, -0.1, 0.5]])
+    brims = np.array([[False, True, False]])
+    assert worth_trying((cell, weights), inside, brims).tolist() == [0, 2]
+
+
+def test_exact_states_do_not_depend_on_those_beside_them():
+    """One state at a time or many, with lanes that are given up among them."""
+    spring = Spring()
+    generator = np.random.default_rng(3)
+    p = np.stack(
+        [generator.uniform(0.4, 1.2, 60), generator.uniform(-0.4, 0.4, 60), np.ones(60)], 1
+    )
+    z, wanted = generator.uniform(-1.5, 1.5, (60, 1)), generator.integers(2, size=60)
+    together = exact_states(spring, z, p, wanted)
+    assert 0 < together[1].sum() < 60
+    assert np.abs(spring.residual(together[0], p)[together[1]]).max() < 1e-14
+    for k in range(60):
+        alone = exact_states(spring, z[k : k + 1], p[k : k + 1], wanted[k : k + 1])
+        assert all(
+            np.array_equal(one[0], all_[k]) for one, all_ in zip(alone, together, strict=True)
+        )
