@@ -1,5 +1,7 @@
 """Refined sets: closed forms tell how far cells are from surfaces; topology must not change."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -8,13 +10,16 @@ from hypothesis import strategies as st
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.accounting import Complex
-from equimorph.manifold.fabric import Fabric, _bisected, edges_of, fabric_of
+from equimorph.manifold.cusp_points import with_cusps_beside
+from equimorph.manifold.fabric import ON_FOLD, RIM, Fabric, _bisected, edges_of, fabric_of
+from equimorph.manifold.leading import led_between
+from equimorph.manifold.on_edges import unmet
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.patches import patch_around
 from equimorph.manifold.simplices import volumes
 from equimorph.manifold.smoothing import smooth
 from equimorph.manifold.surgery import angles, collapse, flip, smallest_angle
-from equimorph.manifold.topology import adjacency, euler_characteristic
+from equimorph.manifold.topology import adjacency, chains, euler_characteristic
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
 from oracles.complexes import (
@@ -171,6 +176,7 @@ def fine_arch(refined_arch):
 )
 def test_refined_arch_does_not_depend_on_the_grid(intervals, refined_arch, fine_arch):
     """Surfaces within 0.01 of the set, and of each other, with the same pieces."""
+    assert fine_arch.audit.smallest_angle > 10.0
     eset = refined_arch(intervals, 0.01)
     assert_faithful(eset)
     assert_upright(eset)
@@ -342,6 +348,57 @@ def test_a_patch_goes_back_as_it_is(coarse):
     assert (adjacency(better.cells).counts <= 2).all()
     assert euler_characteristic(better.cells) == euler_characteristic(coarse.cells)
     assert_sides_are_known(better)
+
+
+def test_cusps_are_not_put_on_the_rim_of_a_patch():
+    """Cells beyond it would not be cut, and a hole would be left."""
+    with unchecked():
+        box = Box(b=(-1.7, 1.9), c=(-1, 0.7))
+        eset = equilibrium_set(swallowtail(), box, fixed={"a": -1.0}, checks=0, intervals=(5, 6))
+    fabric = fabric_of(Setting(eset.structure, eset.points.p[0], np.array([1, 2]), ()), eset)
+    everywhere = np.ones(len(fabric.cells), bool)
+    cut = with_cusps_beside(fabric, everywhere)
+    assert len(cut.cells) == len(fabric.cells) + 4
+    folds = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    rim = replace(
+        fabric,
+        facets=np.concatenate([fabric.facets, folds]),
+        marks=np.concatenate([fabric.marks, np.full(len(folds), RIM)]),
+    )
+    assert with_cusps_beside(rim, everywhere) is rim
+
+
+def test_a_fold_that_bulges_far_out_is_followed_to_its_end(coarse):
+    """From one of its vertices to the eighth after it, halfway; but not as one of another index."""
+    folds = chains(coarse.facets[(coarse.marks & ON_FOLD) > 0])
+    line = max(folds, key=len)[:9]
+    found = led_between(coarse, line[[0, 8]], ON_FOLD, 0)
+    place = coarse.vertices.place[line]
+    length = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    before = np.concatenate([[0.0], np.cumsum(length)])
+    near = np.linalg.norm(place - found.place, axis=1)
+    assert abs(before[near.argmin()] - 0.5 * before[-1]) < near.min() + 0.2 * before[-1]
+    assert near.min() <= length.max()
+    assert np.abs(coarse.setting.structure.residual(found.z, found.p)).max() < 1e-12
+    assert led_between(coarse, line[[0, 8]], ON_FOLD, 1) is None
+
+
+def test_vertices_in_use_are_not_found_again(coarse):
+    chosen = np.unique(coarse.cells)[[3, 5]]
+    known = coarse.vertices.take(chosen)
+    moved = replace(known, place=known.place + np.array([[0.0], [1e-3]]))
+    ((found, new),) = unmet(coarse, [(np.array([True, False, True]), moved)])
+    assert found.tolist() == [False, False, True]
+    assert np.array_equal(new.z, known.z[1:])
+
+
+def test_a_change_of_topology_is_no_clean_refinement():
+    eset = lifted(fold_form(), Box(a=(-1, 1)), (3,))
+    torn = replace(eset, audit=replace(eset.audit, components=2))
+    fine = refined(torn, 0.2)
+    assert fine.audit.changed == 1
+    assert not fine.audit.clean
+    assert ("changes of topology", "1") in fine.audit.rows()
 
 
 def test_vertices_that_are_added_twice_to_the_same_ones_do_not_meet(coarse):

@@ -20,8 +20,9 @@ class Audit:
 
     Of refined sets: the `accuracy` that was asked for, the largest `deviation` of straight cells
     from the set as their edges show it, how many edges are `unrefined` (they could not be
-    bisected), the `smallest_angle` of the triangles in degrees, and the `smallest_dihedral` angle
-    of the tetrahedra. All are zero otherwise.
+    bisected), by how much the numbers of pieces and of boundary loops and the Euler characteristic
+    `changed`, the `smallest_angle` of the triangles in degrees, and the `smallest_dihedral` angle
+    of the tetrahedra. All are zero otherwise; `unrefined` and `changed` must be zero.
     """
 
     vertices: int
@@ -48,6 +49,7 @@ class Audit:
     smallest_angle: float = 0.0
     crossings: int = 0
     smallest_dihedral: float = 0.0
+    changed: int = 0
 
     @property
     def missing_at_most(self) -> float:
@@ -72,6 +74,7 @@ class Audit:
             self.contradictions,
             self.missing,
             self.unrefined,
+            self.changed,
         )
         return not any(faults) and self.largest_residual < 1e-9
 
@@ -83,6 +86,8 @@ class Audit:
             ("edges too long", str(self.unrefined)),
             ("smallest angle", f"{self.smallest_angle:.1f}°"),
         ]
+        if self.changed:
+            refined.append(("changes of topology", str(self.changed)))
         if self.smallest_dihedral:
             refined.append(("smallest dihedral angle", f"{self.smallest_dihedral:.1f}°"))
         return [

@@ -10,7 +10,7 @@ from equimorph.equilibria.locus import Locus, settle
 from equimorph.errors import InputError
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.fabric import ON_FOLD, Fabric, fabric_of
+from equimorph.manifold.fabric import HOLE, ON_FOLD, RIM, Fabric, fabric_of
 from equimorph.manifold.level_cuts import roots
 from equimorph.manifold.levels import fabric_setting
 from equimorph.manifold.pairing import Setting
@@ -130,7 +130,8 @@ def with_cusps_beside(fabric: Fabric, beside: Bool[np.ndarray, " C"]) -> Fabric:
     place = fabric.vertices.place
     gap = np.stack([np.linalg.norm(found.place - place[end], axis=1) for end in ends.T])
     whole = np.linalg.norm(place[ends[:, 1]] - place[ends[:, 0]], axis=1)
-    apart = np.flatnonzero((gap > CLOSE * whole).all(axis=0))
+    whole_edges = (fabric.edge_marks(np.sort(ends, axis=1)) & (HOLE | RIM)) == 0
+    apart = np.flatnonzero((gap > CLOSE * whole).all(axis=0) & whole_edges)
     return fabric.bisected(ends[apart], found.take(apart)) if len(apart) else fabric
 
 

@@ -61,17 +61,24 @@ class Memory:
     cut: Int[np.ndarray, "m 2"] = field(default_factory=lambda: np.zeros((0, 2), int))
     """Edges that were bisected: flips must not bring them back."""
     failures: int = 0
+    lost: set[tuple[int, int]] = field(default_factory=set)
+    """Edges on curves that do not lead from one end to the other: something is hidden there."""
 
     def among(self, inside: Bool[np.ndarray, " V"]) -> "Memory":
         """What is remembered of edges between some of the vertices; deviations all."""
         stuck = {(a, b) for a, b in self.stuck if inside[a] and inside[b]}
         return Memory(
-            self.journal, self.keys, self.error, stuck, self.cut[inside[self.cut].all(axis=1)]
+            self.journal,
+            self.keys,
+            self.error,
+            stuck,
+            self.cut[inside[self.cut].all(axis=1)],
+            lost=set(self.lost),
         )
 
     def copy(self) -> "Memory":
         """What is remembered by now."""
-        return replace(self, stuck=set(self.stuck))
+        return replace(self, stuck=set(self.stuck), lost=set(self.lost))
 
     def learn(self, inner: "Memory", inside: Bool[np.ndarray, " V"]) -> None:
         """Take over what came to be known among some of the vertices, and those added since."""
@@ -81,6 +88,7 @@ class Memory:
         self.stuck = beyond | inner.stuck
         self.cut = np.concatenate([self.cut[~inside[self.cut].all(axis=1)], inner.cut])
         self.failures += inner.failures
+        self.lost |= inner.lost
 
 
 def known(fabric: Fabric, memory: Memory) -> Edges:
@@ -105,7 +113,19 @@ def known(fabric: Fabric, memory: Memory) -> Edges:
         refused = np.array(sorted(memory.stuck))
         failed = np.isin(keys_of(ends, base), keys_of(refused, base))
     pressing = _pressing(ends, marks, length, failed)
+    if memory.lost:
+        stuck |= near_lost(fabric, memory)[ends].any(axis=1)
     return Edges(ends, of_cells, marks, length, error, stuck | failed, pressing)
+
+
+def near_lost(fabric: Fabric, memory: Memory) -> Bool[np.ndarray, " V"]:
+    """Vertices that are as near to edges that are lost as these are long."""
+    place = fabric.vertices.place
+    out = np.zeros(len(place), bool)
+    for a, b in sorted(memory.lost):
+        away = np.linalg.norm(place - 0.5 * (place[a] + place[b]), axis=1)
+        out |= away <= np.linalg.norm(place[a] - place[b])
+    return out
 
 
 def _pressing(

@@ -23,6 +23,11 @@ REACH = 0.3
 EXCESS = 0.35
 """How much longer the parts of an edge may be than they would be on a straight one, relative to
 it."""
+SAME = 1e-7
+"""Distance in the metric below which two vertices are one."""
+MET = (0, -2, -1)
+WEIGHTS = np.array([0.36, 0.48, 0.8])
+"""Coordinates, and a direction in them, along which vertices are in order."""
 ALONG = 0.5
 """Least cosine of the angle between an edge and the set at its new vertex."""
 
@@ -38,6 +43,10 @@ def chunks(
     return parts
 
 
+Tried = tuple[Bool[np.ndarray, " n"], Vertices]
+"""For which edges vertices were found, and these."""
+
+
 @dataclass(frozen=True)
 class Places:
     """Edges with a mark in common, and where along them vertices are wanted.
@@ -51,9 +60,7 @@ class Places:
     t: Float[np.ndarray, " n"]
 
 
-def recalled_on_edges(
-    journal: Journal, fabric: Fabric, parts: Sequence[Places]
-) -> list[tuple[Bool[np.ndarray, " n"], Vertices]]:
+def recalled_on_edges(journal: Journal, fabric: Fabric, parts: Sequence[Places]) -> list[Tried]:
     """Exact vertices on edges, from a journal if it has them; see `on_edges`."""
 
     def compute(part: Places) -> Findings:
@@ -63,6 +70,32 @@ def recalled_on_edges(
     steps = [step_of(f"bisect {part.mark}", part.ends, part.t) for part in parts]
     findings = all_recalled(journal, steps, [partial(compute, part) for part in parts])
     return [(found, Vertices(*columns)) for found, *columns in findings]
+
+
+def unmet(fabric: Fabric, tried: Sequence[Tried]) -> list[Tried]:
+    """Of vertices found on edges those that are not in use already.
+
+    Where cells are too coarse, an edge may lead over another vertex, which its middle finds again.
+    """
+    used = np.zeros(len(fabric.vertices), bool)
+    used[fabric.cells] = True
+    known = np.flatnonzero(used)
+    place = fabric.vertices.place
+    key = place[known][:, MET] @ WEIGHTS
+    order = np.argsort(key)
+    known, key = known[order], key[order]
+    out = []
+    for found, vertices in tried:
+        own = vertices.place[:, MET] @ WEIGHTS
+        first, last = (np.searchsorted(key, own + gap) for gap in (-SAME, SAME))
+        new = np.ones(len(own), bool)
+        for lane in np.flatnonzero(last > first).tolist():
+            there = place[known[first[lane] : last[lane]]]
+            new[lane] = np.linalg.norm(there - vertices.place[lane], axis=1).min() > SAME
+        kept = found.copy()
+        kept[found] = new
+        out.append((found, vertices) if new.all() else (kept, vertices.take(np.flatnonzero(new))))
+    return out
 
 
 def on_edges(

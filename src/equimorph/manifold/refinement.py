@@ -12,6 +12,7 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
+from equimorph.manifold.audit import Audit
 from equimorph.manifold.deviations import Memory, known
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.fabric import Fabric, fabric_of
@@ -95,6 +96,7 @@ def refined(
         unrefined=int((edges.error > SHARE[len(free)] * accuracy).sum()),
         smallest_angle=smallest_angle(fabric),
         smallest_dihedral=smallest_dihedral(fabric),
+        changed=_changed(audit, out.audit),
     )
     return replace(out, audit=quality)
 
@@ -103,6 +105,17 @@ def check_accuracy(accuracy: float) -> None:
     """Refuse what is no accuracy."""
     if not 0.0 < accuracy < np.inf:
         raise InputError(f"`accuracy` must be positive and finite; got {accuracy!r}.")
+
+
+def _changed(before: Audit, after: Audit) -> int:
+    """By how much the topology changed, which it must not."""
+    counts = np.array(
+        [
+            (audit.components, audit.euler_characteristic, sum(n for _, n in audit.loops))
+            for audit in (before, after)
+        ]
+    )
+    return int(np.abs(counts[0] - counts[1]).sum())
 
 
 def _settled_and_righted(

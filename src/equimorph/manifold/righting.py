@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from equimorph.manifold.cusp_points import with_cusps_beside
-from equimorph.manifold.deviations import Memory, known
+from equimorph.manifold.deviations import Memory, known, near_lost
 from equimorph.manifold.fabric import CURVES, Fabric
 from equimorph.manifold.patches import Patch, patch_around
 from equimorph.manifold.settling import bisected, settled, tidied
@@ -29,6 +29,8 @@ def righted(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     """
     tried = np.zeros(len(fabric.vertices), bool)
     bad = fabric.cells[_bad(fabric)]
+    if memory.lost:
+        bad = bad[~near_lost(fabric, memory)[bad].any(axis=1)]
     while True:
         bad = bad[~tried[bad].all(axis=1)]  # the others stay as they are
         if len(bad) == 0:

@@ -7,7 +7,8 @@ from equimorph.manifold.collapsing import collapse_edges
 from equimorph.manifold.copies import copies, doubled, first_copies, with_copies
 from equimorph.manifold.deviations import Edges, Memory, chosen, known
 from equimorph.manifold.fabric import CURVES, Fabric
-from equimorph.manifold.on_edges import Places, chunks, recalled_on_edges
+from equimorph.manifold.leading import led_between, on_plain_curves
+from equimorph.manifold.on_edges import Places, chunks, recalled_on_edges, unmet
 from equimorph.manifold.patches import patch_around
 from equimorph.manifold.reconnection import reconnect
 from equimorph.manifold.smoothing import SHARP, smooth
@@ -123,6 +124,14 @@ def bisected(
         np.minimum.at(lowest, side, fabric.cell_index)
 
     done, parts, left = _found(fabric, edges, at_once, lowest, memory.journal)
+    for edge in left[on_plain_curves(fabric, ends[left], edges.marks[left])].tolist():
+        led = led_between(fabric, ends[edge], int(edges.marks[edge]), int(lowest[edge]))
+        if led is None:
+            memory.lost.add((int(ends[edge, 0]), int(ends[edge, 1])))
+            continue
+        done.append(np.array([edge]))
+        parts.append(led)
+        left = left[left != edge]
     _, others = copies(fabric, ends[left])
     memory.stuck.update(map(tuple, np.concatenate([ends[left], others]).tolist()))
     memory.failures += len(left)
@@ -158,7 +167,7 @@ def _found(
             Places(edges.ends[some], int(edges.marks[some[0]]), lowest[some], np.full(len(some), t))
             for some in own
         ]
-        tried = recalled_on_edges(journal, fabric, places)
+        tried = unmet(fabric, recalled_on_edges(journal, fabric, places))
         done.extend(some[found] for some, (found, _) in zip(own, tried, strict=True))
         parts.extend(vertices for _, vertices in tried)
         failed = [some[~found] for some, (found, _) in zip(own, tried, strict=True)]

@@ -141,7 +141,7 @@ def _moves(fabric: Fabric, short: float) -> Int[np.ndarray, "m 2"]:
     if len(corners) == 0:
         return np.zeros((0, 2), int)
     around = [corners[:, [i, j]] for i in range(3) for j in range(3) if i != j]
-    moves = np.concatenate(around)
+    moves = np.concatenate([*around, _short_ways(fabric, corners, short)])
     _, others = copies(fabric, moves)
     moves = np.unique(np.concatenate([moves, others, others[:, ::-1]]), axis=0)
     near = np.zeros(base, bool)
@@ -150,6 +150,27 @@ def _moves(fabric: Fabric, short: float) -> Int[np.ndarray, "m 2"]:
     edges, _ = edges_of(cells[near[cells].any(axis=1)], base)
     moves = moves[_free_to_move(fabric, moves, edges)]
     return best_apart(fabric, moves, edges, short)
+
+
+def _short_ways(
+    fabric: Fabric, corners: Int[np.ndarray, "n 3"], short: float
+) -> Int[np.ndarray, "m 2"]:
+    """Edges, both ways, beside triangles that are much shorter than others at their ends.
+
+    Two vertices of a fold or constraint so close may be what keeps a third one beside them.
+    """
+    if short == 0.0:
+        return np.zeros((0, 2), int)
+    beside = np.zeros(len(fabric.vertices), bool)
+    beside[corners] = True
+    own = beside[fabric.cells].any(axis=1)
+    edges, of_cells = edges_of(fabric.cells[own], len(beside))
+    length, reach = np.empty(len(edges)), np.zeros(len(beside))
+    length[of_cells] = np.sqrt(fabric.squared[own])
+    for end in edges.T:
+        np.maximum.at(reach, end, length)
+    chosen = edges[length < short * reach[edges].max(axis=1)]
+    return np.concatenate([chosen, chosen[:, ::-1]])
 
 
 def best_apart(
