@@ -5,6 +5,7 @@ a fast answer that is wrong is seen.
 """
 
 import platform
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -97,6 +98,31 @@ def bench_states_over_a_point(benchmark, arch_set):
     benchmark.extra_info.update(states=len(here), largest_residual=float(here.residual.max()))
 
 
+@pytest.fixture(scope="module", params=[None, 0.0006], ids=["24x41", "refined"])
+def asked_set(request) -> EquilibriumSet:
+    return lifted((24, 41), accuracy=request.param)
+
+
+def random_points(count: int) -> np.ndarray:
+    return np.random.default_rng(0).uniform([0.2, -2], [2.5, 2], (count, 2))
+
+
+def bench_states_over_single_points(benchmark, asked_set):
+    """400 random points one by one; the median point counts."""
+    points, took = random_points(400), np.zeros(400)
+    asked_set.at(Theta=1.0, Delta=0.0)
+
+    def ask_all():
+        for k, (theta, delta) in enumerate(points):
+            start = perf_counter()
+            asked_set.at(Theta=theta, Delta=delta)
+            took[k] = perf_counter() - start
+
+    benchmark.pedantic(ask_all, rounds=3)
+    for share in (0.5, 0.9, 1.0):
+        benchmark.extra_info[f"milliseconds at {share:g}"] = 1e3 * float(np.quantile(took, share))
+
+
 @pytest.mark.parametrize("via", [VIA, None], ids=["by way-points", "free"])
 @pytest.mark.parametrize("margin", [0.0, 0.3])
 def bench_plan(benchmark, arch_set, via, margin):
@@ -127,10 +153,10 @@ def bench_plan_by_objective(benchmark, arch_set, objective):
     )
 
 
-def bench_states_over_many_points(benchmark, arch_set):
+def bench_states_over_many_points(benchmark, asked_set):
     """10⁴ random points in one call."""
-    points = np.random.default_rng(0).uniform([0.2, -2], [2.5, 2], (10_000, 2))
-    found = benchmark(arch_set.over, Theta=points[:, 0], Delta=points[:, 1])
+    points = random_points(10_000)
+    found = benchmark(asked_set.over, Theta=points[:, 0], Delta=points[:, 1])
     benchmark.extra_info.update(
         states=len(found.states),
         microseconds_each=benchmark.stats.stats.min * 100,

@@ -17,6 +17,9 @@ SMALLEST_SHARE = 256
 
 Result = TypeVar("Result")
 
+_FILLED = [np.minimum(np.arange(LANES), max(lanes - 1, 0)) for lanes in range(LANES)]
+"""Lanes of blocks that are filled up with copies of the last one."""
+
 
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
@@ -76,9 +79,9 @@ def over_lanes(
     shares = lanes // SMALLEST_SHARE
     shares = min(threads(), shares) if shares > 1 else shares  # to ask the system takes a while
     if 0 < lanes < LANES:
-        at = np.minimum(np.arange(LANES), lanes - 1)
+        at = _FILLED[lanes]
         wide = [np.empty((LANES, *array.shape[1:]), array.dtype) for array in outputs]
-        kernel(*shared, *[array[at] for array in inputs], *wide)
+        kernel(*shared, *[array.take(at, axis=0) for array in inputs], *wide)
         for array, result in zip(outputs, wide, strict=True):
             array[:] = result[:lanes]
         return

@@ -124,12 +124,25 @@ class EquilibriumSet:
         point = np.array([float(at[name]) for name in self.names])
         if not self.box.contains(point, slack=1e-12):
             raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
-        return parameter_vector(self.structure.parameters, {**self.fixed, **at})
+        p = self._corner.copy()
+        p[self._free] = point
+        return p
+
+    @cached_property
+    def _corner(self) -> Float[np.ndarray, " P"]:
+        """All parameters at the lower corner of the box."""
+        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
+        return parameter_vector(self.structure.parameters, {**self.fixed, **low})
+
+    @cached_property
+    def _free(self) -> Int[np.ndarray, " d"]:
+        """Places of the free parameters."""
+        return np.array([position(self.structure.parameters, name) for name in self.names])
 
     def at(self, **at: float) -> States:
         """Exact states over one point of the box, sorted by energy; see `over`."""
         states = self._sheets.over(self.parameters_at(at)[None])[0]
-        return states[np.argsort(states.energy, kind="stable")]
+        return states[np.argsort(states.energy, kind="stable")] if len(states) > 1 else states
 
     def over(self, **at: Float[np.ndarray, " points"]) -> StatesOver:
         """Exact states over many points of the box, with the pieces of the set that they lie on.
@@ -176,15 +189,13 @@ class EquilibriumSet:
         if len(outside):
             worst = dict(zip(self.names, points[outside[0]].tolist(), strict=True))
             raise InputError(f"`at` must lie in {self.box}; got {worst} (point {outside[0]}).")
-        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
-        p = np.tile(self.parameters_at(low), (len(points), 1))
-        p[:, [position(self.structure.parameters, name) for name in self.names]] = points
+        p = np.tile(self._corner, (len(points), 1))
+        p[:, self._free] = points
         return p
 
     @cached_property
     def _sheets(self) -> Sheets:
         """The cells, made ready for queries."""
-        free = [position(self.structure.parameters, name) for name in self.names]
         caps = [piece.vertices for piece in self.boundaries if piece.kind != "box"]
         folded, capped = np.zeros((2, len(self.points)), bool)
         singular = (*self.folds, *self.crossings)
@@ -193,7 +204,7 @@ class EquilibriumSet:
                 flags[piece] = True
         return Sheets(
             self.points,
-            np.array(free),
+            self._free,
             self.cells,
             self.cell_index,
             self.component,
