@@ -7,6 +7,10 @@ from hypothesis import strategies as st
 
 from equimorph import lift, plotting, storage
 from equimorph.manifold import EquilibriumSet, equilibrium_set, locate, refine, restricted
+from equimorph.manifold.corners import squeezed
+from equimorph.manifold.fabric import fabric_of
+from equimorph.manifold.levels import fabric_setting
+from equimorph.manifold.surgery import angles
 from equimorph.manifold.topology import adjacency
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
@@ -282,6 +286,12 @@ def test_figure_names_the_branch_points(symmetric_slice):
     assert "branch points" in [text.get_text() for text in ax.get_legend().get_texts()]
 
 
+def angles_off_curves(eset: EquilibriumSet) -> np.ndarray:
+    """Smallest angles, in degrees, of triangles that are not squeezed between curves."""
+    fabric = fabric_of(fabric_setting(eset), eset)
+    return np.degrees(angles(fabric)[~squeezed(fabric, np.radians(10.0))])
+
+
 @pytest.fixture(scope="module")
 def refined_slice(symmetric_slice):
     with unchecked():
@@ -295,6 +305,11 @@ def test_symmetric_slice_is_refined(refined_slice):
         assert_crossings(eset)
         assert_upright(eset)
     assert eset.audit.deviation <= 0.02
+    # the fold beside a pitchfork curve meets it at 0.3°; only beside that corner cells are sharp
+    assert eset.audit.smallest_angle < 1.0
+    with unchecked():
+        free = angles_off_curves(eset)
+    assert np.count_nonzero(free < 10.0) <= 0.005 * len(free)
 
 
 def test_slice_cut_at_an_end_angle_has_the_known_pitchfork_on_its_edge(refined_slice):

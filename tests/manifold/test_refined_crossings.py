@@ -80,6 +80,32 @@ def test_refined_pitchforks_keep_their_common_curve(cubic, slant, grid):
     )
 
 
+@pytest.mark.parametrize(
+    ("structure", "grid"),
+    [
+        (pitchforks(-2.0, -0.4), (3, 4)),
+        (crossing_sheets(), (4, 5)),
+        pytest.param(pitchforks(1.0, 0.0), (3, 4), marks=pytest.mark.slow),
+        pytest.param(pitchforks(1.0, 0.3), (4, 5), marks=pytest.mark.slow),
+        pytest.param(tricritical(-0.7), (4, 5), marks=pytest.mark.slow),
+        pytest.param(hilltop(2.5), (3, 4), marks=pytest.mark.slow),
+    ],
+)
+def test_triangles_beside_crossings_are_not_thin(structure, grid):
+    """At 10⁻³ one sheet needs triangles thirty times smaller than the other; both share edges.
+
+    Curves meet one another and the box at more than 20°.
+    """
+    with unchecked():
+        eset = refine(lifted(structure, grid), 1e-3)
+        assert_faithful(eset)
+        assert_crossings(eset)
+        assert_upright(eset)
+    assert eset.audit.deviation <= 1e-3
+    assert eset.audit.smallest_angle >= 10.0
+    assert eset.audit.smallest_free_angle >= eset.audit.smallest_angle
+
+
 @few
 @given(cubics, slants)
 def test_areas_of_pitchforks_and_of_their_parts(cubic, slant):

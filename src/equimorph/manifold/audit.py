@@ -21,8 +21,10 @@ class Audit:
     Of refined sets: the `accuracy` that was asked for, the largest `deviation` of straight cells
     from the set as their edges show it, how many edges are `unrefined` (they could not be
     bisected), by how much the numbers of pieces and of boundary loops and the Euler characteristic
-    `changed`, the `smallest_angle` of the triangles in degrees, and the `smallest_dihedral` angle
-    of the tetrahedra. All are zero otherwise; `unrefined` and `changed` must be zero.
+    `changed`, the `smallest_angle` of the triangles in degrees, that of those that are not squeezed
+    between a crossing and another curve (`smallest_free_angle`: two such curves may meet at a small
+    angle, or run side by side), and the `smallest_dihedral` angle of the tetrahedra. All are zero
+    otherwise; `unrefined` and `changed` must be zero.
     """
 
     vertices: int
@@ -50,6 +52,7 @@ class Audit:
     crossings: int = 0
     smallest_dihedral: float = 0.0
     changed: int = 0
+    smallest_free_angle: float = 0.0
 
     @property
     def missing_at_most(self) -> float:
@@ -88,6 +91,8 @@ class Audit:
         ]
         if self.changed:
             refined.append(("changes of topology", str(self.changed)))
+        if self.crossings and self.smallest_free_angle:
+            refined.append(("smallest angle off crossings", f"{self.smallest_free_angle:.1f}°"))
         if self.smallest_dihedral:
             refined.append(("smallest dihedral angle", f"{self.smallest_dihedral:.1f}°"))
         return [

@@ -7,7 +7,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.linalg.lanes import results_of
-from equimorph.manifold.fabric import CURVES, HOLE, RIM, Fabric, edges_of
+from equimorph.manifold.fabric import (
+    CURVES,
+    HOLE,
+    ON_CROSSING,
+    RIM,
+    TRIANGLES,
+    Fabric,
+    edges_of,
+)
 from equimorph.manifold.on_edges import chunks
 from equimorph.manifold.tangents import Cubics
 from equimorph.manifold.topology import keys_of
@@ -19,6 +27,10 @@ COARSE = 4.0
 """Deviation, in tolerances, of edges whose halves are likely to deviate too much as well."""
 BULGE = 0.5
 """How long edges on folds may be, relative to edges at their ends that could not be bisected."""
+OBTUSE = float(np.cos(np.radians(120.0)))
+"""Cosine of the largest angle opposite to an edge on a crossing."""
+UNEVEN = 4.0
+"""How much longer than an edge on a crossing those of the same triangle may be."""
 FEW = 50
 """Fewer than one in so many edges are bisected all at once."""
 
@@ -27,7 +39,8 @@ FEW = 50
 class Edges:
     """Edges of a fabric, those of each cell, their marks, length and deviation from the set.
 
-    stuck: cannot be bisected; pressing: must be, whatever they deviate.
+    stuck: cannot be bisected; pressing: must be, whatever they deviate; uneven: should be in the
+    end, because they are much longer than an edge on a crossing in the same triangle.
     """
 
     ends: Int[np.ndarray, "E 2"]
@@ -37,6 +50,7 @@ class Edges:
     error: Float[np.ndarray, " E"]
     stuck: Bool[np.ndarray, " E"]
     pressing: Bool[np.ndarray, " E"]
+    uneven: Bool[np.ndarray, " E"]
 
     def deviating(self, tolerance: float) -> Bool[np.ndarray, " E"]:
         """Edges that should be bisected now, and can be.
@@ -45,8 +59,11 @@ class Edges:
         beside them would cross them.
         """
         first = (self.error > COARSE * tolerance) & ((self.marks & CURVES) > 0)
-        first = (first | self.pressing) & ~self.stuck
-        return first if first.any() else np.asarray((self.error > tolerance) & ~self.stuck)
+        for wanted in (first | self.pressing, self.error > tolerance, self.uneven):
+            own = wanted & ~self.stuck
+            if own.any():
+                break
+        return np.asarray(own)
 
 
 @dataclass
@@ -112,10 +129,11 @@ def known(fabric: Fabric, memory: Memory) -> Edges:
     if memory.stuck:
         refused = np.array(sorted(memory.stuck))
         failed = np.isin(keys_of(ends, base), keys_of(refused, base))
-    pressing = _pressing(ends, marks, length, failed)
+    obtuse, uneven = _beside_crossings(fabric, of_cells, marks)
+    pressing = _pressing(ends, marks, length, failed) | obtuse
     if memory.lost:
         stuck |= near_lost(fabric, memory)[ends].any(axis=1)
-    return Edges(ends, of_cells, marks, length, error, stuck | failed, pressing)
+    return Edges(ends, of_cells, marks, length, error, stuck | failed, pressing, uneven)
 
 
 def near_lost(fabric: Fabric, memory: Memory) -> Bool[np.ndarray, " V"]:
@@ -145,6 +163,31 @@ def _pressing(
     return np.asarray(((marks & CURVES) > 0) & (length > BULGE * short))
 
 
+def _beside_crossings(
+    fabric: Fabric, of_cells: Int[np.ndarray, "C sides"], marks: Int[np.ndarray, " E"]
+) -> tuple[Bool[np.ndarray, " E"], Bool[np.ndarray, " E"]]:
+    """Edges on crossings opposite to a too obtuse angle, and edges that are too long beside others.
+
+    A sheet may be bent strongly across a straight crossing, and another one be flat: both share the
+    edges there, which no flip takes away [Ruppert1995]_. Triangles between a crossing and another
+    curve are left alone: where these meet at a small angle, cuts would go on and on.
+    """
+    obtuse, long = np.zeros(len(marks), bool), np.zeros(len(marks), bool)
+    if fabric.dimension != TRIANGLES:
+        return obtuse, long
+    cell, side = np.nonzero((marks[of_cells] & ON_CROSSING) > 0)
+    # sides 01, 02, 12 are opposite to corners 2, 1, 0
+    free = (fabric.vertex_marks[fabric.cells[cell, 2 - side]] & CURVES) == 0
+    cell, side = cell[free], side[free]
+    squared, row = fabric.squared[cell], np.arange(len(cell))
+    own, first, second = (squared[row, (side + k) % 3] for k in range(3))
+    wide = first + second - own < 2.0 * OBTUSE * np.sqrt(first * second)
+    obtuse[of_cells[cell[wide], side[wide]]] = True
+    far = squared.max(axis=1, initial=0.0) > UNEVEN**2 * own
+    long[of_cells[cell[far], squared[far].argmax(axis=1)]] = True
+    return obtuse, long
+
+
 def _keys(ends: Int[np.ndarray, "E 2"]) -> Int[np.ndarray, " E"]:
     """Numbers of edges with sorted ends that stay the same while vertices are added."""
     return np.asarray(ends[:, 1] * (ends[:, 1] - 1) // 2 + ends[:, 0])
@@ -172,7 +215,7 @@ def chosen(edges: Edges, tolerance: float) -> Int[np.ndarray, " n"]:
     around them want to be cut at first: the rest may then be within the tolerance, or flipped.
     """
     deviating = edges.deviating(tolerance)
-    few = np.count_nonzero(deviating) * FEW < len(deviating)
+    few = np.count_nonzero(deviating) * FEW < len(deviating) and not deviating[edges.uneven].any()
     coarse, _ = _closed(edges, deviating & (few | (edges.error > COARSE * tolerance)))
     wanted, weight = _closed(edges, coarse | deviating)
     cells = edges.of_cells[wanted[edges.of_cells].any(axis=1)]

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.manifold.fabric import RIM, Fabric
+from equimorph.manifold.fabric import ON_CROSSING, RIM, Fabric
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,12 @@ class Patch:
 
 
 def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Patch:
-    """Triangles around some vertices, and so many rings more; all of them if sheets cross."""
-    near = near | (fabric.vertices.shared >= 0).any()
+    """Triangles around some vertices, and so many rings more; where sheets cross, of all of them.
+
+    Edges on crossings that other sheets hold beyond the patch belong to its rim.
+    """
     for _ in range(rings + 1):
+        near = _in_all_sheets(fabric, near)
         own = near[fabric.cells].any(axis=1)
         near = np.zeros_like(near)
         near[fabric.cells[own]] = True
@@ -51,6 +54,9 @@ def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Pa
     rim = _pairs_between(rest.cells, near & beyond)
     shared = near[fabric.facets].all(axis=1)
     facets, marks = fabric.facets[shared], fabric.marks[shared]
+    outside = _in_all_sheets(fabric, beyond & (near | (fabric.vertices.shared >= 0)))
+    held = ((marks & ON_CROSSING) > 0) & outside[facets].any(axis=1)
+    rim = np.concatenate([rim, facets[held]])
     patch = replace(
         fabric.only(own),
         facets=np.concatenate([facets, rim]),
@@ -58,6 +64,15 @@ def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Pa
     )
     rest = replace(rest, facets=fabric.facets[~shared], marks=fabric.marks[~shared])
     return Patch(patch, rest, near)
+
+
+def _in_all_sheets(fabric: Fabric, near: Bool[np.ndarray, " V"]) -> Bool[np.ndarray, " V"]:
+    """Some vertices, and those that are the same points of other sheets."""
+    shared = fabric.vertices.shared
+    met = np.zeros(int(shared.max(initial=-1)) + 2, bool)
+    met[shared[near]] = True
+    met[-1] = False
+    return np.asarray(near | met[shared])
 
 
 def _pairs_between(

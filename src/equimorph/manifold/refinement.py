@@ -13,6 +13,7 @@ import numpy as np
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
 from equimorph.manifold.audit import Audit
+from equimorph.manifold.corners import smallest_free_angle
 from equimorph.manifold.deviations import Memory, known
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.fabric import Fabric, fabric_of
@@ -97,6 +98,7 @@ def refined(
         smallest_angle=smallest_angle(fabric),
         smallest_dihedral=smallest_dihedral(fabric),
         changed=_changed(audit, out.audit),
+        smallest_free_angle=smallest_free_angle(fabric),
     )
     return replace(out, audit=quality)
 

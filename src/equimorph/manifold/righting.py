@@ -3,9 +3,10 @@
 import numpy as np
 from jaxtyping import Bool
 
+from equimorph.manifold.corners import squeezed
 from equimorph.manifold.cusp_points import with_cusps_beside
 from equimorph.manifold.deviations import Memory, known, near_lost
-from equimorph.manifold.fabric import CURVES, Fabric
+from equimorph.manifold.fabric import CURVES, ON_CROSSING, Fabric
 from equimorph.manifold.patches import Patch, patch_around
 from equimorph.manifold.settling import bisected, settled, tidied
 from equimorph.manifold.smoothing import SHARP
@@ -66,16 +67,24 @@ def _best(patch: Patch, tolerance: float, memory: Memory) -> tuple[Fabric, Memor
 
 
 def _bad(fabric: Fabric) -> Bool[np.ndarray, " C"]:
-    """Cells that are overturned, look backwards, or have a small angle."""
-    over, sharp = fabric.overturned(fabric.cells, fabric.sense), angles(fabric) < SHARP
-    return np.asarray(over | fabric.backward() | sharp)
+    """Cells that are overturned, look backwards, or have a small angle where that can be helped."""
+    over = fabric.overturned(fabric.cells, fabric.sense)
+    return np.asarray(over | fabric.backward() | _sharp(fabric))
+
+
+def _sharp(fabric: Fabric) -> Bool[np.ndarray, " C"]:
+    """Cells with a small angle, unless they lie between curves that meet at one."""
+    sharp = angles(fabric) < SHARP
+    if not (fabric.marks & ON_CROSSING).any():
+        return np.asarray(sharp)
+    return np.asarray(sharp & ~squeezed(fabric, SHARP) if sharp.any() else sharp)
 
 
 def _faults(fabric: Fabric, tolerance: float, memory: Memory) -> tuple[int, int, int, int]:
     """Numbers of edges that deviate, and of cells overturned, looking backwards, and sharp."""
     deviating = int((known(fabric, memory).error > tolerance).sum())
     over = int(fabric.overturned(fabric.cells, fabric.sense).sum())
-    return deviating, over, int(fabric.backward().sum()), int((angles(fabric) < SHARP).sum())
+    return deviating, over, int(fabric.backward().sum()), int(_sharp(fabric).sum())
 
 
 def _cut_around(fabric: Fabric, memory: Memory, widely: bool) -> Fabric:

@@ -45,7 +45,7 @@ def settled(
     for _ in range(ROUNDS):
         edges = known(fabric, memory)
         hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
-        todo = ((edges.error > tolerance) | edges.pressing) & ~edges.stuck
+        todo = ((edges.error > tolerance) | edges.pressing | edges.uneven) & ~edges.stuck
         if hopeless or len(fabric.vertices) > MOST or not todo.any():
             break
         if progress is not None and _few(fabric, todo):
@@ -65,8 +65,7 @@ def settled(
 
 def _few(fabric: Fabric, todo: Bool[np.ndarray, " E"]) -> bool:
     """Whether so few edges deviate that it is worth while to work around them alone."""
-    few = int(np.count_nonzero(todo)) * LOCAL < len(todo)
-    return few and fabric.dimension == 2 and not (fabric.vertices.shared >= 0).any()
+    return fabric.dimension == 2 and int(np.count_nonzero(todo)) * LOCAL < len(todo)
 
 
 def _settled_around(
