@@ -271,6 +271,30 @@ def test_both_asymmetric_sheets_are_attached_along_the_pitchfork(symmetric_slice
     assert np.ptp(over.energy[tilted]) < 1e-12
 
 
+def test_no_state_is_lost_beside_the_pitchfork(symmetric_slice):
+    """Θ = 0.9: branch point at 4.2439977594 (PHYSICS §5), subcritical: three states before it.
+
+    Their amplitudes grow like the root of the distance.
+    """
+    away = 10.0 ** -np.arange(4.0, 9.5)
+    loads = 4.2439977594 + np.concatenate([-away, away])
+    with unchecked():
+        over = symmetric_slice.over(Theta=np.full(len(loads), 0.9), q=loads)
+    arch = symmetric_slice.structure
+    amplitudes = []
+    for number, states in enumerate(over):
+        near = np.abs(arch.height(0.5)(states.states) - 0.2332) < 0.003
+        tilt = (arch.height(1 / 3)(states.states) - arch.height(2 / 3)(states.states))[near]
+        order = np.argsort(tilt)
+        index = states.index[near][order].tolist()
+        assert index == ([1, 0, 1] if number < len(away) else [1])
+        if number < len(away):
+            amplitudes.append(np.abs(tilt[order])[[0, 2]])
+    growth = np.array(amplitudes) / np.sqrt(away)[:, None]
+    np.testing.assert_allclose(growth[:-1], growth[2, 0], rtol=0.01)
+    np.testing.assert_allclose(growth[-1], growth[2, 0], rtol=0.1)
+
+
 def test_set_with_crossings_comes_back_from_its_file(symmetric_slice, tmp_path):
     path = tmp_path / "slice.h5"
     storage.save_set(path, symmetric_slice)

@@ -10,7 +10,9 @@ from jaxtyping import Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.mesh import BaseMesh
+from equimorph.manifold.near_crossings import NearCrossings, of_set
 from equimorph.manifold.over import Sheets, StatesOver
+from equimorph.manifold.pairing import Setting
 from equimorph.model import Box, Constraint, parameter_vector, position
 from equimorph.structures import States, Structure
 
@@ -148,7 +150,9 @@ class EquilibriumSet:
         """Exact states over many points of the box, with the pieces of the set that they lie on.
 
         The cells above a point give guesses, which Newton corrects. Where they leave a doubt, as
-        close to curved folds, all known equilibria nearby are lifted to the point.
+        close to curved folds, all known equilibria nearby are lifted to the point. Beside crossings
+        of sheets all roots of the reduced equation are returned; states of these sheets that are
+        closer together than 1e-5 in the metric are one.
 
         Parameters
         ----------
@@ -211,7 +215,21 @@ class EquilibriumSet:
             folded,
             capped,
             self.constraints,
+            self._near_crossings(),
         )
+
+    def _near_crossings(self) -> NearCrossings | None:
+        """Facets along which sheets cross, if they do."""
+        if not self.crossings:
+            return None
+        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
+        setting = Setting(self.structure, self.parameters_at(low), self._free, self.constraints)
+        d = len(self.names)
+        pieces = [
+            np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+            for piece in self.crossings
+        ]
+        return of_set(setting, self.points, self.cells, np.concatenate(pieces))
 
 
 def _check_names(names: tuple[str, ...], at: Mapping[str, object]) -> None:

@@ -14,6 +14,7 @@ from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.cell_index import CellIndex, Hits
 from equimorph.manifold.exact import Lanes, Points, exact_states
+from equimorph.manifold.near_crossings import NearCrossings
 from equimorph.manifold.querying.kernels import (
     balanced,
     guesses,
@@ -107,6 +108,8 @@ class Sheets:
         Whether vertices lie on folds, and on constraints.
     constraints
         Those that cut the set off.
+    crossings
+        Where sheets cross, if they do.
     """
 
     points: States
@@ -117,6 +120,7 @@ class Sheets:
     folded: Bool[np.ndarray, " V"]
     capped: Bool[np.ndarray, " V"]
     constraints: tuple[Constraint, ...]
+    crossings: NearCrossings | None = None
 
     @property
     def structure(self) -> Structure:
@@ -174,7 +178,32 @@ class Sheets:
         if doubtful:
             order = np.lexsort((cell, point))
             z, point, cell = z[order], point[order], cell[order]
+        if self.crossings is not None:
+            z, point, cell = self._beside_crossings(self.crossings, p, (z, point, cell))
         return States(self.structure, z, p[point]), point, cell
+
+    def _beside_crossings(self, crossings: NearCrossings, p: Points, found: Found) -> Found:
+        """States found over points, where these are close to crossings by the reduced equation."""
+        z, point, cell = found
+        near = self.above.near(p[:, self.free])
+        close = crossings.close(near, p)
+        if len(close) == 0:
+            return found
+        centres = crossings.centres(close, p)
+        branches, centres = crossings.branches(centres, p)
+        own = np.isin(branches.index, self.cell_index)
+        own &= self._allowed(branches.z, p[branches.point])
+        of_own = (branches.z[own], branches.point[own], branches.index[own])
+        kept = ~crossings.on_branches(centres, p, (z, point))
+        parts = [(z[kept], point[kept], cell[kept])]
+        for number in np.unique(of_own[1]):
+            here, index = (column[of_own[1] == number] for column in (of_own[0], of_own[2]))
+            mine = near.take(near.point == number)
+            there = self._nearest(here, index, self._guess(mine), mine)
+            parts.append((here, np.full(len(here), number), there))
+        z, point, cell = (np.concatenate(column) for column in zip(*parts, strict=True))
+        order = np.lexsort((cell, point))
+        return z[order], point[order], cell[order]
 
     def _in_chunks(self, p: Points) -> list[tuple[Found, Hits | None]]:
         """States and doubtful cells as `_some` finds them, chunk by chunk, on all threads."""
