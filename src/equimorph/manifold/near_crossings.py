@@ -99,7 +99,7 @@ class NearCrossings:
         pinned = self._pinned(p, number)
         away = np.linalg.norm(self._places(pinned.p - p), axis=1)
         size = np.ptp(self._places(self.points.p)[self.facets], axis=1).max(axis=1, initial=0.0)
-        return np.where(pinned.found, away, 0.1 * size)
+        return np.asarray(np.where(pinned.found, away, 0.1 * size))
 
     def _places(self, p: Float[np.ndarray, "... P"]) -> Float[np.ndarray, "... d"]:
         return np.asarray(p[..., self.setting.free] / self.setting.scales)
@@ -181,8 +181,8 @@ class NearCrossings:
             real = real[np.abs(real) <= 1.0 + IMAGINARY]
             owner.extend(len(real) * [lane])
             start.extend((real * widest[lane]).tolist())
-        roots = self._roots(centres, p, np.array(owner, int), np.array(start, float))
-        return _distinct(*roots), centres.take(whole)
+        found = self._roots(centres, p, np.array(owner, int), np.array(start, float))
+        return _distinct(*found), centres.take(np.flatnonzero(whole))
 
     def _roots(
         self,
