@@ -13,7 +13,7 @@ from equimorph.manifold.accounting import Complex
 from equimorph.manifold.cusp_points import with_cusps_beside
 from equimorph.manifold.fabric import ON_FOLD, RIM, Fabric, _bisected, edges_of, fabric_of
 from equimorph.manifold.leading import led_between
-from equimorph.manifold.on_edges import unmet
+from equimorph.manifold.on_edges import on_edges, unmet
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.patches import patch_around
 from equimorph.manifold.simplices import volumes
@@ -297,6 +297,44 @@ def test_no_flip_is_left_that_would_widen_angles(coarse):
     flipped = flip(coarse)
     assert gains_of_flips(flipped) == []
     assert flip(flipped) is flipped
+
+
+@pytest.fixture(scope="module")
+def plain_edges(coarse) -> tuple[Fabric, np.ndarray, np.ndarray]:
+    """The fabric flipped, every third edge inside a sheet, and the index of the sheets."""
+    flipped = flip(coarse)
+    ends, of_cells = edges_of(flipped.cells, len(flipped.vertices))
+    index = np.empty(len(ends), int)
+    index[of_cells] = flipped.cell_index[:, None]
+    some = np.flatnonzero(flipped.edge_marks(ends) == 0)[::3]
+    return flipped, ends[some], index[some]
+
+
+def test_after_a_bisection_flips_are_looked_for_around_its_vertices_only(plain_edges):
+    """Equal to flips that look everywhere: elsewhere nothing was left to be flipped."""
+    flipped, ends, index = plain_edges
+    with unchecked():
+        found, vertices = on_edges(flipped, ends, 0, index, np.full(len(ends), 0.5))
+    halved = flipped.bisected(ends[found], vertices)
+    everywhere = flip(halved)
+    assert not np.array_equal(everywhere.cells, halved.cells)
+    assert np.array_equal(flip(halved, since=len(flipped.vertices)).cells, everywhere.cells)
+
+
+def test_rough_tangent_spaces_of_new_vertices_are_nearly_exact(plain_edges):
+    """Those where Newton's last step began, against those solved for at the vertices."""
+    flipped, ends, index = plain_edges
+    half = np.full(len(ends), 0.5)
+    with unchecked():
+        found, exact = on_edges(flipped, ends, 0, index, half)
+        again, rough = on_edges(flipped, ends, 0, index, half, rough=True)
+    assert found.sum() > 50
+    assert np.array_equal(again, found)
+    np.testing.assert_array_equal(rough.index, exact.index)
+    np.testing.assert_allclose(rough.z, exact.z, atol=1e-12)
+    np.testing.assert_allclose(rough.p, exact.p, atol=1e-12)
+    np.testing.assert_allclose(rough.rows, exact.rows, atol=1e-4)
+    assert np.abs(flipped.setting.structure.residual(rough.z, rough.p)).max() < 1e-11
 
 
 def test_flips_do_not_make_edges_that_are_ruled_out(coarse):

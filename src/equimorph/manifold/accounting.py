@@ -21,6 +21,7 @@ from equimorph.manifold.pairing import Pairing, Setting, abandoned
 from equimorph.manifold.parted_sheets import parted
 from equimorph.manifold.points import CROSSING
 from equimorph.manifold.topology import (
+    PAIR,
     Adjacency,
     adjacency,
     euler_characteristic,
@@ -130,7 +131,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
     coordinates = points.p[:, frame.setting.free]
-    parts = (corners, given.cell_index, crossed, whole, coordinates)
+    parts = (corners, given.cell_index, crossed, whole, coordinates, component)
     return EquilibriumSet(
         structure=frame.setting.structure,
         box=frame.box,
@@ -146,7 +147,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         stratum=stratum,
         folds=tuple(pieces(whole.facets[folds])),
         boundaries=boundaries,
-        components=_components(corners, given.cell_index, component, boundaries),
+        components=_components(corners, given.cell_index, component, (whole, boundaries)),
         strata=strata,
         audit=_audit(points, lifting, parts, boundaries),
         mesh=frame.mesh,
@@ -189,21 +190,35 @@ def _components(
     corners: Int[np.ndarray, "C corners"],
     cell_index: Int[np.ndarray, " C"],
     component: Int[np.ndarray, " C"],
-    boundaries: tuple[Boundary, ...],
+    given: tuple[Adjacency, tuple[Boundary, ...]],
 ) -> tuple[Component, ...]:
+    whole, boundaries = given
+    edges = _edges_of(whole, component)
+    at_loops = np.array([boundary.vertices.flat[0] for boundary in boundaries], int)
     out = []
     for k in range(component.max(initial=-1) + 1):
         own = component == k
-        vertices = set(np.unique(corners[own]).tolist())
+        held = np.zeros(int(corners.max(initial=0)) + 1, bool)
+        held[corners[own]] = True
         out.append(
             Component(
                 int(own.sum()),
-                euler_characteristic(corners[own]),
-                sum(int(b.vertices.flat[0]) in vertices for b in boundaries),
+                euler_characteristic(corners[own], edges[k]),
+                int(held[at_loops].sum()),
                 tuple(np.unique(cell_index[own]).tolist()),
             )
         )
     return tuple(out)
+
+
+def _edges_of(whole: Adjacency, component: Int[np.ndarray, " C"]) -> list[int | None]:
+    """Number of edges of each component, where it is known: where edges are facets."""
+    many = component.max(initial=-1) + 1
+    if whole.facets.shape[1] != PAIR:
+        return [None] * many
+    of_facet = np.zeros(len(whole.facets), int)
+    of_facet[whole.cell_facets] = component[:, None]
+    return list(np.bincount(of_facet, minlength=many).tolist())
 
 
 def _audit(
@@ -215,13 +230,18 @@ def _audit(
         Bool[np.ndarray, " F"],
         Adjacency,
         Float[np.ndarray, "V d"],
+        Int[np.ndarray, " C"],
     ],
     boundaries: tuple[Boundary, ...],
 ) -> Audit:
-    corners, cell_index, crossed, whole, coordinates = parts
+    corners, cell_index, crossed, whole, coordinates, component = parts
     # of parts of sets two cells may be left at a crossing that belong to different sheets
-    cells, origin = parted(corners, whole.facets[crossed], len(points))
-    sense = senses(cells, cell_index, coordinates[origin], adjacency(cells))
+    if crossed.any():
+        cells, origin = parted(corners, whole.facets[crossed], len(points))
+        sense = senses(cells, cell_index, coordinates[origin], adjacency(cells))
+    else:
+        sense = senses(corners, cell_index, coordinates, whole, component)
+    edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
     whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
     most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
     kinds = [boundary.kind for boundary in boundaries]
@@ -234,8 +254,8 @@ def _audit(
         contradictions=sense.contradictions
         + unbalanced(corners, whole, sense, crossed & whole_crossing),
         overturned=int(sense.overturned.sum()),
-        euler_characteristic=euler_characteristic(corners),
-        components=int(labels(len(corners), whole.links).max(initial=-1)) + 1,
+        euler_characteristic=euler_characteristic(corners, edges),
+        components=int(component.max(initial=-1)) + 1,
         loops=tuple((kind, kinds.count(kind)) for kind in sorted(set(kinds))),
         largest_residual=float(points.residual.max(initial=0.0)),
         checked=0,

@@ -1,5 +1,6 @@
 """Edges of a complex that is being refined: how far they deviate, and which are to be bisected."""
 
+from collections import deque
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -15,9 +16,11 @@ from equimorph.manifold.fabric import (
     TRIANGLES,
     Fabric,
     edges_of,
+    shares,
 )
+from equimorph.manifold.kernels import measure_edges
 from equimorph.manifold.on_edges import chunks
-from equimorph.manifold.tangents import Cubics
+from equimorph.manifold.tangents import S_SHAPE, Cubics
 from equimorph.manifold.topology import keys_of
 from equimorph.model import Journal
 
@@ -72,7 +75,7 @@ class Memory:
 
     journal: Journal
     keys: Int[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, int))
-    """Of the edges whose deviation is known; so numbered that they stay when vertices are added."""
+    """Of the edges whose deviation is known, in order: lower ends in the upper half of the bits."""
     error: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
     stuck: set[tuple[int, int]] = field(default_factory=set)
     cut: Int[np.ndarray, "m 2"] = field(default_factory=lambda: np.zeros((0, 2), int))
@@ -113,15 +116,14 @@ def known(fabric: Fabric, memory: Memory) -> Edges:
     base = len(fabric.vertices)
     ends, of_cells = edges_of(fabric.cells, base)
     marks = fabric.edge_marks(ends)
-    keys = _keys(ends)
+    keys = ends[:, 0] << 32 | ends[:, 1]
     at = np.minimum(np.searchsorted(memory.keys, keys), max(len(memory.keys) - 1, 0))
     old = memory.keys[at] == keys if len(memory.keys) else np.zeros(len(keys), bool)
     error = np.empty(len(keys))
     error[old] = memory.error[at[old]]
     new = np.flatnonzero(~old)
     error[new] = _deviations(fabric, ends[new], marks[new])
-    order = np.argsort(keys)
-    memory.keys, memory.error = keys[order], error[order]
+    memory.keys, memory.error = keys, error
     length = np.empty(len(ends))
     length[of_cells] = np.sqrt(fabric.squared)
     stuck = (marks & (HOLE | RIM)) > 0
@@ -188,11 +190,6 @@ def _beside_crossings(
     return obtuse, long
 
 
-def _keys(ends: Int[np.ndarray, "E 2"]) -> Int[np.ndarray, " E"]:
-    """Numbers of edges with sorted ends that stay the same while vertices are added."""
-    return np.asarray(ends[:, 1] * (ends[:, 1] - 1) // 2 + ends[:, 0])
-
-
 def _deviations(
     fabric: Fabric, ends: Int[np.ndarray, "E 2"], marks: Int[np.ndarray, " E"]
 ) -> Float[np.ndarray, " E"]:
@@ -202,9 +199,18 @@ def _deviations(
         first, second = (fabric.end(ends[own], side, int(marks[own[0]])) for side in range(2))
         return Cubics(first, second).error
 
-    out, parts = np.zeros(len(ends)), chunks(np.arange(len(ends)), marks)
+    out = np.zeros(len(ends))
+    parts = chunks(np.flatnonzero(marks), marks)
     for own, error in zip(parts, results_of([partial(of, own) for own in parts]), strict=True):
         out[own] = error
+    plain, store = np.flatnonzero(marks == 0), fabric.vertices
+    free, found = ends[plain], np.empty(len(plain))
+    tasks = [
+        partial(measure_edges, store.place, store.rows, free[at:stop], S_SHAPE, found[at:stop])
+        for at, stop in shares(len(plain))
+    ]
+    deque(results_of(tasks), maxlen=0)
+    out[plain] = found
     return out
 
 

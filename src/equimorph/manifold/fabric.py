@@ -4,16 +4,19 @@ Marks say on what a facet lies: a fold, a constraint, sides of the box. Vertices
 an edge must lie on what the edge lies on.
 """
 
+from collections import deque
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
+from equimorph.linalg.lanes import results_of
 from equimorph.manifold.accounting import Complex
 from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.kernels import square_sides
+from equimorph.manifold.kernels import cut_rows, look_back, number_edges, square_sides
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.parted_sheets import parted
 from equimorph.manifold.points import CAP, CORNER, CROSSING
@@ -22,7 +25,7 @@ from equimorph.manifold.tangents import (
     Ends,
     best_corners,
 )
-from equimorph.manifold.topology import adjacency, flags_of, keys_of, rows_of, senses
+from equimorph.manifold.topology import adjacency, flags_of, keys_of, senses
 from equimorph.manifold.vertices import Vertices, on_constraints, vertices_of
 from equimorph.structures import States
 
@@ -35,9 +38,9 @@ HOLE, RIM = 1 << 20, 1 << 21
 """Marks of facets on the boundary that lie on nothing: the set is incomplete there, or cells beyond
 are set apart."""
 TRIANGLES = 2
-AT_ONCE = 2048
-"""Triangles whose tangent planes are looked at together."""
 """Dimension of their cells."""
+AT_ONCE = 4096
+"""Cells or edges that one thread looks at in one go."""
 ON_BOX = 1e-9
 
 
@@ -135,17 +138,19 @@ class Fabric:
         """Which of some cells project against their sense."""
         place = self.vertices.place
         flat = place[:, place.shape[1] - self.dimension :]
+        if len(cells) > len(flat):
+            flat = np.ascontiguousarray(flat)
         return np.asarray(volumes(flat[cells]) * sense < 0.0)
 
     def backward(self) -> Bool[np.ndarray, " C"]:
         """Which triangles look backwards, on average, in the tangent planes at their corners."""
-        total = np.empty(len(self.cells))
-        for first in range(0, len(self.cells), AT_ONCE):
-            own = self.cells[first : first + AT_ONCE]
-            place, rows = self.vertices.place[own], self.vertices.rows[own]
-            seen = rows @ np.swapaxes(place[:, 1:] - place[:, :1], 1, 2)[:, None]
-            areas = seen[..., 0, 0] * seen[..., 1, 1] - seen[..., 0, 1] * seen[..., 1, 0]
-            total[first : first + AT_ONCE] = areas.sum(axis=1)
+        cells, store = np.ascontiguousarray(self.cells), self.vertices
+        total = np.empty(len(cells))
+        tasks = [
+            partial(look_back, store.place, store.rows, cells[at:stop], total[at:stop])
+            for at, stop in shares(len(cells))
+        ]
+        deque(results_of(tasks), maxlen=0)
         return np.asarray(total * self.sense * np.where(self.cell_index % 2 == 0, 1, -1) <= 0.0)
 
     def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
@@ -220,6 +225,11 @@ def squared_sides(
     return out
 
 
+def shares(count: int) -> list[tuple[int, int]]:
+    """Where the shares of so many things begin and end that threads are handed."""
+    return [(at, min(at + AT_ONCE, count)) for at in range(0, count, AT_ONCE)]
+
+
 def held(mark: int, dimension: int) -> list[int]:
     """Free parameters that sides of the box hold."""
     return [k for k in range(dimension) if mark & (3 * SIDES << 2 * k)]
@@ -292,35 +302,18 @@ def _bisected(
     rows: Int[np.ndarray, "n k"], edges: Int[np.ndarray, "E 2"], base: int
 ) -> tuple[Int[np.ndarray, "m k"], Int[np.ndarray, " m"]]:
     """Rows cut at vertices ``base + e`` on edges e that they hold, and the rows they come from."""
-    whole = base + len(edges)
-    keys = keys_of(edges, whole)
-    order = np.argsort(keys)
-    keys = keys[order]
-    near = np.zeros(base, bool)
-    near[edges] = True
-    active = np.flatnonzero(near[rows].sum(axis=1) > 1)
-    rows, owner = rows.copy(), np.arange(len(rows))
-    while len(active) and len(edges):
-        which = np.full(len(active), len(edges))
-        for pair in combinations(range(rows.shape[1]), 2):
-            own = keys_of(rows[active][:, list(pair)], whole)
-            at = np.minimum(np.searchsorted(keys, own), len(keys) - 1)
-            which = np.where(keys[at] == own, np.minimum(which, order[at]), which)
-        held = which < len(edges)
-        cut, which = active[held], which[held]
-        (a, b), middle = edges[which].T, base + which[:, None]
-        halves = np.where(rows[cut] == a[:, None], middle, rows[cut])
-        rows[cut] = np.where(rows[cut] == b[:, None], middle, rows[cut])
-        active = np.concatenate([cut, np.arange(len(rows), len(rows) + len(cut))])
-        rows, owner = np.concatenate([rows, halves]), np.concatenate([owner, owner[cut]])
-    return rows, owner
+    cut, owner = cut_rows(np.ascontiguousarray(rows), np.ascontiguousarray(edges), base)
+    return cut, owner
 
 
 def edges_of(
     cells: Int[np.ndarray, "C corners"], base: int
 ) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, "C sides"]]:
     """All edges, sorted, and the numbers of those of each cell (pairs 01, 02, 12 and so on)."""
-    pairs = combinations(range(cells.shape[1]), 2)
-    keys = np.stack([keys_of(cells[:, list(pair)], base) for pair in pairs], axis=1)
-    distinct, inverse = np.unique(keys.ravel(), return_inverse=True)
-    return rows_of(distinct, base, 2), inverse.reshape(keys.shape)
+    pairs = np.array(list(combinations(range(cells.shape[1]), 2)))
+    ends, of_cells = (
+        np.empty((cells.shape[0] * len(pairs), 2), int),
+        np.empty((len(cells), len(pairs)), int),
+    )
+    count = number_edges(np.ascontiguousarray(cells), pairs, base, ends, of_cells)
+    return ends[:count].copy(), of_cells

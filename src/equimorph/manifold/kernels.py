@@ -67,191 +67,6 @@ def orient(cells, starts, neighbours, edge_in_cell, signs):
 
 
 @njit(nogil=True)
-def _slot(keys, key):
-    """Place of a key in a hash table, or the empty place (−1) where it would go."""
-    mask = keys.shape[0] - 1
-    at = ((key * -7046029254386353131) >> 20) & mask
-    while keys[at] != -1 and keys[at] != key:
-        at = (at + 1) & mask
-    return at
-
-
-@njit(nogil=True)
-def _edge_key(a, b, base):
-    return a * base + b if a < b else b * base + a
-
-
-@njit(nogil=True)
-def _linked(cells, index, facets, base, keys, counts):
-    """Cells across the sides opposite to each corner of triangles; −1 where none may be flipped.
-
-    Fills the hash table of edges: how many triangles have each; facets count as three.
-    """
-    slots = np.empty(cells.shape, np.int64)
-    for i in range(facets.shape[0]):
-        at = _slot(keys, _edge_key(facets[i, 0], facets[i, 1], base))
-        keys[at] = _edge_key(facets[i, 0], facets[i, 1], base)
-        counts[at] = 3
-    for t in range(cells.shape[0]):
-        for k in range(3):
-            key = _edge_key(cells[t, (k + 1) % 3], cells[t, (k + 2) % 3], base)
-            at = _slot(keys, key)
-            keys[at] = key
-            counts[at] = min(counts[at] + 1, 3)
-            slots[t, k] = at
-    first = np.full(keys.shape[0], -1)
-    across = np.full(cells.shape, -1)
-    for t in range(cells.shape[0]):
-        for k in range(3):
-            at = slots[t, k]
-            if counts[at] != 2:
-                continue
-            if first[at] < 0:
-                first[at] = 3 * t + k
-                continue
-            other, corner = divmod(first[at], 3)
-            if index[other] == index[t]:
-                across[t, k], across[other, corner] = other, t
-    return across
-
-
-@njit(nogil=True)
-def _cotangent(squared, corner):
-    """Cotangent of the angle at a corner of a triangle with squared sides 01, 02, 12."""
-    total = squared[0] + squared[1] + squared[2]
-    area = total**2 - 2.0 * (squared[0] ** 2 + squared[1] ** 2 + squared[2] ** 2)
-    return (total - 2.0 * squared[2 - corner]) / np.sqrt(max(area, 1e-28 * total**2))
-
-
-@njit(nogil=True)
-def _stays_up(place, rows, a, b, c, d):
-    """Whether adc and dbc look the same way as abc and bad did, in the planes at all corners."""
-    width = place.shape[1]
-    flat = np.empty((3, 2))
-    for plane in (a, b, c, d):
-        for i in range(2):
-            x, y, z = 0.0, 0.0, 0.0
-            for k in range(width):
-                x += rows[plane, i, k] * (place[b, k] - place[a, k])
-                y += rows[plane, i, k] * (place[c, k] - place[a, k])
-                z += rows[plane, i, k] * (place[d, k] - place[a, k])
-            flat[0, i], flat[1, i], flat[2, i] = x, y, z
-        whole = flat[0, 0] * (flat[1, 1] - flat[2, 1]) - flat[0, 1] * (flat[1, 0] - flat[2, 0])
-        near = flat[2, 0] * flat[1, 1] - flat[2, 1] * flat[1, 0]
-        far = whole - near
-        # slivers may look either way
-        if min(near * np.sign(whole), far * np.sign(whole)) <= 1e-3 * abs(whole):
-            return False
-    return True
-
-
-@njit(nogil=True)
-def _overturned_area(place, a, b, c, sense):
-    """Area, twice, of a triangle in the last two coordinates, the parameters, if it is overturned.
-
-    Else zero.
-    """
-    x, y = place.shape[1] - 2, place.shape[1] - 1
-    area = (place[b, x] - place[a, x]) * (place[c, y] - place[a, y])
-    area -= (place[b, y] - place[a, y]) * (place[c, x] - place[a, x])
-    return max(-area * sense, 0.0)
-
-
-@njit(nogil=True)
-def _worth(place, squared, sense, corners, pair, least):
-    """Whether to flip: what is overturned counts first, then what the angles gain.
-
-    corners: a, b, c, d of triangles t, abc, and u, bad; pair: t, k, u, j, c being corner k of t and
-    d corner j of u.
-    """
-    a, b, c, d = corners
-    t, k, u, j = pair
-    own = sense[t]
-    before = _overturned_area(place, a, b, c, own) + _overturned_area(place, b, a, d, own)
-    after = _overturned_area(place, a, d, c, own) + _overturned_area(place, d, b, c, own)
-    if abs(before - after) > 1e-9 * max(before, after):
-        return after < before
-    return -_cotangent(squared[t], k) - _cotangent(squared[u], j) > least
-
-
-@njit(nogil=True)
-def flip_edges(cells, squared, index, sense, facets, place, rows, least):
-    """Flip edges of triangles whose opposite angles add up to more than π; return how many.
-
-    Changes cells (T, 3), the squares of their sides 01, 02, 12, and their sense (T,): the sign of
-    their area in the parameters, if they are not overturned. Edges between triangles of different
-    index, `facets` (F, 2), and edges of other than two triangles stay. A flip must gain `least`:
-    minus the sum of the cotangents of both angles; or leave less area overturned, never more.
-    Nothing may fold over in the tangent planes, spanned by rows (V, 2, coordinates), at all four
-    corners.
-    """
-    base, count = place.shape[0], cells.shape[0]
-    size = 16
-    while size < 4 * count + 2 * facets.shape[0]:
-        size *= 2
-    keys, counts = np.full(size, -1), np.zeros(size, np.int8)
-    across = _linked(cells, index, facets, base, keys, counts)
-    most = count
-    stack = np.empty(3 * count + 4 * most, np.int64)
-    top = 0
-    for side in range(3 * count - 1, -1, -1):
-        if across[side // 3, side % 3] > side // 3:
-            stack[top] = side
-            top += 1
-    flips = 0
-    while top > 0 and flips < most:
-        top -= 1
-        t, k = divmod(stack[top], 3)
-        u = across[t, k]
-        if u < 0:
-            continue
-        c, a, b = cells[t, k], cells[t, (k + 1) % 3], cells[t, (k + 2) % 3]
-        j = _corner_apart(cells, u, a, b)
-        d = cells[u, j]
-        if not _worth(place, squared, sense, (a, b, c, d), (t, k, u, j), least):
-            continue
-        new = _slot(keys, _edge_key(c, d, base))
-        if counts[new] > 0 or not _stays_up(place, rows, a, b, c, d):
-            continue
-        gap = 0.0
-        for i in range(place.shape[1]):
-            gap += (place[c, i] - place[d, i]) ** 2
-        ac, bc = squared[t, 2 - (k + 2) % 3], squared[t, 2 - (k + 1) % 3]
-        at_a = _corner_apart(cells, u, b, d)
-        at_b = 3 - at_a - j
-        ad, bd = squared[u, 2 - at_b], squared[u, 2 - at_a]
-        beside_ac, beside_bc = across[t, (k + 2) % 3], across[t, (k + 1) % 3]
-        beside_ad, beside_bd = across[u, at_b], across[u, at_a]
-        counts[_slot(keys, _edge_key(a, b, base))] = 0
-        keys[new], counts[new] = _edge_key(c, d, base), 2
-        cells[t, 0], cells[t, 1], cells[t, 2] = a, d, c
-        squared[t, 0], squared[t, 1], squared[t, 2] = ad, ac, gap
-        across[t, 0], across[t, 1], across[t, 2] = u, beside_ac, beside_ad
-        cells[u, 0], cells[u, 1], cells[u, 2] = d, b, c
-        sense[u] = sense[t]
-        squared[u, 0], squared[u, 1], squared[u, 2] = bd, gap, bc
-        across[u, 0], across[u, 1], across[u, 2] = beside_bc, t, beside_bd
-        if beside_bc >= 0:
-            across[beside_bc, _corner_apart(cells, beside_bc, b, c)] = u
-        if beside_ad >= 0:
-            across[beside_ad, _corner_apart(cells, beside_ad, a, d)] = t
-        flips += 1
-        stack[top], stack[top + 1] = 3 * t + 1, 3 * t + 2
-        stack[top + 2], stack[top + 3] = 3 * u, 3 * u + 2
-        top += 4
-    return flips
-
-
-@njit(nogil=True)
-def _corner_apart(cells, t, a, b):
-    """Corner of a triangle that is neither a nor b."""
-    for k in range(2):
-        if cells[t, k] != a and cells[t, k] != b:
-            return k
-    return 2
-
-
-@njit(nogil=True)
 def square_sides(place, cells, out):
     """Squared lengths of the sides 01, 02, 12 and so on of cells with corners at `place`."""
     for t in range(cells.shape[0]):
@@ -263,3 +78,176 @@ def square_sides(place, cells, out):
                     total += (place[cells[t, i], k] - place[cells[t, j], k]) ** 2
                 out[t, side] = total
                 side += 1
+
+
+@njit(nogil=True)
+def sort_sides(cells, pairs, fixed, base):
+    """Sides of cells, in order of their ends, sorted; and where those of each lower end begin.
+
+    Each as ``upper end << 32 | number``: numbers go through the `pairs` of corners of cell after
+    cell, and then through pairs of vertices `fixed`.
+    """
+    sides, more = pairs.shape[0], fixed.shape[0]
+    count = cells.shape[0] * sides
+    starts = np.zeros(base + 1, np.int64)
+    for t in range(cells.shape[0]):
+        for k in range(sides):
+            starts[min(cells[t, pairs[k, 0]], cells[t, pairs[k, 1]]) + 1] += 1
+    for i in range(more):
+        starts[min(fixed[i, 0], fixed[i, 1]) + 1] += 1
+    for v in range(base):
+        starts[v + 1] += starts[v]
+    entries, free = np.empty(count + more, np.int64), starts[:-1].copy()
+    for t in range(cells.shape[0]):
+        for k in range(sides):
+            a, b = cells[t, pairs[k, 0]], cells[t, pairs[k, 1]]
+            low, high = min(a, b), max(a, b)
+            entries[free[low]] = high << 32 | (t * sides + k)
+            free[low] += 1
+    for i in range(more):
+        low, high = min(fixed[i, 0], fixed[i, 1]), max(fixed[i, 0], fixed[i, 1])
+        entries[free[low]] = high << 32 | (count + i)
+        free[low] += 1
+    for v in range(base):
+        for i in range(starts[v] + 1, starts[v + 1]):
+            own, at = entries[i], i
+            while at > starts[v] and entries[at - 1] > own:
+                entries[at] = entries[at - 1]
+                at -= 1
+            entries[at] = own
+    return entries, starts
+
+
+@njit(nogil=True)
+def number_edges(cells, pairs, base, ends, of_cells):
+    """Number the edges of cells in the order of their ends, sorted; return how many there are.
+
+    Fills ends (edges, 2), which must have room for all sides of all cells, and of_cells
+    (cells, sides) in the order of the pairs of corners.
+    """
+    sides = pairs.shape[0]
+    entries, starts = sort_sides(cells, pairs, np.empty((0, 2), np.int64), base)
+    edge = -1
+    for v in range(base):
+        last = -1
+        for i in range(starts[v], starts[v + 1]):
+            high, own = entries[i] >> 32, entries[i] & 0xFFFFFFFF
+            if high != last:
+                edge, last = edge + 1, high
+                ends[edge, 0], ends[edge, 1] = v, high
+            of_cells[own // sides, own % sides] = edge
+    return edge + 1
+
+
+@njit(nogil=True)
+def measure_edges(place, rows, ends, s_shape, out):
+    """How far the cubics over edges that touch the planes at both ends are from the edges.
+
+    place (V, coordinates), rows (V, d, coordinates), orthonormal, and s_shape as in
+    `tangents.Cubics`, which says the same of edges on which something stays zero.
+    """
+    width, d = place.shape[1], rows.shape[1]
+    flat = np.empty((2, d))
+    for e in range(ends.shape[0]):
+        a, b = ends[e, 0], ends[e, 1]
+        length = 0.0
+        for c in range(width):
+            length += (place[b, c] - place[a, c]) ** 2
+        for side in range(2):
+            total = 0.0
+            for i in range(d):
+                share = 0.0
+                for c in range(width):
+                    share += rows[ends[e, side], i, c] * (place[b, c] - place[a, c])
+                flat[side, i] = share
+                total += share * share
+            factor = min(np.sqrt(length) / max(np.sqrt(total), 1e-300), 2.0)
+            for i in range(d):
+                flat[side, i] *= factor
+        first, second, apart = 0.0, 0.0, 0.0
+        for c in range(width):
+            chord = place[b, c] - place[a, c]
+            one, other = -chord, -chord
+            for i in range(d):
+                one += flat[0, i] * rows[a, i, c]
+                other += flat[1, i] * rows[b, i, c]
+            first += one * one
+            second += other * other
+            apart += (one - other) ** 2
+        out[e] = max(np.sqrt(apart) / 8.0, s_shape * np.sqrt(max(first, second)))
+
+
+@njit(nogil=True)
+def look_back(place, rows, cells, out):
+    """Sum of the areas of triangles, twice, seen in the planes at their three corners."""
+    width = place.shape[1]
+    for t in range(cells.shape[0]):
+        a, b, c = cells[t, 0], cells[t, 1], cells[t, 2]
+        total = 0.0
+        for k in range(3):
+            plane = cells[t, k]
+            bx, by, cx, cy = 0.0, 0.0, 0.0, 0.0
+            for i in range(width):
+                to_b, to_c = place[b, i] - place[a, i], place[c, i] - place[a, i]
+                bx += rows[plane, 0, i] * to_b
+                by += rows[plane, 1, i] * to_b
+                cx += rows[plane, 0, i] * to_c
+                cy += rows[plane, 1, i] * to_c
+            total += bx * cy - by * cx
+        out[t] = total
+
+
+@njit(nogil=True)
+def cut_rows(rows, edges, base):
+    """Cut rows of vertices below `base` at vertices base + e on edges e, the first ones first.
+
+    Return the rows and those that they come from. Second halves follow behind, cut by cut.
+    """
+    head, following = np.full(base, -1), np.empty(edges.shape[0], np.int64)
+    for e in range(edges.shape[0]):
+        low = min(edges[e, 0], edges[e, 1])
+        following[e], head[low] = head[low], e
+    count, corners = rows.shape
+    room = count + 4 * edges.shape[0] + 16
+    out, owner = np.empty((room, corners), np.int64), np.empty(room, np.int64)
+    out[:count], owner[:count] = rows, np.arange(count)
+    active = np.arange(count)
+    while active.shape[0] > 0:
+        cut, start = 0, count
+        for i in range(active.shape[0]):
+            row = active[i]
+            which = _first_edge(out[row], edges, head, following)
+            if which < 0:
+                continue
+            if count == room:
+                room *= 2
+                wider, more = np.empty((room, corners), np.int64), np.empty(room, np.int64)
+                wider[:count], more[:count] = out, owner
+                out, owner = wider, more
+            for k in range(corners):
+                vertex = out[row, k]
+                out[count, k] = base + which if vertex == edges[which, 0] else vertex
+                out[row, k] = base + which if vertex == edges[which, 1] else vertex
+            owner[count] = owner[row]
+            active[cut] = row
+            count += 1
+            cut += 1
+        again = np.empty(2 * cut, np.int64)
+        again[:cut], again[cut:] = active[:cut], np.arange(start, count)
+        active = again
+    return out[:count], owner[:count]
+
+
+@njit(nogil=True)
+def _first_edge(row, edges, head, following):
+    """First of some edges, listed by their lower ends, that a row of vertices holds; else −1."""
+    best = -1
+    for i in range(row.shape[0]):
+        for j in range(i + 1, row.shape[0]):
+            low, high = min(row[i], row[j]), max(row[i], row[j])
+            edge = head[low] if low < head.shape[0] else -1
+            while edge >= 0:
+                if max(edges[edge, 0], edges[edge, 1]) == high and (best < 0 or edge < best):
+                    best = edge
+                edge = following[edge]
+    return best

@@ -7,13 +7,14 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.manifold.corrections import Corrected, corrected_amid
 from equimorph.manifold.crossing_points import corrected_crossings
 from equimorph.manifold.fabric import ON_CAP, ON_CROSSING, ON_FOLD, Fabric, held
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.pins import Aim, corrected, lower_index
+from equimorph.manifold.pins import Aim, Pinned, corrected, lower_index
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
-from equimorph.manifold.tangents import Cubics, split_step
-from equimorph.manifold.vertices import Vertices, vertices_of
+from equimorph.manifold.tangents import Cubics, Ends, split_step
+from equimorph.manifold.vertices import Vertices, free_vertices, vertices_of
 from equimorph.model import Findings, Journal, all_recalled, step_of
 
 CHUNK = 512
@@ -64,7 +65,7 @@ def recalled_on_edges(journal: Journal, fabric: Fabric, parts: Sequence[Places])
     """Exact vertices on edges, from a journal if it has them; see `on_edges`."""
 
     def compute(part: Places) -> Findings:
-        found, vertices = on_edges(fabric, part.ends, part.mark, part.lowest, part.t)
+        found, vertices = on_edges(fabric, part.ends, part.mark, part.lowest, part.t, rough=True)
         return found, *vertices.columns.values()
 
     steps = [step_of(f"bisect {part.mark}", part.ends, part.t) for part in parts]
@@ -104,8 +105,13 @@ def on_edges(
     mark: int,
     lowest: Int[np.ndarray, " n"],
     t: Float[np.ndarray, " n"],
+    *,
+    rough: bool = False,
 ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
-    """Exact vertices at places t along edges with a mark, and for which edges they were found."""
+    """Exact vertices at places t along edges with a mark, and for which edges they were found.
+
+    Their tangent spaces may be `rough`: those at the start of the last step of Newton.
+    """
     setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
     first, second = (fabric.end(ends, side, mark) for side in range(2))
     z, p = store.z[ends], store.p[ends]
@@ -121,32 +127,78 @@ def on_edges(
     # the second space seen from the first, so that both bases point the same way
     turned = first.rows @ np.swapaxes(second.rows, 1, 2)
     plane = first.rows + turned @ second.rows
-    inside = replace(first, rows=plane).allowed
-    rows = np.swapaxes(inside, 1, 2) @ plane
-    aim_span = np.delete(np.eye(d), keep, axis=0)
     place = _embedded(fabric, z, p)
-    fold, cap, crossing = (bool(mark & each) for each in (ON_FOLD, ON_CAP, ON_CROSSING))
-    aim = Aim(setting, fold, cap, np.tile(aim_span, (len(z), 1, 1)), place, rows)
     length = np.linalg.norm(second.place - first.place, axis=1)
-    pinned = (corrected_crossings if crossing else corrected)(aim, z, p, length)
-    here = _embedded(fabric, pinned.z, pinned.p)
-    found = pinned.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
+    if mark == 0 and rough:
+        at: Corrected | Pinned = corrected_amid(setting, (z, p), place, plane, length)
+    else:
+        at = _on_curves(fabric, mark, (z, p), (place, plane, length), first)
+    here = _embedded(fabric, at.z, at.p)
+    found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
     for end, part in ((first, t), (second, 1.0 - t)):
         found &= np.linalg.norm(here - end.place, axis=1) <= (part + EXCESS) * length
-    free = pinned.p[:, setting.free]
+    free = at.p[:, setting.free]
     found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
-    if crossing:
-        lowest = store.index[ends].max(axis=1)
+    if isinstance(at, Corrected):
+        found &= at.index == lowest
+        vertices = free_vertices(setting, at if found.all() else at.take(found))
+    else:
+        if mark & ON_CROSSING:
+            lowest = store.index[ends].max(axis=1)
+        vertices = _counted(fabric, mark, at, (found, lowest), plane)
+    good = _along(replace(fabric, vertices=vertices), mark, (second.place - first.place)[found])
+    found[found] = good
+    return found, vertices if good.all() else vertices.take(np.flatnonzero(good))
+
+
+def _on_curves(
+    fabric: Fabric,
+    mark: int,
+    states: tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]],
+    near: tuple[
+        Float[np.ndarray, "n coordinates"],
+        Float[np.ndarray, "n d coordinates"],
+        Float[np.ndarray, " n"],
+    ],
+    end: Ends,
+) -> Pinned:
+    """Points on folds, constraints, crossings or sides of the box near places with planes."""
+    setting, d = fabric.setting, fabric.dimension
+    place, plane, length = near
+    inside = replace(end, rows=plane).allowed
+    rows = np.swapaxes(inside, 1, 2) @ plane
+    span = np.delete(np.eye(d), held(mark, d), axis=0)
+    aim = Aim(
+        setting,
+        bool(mark & ON_FOLD),
+        bool(mark & ON_CAP),
+        np.tile(span, (len(place), 1, 1)),
+        place,
+        rows,
+    )
+    return (corrected_crossings if mark & ON_CROSSING else corrected)(aim, *states, length)
+
+
+def _counted(
+    fabric: Fabric,
+    mark: int,
+    at: Pinned,
+    wanted: tuple[Bool[np.ndarray, " n"], Int[np.ndarray, " n"]],
+    plane: Float[np.ndarray, "n d coordinates"],
+) -> Vertices:
+    """Vertices on folds and so on where they were found; of these, only those of the right index.
+
+    What was found and the index are `wanted`; the former is changed.
+    """
+    (found, lowest), setting = wanted, fabric.setting
+    fold, cap, crossing = (bool(mark & each) for each in (ON_FOLD, ON_CAP, ON_CROSSING))
     count = lower_index if fold or crossing else _index
-    found[found] = count(setting, pinned.z[found], pinned.p[found]) == lowest[found]
+    found[found] = count(setting, at.z[found], at.p[found]) == lowest[found]
     kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
     others = (lowest[found], np.full(found.sum(), -1))
     kinds = np.full(found.sum(), CROSSING if crossing else kind[fold, cap])
-    states = (pinned.z[found], pinned.p[found])
-    vertices = vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
-    good = _along(replace(fabric, vertices=vertices), mark, (second.place - first.place)[found])
-    found[found] = good
-    return found, vertices.take(np.flatnonzero(good))
+    states = (at.z[found], at.p[found])
+    return vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
 
 
 def _along(

@@ -14,7 +14,7 @@ from equimorph.manifold.reconnection import reconnect
 from equimorph.manifold.smoothing import SHARP, smooth
 from equimorph.manifold.surgery import SHORT, angles, collapse, flip
 from equimorph.manifold.topology import keys_of
-from equimorph.manifold.vertices import Vertices
+from equimorph.manifold.vertices import Vertices, gathered
 from equimorph.model import Journal, Progress, Silent
 
 ROUNDS = 200
@@ -54,9 +54,10 @@ def settled(
         (progress or Silent()).report(
             "refining", int((edges.error <= tolerance).sum()), len(edges.error)
         )
+        before = len(fabric.vertices)
         fabric = bisected(fabric, edges, chosen(edges, tolerance), memory)
         if fabric.dimension == 2:
-            fabric = flip(fabric, memory.cut)
+            fabric = flip(fabric, memory.cut, since=before)
         elif fabric.dimension == 3 and len(fabric.cells) > GROWN * cells:
             fabric = tidied(fabric, memory)
             cells = len(fabric.cells)
@@ -136,12 +137,12 @@ def bisected(
     memory.failures += len(left)
     if not done:
         return fabric
-    more = parts[0].joined(*parts[1:])
-    at = np.concatenate(done)
-    rank = np.empty(len(ends), int)
+    at, rank = np.concatenate(done), np.empty(len(ends), int)
     rank[at_once] = np.arange(len(at_once))
     order = np.argsort(rank[at])
-    at, more = at[order], more.take(order)
+    place = np.empty(len(at), int)
+    place[order] = np.arange(len(at))
+    at, more = at[order], gathered(parts, place)
     if ((edges.marks[at] & CURVES) > 0).any():
         memory.stuck.clear()  # beside a fold that is better known they may succeed
     whole, more = with_copies(fabric, ends[at], more)

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.copies import copies
 from equimorph.manifold.fabric import RIM, Fabric, edges_of, squared_sides
-from equimorph.manifold.kernels import flip_edges
+from equimorph.manifold.flips import flip_edges
 from equimorph.manifold.topology import keys_of
 
 SLENDER = np.radians(20.0)
@@ -26,6 +26,8 @@ SHORT = 0.05
 WORSE, MUCH_WORSE = 0.7, 0.2
 """Least share of the smallest angle around a vertex that must remain when it goes; and when it goes
 a short way."""
+OPPOSITE = np.array([[1, 2], [2, 0], [0, 1]])
+"""The other corners of triangles."""
 
 Triangles = Int[np.ndarray, "T 3"]
 
@@ -48,21 +50,24 @@ def angles(fabric: Fabric) -> Float[np.ndarray, " C"]:
     return _smallest(fabric.squared)
 
 
-def flip(fabric: Fabric, but: Int[np.ndarray, "m 2"] | None = None) -> Fabric:
+def flip(fabric: Fabric, but: Int[np.ndarray, "m 2"] | None = None, since: int = 0) -> Fabric:
     """Flip edges whose opposite angles add up to more than π, as far as nothing folds over.
 
     And those whose flip leaves fewer cells overturned, whatever the angles.
-    Edges between the pairs of vertices `but` do not come into being.
+    Edges between the pairs of vertices `but` do not come into being. Where nothing was left to be
+    flipped before the vertices from the number `since` on were added, only their surroundings are
+    looked at.
     """
     cells, squared, sense = fabric.cells.copy(), fabric.squared.copy(), fabric.sense.copy()
     fixed = fabric.facets
     if but is not None:
         near = np.zeros(len(fabric.vertices), bool)
         near[cells] = True
-        fixed = np.concatenate([fixed, but[near[but].all(axis=1)]])
-    store = fabric.vertices
-    parts = (fabric.cell_index, sense, np.ascontiguousarray(fixed), store.place, store.rows)
-    count = flip_edges(cells, squared, *parts, GAIN)
+        fixed = np.concatenate([fixed, but[near[but[:, 0]] & near[but[:, 1]]]])
+    place, rows = fabric.vertices.place, fabric.vertices.rows
+    flat = np.ascontiguousarray(place[:, -fabric.dimension :])
+    parts = (fabric.cell_index, sense, np.ascontiguousarray(fixed), place, rows, flat, OPPOSITE)
+    count = flip_edges(cells, squared, *parts, GAIN, since)
     return replace(fabric, cells=cells, squared=squared, sense=sense) if count else fabric
 
 

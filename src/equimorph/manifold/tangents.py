@@ -57,10 +57,22 @@ def _frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
     lanes, size, d = len(z), z.shape[1], len(setting.free)
     rhs = np.zeros((lanes, d, size + d))
     rhs[:, :, size:] = np.eye(d)
-    raw = setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
-    placed = placed_frames(setting, raw)
-    gram = placed @ np.swapaxes(placed, 1, 2)
-    return np.asarray(np.linalg.solve(np.linalg.cholesky(gram), raw))
+    return orthonormal(
+        setting, setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
+    )
+
+
+def orthonormal(setting: Setting, frames: Frames) -> Frames:
+    """Bases of the same tangent spaces, orthonormal in the metric and oriented alike."""
+    placed = placed_frames(setting, frames)
+    lower = np.linalg.cholesky(placed @ np.swapaxes(placed, 1, 2))
+    out = np.empty_like(frames)
+    for i in range(frames.shape[1]):
+        row = frames[:, i]
+        for j in range(i):
+            row = row - lower[:, i, j, None] * out[:, j]
+        out[:, i] = row / lower[:, i, i, None]
+    return out
 
 
 def placed_frames(setting: Setting, frames: Frames) -> Rows:

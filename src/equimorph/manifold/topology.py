@@ -11,6 +11,9 @@ from scipy.sparse.csgraph import connected_components
 from equimorph.manifold.kernels import orient
 from equimorph.manifold.simplices import volumes
 
+PAIR = 2
+"""Corners of an edge."""
+
 Pairs = Int[np.ndarray, "n 2"]
 Cells = Int[np.ndarray, "C corners"]
 
@@ -77,20 +80,38 @@ def adjacency(cells: Cells) -> Adjacency:
     """Facets and links of segments, triangles or tetrahedra."""
     corners = cells.shape[1]
     base = int(cells.max(initial=0)) + 1
-    opposite = [keys_of(np.delete(cells, k, axis=1), base) for k in range(corners)]
-    keys, inverse, counts = np.unique(
-        np.stack(opposite, axis=1).ravel(), return_inverse=True, return_counts=True
-    )
-    order = np.argsort(inverse, kind="stable")
-    same = np.flatnonzero(inverse[order[1:]] == inverse[order[:-1]])
-    links = np.stack([order[same], order[same + 1]], axis=1) // corners
+    keys = np.stack([keys_of(np.delete(cells, k, axis=1), base) for k in range(corners)], axis=1)
+    order, starts = _groups(keys.ravel())
+    counts = np.diff(starts)
+    number = np.repeat(np.arange(len(counts)), counts)
+    of_cells = np.empty(keys.size, int)
+    of_cells[order] = number
+    same = np.flatnonzero(np.diff(number) == 0)
     return Adjacency(
-        rows_of(keys, base, corners - 1),
+        rows_of(keys.ravel()[order[starts[:-1]]], base, corners - 1),
         counts,
-        inverse.reshape(-1, corners),
-        links,
-        inverse[order[same]],
+        of_cells.reshape(-1, corners),
+        np.stack([order[same], order[same + 1]], axis=1) // corners,
+        number[same],
     )
+
+
+def _groups(
+    keys: Int[np.ndarray, " n"],
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " starts"]]:
+    """Order of numbers, equal ones as they come, and where each group of these starts, and ends.
+
+    Most groups have at most two: then the fast sort, which may exchange equal ones, is put right.
+    """
+    order = np.argsort(keys)
+    first = np.flatnonzero(np.diff(keys[order], prepend=-1) > 0)
+    starts = np.append(first, len(keys))
+    if (np.diff(starts) > 2).any():
+        return np.argsort(keys, kind="stable"), starts
+    pairs = first[np.diff(starts) == 2]
+    ends = np.sort(order[pairs[:, None] + np.arange(2)], axis=1)
+    order[pairs], order[pairs + 1] = ends.T
+    return order, starts
 
 
 def flags_of(
@@ -111,12 +132,15 @@ def labels(cells: int, links: Pairs) -> Int[np.ndarray, " C"]:
     return np.asarray(rank[label])
 
 
-def euler_characteristic(cells: Cells) -> int:
-    """Vertices − edges + triangles − tetrahedra."""
+def euler_characteristic(cells: Cells, edges: int | None = None) -> int:
+    """Vertices − edges + triangles − tetrahedra; the number of edges may be known."""
     corners = cells.shape[1]
     numbers = [
         np.count_nonzero(np.bincount(cells.ravel())),
-        *(len(faces_of(cells, k)) for k in range(2, corners)),
+        *(
+            edges if edges is not None and k == PAIR else len(faces_of(cells, k))
+            for k in range(2, corners)
+        ),
     ]
     signs = (-1) ** np.arange(corners)
     return int(signs @ [*numbers, len(cells)])
@@ -172,7 +196,7 @@ def orientation(cells: Cells, whole: Adjacency) -> tuple[Int[np.ndarray, " C"], 
     shared = whole.across[whole.manifold]
     sign = -_sign_at(whole, induced, a, shared) * _sign_at(whole, induced, b, shared)
     both = np.concatenate([np.stack([a, b, sign], 1), np.stack([b, a, sign], 1)])
-    both = both[np.argsort(both[:, 0], kind="stable")]
+    both = both[np.argsort(both[:, 0] * count + both[:, 1])]
     starts = np.concatenate([[0], np.cumsum(np.bincount(both[:, 0], minlength=count))])
     signs = np.zeros(count, np.int64)
     columns = [np.ascontiguousarray(both[:, k]) for k in (1, 2)]
@@ -227,16 +251,20 @@ def senses(
     index: Int[np.ndarray, " C"],
     coordinates: Float[np.ndarray, "V d"],
     whole: Adjacency,
+    component: Int[np.ndarray, " C"] | None = None,
 ) -> Senses:
     """Orientation of cells with the index that each has.
 
-    Patches end where more than two cells share a facet.
+    Patches end where more than two cells share a facet; where none do, they are the components,
+    which may be known.
     """
     signs, contradictions = orientation(cells, whole)
-    patch = labels(len(cells), whole.links[whole.manifold])
+    manifold = whole.manifold
+    if component is None or not manifold.all():
+        component = labels(len(cells), whole.links[manifold])
     volume = projected_volume(coordinates, cells) * signs * np.where(index % 2 == 0, 1, -1)
-    total = np.sign(np.bincount(patch, weights=volume, minlength=1)).astype(int)
-    return Senses(signs * total[patch], contradictions, volume * total[patch] < 0)
+    total = np.sign(np.bincount(component, weights=volume, minlength=1)).astype(int)
+    return Senses(signs * total[component], contradictions, volume * total[component] < 0)
 
 
 def unbalanced(

@@ -1,14 +1,16 @@
 """Vertices of a complex that is being cut and rearranged: exact points with tangent frames."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.manifold.corrections import Corrected
 from equimorph.manifold.crossing_frames import crossing_frames
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.tangents import cap_slopes, fold_slopes, placed_frames, tangent_frames
 
 ROOM = 2
@@ -85,6 +87,17 @@ class Vertices:
         return _Room(arrays, len(self))
 
 
+def gathered(parts: Sequence[Vertices], place: Int[np.ndarray, " V"]) -> Vertices:
+    """Vertices of several parts, part by part, each in its place."""
+    first, cuts = parts[0], np.cumsum([len(part) for part in parts])[:-1]
+    columns = {}
+    for name, column in first.columns.items():
+        columns[name] = np.empty((len(place), *column.shape[1:]), column.dtype)
+        for part, own in zip(parts, np.split(place, cuts), strict=True):
+            columns[name][own] = part.columns[name]
+    return replace(first, **columns, room=None)
+
+
 def vertices_of(
     setting: Setting,
     states: tuple[Float[np.ndarray, "V size"], Float[np.ndarray, "V P"]],
@@ -111,12 +124,36 @@ def vertices_of(
         own = np.flatnonzero(wanted)
         if len(own):
             out[own] = function(setting, z[own], p[own], frame[own])
-    place = embed(setting, z, p)
-    placed = placed_frames(setting, frame)
-    index, grid_vertex = others
-    lone = np.full(len(z), -1)
-    slopes = folds, caps, crossings
-    return Vertices(z, p, kinds, index, grid_vertex, place, frame, placed, *slopes, lone)
+    return _with_slopes(setting, states, kinds, others, frame, (folds, caps, crossings))
+
+
+def free_vertices(setting: Setting, at: Corrected) -> Vertices:
+    """Vertices inside sheets."""
+    count, d = at.frames.shape[:2]
+    kinds, nowhere = np.full(count, REFINED), np.full(count, -1)
+    slopes = np.zeros((3, count, d))
+    return _with_slopes(
+        setting,
+        (at.z, at.p),
+        kinds,
+        (at.index, nowhere),
+        at.frames,
+        (slopes[0], slopes[1], slopes[2]),
+    )
+
+
+def _with_slopes(
+    setting: Setting,
+    states: tuple[Float[np.ndarray, "V size"], Float[np.ndarray, "V P"]],
+    kinds: Int[np.ndarray, " V"],
+    others: tuple[Int[np.ndarray, " V"], Int[np.ndarray, " V"]],
+    frame: Float[np.ndarray, "V d full"],
+    slopes: tuple[Float[np.ndarray, "V d"], Float[np.ndarray, "V d"], Float[np.ndarray, "V d"]],
+) -> Vertices:
+    """Vertices with all that is known of them, in the coordinates of the embedding, too."""
+    place, placed = embed(setting, *states), placed_frames(setting, frame)
+    lone = np.full(len(kinds), -1)
+    return Vertices(*states, kinds, *others, place, frame, placed, *slopes, lone)
 
 
 def on_constraints(
