@@ -9,9 +9,10 @@ from equimorph.manifold import build, equilibrium_set
 from equimorph.manifold.seeds import seeds
 from equimorph.model import Box, Descriptor
 from oracles.complexes import assert_faithful, assert_folds_are_singular
-from oracles.polynomial import bead_on_a_circle
+from oracles.polynomial import Polynomial, Sum, bead_on_a_circle
 from oracles.surfaces import (
     cusp,
+    integral,
     sphere,
     swallowtail,
     three_sheets,
@@ -113,6 +114,35 @@ def test_sheets_that_the_seeds_lack_are_found_by_the_checks(monkeypatch):
     assert topology(eset) == (3, 3, 3)
     assert eset.audit.recovered >= 2
     assert eset.audit.clean
+
+
+def island(radius: float, places: tuple[float, ...]) -> Polynomial:
+    """x² + (a − a₀)² + (b − b₀)² + … = r², over as many parameters as there are places."""
+
+    def energy(x: Sum, *parameters: Sum) -> Sum:
+        force = x**2 - radius**2
+        for each, place in zip(parameters, places, strict=True):
+            force = force + (each - place) ** 2
+        return integral(force)
+
+    return Polynomial(energy, 1, ("a", "b", "c")[: len(places)])
+
+
+@pytest.mark.parametrize(
+    ("radius", "places", "euler"),
+    [(0.1, (0.1,), 0), (0.3, (0.1, 0.2), 2), (0.07, (0.1, 0.2), 2), (0.2, (0.1, 0.2, 0.3), 0)],
+)
+def test_islands_between_grid_lines_are_found(radius, places, euler):
+    """Intervals are 0.8 long: the random states of the checks find the island, bisection shows it.
+
+    Closed curve, sphere and three-sphere: Euler characteristic 0, 2 and 0.
+    """
+    names = ("a", "b", "c")[: len(places)]
+    box = Box(**dict.fromkeys(names, (-2.0, 2.0)))
+    eset = lifted(island(radius, places), box, intervals=(5,) * len(places), checks=1)
+    assert eset.audit.clean, eset.audit
+    assert topology(eset) == (1, euler, 0)
+    assert len(eset.folds) == (2 if len(places) == 1 else 1)
 
 
 @few

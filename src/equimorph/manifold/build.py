@@ -15,7 +15,7 @@ from equimorph.manifold.completeness import check, seeds_from
 from equimorph.manifold.crossing_curves import flood_crossings
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.flooding import flood
-from equimorph.manifold.mesh import Lines, coarse_grid, grid_lines, grid_mesh
+from equimorph.manifold.mesh import BaseMesh, Lines, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.pairing import Pairing, Setting, start_pairing
 from equimorph.manifold.questions import question_of_set
 from equimorph.manifold.refinement import check_accuracy, refined
@@ -39,11 +39,16 @@ COARSE = {1: 12, 2: 12, 3: 7}
 BISECTIONS = {1: 12, 2: 24, 3: 60}
 """Rounds by the number of free parameters: each cuts the longest edges of doubtful cells."""
 GRIDS = 3
-"""Grids that are tried, each with twice the intervals, until refinement succeeds everywhere."""
+"""Grids that are tried, each with twice the intervals, until refinement succeeds everywhere, and
+over one parameter until nothing is missing."""
 CHEAP = 4
 """Times the independent checks in diagrams over one parameter, and in symmetric slices."""
-SEARCHES = 4
+SEARCHES = 6
 """Rounds of independent checks; what one round finds missing is lifted before the next."""
+RECOVERED = 50
+"""Missing states, spread over all that were found, whose surroundings are lifted at once."""
+HIDDEN = 12
+"""Rounds of bisection around missing states that bring no new equilibria over grid vertices."""
 HOPELESS = 50
 """Doubtful grid cells, and four times what there were at first, beyond which bisection ends."""
 
@@ -85,9 +90,10 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
         Of the random generator; the result is deterministic.
     checks
         Random points, half of them below the set, half anywhere in the box, at which an independent
-        search looks for equilibria that the set lacks. They are added and lifted like seeds, and
-        other points are checked, until nothing is missing or four rounds are over. Four times as
-        many in diagrams over one parameter and in symmetric slices.
+        search looks for equilibria that the set lacks; four times as many in diagrams over one
+        parameter and in symmetric slices. Newton's method from 2000 random states, each over its
+        own point, looks besides. What is found is lifted like seeds, and other points are checked,
+        until nothing is missing or six rounds are over. None: no checks at all.
     accuracy
         Largest distance of the straight cells from the set, in the metric, to which the set is
         refined (see `refine`); it is left as it was lifted if not given. If some edges cannot be
@@ -120,10 +126,11 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     for number in range(GRIDS):
         given = (box, dict(fixed or {}), intervals)
         eset = _of_grid(setting, given, (seed, checks), progress, journal)
-        if accuracy is None:
-            break
-        eset = refined(eset, accuracy, progress, journal)
-        if eset.audit.unrefined == 0 or number == GRIDS - 1:
+        if accuracy is not None:
+            eset = refined(eset, accuracy, progress, journal)
+        # over one parameter no cells are bisected to find what they hide
+        hidden = eset.audit.missing if len(intervals) == 1 else 0
+        if eset.audit.unrefined + hidden == 0 or number == GRIDS - 1:
             break
         # odd numbers stay odd, which keeps lines of symmetry off the grid
         intervals = tuple(2 * n + n % 2 for n in intervals)
@@ -155,11 +162,13 @@ def _of_grid(
         cells, bisected = _lifted(pairing, finder, progress)
         eset = account(pairing, cells, given, bisected)
         found = check(eset, generator, _checks(checks, setting), progress, journal)
-        if found.lacking == 0 or number == SEARCHES - 1:
+        lacking = len(found.missing)
+        if lacking == 0 or number == SEARCHES - 1:
             break
-        recovered += found.lacking
-        pairing.points.over_vertices(*_recovered(pairing, found.missing))
-    audit = replace(eset.audit, checked=found.found, missing=found.lacking, recovered=recovered)
+        recovered += lacking
+        some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
+        _recover(pairing, found.missing[some])
+    audit = replace(eset.audit, checked=found.found, missing=lacking, recovered=recovered)
     return replace(eset, audit=audit)
 
 
@@ -226,12 +235,25 @@ def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[C
     return cells, bisected
 
 
-def _recovered(pairing: Pairing, missing: tuple[States, ...]) -> Seeds:
-    """Equilibria over the corners of grid cells around states that were missing."""
-    step = step_of("recover", *(states.z for states in missing))
-    seek = partial(seeds_from, pairing.setting, pairing.mesh, missing)
-    vertices, z, p, index = recalled(pairing.journal, step, seek)
-    return vertices, z, p, index
+def _recover(pairing: Pairing, missing: States) -> None:
+    """Enter equilibria over the corners of grid cells around states that were missing.
+
+    Cells are bisected where that brings nothing new: no corner lies below the piece of the set, or
+    its straight cells leave out the states, which are close to a curved fold.
+    """
+    for _ in range(HIDDEN):
+        known, mesh = pairing.points.count, pairing.mesh
+        step = step_of("recover", missing.z)
+        seek = partial(seeds_from, pairing.setting, mesh, missing)
+        *seeds, origin = recalled(pairing.journal, step, seek)
+        ids, _ = pairing.points.over_vertices(*seeds)
+        missing = missing[np.setdiff1d(np.arange(len(missing)), origin[ids >= known])]
+        if len(missing) == 0 or mesh.dimension == 1:
+            return
+        around = np.unique([mesh.locate(point) for point in missing.p[:, pairing.setting.free]])
+        sides = mesh.sides[around] if mesh.dimension == 2 else mesh.sides[mesh.faces[around]]
+        longest = _longest(mesh, sides.reshape(len(around), -1))
+        pairing.use_mesh(bisect(mesh, np.unique(longest), _off_zero(pairing.setting)))
 
 
 def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Seeds:
@@ -255,15 +277,16 @@ def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Se
 def _longest_edges(pairing: Pairing, cells: Cells) -> Int[np.ndarray, " n"]:
     """Longest edge of each doubtful grid cell, relative to the box."""
     mesh = pairing.mesh
-    size = np.ptp(mesh.vertices, axis=0)
     around = mesh.faces[cells.doubtful_tetrahedra]
     groups = [
         mesh.sides[cells.doubtful_triangles],
         mesh.sides[around].reshape(len(around), 12),
     ]
-    longest = []
-    for sides in groups:
-        ends = mesh.vertices[mesh.edges[sides]] / size
-        length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
-        longest.append(sides[np.arange(len(sides)), length.argmax(axis=1)])
-    return np.unique(np.concatenate(longest))
+    return np.unique(np.concatenate([_longest(mesh, sides) for sides in groups]))
+
+
+def _longest(mesh: BaseMesh, sides: Int[np.ndarray, "n sides"]) -> Int[np.ndarray, " n"]:
+    """Longest edge of each row, relative to the box."""
+    ends = mesh.vertices[mesh.edges[sides]] / np.ptp(mesh.vertices, axis=0)
+    length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
+    return np.asarray(sides[np.arange(len(sides)), length.argmax(axis=1)])

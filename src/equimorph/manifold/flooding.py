@@ -65,7 +65,8 @@ def _refuse_endless(pairing: Pairing) -> None:
         point = ", ".join(f"{name} = {value:g}" for name, value in zip(names, p, strict=True))
         raise InputError(
             f"`within` must leave at most {ENDLESS} equilibria over a point; got more over "
-            f"{point}. The set may wind for ever: bound a descriptor that grows as it winds."
+            f"{point}. Bound a descriptor: one that grows as it winds if the set winds for ever, "
+            "displacements if the structure has so many states."
         )
 
 

@@ -1,7 +1,7 @@
 """First equilibria over a few grid vertices, from which the set is flooded."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import ParameterLine, TraceOptions, search_points
 from equimorph.equilibria.outcome import follow
@@ -40,7 +40,7 @@ def seeds(
     vertices, z = _from_natural_states(setting, _spread(mesh))
     searched_v, searched_z = _from_search(setting, mesh, searchable, seed)
     vertices, z = np.concatenate([vertices, searched_v]), np.concatenate([z, searched_z])
-    return polished(setting, mesh, vertices, z)
+    return polished(setting, mesh, vertices, z)[0]
 
 
 def polished(
@@ -48,15 +48,15 @@ def polished(
     mesh: BaseMesh,
     vertices: Int[np.ndarray, " some"],
     z: Float[np.ndarray, "some size"],
-) -> Seeds:
-    """Those of the states over vertices that are resolved equilibria, polished, with index."""
+) -> tuple[Seeds, Bool[np.ndarray, " some"]]:
+    """Those of the states over vertices that are resolved equilibria, polished; and which."""
     p = setting.parameters(mesh.vertices[vertices])
     # a line of no length polishes the points and counts their index
     still = ParameterLine(setting.structure, p, np.zeros_like(p))
     index = setting.structure.index(z, p)
     direct = lift_directly(still, z, index, setting.constraints)
     good = direct.good & setting.structure.resolved(z, p)
-    return vertices[good], direct.z[good], p[good], index[good]
+    return (vertices[good], direct.z[good], p[good], index[good]), good
 
 
 def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n d"]]:

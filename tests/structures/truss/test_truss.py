@@ -191,3 +191,24 @@ def test_parameters_end_where_a_bar_would_vanish():
     with pytest.raises(em.InputError, match=r"`a` must be .* between -0.5 and 1"):
         truss.natural_state(a=-0.5)
     assert truss.elevation.name == "displacement(B,x)"
+
+
+def test_states_of_a_shallow_dome_are_found_close_to_it():
+    """Star dome of 24 bars, unloaded: as built it is an equilibrium, among many others.
+
+    Guesses as large as the dome tangle its bars, and lead nowhere.
+    """
+    joints, bars = {"C": (0.0, 0.0, 0.08)}, []
+    for k in range(6):
+        inner, outer = np.pi / 3 * k, np.pi / 3 * (k + 0.5)
+        joints[f"I{k}"] = (0.25 * np.cos(inner), 0.25 * np.sin(inner), 0.06)
+        joints[f"O{k}"] = (0.43 * np.cos(outer), 0.43 * np.sin(outer), 0.0)
+        bars += [("C", f"I{k}"), (f"I{k}", f"I{(k + 1) % 6}")]
+        bars += [(f"I{k}", f"O{k}"), (f"I{k}", f"O{(k - 1) % 6}")]
+    supports = {f"O{k}": "xyz" for k in range(6)}
+    dome = Truss(joints, bars, supports, {"F": {"C": (0.0, 0.0, -1.0)}})
+    with unchecked():
+        found = em.find_equilibria(dome, {"F": 0.0}, starts=60, runs=1)
+    assert len(found) > 50
+    assert np.abs(found.z).max(axis=1).min() < 1e-12
+    assert found.residual.max() < 1e-12

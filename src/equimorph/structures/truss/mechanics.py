@@ -24,6 +24,8 @@ Entries = Float[np.ndarray, "lanes entries"]
 
 SHORTEST = 1e-6
 """Length of a bar, relative to its rest length, at which its joints count as one."""
+SMALLEST = 0.02
+"""Least size of guesses, relative to the truss."""
 
 
 class TrussMechanics(DiscreteStructure):
@@ -161,11 +163,16 @@ class TrussMechanics(DiscreteStructure):
     # --- states ---------------------------------------------------------------------------------
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Displacements within the size of the truss along each axis."""
+        """Displacements within the size of the truss along each axis, half of them much smaller.
+
+        A shallow truss of many bars has its other states close to where it was built.
+        """
         extent = np.ptp(self.network.places, axis=0)
         reach = np.broadcast_to(np.maximum(extent, 0.2 * extent.max()), self.network.held.shape)
         shape = (len(p), self.unknowns)
-        return np.asarray(generator.uniform(-1.0, 1.0, shape) * reach[~self.network.held])
+        size = np.exp(generator.uniform(np.log(SMALLEST), 0.0, (len(p), 1)))
+        size[::2] = 1.0
+        return np.asarray(size * generator.uniform(-1.0, 1.0, shape) * reach[~self.network.held])
 
     def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
         """No bar has shrunk to a point, and all rest lengths are positive."""
