@@ -187,6 +187,47 @@ def test_refined_arch_does_not_depend_on_the_grid(intervals, refined_arch, fine_
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("load", "cap", "intervals", "accuracy"),
+    [
+        ("left-half", 20, (51, 19), 0.05),
+        ("uniform", 20, (42, 50), 0.02),
+        ("uniform", 20, (40, 21), 0.05),
+        ("uniform", 10, (31, 33), 0.05),
+        ("left-half", 20, (31, 33), 0.02),
+        ("left-half", 20, (6, 50), 0.02),
+        ("left-half", 40, (42, 50), 0.02),
+    ],
+)
+def test_arches_on_odd_grids_are_faithful_without_slivers(load, cap, intervals, accuracy):
+    """Of a sweep over random grids: with a hole before, cells turned over, or angles below 10°."""
+    arch = Rod(load=load)
+    given = {"fixed": {"q": 2.5}, "within": [arch.max_curvature <= cap], "checks": 0}
+    with unchecked():
+        box = Box(Theta=(0.2, 2.5), Delta=(-2, 2))
+        eset = equilibrium_set(arch, box, intervals=intervals, **given)
+        fine = refine(eset, accuracy)
+    assert_faithful(fine)
+    assert_upright(fine)
+    assert topology(fine) == topology(eset)
+    assert fine.audit.smallest_angle > 10.0
+    assert fine.audit.deviation <= accuracy
+
+
+@pytest.mark.slow
+def test_a_fold_hidden_in_a_cell_ends_refinement_there():
+    """A curve of the constraint meets a fold that the grid does not show: no two edges go on."""
+    arch = Rod(load="left-half")
+    given = {"fixed": {"q": 2.5}, "within": [arch.max_curvature <= 40], "checks": 0}
+    with unchecked():
+        box = Box(Theta=(0.2, 2.5), Delta=(-2, 2))
+        eset = refine(equilibrium_set(arch, box, intervals=(51, 19), **given), 0.02)
+    assert 0 < eset.audit.unrefined < 60
+    assert not eset.audit.clean
+    assert len(eset.points) < 4000
+
+
+@pytest.mark.slow
 def test_a_grid_too_coarse_for_the_accuracy_is_made_finer():
     """Between its folds near (0.87, 0) edges of 6 × 11 intervals cannot be bisected."""
     arch = Rod()
@@ -386,6 +427,21 @@ def test_a_patch_goes_back_as_it_is(coarse):
     assert (adjacency(better.cells).counts <= 2).all()
     assert euler_characteristic(better.cells) == euler_characteristic(coarse.cells)
     assert_sides_are_known(better)
+
+
+def test_a_patch_of_a_patch_keeps_both_rims(coarse):
+    """The rim of the larger one comes back with what the smaller one makes of its cells."""
+    near = np.zeros(len(coarse.vertices), bool)
+    near[coarse.cells[5]] = True
+    outer = patch_around(coarse, near, 4).fabric
+    inner = patch_around(outer, near, 3)
+    assert ((inner.fabric.marks & RIM) > 0).sum() > 0
+    back = inner.replaced(inner.fabric)
+    for whole, again in ((outer.cells, back.cells), (outer.facets, back.facets)):
+        assert sorted(map(tuple, whole.tolist())) == sorted(map(tuple, again.tolist()))
+    for fabric in (outer, inner.fabric):
+        rims = fabric.facets[(fabric.marks & RIM) > 0]
+        assert (fabric.edge_marks(np.sort(rims, axis=1)) & RIM).all()
 
 
 def test_cusps_are_not_put_on_the_rim_of_a_patch():

@@ -58,10 +58,10 @@ class Edges:
     def deviating(self, tolerance: float) -> Bool[np.ndarray, " E"]:
         """Edges that should be bisected now, and can be.
 
-        Where folds and constraints bulge far out between their vertices, they come first: edges
-        beside them would cross them.
+        Folds and constraints come first: they bulge out between their vertices, and edges beside
+        them would cross them.
         """
-        first = (self.error > COARSE * tolerance) & ((self.marks & CURVES) > 0)
+        first = (self.error > tolerance) & ((self.marks & CURVES) > 0)
         for wanted in (first | self.pressing, self.error > tolerance, self.uneven):
             own = wanted & ~self.stuck
             if own.any():

@@ -142,16 +142,23 @@ class Fabric:
             flat = np.ascontiguousarray(flat)
         return np.asarray(volumes(flat[cells]) * sense < 0.0)
 
-    def backward(self) -> Bool[np.ndarray, " C"]:
+    @property
+    def parity(self) -> Int[np.ndarray, " C"]:
+        """Sense of triangles on the set: that over the parameters changes with their index."""
+        return np.asarray(self.sense * np.where(self.cell_index % 2 == 0, 1, -1))
+
+    def backward(
+        self, cells: Int[np.ndarray, "n 3"], parity: Int[np.ndarray, " n"]
+    ) -> Bool[np.ndarray, " n"]:
         """Which triangles look backwards, on average, in the tangent planes at their corners."""
-        cells, store = np.ascontiguousarray(self.cells), self.vertices
+        cells, store = np.ascontiguousarray(cells), self.vertices
         total = np.empty(len(cells))
         tasks = [
             partial(look_back, store.place, store.rows, cells[at:stop], total[at:stop])
             for at, stop in shares(len(cells))
         ]
         deque(results_of(tasks), maxlen=0)
-        return np.asarray(total * self.sense * np.where(self.cell_index % 2 == 0, 1, -1) <= 0.0)
+        return np.asarray(total * parity <= 0.0)
 
     def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
         """Cut edges at new vertices, and all cells and facets around them.

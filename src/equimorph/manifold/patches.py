@@ -51,8 +51,12 @@ def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Pa
     rest = fabric.only(~own)
     beyond = np.zeros_like(near)
     beyond[rest.cells] = True
-    rim = _pairs_between(rest.cells, near & beyond)
-    shared = near[fabric.facets].all(axis=1)
+    within = near[fabric.facets].all(axis=1)
+    # the rim of a patch that this one is a part of stays that of the larger one, too
+    outer = (fabric.marks & RIM) > 0
+    rims = [_pairs_between(rest.cells, near & beyond), fabric.facets[within & outer]]
+    rim = np.unique(np.sort(np.concatenate(rims), axis=1), axis=0)
+    shared = within & ~outer
     facets, marks = fabric.facets[shared], fabric.marks[shared]
     outside = _in_all_sheets(fabric, beyond & (near | (fabric.vertices.shared >= 0)))
     held = ((marks & ON_CROSSING) > 0) & outside[facets].any(axis=1)

@@ -26,8 +26,8 @@ PLACES = (0.5, 0.3, 0.7)
 """Where along an edge a vertex is tried, one place after the other."""
 HOPELESS = 60
 """Failed bisections, and a fiftieth of all edges, beyond which refinement ends."""
-MOST = 2_000_000
-"""Vertices beyond which refinement ends."""
+MOST = 4_000_000
+"""Cells beyond which refinement ends."""
 LOCAL = 40
 """Where one in so many edges deviates at most, what is around these is worked on alone."""
 RINGS = 4
@@ -35,9 +35,13 @@ RINGS = 4
 
 
 def settled(
-    fabric: Fabric, tolerance: float, memory: Memory, progress: Progress | None = None
+    fabric: Fabric,
+    tolerance: float,
+    memory: Memory,
+    progress: Progress | None = None,
+    most: int = MOST,
 ) -> Fabric:
-    """Bisect and flip until no edge deviates that can be bisected.
+    """Bisect and flip until no edge deviates that can be bisected, or there are too many cells.
 
     Without a sink for progress all at once, even if little is to be done.
     """
@@ -46,7 +50,7 @@ def settled(
         edges = known(fabric, memory)
         hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
         todo = ((edges.error > tolerance) | edges.pressing | edges.uneven) & ~edges.stuck
-        if hopeless or len(fabric.vertices) > MOST or not todo.any():
+        if hopeless or len(fabric.cells) > most or not todo.any():
             break
         if progress is not None and _few(fabric, todo):
             fabric = _settled_around(fabric, edges.ends[todo], tolerance, memory)

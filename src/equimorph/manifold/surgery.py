@@ -262,6 +262,8 @@ def _spread(
 def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"], short: float) -> Float[np.ndarray, " m"]:
     """How many slender or overturned triangles fewer there are if vertices go into neighbours.
 
+    Overturned over the parameters or as the tangent planes see them.
+
     And, less than one, by how much the smallest angle around it grows. Minus infinity where a
     triangle would fold over, get much more slender or much longer.
     """
@@ -269,7 +271,7 @@ def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"], short: float) -> Float
     going = np.zeros(base, bool)
     going[moves[:, 0]] = True
     chosen = going[fabric.cells].any(axis=1)
-    cells, sense = fabric.cells[chosen], fabric.sense[chosen]
+    cells, sense, parity = fabric.cells[chosen], fabric.sense[chosen], fabric.parity[chosen]
     order = np.argsort(cells.ravel(), kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(cells.ravel(), minlength=base))])
     row, at = _spread(starts, moves[:, 0])
@@ -281,8 +283,11 @@ def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"], short: float) -> Float
     old_angle, new_angle = _angles(fabric, old), _angles(fabric, new[stays])
     np.minimum.at(before, row, old_angle)
     np.minimum.at(after, row[stays], new_angle)
-    sense = sense[order[at] // 3]
-    old_over, new_over = fabric.overturned(old, sense), fabric.overturned(new[stays], sense[stays])
+    sense, parity = sense[order[at] // 3], parity[order[at] // 3]
+    old_over, new_over = (
+        fabric.overturned(each, sense[own]) | fabric.backward(each, parity[own])
+        for each, own in ((old, np.ones(len(old), bool)), (new[stays], stays))
+    )
     fewer = np.bincount(row[(old_angle < SLENDER) | old_over], minlength=len(moves))
     fewer -= np.bincount(row[stays][(new_angle < SLENDER) | new_over], minlength=len(moves))
     good = np.ones(len(moves), bool)
