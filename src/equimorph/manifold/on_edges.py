@@ -36,9 +36,9 @@ ALONG = 0.5
 def chunks(
     chosen: Int[np.ndarray, " n"], marks: Int[np.ndarray, " E"]
 ) -> list[Int[np.ndarray, " k"]]:
-    """Edges in chunks of equal marks."""
+    """Edges in chunks of equal marks; those on curves first, because they take longest."""
     parts: list[Int[np.ndarray, " k"]] = []
-    for mark in np.unique(marks[chosen]).tolist():
+    for mark in np.unique(marks[chosen])[::-1].tolist():
         own = chosen[marks[chosen] == mark]
         parts.extend(own[at : at + CHUNK] for at in range(0, len(own), CHUNK))
     return parts

@@ -290,17 +290,20 @@ def _gains(fabric: Fabric, moves: Int[np.ndarray, "m 2"], short: float) -> Float
     )
     fewer = np.bincount(row[(old_angle < SLENDER) | old_over], minlength=len(moves))
     fewer -= np.bincount(row[stays][(new_angle < SLENDER) | new_over], minlength=len(moves))
-    good = np.ones(len(moves), bool)
-    turned = _turned(fabric, old[stays], new[stays]) | (new_over & ~old_over[stays])
-    good[row[stays][turned]] = False
     reach, longest = np.zeros(len(moves)), np.zeros(len(moves))
     np.maximum.at(reach, row, _longest(fabric, old))
     np.maximum.at(longest, row[stays], _longest(fabric, new[stays]))
     place = fabric.vertices.place
     tiny = np.linalg.norm(place[moves[:, 0]] - place[moves[:, 1]], axis=1) < short * reach
-    good &= (longest <= LONGER * reach) & np.isfinite(after)
+    good = (longest <= LONGER * reach) & np.isfinite(after)
     good &= after >= np.where(tiny, MUCH_WORSE, WORSE) * before
-    return np.where(good, fewer + tiny + (after - before) / np.pi, -np.inf)
+    good[row[stays][new_over & ~old_over[stays]]] = False
+    gain = np.where(good, fewer + tiny + (after - before) / np.pi, -np.inf)
+    # looked at last, and only where that matters: copies of a move count together
+    wanted = good & ((gain > 0.0) | (fabric.vertices.shared[moves[:, 0]] >= 0))
+    some = np.flatnonzero(stays & wanted[row])
+    gain[row[some[_turned(fabric, old[some], new[some])]]] = -np.inf
+    return gain
 
 
 def _turned(fabric: Fabric, old: Triangles, new: Triangles) -> Bool[np.ndarray, " n"]:

@@ -6,8 +6,7 @@ import h5py
 
 from equimorph.charts import Atlas, Chart
 from equimorph.storage import chart_group
-from equimorph.storage.files import write_bytes
-from equimorph.storage.hdf import content, get_json, opened, put_json
+from equimorph.storage.hdf import get_json, opened, put_json, write
 from equimorph.structures import from_identity
 
 FORMAT = "equimorph chart"
@@ -36,7 +35,7 @@ def save_chart(path: str | Path, chart: Chart | Atlas) -> Path:
         put_json(file, STRUCTURE, chart.eset.structure.identity())
         chart_group.write(file.create_group(CHART), chart)
 
-    return write_bytes(Path(path), content(FORMAT, VERSION, fill))
+    return write(Path(path), FORMAT, VERSION, fill)
 
 
 def load_chart(path: str | Path) -> Chart | Atlas:

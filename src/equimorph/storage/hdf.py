@@ -10,6 +10,7 @@ import io
 import json
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib.metadata import version as release
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,11 @@ import numpy as np
 from jaxtyping import Shaped
 
 from equimorph.errors import InputError
+from equimorph.linalg.lanes import in_background
+from equimorph.storage.files import replacing
 
+BLOCK = 1 << 24
+"""Bytes by which files in memory grow."""
 MARK = b"equimorph-sha256"
 """Precedes the checksum at the end of a file."""
 
@@ -59,7 +64,7 @@ def put(
         # digits of computed numbers are random: compressing them saves a tenth in twenty times
         filters |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
     kind = h5py.string_dtype() if array.dtype.kind in "OU" else array.dtype
-    dataset = group.create_dataset(name, data=array.astype(kind), dtype=kind, **filters)
+    dataset = group.create_dataset(name, data=array.astype(kind, copy=False), dtype=kind, **filters)
     if meaning:
         dataset.attrs["long_name"] = meaning
     for axis, (dimension, size) in enumerate(zip(dimensions, array.shape, strict=True)):
@@ -86,27 +91,31 @@ def get_json(group: h5py.Group, name: str) -> Any:
 
 
 def content(kind: str, version: int, fill: Callable[[h5py.File], None]) -> bytes:
-    """Return the content of a new HDF5 file of ours.
+    """Return the content of a new HDF5 file of ours, with its checksum; see `write`."""
+    image = _image(kind, version, fill)
+    return b"".join((image, MARK, hashlib.sha256(image).digest()))
+
+
+def write(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None]) -> Path:
+    """Write a new HDF5 file of ours in one step.
 
     It is made in memory: on a full disk the HDF5 library fails late and leaves a wreck open, while
     bytes are written or not.
 
     Parameters
     ----------
+    path
+        Name of the file.
     kind, version
         What `opened` checks.
     fill
         Puts the groups into the file.
     """
-    with h5py.File("memory", "w", driver="core", backing_store=False) as file:
-        file.attrs.update(format=kind, version=version, release=release("equimorph"))
-        fill(file)
-        file.flush()
-        return _sealed(file.id.get_file_image())
+    return _write_sealed(path, _image(kind, version, fill))
 
 
-def extended(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None]) -> bytes:
-    """Return the content of a file of ours with more in it.
+def extend(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None]) -> Path:
+    """Put more into a file of ours, in one step.
 
     Parameters
     ----------
@@ -127,7 +136,27 @@ def extended(path: Path, kind: str, version: int, fill: Callable[[h5py.File], No
         memory.write(_unsealed(path.read_bytes()))
     with h5py.File(memory, "r+") as file:
         fill(file)
-    return _sealed(memory.getvalue())
+    return _write_sealed(path, memory.getvalue())
+
+
+def _image(kind: str, version: int, fill: Callable[[h5py.File], None]) -> bytes:
+    with h5py.File("memory", "w", driver="core", backing_store=False, block_size=BLOCK) as file:
+        file.attrs.update(format=kind, version=version, release=release("equimorph"))
+        fill(file)
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def _write_sealed(path: Path, image: bytes) -> Path:
+    """Write content, and behind it its checksum, which another thread finds meanwhile."""
+    checksum = hashlib.sha256()
+    (summed,) = in_background([partial(checksum.update, image)])
+    with replacing(path) as incomplete:
+        incomplete.write_bytes(image)
+        summed.result()
+        with incomplete.open("ab") as file:
+            file.write(MARK + checksum.digest())
+    return path
 
 
 @contextmanager
@@ -164,17 +193,13 @@ def opened(path: Path, kind: str, version: int) -> Generator[h5py.File]:
         ) from error
 
 
-def _sealed(image: bytes) -> bytes:
-    """Content with its checksum."""
-    return b"".join((image, MARK, hashlib.sha256(image).digest()))
-
-
 def _unsealed(content: bytes) -> bytes:
     """Content without its checksum, if it has one, which must be right."""
     start = len(content) - len(MARK) - hashlib.sha256().digest_size
     if start < 0 or content[start : start + len(MARK)] != MARK:
         return content
-    if _sealed(content[:start]) != content:
+    seal = memoryview(content)[start + len(MARK) :]
+    if hashlib.sha256(memoryview(content)[:start]).digest() != seal:
         raise ValueError("the checksum is another one")
     return content[:start]
 

@@ -18,8 +18,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.storage import map_group, route_group, set_group, states_group
-from equimorph.storage.files import write_bytes
-from equimorph.storage.hdf import content, extended, get_json, opened, put_json
+from equimorph.storage.hdf import extend, get_json, opened, put_json, write
 from equimorph.storage.parts import PARTS, Part
 from equimorph.storage.vtkhdf import link_grid
 from equimorph.structures import States, Structure, from_identity
@@ -111,7 +110,7 @@ def write_results(  # noqa: PLR0913  # one for each kind of content
                 group.attrs[KIND] = answer.part.kind
                 answer.part.write(group, answer.value)
 
-    return write_bytes(Path(path), content(FORMAT, VERSION, fill))
+    return write(Path(path), FORMAT, VERSION, fill)
 
 
 def append_results(
@@ -152,7 +151,7 @@ def append_results(
             raise InputError(f"`{path}` must hold results of the same structure; got another one.")
         _add(file, routes or {}, equilibria, maps or {})
 
-    return write_bytes(path, extended(path, FORMAT, VERSION, fill))
+    return extend(path, FORMAT, VERSION, fill)
 
 
 def save_set(path: str | Path, eset: EquilibriumSet, height: Descriptor | None = None) -> Path:
