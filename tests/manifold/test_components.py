@@ -140,7 +140,7 @@ def test_pieces_can_be_read(tilted):
 
 
 def test_wrong_questions_about_pieces_are_refused(spring_set, tilted):
-    with unchecked(), pytest.raises(InputError, match="`within` must hold constraints"):
+    with unchecked(), pytest.raises(InputError, match="`within` must be a list of constraints"):
         components(spring_set, within=["angle <= 1"])
     with pytest.raises(IndexError, match="2 pieces; got number 2"):
         tilted[2]

@@ -8,6 +8,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Rod, Spring
+from typecheck import unchecked
 
 
 @pytest.mark.parametrize(
@@ -53,11 +54,41 @@ from equimorph.structures import Rod, Spring
             {"intervals": (4, 5)},
             "`intervals` must be one whole number >= 2; got (4, 5).",
         ),
+        (
+            Box(F=(-1, 1)),
+            {"intervals": 4.5},
+            "`intervals` must be one whole number >= 2; got 4.5.",
+        ),
+        (
+            {"F": (-1, 1)},
+            {},
+            "`box` must be a box, like `Box(q=(0.0, 2.5))`; got {'F': (-1, 1)}.",
+        ),
+        (
+            Box(F=(-1, 1)),
+            {"fixed": 0.5},
+            '`fixed` must give values by name, like `{"q": 2.5}`; got 0.5.',
+        ),
+        (Box(F=(-1, 1)), {"checks": -1}, "`checks` must be a whole number >= 0; got -1."),
+        (Box(F=(-1, 1)), {"seed": 0.5}, "`seed` must be a whole number >= 0; got 0.5."),
+        (
+            Box(F=(-1, 1)),
+            {"accuracy": "fine"},
+            "`accuracy` must be positive and finite; got 'fine'.",
+        ),
     ],
 )
 def test_wrong_problem_is_refused_by_name(box, options, message):
-    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+    with unchecked(), pytest.raises(InputError, match=f"^{re.escape(message)}$"):
         equilibrium_set(Spring(), box, **options)
+
+
+@pytest.mark.parametrize("within", ["angle <= 1", ["angle <= 1"], [Spring().angle], 3.0])
+def test_what_is_no_constraint_is_refused(within):
+    said = r"^`within` must be a list of constraints, like `\[rod.max_curvature <= 6\]`; got "
+    for each in (within, Spring().angle <= 1):
+        with unchecked(), pytest.raises(InputError, match=said):
+            equilibrium_set(Spring(), Box(F=(-1, 1)), within=each)
 
 
 def test_reversed_bounds_are_refused_by_name():

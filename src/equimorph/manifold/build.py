@@ -9,6 +9,7 @@ from jaxtyping import Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import account
+from equimorph.manifold.asked import check_accuracy, check_box, constraints, whole_number
 from equimorph.manifold.bisection import bisect
 from equimorph.manifold.cells import CellFinder, Cells
 from equimorph.manifold.completeness import check, seeds_from
@@ -18,7 +19,7 @@ from equimorph.manifold.flooding import flood
 from equimorph.manifold.mesh import BaseMesh, Lines, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.pairing import Pairing, Setting, start_pairing
 from equimorph.manifold.questions import question_of_set
-from equimorph.manifold.refinement import check_accuracy, refined
+from equimorph.manifold.refinement import refined
 from equimorph.manifold.seeds import Seeds, is_symmetric, seeds
 from equimorph.model import (
     Box,
@@ -113,13 +114,16 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
     ------
     InputError
         For a box in more than three parameters, unknown names, parameters both free and fixed,
-        values without meaning, an accuracy that is not positive, or a journal of something else.
+        values without meaning, an accuracy that is not positive, no constraints in `within`, or a
+        journal of something else.
     """
     progress = progress or Silent()
+    check_box(box, fixed)
     if accuracy is not None:
         check_accuracy(accuracy)
+    seed, checks = whole_number("seed", seed, 0), whole_number("checks", checks, 0)
     intervals = _intervals(box, intervals)
-    setting = _setting(structure, box, fixed or {}, tuple(within))
+    setting = _setting(structure, box, fixed or {}, constraints(within))
     if journal is not None:
         journal.begin(question_of_set(setting, box, intervals, (seed, checks, accuracy)))
     journal = journal or Forgetful()
@@ -185,10 +189,14 @@ def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:
         )
     if intervals is None:
         return INTERVALS[d]
-    if len(intervals) != d or any(int(n) != n or n < 2 for n in intervals):
+    try:
+        whole = tuple(whole_number("intervals", n, 2) for n in intervals)
+    except (TypeError, InputError):
+        whole = ()
+    if len(whole) != d:
         number = ("one whole number", "two whole numbers", "three whole numbers")[d - 1]
         raise InputError(f"`intervals` must be {number} >= 2; got {intervals!r}.")
-    return tuple(map(int, intervals))
+    return whole
 
 
 def _setting(

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.errors import InputError
+from equimorph.manifold.asked import constraints
 from equimorph.manifold.equilibrium_set import Component, EquilibriumSet
 from equimorph.manifold.levels import cell_sizes, part, restricted
 from equimorph.manifold.locate import cell_of
@@ -63,6 +64,8 @@ class Components:
         InputError
             If the state has other fixed parameters than the set, or lies beyond its box.
         """
+        if state.structure.signature != self.eset.structure.signature:
+            raise InputError(f"`state` must be of the set's structure; got {state!r}.")
         here = {name: state[name] for name in self.eset.names}
         if not np.allclose(self.eset.parameters_at(here), state.p, rtol=0, atol=1e-9):
             raise InputError(
@@ -134,14 +137,10 @@ def components(
     >>> len(components(eset, stable=True, within=[spring.angle >= 0]))
     1
     """
-    for each in within:
-        if not isinstance(each, Constraint):
-            raise InputError(
-                f"`within` must hold constraints, like `[rod.max_curvature <= 6]`; got {each!r}."
-            )
+    rules = constraints(within)
     known = part(eset, eset.cell_index == 0) if stable else eset
     before = known.audit.unrefined
-    for each in dict.fromkeys(within):
+    for each in dict.fromkeys(rules):
         if each not in known.constraints and len(known.cells):
             known = restricted(known, each)
     sizes = np.bincount(known.component, cell_sizes(known), len(known.components))

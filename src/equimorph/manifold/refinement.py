@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
+from equimorph.manifold.asked import check_accuracy
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.corners import smallest_free_angle
 from equimorph.manifold.deviations import Memory, known
@@ -101,12 +101,6 @@ def refined(
         smallest_free_angle=smallest_free_angle(fabric),
     )
     return replace(out, audit=quality)
-
-
-def check_accuracy(accuracy: float) -> None:
-    """Refuse what is no accuracy."""
-    if not 0.0 < accuracy < np.inf:
-        raise InputError(f"`accuracy` must be positive and finite; got {accuracy!r}.")
 
 
 def _changed(before: Audit, after: Audit) -> int:

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Int
 
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.errors import InputError
+from equimorph.manifold.asked import whole_number
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.topology import adjacency, flags_of, pieces
 from equimorph.model import Progress, Silent
@@ -113,15 +114,14 @@ def snap_graph(
     InputError
         If `samples` is not a whole number of at least two.
     """
-    if int(samples) != samples or samples < 2:
-        raise InputError(f"`samples` must be a whole number >= 2; got {samples!r}.")
+    samples = whole_number("samples", samples, 2)
     progress = progress or Silent()
     stable = tuple(k for k, stratum in enumerate(eset.strata) if stratum.index == 0)
     edges = [(k, piece) for k in stable for piece in _pieces(eset, k)]
     snaps = []
     for number, (source, piece) in enumerate(edges):
         progress.report("snaps", number, len(edges))
-        snaps.extend(_Edge(eset, source, piece).snaps(int(samples)))
+        snaps.extend(_Edge(eset, source, piece).snaps(samples))
     return SnapGraph(eset, stable, tuple(snaps))
 
 
