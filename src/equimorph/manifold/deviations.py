@@ -34,6 +34,8 @@ OBTUSE = float(np.cos(np.radians(120.0)))
 """Cosine of the largest angle opposite to an edge on a crossing."""
 UNEVEN = 4.0
 """How much longer than an edge on a crossing those of the same triangle may be."""
+SIX = 6
+"""Edges of a tetrahedron."""
 FEW = 50
 """Fewer than one in so many edges are bisected all at once."""
 
@@ -59,9 +61,16 @@ class Edges:
         """Edges that should be bisected now, and can be.
 
         Folds and constraints come first: they bulge out between their vertices, and edges beside
-        them would cross them.
+        them would cross them. Of tetrahedra the curves in which these surfaces and the sides of the
+        box meet come before all else, and then surfaces that bulge far out.
         """
         first = (self.error > tolerance) & ((self.marks & CURVES) > 0)
+        if self.of_cells.shape[1] == SIX:
+            on = self.marks & ~(HOLE | RIM)
+            corners = (self.error > tolerance) & (on & (on - 1) > 0) & ~self.stuck
+            if corners.any():
+                return np.asarray(corners)
+            first &= self.error > COARSE * tolerance
         for wanted in (first | self.pressing, self.error > tolerance, self.uneven):
             own = wanted & ~self.stuck
             if own.any():
@@ -80,21 +89,24 @@ class Memory:
     stuck: set[tuple[int, int]] = field(default_factory=set)
     cut: Int[np.ndarray, "m 2"] = field(default_factory=lambda: np.zeros((0, 2), int))
     """Edges that were bisected: flips must not bring them back."""
+    put: Int[np.ndarray, " m"] = field(default_factory=lambda: np.zeros(0, int))
+    """The vertices that were put on them."""
     failures: int = 0
     lost: set[tuple[int, int]] = field(default_factory=set)
     """Edges on curves that do not lead from one end to the other: something is hidden there."""
 
+    def barred(self, fabric: Fabric) -> tuple[Int[np.ndarray, "n 2"], Int[np.ndarray, " n"]]:
+        """Edges that were bisected, with the vertices on them, where these are there."""
+        live = np.zeros(len(fabric.vertices), bool)
+        live[fabric.cells] = True
+        return self.cut[live[self.put]], self.put[live[self.put]]
+
     def among(self, inside: Bool[np.ndarray, " V"]) -> "Memory":
         """What is remembered of edges between some of the vertices; deviations all."""
         stuck = {(a, b) for a, b in self.stuck if inside[a] and inside[b]}
-        return Memory(
-            self.journal,
-            self.keys,
-            self.error,
-            stuck,
-            self.cut[inside[self.cut].all(axis=1)],
-            lost=set(self.lost),
-        )
+        own = inside[self.cut].all(axis=1)
+        cut, put, lost = self.cut[own], self.put[own], set(self.lost)
+        return Memory(self.journal, self.keys, self.error, stuck, cut, put, lost=lost)
 
     def copy(self) -> "Memory":
         """What is remembered by now."""
@@ -106,7 +118,9 @@ class Memory:
         self.keys, self.error = keys, np.concatenate([self.error, inner.error])[at]
         beyond = {(a, b) for a, b in self.stuck if not (inside[a] and inside[b])}
         self.stuck = beyond | inner.stuck
-        self.cut = np.concatenate([self.cut[~inside[self.cut].all(axis=1)], inner.cut])
+        kept = ~inside[self.cut].all(axis=1)
+        self.cut = np.concatenate([self.cut[kept], inner.cut])
+        self.put = np.concatenate([self.put[kept], inner.put])
         self.failures += inner.failures
         self.lost |= inner.lost
 
@@ -122,7 +136,7 @@ def known(fabric: Fabric, memory: Memory) -> Edges:
     error = np.empty(len(keys))
     error[old] = memory.error[at[old]]
     new = np.flatnonzero(~old)
-    error[new] = _deviations(fabric, ends[new], marks[new])
+    error[new] = deviations(fabric, ends[new], marks[new])
     memory.keys, memory.error = keys, error
     length = np.empty(len(ends))
     length[of_cells] = np.sqrt(fabric.squared)
@@ -190,7 +204,7 @@ def _beside_crossings(
     return obtuse, long
 
 
-def _deviations(
+def deviations(
     fabric: Fabric, ends: Int[np.ndarray, "E 2"], marks: Int[np.ndarray, " E"]
 ) -> Float[np.ndarray, " E"]:
     """How far the set is from straight edges."""

@@ -37,7 +37,7 @@ CURVES = ON_FOLD | ON_CAP | ON_CROSSING
 HOLE, RIM = 1 << 20, 1 << 21
 """Marks of facets on the boundary that lie on nothing: the set is incomplete there, or cells beyond
 are set apart."""
-TRIANGLES = 2
+TRIANGLES, TETRAHEDRA = 2, 3
 """Dimension of their cells."""
 AT_ONCE = 4096
 """Cells or edges that one thread looks at in one go."""
@@ -52,7 +52,8 @@ class Fabric:
 
     box: lower and upper bounds of the free parameters; squared: lengths of the sides of the cells,
     squared, in the order 01, 02, 12 and so on; sense: sign that the areas of triangles in the free
-    parameters have, unless they are overturned; empty in other dimensions.
+    parameters have, unless they are overturned; empty in other dimensions. Corners of tetrahedra
+    are so ordered that all are oriented alike, and most project as the parity of their index says.
     """
 
     setting: Setting
@@ -260,6 +261,7 @@ def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
         for pieces in (eset.crossings, eset.folds)
     )
     cells, origin = parted(eset.cells, crossings, len(eset.points))
+    cells = cells.copy()
     z, p = eset.points.z[origin], eset.points.p[origin]
     whole = adjacency(cells)
     sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
@@ -277,6 +279,9 @@ def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
     marks[outer] |= np.where(marks[outer] > 0, outer_marks & ~HOLE, outer_marks)
     marked = marks > 0
     box = np.stack([eset.box.lower, eset.box.upper])
+    if d == TETRAHEDRA:
+        against = sense.signs < 0
+        cells[against] = cells[against][:, [0, 1, 3, 2]]
     squared = squared_sides(vertices.place, cells)
     facets = (whole.facets[marked], marks[marked])
     upright = sense.signs * np.where(eset.cell_index % 2 == 0, 1, -1)

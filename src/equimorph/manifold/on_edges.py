@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.corrections import Corrected, corrected_amid
 from equimorph.manifold.crossing_points import corrected_crossings
-from equimorph.manifold.fabric import ON_CAP, ON_CROSSING, ON_FOLD, Fabric, held
+from equimorph.manifold.fabric import ON_CAP, ON_CROSSING, ON_FOLD, SIDES, TETRAHEDRA, Fabric, held
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import Aim, Pinned, corrected, lower_index
 from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
@@ -29,6 +29,9 @@ SAME = 1e-7
 MET = (0, -2, -1)
 WEIGHTS = np.array([0.36, 0.48, 0.8])
 """Coordinates, and a direction in them, along which vertices are in order."""
+BESIDE = 0.05
+"""How near to a side of the box, relative to its edge, a vertex may lie where the set bulges over
+that side."""
 ALONG = 0.5
 """Least cosine of the angle between an edge and the set at its new vertex."""
 
@@ -112,18 +115,93 @@ def on_edges(
 
     Their tangent spaces may be `rough`: those at the start of the last step of Newton.
     """
+    found, vertices = _orthogonally(fabric, ends, mark, lowest, t, rough=rough)
+    left = np.flatnonzero(~found)
+    if fabric.dimension != TETRAHEDRA or mark & ON_CROSSING or len(left) == 0:
+        return found, vertices
+    again, more = _beside_sides(fabric, ends[left], mark, lowest[left], t[left])
+    at = np.concatenate([np.flatnonzero(found), left[again]])
+    found[left[again]] = True
+    return found, vertices.joined(more).take(np.argsort(at))
+
+
+def _beside_sides(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    mark: int,
+    lowest: Int[np.ndarray, " n"],
+    t: Float[np.ndarray, " n"],
+) -> Tried:
+    """Vertices on edges that the set bulges over a side of the box from, and for which edges.
+
+    They keep the parameter that the side holds.
+    """
     setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
     first, second = (fabric.end(ends, side, mark) for side in range(2))
-    z, p = store.z[ends], store.p[ends]
-    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
-    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
-    frames = store.frame[ends[:, 0]], store.frame[ends[:, 1]]
-    bend = Cubics(first, second).step(frames, chord, t)
-    dz, dp = split_step(setting, t[:, None] * chord + bend)
-    z, p = z[:, 0] + dz, p[:, 0] + dp
-    keep = held(mark, d)
-    for k in keep:
-        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
+    z, p = _predicted(fabric, ends, mark, t)
+    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
+    plane = first.rows + turned @ second.rows
+    length = np.linalg.norm(second.place - first.place, axis=1)
+    place = _embedded(fabric, z, p)
+    freely = _on_curves(fabric, mark, (z, p), (place, plane, length), first)
+    found = np.zeros(len(ends), bool)
+    for k in range(d):
+        free = freely.p[:, setting.free[k]]
+        beyond = (free < fabric.box[0, k]) | (free > fabric.box[1, k])
+        a, b = store.p[ends, setting.free[k]].T
+        there = a + t * (b - a)
+        room = np.abs(there[:, None] - fabric.box[:, k]).min(axis=1) / setting.scales[k]
+        own = np.flatnonzero(freely.found & beyond & (room > BESIDE * length) & ~found)
+        if len(own) == 0:
+            continue
+        near = z[own], p[own].copy()
+        near[1][:, setting.free[k]] = there[own]
+        end = first.take(own)
+        row = plane[own][:, :, plane.shape[2] - d + k]
+        end = replace(end, slopes=np.concatenate([end.slopes, row[:, None]], axis=1))
+        place[own] = _embedded(fabric, *near)
+        given = (place[own], plane[own], length[own])
+        pinned = _on_curves(fabric, mark | SIDES << 2 * k, near, given, end)
+        z[own], p[own], found[own] = pinned.z, pinned.p, pinned.found
+    return _accepted(fabric, (ends, mark, lowest, t), Pinned(z, p, found), place, plane)
+
+
+def _accepted(
+    fabric: Fabric,
+    about: tuple[Int[np.ndarray, "n 2"], int, Int[np.ndarray, " n"], Float[np.ndarray, " n"]],
+    at: Pinned,
+    place: Float[np.ndarray, "n coordinates"],
+    plane: Float[np.ndarray, "n d coordinates"],
+) -> Tried:
+    """Those vertices on edges that are close to where they were looked for, and of the index."""
+    ends, mark, lowest, t = about
+    first, second = (fabric.vertices.place[ends[:, side]] for side in range(2))
+    length = np.linalg.norm(second - first, axis=1)
+    here = _embedded(fabric, at.z, at.p)
+    found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
+    for end, part in ((first, t), (second, 1.0 - t)):
+        found &= np.linalg.norm(here - end, axis=1) <= (part + EXCESS) * length
+    free = at.p[:, fabric.setting.free]
+    found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
+    vertices = _counted(fabric, mark, at, (found, lowest), plane)
+    good = _along(replace(fabric, vertices=vertices), mark, (second - first)[found])
+    found[found] = good
+    return found, vertices.take(np.flatnonzero(good))
+
+
+def _orthogonally(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    mark: int,
+    lowest: Int[np.ndarray, " n"],
+    t: Float[np.ndarray, " n"],
+    *,
+    rough: bool = False,
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Vertices corrected orthogonally to the mean of the tangent spaces at both ends of edges."""
+    setting, store = fabric.setting, fabric.vertices
+    first, second = (fabric.end(ends, side, mark) for side in range(2))
+    z, p = _predicted(fabric, ends, mark, t)
     # the second space seen from the first, so that both bases point the same way
     turned = first.rows @ np.swapaxes(second.rows, 1, 2)
     plane = first.rows + turned @ second.rows
@@ -149,6 +227,24 @@ def on_edges(
     good = _along(replace(fabric, vertices=vertices), mark, (second.place - first.place)[found])
     found[found] = good
     return found, vertices if good.all() else vertices.take(np.flatnonzero(good))
+
+
+def _predicted(
+    fabric: Fabric, ends: Int[np.ndarray, "n 2"], mark: int, t: Float[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]]:
+    """Points at places t on the cubics over edges."""
+    setting, store = fabric.setting, fabric.vertices
+    first, second = (fabric.end(ends, side, mark) for side in range(2))
+    z, p = store.z[ends], store.p[ends]
+    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
+    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
+    frames = store.frame[ends[:, 0]], store.frame[ends[:, 1]]
+    bend = Cubics(first, second).step(frames, chord, t)
+    dz, dp = split_step(setting, t[:, None] * chord + bend)
+    z, p = z[:, 0] + dz, p[:, 0] + dp
+    for k in held(mark, fabric.dimension):
+        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
+    return z, p
 
 
 def _on_curves(

@@ -1,8 +1,9 @@
-"""Better tetrahedra between the same vertices: two become three, or three become two.
+"""Better tetrahedra between the same vertices: edges are taken out, or put through a facet.
 
-Dihedral angles are measured in the embedding. Nothing may fold over: in the tangent spaces at all
-five vertices, new tetrahedra look the same way as what they replace [Freitag1997]_. Facets on
-folds, on constraints and on the boundary stay.
+What is around an edge is filled anew without it: three tetrahedra become two, four become four
+others, and so on [Freitag1997]_. An edge on a fold, on a constraint, or on a side of the box gives
+way to the other diagonal of the two marked facets beside it. Nothing may fold over in the tangent
+spaces at the vertices.
 """
 
 from dataclasses import dataclass, replace
@@ -11,219 +12,255 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.manifold.deviations import deviations
 from equimorph.manifold.fabric import Fabric, squared_sides
-from equimorph.manifold.topology import distinct, keys_of
+from equimorph.manifold.rings import MOST, Rings, fill, rings_around
+from equimorph.manifold.tetrahedra import POOR, Judge, Tetrahedra, Values, beside, dihedrals
+from equimorph.manifold.topology import among, distinct, keys_of, rows_of
 
-POOR = np.radians(18.0)
-"""Tetrahedra with a smaller dihedral angle are taken apart, if that helps."""
 GAIN = np.radians(0.2)
 """Least gain of the smallest angle."""
-FLAT = 1e-3
-"""Least volume of a new tetrahedron in a tangent space, relative to all that replace the old."""
-PASSES = 12
+PASSES = 20
 
-Tetrahedra = Int[np.ndarray, "T 4"]
+Keys = Int[np.ndarray, " n"]
+Ends = Int[np.ndarray, "m 2"]
+Near = Bool[np.ndarray, " V"]
 
 
 @dataclass(frozen=True)
 class _Moves:
-    """Cells that go (−1: none), those that come, and the edge or facet that comes with them."""
+    """Cells that go and come, with their index; so facets, with their mark.
 
-    gone: Int[np.ndarray, "n 3"]
-    come: Int[np.ndarray, "n 3 4"]
-    """With a first corner of −1 where there is none."""
-    gain: Float[np.ndarray, " n"]
-    key: Int[np.ndarray, " n"]
+    keys: of edges and facets that come, different for both. −1: none.
+    """
 
-    def take(self, some: Int[np.ndarray, " k"] | Bool[np.ndarray, " n"]) -> "_Moves":
+    gone: Int[np.ndarray, "n _"]
+    come: Int[np.ndarray, "n _ 4"]
+    index: Int[np.ndarray, "n _"]
+    lost: Int[np.ndarray, "n 2 3"]
+    new: Int[np.ndarray, "n 2 3"]
+    mark: Int[np.ndarray, " n"]
+    chords: Int[np.ndarray, "n _ 2"]
+    gain: Values
+
+    def take(self, some: Keys | Bool[np.ndarray, " n"]) -> "_Moves":
         """Return some of the moves."""
         return _Moves(*(column[some] for column in vars(self).values()))
 
 
-def dihedral_angles(
-    place: Float[np.ndarray, "V coordinates"], cells: Tetrahedra
-) -> Float[np.ndarray, "T 6"]:
-    """Angles between the facets of tetrahedra: opposite to corners 0 and 1, 0 and 2, and so on.
+def reconnect(fabric: Fabric, judge: Judge, near: Near, but: Ends, limit: float) -> Fabric:
+    """Reconnect vertices as long as poor tetrahedra with a corner near get better.
 
-    From the products of the gradients of the barycentric coordinates.
+    Edges between the pairs of vertices `but` do not come into being, nor such as deviate from the
+    set by more than `limit`.
     """
-    sides = place[cells[:, 1:]] - place[cells[:, :1]]
-    gram = sides @ np.swapaxes(sides, 1, 2)
-    products = np.empty((len(cells), 4, 4))
-    for i in range(3):
-        a, b = (k for k in range(3) if k != i)
-        for j in range(3):
-            c, d = (k for k in range(3) if k != j)
-            minor = gram[:, a, c] * gram[:, b, d] - gram[:, a, d] * gram[:, b, c]
-            products[:, i + 1, j + 1] = (-1.0) ** (i + j) * minor
-    products[:, 0, 1:] = products[:, 1:, 0] = -products[:, 1:, 1:].sum(axis=1)
-    products[:, 0, 0] = -products[:, 0, 1:].sum(axis=1)
-    size = np.sqrt(np.maximum(np.einsum("nii->ni", products), 1e-300))
-    cosines = [-products[:, i, j] / (size[:, i] * size[:, j]) for i, j in combinations(range(4), 2)]
-    return np.asarray(np.arccos(np.clip(np.stack(cosines, axis=1), -1.0, 1.0)))
-
-
-def smallest_dihedral(fabric: Fabric) -> float:
-    """Smallest dihedral angle of all tetrahedra, in degrees; 0 where there are none."""
-    if fabric.dimension < 3:
-        return 0.0
-    return float(np.degrees(_smallest(fabric, fabric.cells).min(initial=np.pi)))
-
-
-def reconnect(fabric: Fabric, but: Int[np.ndarray, "m 2"]) -> Fabric:
-    """Reconnect vertices as long as the smallest angles of poor tetrahedra grow.
-
-    Edges between the pairs of vertices `but` do not come into being.
-    """
-    cells, index = fabric.cells.copy(), fabric.cell_index.copy()
-    angle = _smallest(fabric, cells)
+    quality = judge.of(fabric, beside(fabric.cells, near))
     for _ in range(PASSES):
-        moves = _apart(_moves(fabric, cells, index, angle, but), len(cells))
+        poor = (quality < POOR) & near[fabric.cells].any(axis=1)
+        moves = _moves(fabric, judge, (quality, poor), (but, limit))
+        moves = _apart(moves, len(fabric.cells), len(fabric.vertices))
         if len(moves.gain) == 0:
             break
-        gone = moves.gone[moves.gone >= 0]
-        row, column = np.nonzero(moves.come[:, :, 0] >= 0)
-        come = moves.come[row, column]
-        kept = np.delete(np.arange(len(cells)), gone)
-        index = np.concatenate([index[kept], index[moves.gone[row, 0]]])
-        cells = np.concatenate([cells[kept], come])
-        angle = np.concatenate([angle[kept], _smallest(fabric, come)])
-    squared = squared_sides(fabric.vertices.place, cells)
-    return replace(fabric, cells=cells, cell_index=index, squared=squared)
+        near = np.zeros(len(fabric.vertices), bool)
+        near[fabric.cells[moves.gone[moves.gone >= 0]]] = True
+        fabric, quality = _applied(fabric, judge, quality, moves)
+    return fabric
 
 
-def _smallest(fabric: Fabric, cells: Tetrahedra) -> Float[np.ndarray, " T"]:
-    return np.asarray(dihedral_angles(fabric.vertices.place, cells).min(axis=1, initial=np.pi))
+def _applied(fabric: Fabric, judge: Judge, quality: Values, moves: _Moves) -> tuple[Fabric, Values]:
+    """Complex and qualities after some moves."""
+    base = len(fabric.vertices)
+    stays = np.ones(len(fabric.cells), bool)
+    stays[moves.gone[moves.gone >= 0]] = False
+    real = moves.come[:, :, 0] >= 0
+    come, index = moves.come[real], moves.index[real]
+    on = moves.mark > 0
+    left = ~np.isin(keys_of(fabric.facets, base), keys_of(moves.lost[on].reshape(-1, 3), base))
+    fabric = replace(
+        fabric,
+        cells=np.concatenate([fabric.cells[stays], come]),
+        cell_index=np.concatenate([fabric.cell_index[stays], index]),
+        squared=np.concatenate([fabric.squared[stays], squared_sides(judge.place, come)]),
+        facets=np.concatenate([fabric.facets[left], moves.new[on].reshape(-1, 3)]),
+        marks=np.concatenate([fabric.marks[left], np.repeat(moves.mark[on], 2)]),
+    )
+    return fabric, np.concatenate([quality[stays], judge.qualities(come, index)])
 
 
 def _moves(
     fabric: Fabric,
-    cells: Tetrahedra,
-    index: Int[np.ndarray, " T"],
-    angle: Float[np.ndarray, " T"],
-    but: Int[np.ndarray, "m 2"],
+    judge: Judge,
+    given: tuple[Values, Bool[np.ndarray, " T"]],
+    rules: tuple[Ends, float],
 ) -> _Moves:
-    """All moves that take poor cells apart and let angles grow."""
-    base = len(fabric.vertices)
-    poor = angle < POOR
+    """All moves that take poor cells apart and let angles grow; `given` are qualities and these."""
+    (quality, poor), base = given, len(fabric.vertices)
     near = np.zeros(base, bool)
-    near[cells[poor]] = True
-    around = np.flatnonzero(near[cells].any(axis=1))
-    sides = [cells[around][:, list(k)] for k in combinations(range(4), 2)]
-    known = distinct(np.concatenate([keys_of(side, base) for side in (*sides, but)]))
-    both = [
-        _two_to_three(fabric, cells, around, known),
-        _three_to_two(fabric, cells, around),
-    ]
-    moves = _Moves(
-        *(np.concatenate([getattr(each, name) for each in both]) for name in vars(both[0]))
+    near[fabric.cells[poor]] = True
+    around = np.flatnonzero(near[fabric.cells].sum(axis=1) > 1)
+    own = fabric.cells[around]
+    known = _known(fabric, own, rules[0])
+    sides = [fabric.cells[poor][:, list(k)] for k in combinations(range(4), 2)]
+    wanted = distinct(np.concatenate([keys_of(side, base) for side in sides]))
+    rings = rings_around(
+        replace(fabric, cells=own, cell_index=fabric.cell_index[around]),
+        rows_of(wanted, base, 2),
     )
-    held = moves.gone >= 0
-    helps = (poor[moves.gone] & held).any(axis=1)
-    one = (index[moves.gone] == index[moves.gone[:, :1]]) | ~held
-    moves = moves.take(helps & one.all(axis=1))
-    before = np.where(moves.gone >= 0, angle[moves.gone], np.pi).min(axis=1, initial=np.pi)
-    after = _smallest(fabric, moves.come.reshape(-1, 4)).reshape(-1, 3)
-    after = np.where(moves.come[:, :, 0] >= 0, after, np.pi).min(axis=1, initial=np.pi)
-    moves = replace(moves, gain=after - before)
-    moves = moves.take(moves.gain > GAIN)
-    return moves.take(_stays_up(fabric, cells, moves))
+    rings = replace(rings, cells=np.where(rings.cells >= 0, around[rings.cells], -1))
+    both = [
+        _without_edges(fabric, judge, quality, rings, known),
+        _through_facets(fabric, judge, given, around, known[0]),
+    ]
+    parts = (np.concatenate([getattr(each, name) for each in both]) for name in vars(both[0]))
+    moves = _Moves(*parts)
+    return moves.take(_within(fabric, moves, rules[1]))
 
 
-def _two_to_three(
-    fabric: Fabric,
-    cells: Tetrahedra,
-    around: Int[np.ndarray, " n"],
-    known: Int[np.ndarray, " edges"],
+def _known(fabric: Fabric, around: Tetrahedra, but: Ends) -> tuple[Keys, Keys]:
+    """Keys, in order, of edges and facets between corners of some cells; `but` are no edges."""
+    base = len(fabric.vertices)
+    near = np.zeros(base, bool)
+    near[around] = True
+    cells = fabric.cells[near[fabric.cells].sum(axis=1) > 1]
+    edges = [keys_of(cells[:, list(k)], base) for k in combinations(range(4), 2)]
+    cells = cells[near[cells].sum(axis=1) > 2]
+    facets = [keys_of(cells[:, list(k)], base) for k in combinations(range(4), 3)]
+    barred = distinct(np.concatenate([*edges, keys_of(but, base)]))
+    return barred, distinct(np.concatenate(facets))
+
+
+def _without_edges(
+    fabric: Fabric, judge: Judge, quality: Values, rings: Rings, known: tuple[Keys, Keys]
 ) -> _Moves:
-    """Pairs of cells on both sides of a facet, and three around the new edge through it."""
+    """Moves that take edges out."""
+    (barred, facets), base = known, len(fabric.vertices)
+    before = _worth(np.where(rings.cells >= 0, quality[rings.cells], np.inf))
+    # on surfaces the other diagonal is new, unless one side of the edge has a single cell
+    chord = rings.chord
+    flat = (_sizes(rings.first) == 2) | (_sizes(rings.second) == 2)
+    free = (rings.mark == 0) | flat | ~among(keys_of(chord, base), barred)
+    rings, before = rings.take(free), before[free]
+    fillings = [fill(judge, rings.ends, each, barred) for each in (rings.first, rings.second)]
+    after = np.minimum(fillings[0].quality, fillings[1].quality)
+    good = np.flatnonzero((after - before > GAIN) & np.isfinite(before))
+    rings, before = rings.take(good), before[good]
+    come = np.concatenate([each.cells[good] for each in fillings], axis=1)
+    index = np.repeat(rings.index, fillings[0].cells.shape[1], axis=1)
+    chord, on = rings.chord, rings.mark > 0
+    flat = (_sizes(rings.first) == 2) | (_sizes(rings.second) == 2)
+    made = np.where((on & ~flat)[:, None], chord, -1)
+    chords = np.concatenate([*(each.chords[good] for each in fillings), made[:, None]], axis=1)
+    lost = np.stack([np.concatenate([rings.ends, chord[:, [k]]], axis=1) for k in range(2)], 1)
+    new = np.stack([np.concatenate([rings.ends[:, [k]], chord], axis=1) for k in range(2)], 1)
+    ended = _Moves(rings.cells, come, index, lost, new, rings.mark, chords, before)
+    between = come[:, :, 1:].reshape(-1, 3)
+    old = among(keys_of(between, base), facets) & (between[:, 0] >= 0)
+    kept = ~old.reshape(come.shape[:2]).any(axis=1)
+    kept &= ~_marked(fabric, new).any(axis=1) | ~on
+    return _gaining(judge, ended.take(kept))
+
+
+def _sizes(polygons: Int[np.ndarray, "n ring"]) -> Keys:
+    return np.asarray((polygons >= 0).sum(axis=1))
+
+
+def _marked(fabric: Fabric, facets: Int[np.ndarray, "n 2 3"]) -> Bool[np.ndarray, "n 2"]:
+    """Which facets are marked already."""
     base = len(fabric.vertices)
-    facets = np.concatenate([np.delete(cells[around], k, axis=1) for k in range(4)])
-    tips = np.concatenate([cells[around, k] for k in range(4)])
-    owner = np.tile(around, 4)
+    known = keys_of(fabric.facets, base)
+    return np.isin(keys_of(facets.reshape(-1, 3), base), known).reshape(-1, 2)
+
+
+def _gaining(judge: Judge, moves: _Moves) -> _Moves:
+    """Those moves, given with the quality before, that leave a better one, with their gain."""
+    real = moves.come[:, :, 0] >= 0
+    each = np.full(real.shape, np.inf)
+    each[real] = judge.qualities(moves.come[real], moves.index[real])
+    # whatever goes without anything in its place is worth as much as what is good
+    after = np.minimum(_worth(each), np.pi / 2)
+    moves = replace(moves, gain=after - moves.gain)
+    return moves.take(moves.gain > GAIN)
+
+
+def _worth(qualities: Float[np.ndarray, "n cells"]) -> Values:
+    """What groups of tetrahedra are worth, see `worth`; infinite where there is none."""
+    worst = qualities.min(axis=1, initial=np.inf)
+    return np.asarray(np.where(worst < 0.0, np.minimum(qualities, 0.0).sum(axis=1), worst))
+
+
+def _through_facets(
+    fabric: Fabric,
+    judge: Judge,
+    known: tuple[Values, Bool[np.ndarray, " T"]],
+    around: Keys,
+    barred: Keys,
+) -> _Moves:
+    """Moves that put edges through facets: two cells become three."""
+    (quality, poor), base = known, len(fabric.vertices)
+    own = fabric.cells[around]
+    # facets so ordered that the corner opposite sees them turn to the left
+    order = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+    facets = np.concatenate([own[:, list(each)] for each in order])
+    tips, owner = np.concatenate(list(own.T)), np.tile(around, 4)
     keys = keys_of(facets, base)
-    order = np.argsort(keys, kind="stable")
-    same = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
-    one, other = order[same], order[same + 1]
+    by_key = np.argsort(keys, kind="stable")
+    same = np.flatnonzero(keys[by_key[1:]] == keys[by_key[:-1]])
+    one, other = by_key[same], by_key[same + 1]
     new = keys_of(np.stack([tips[one], tips[other]], axis=1), base)
-    free = ~np.isin(new, known) & ~np.isin(keys[one], keys_of(fabric.facets, base))
-    one, other, new = one[free], other[free], new[free]
-    (a, b, c), d, e = facets[one].T, tips[one], tips[other]
-    come = np.stack([np.stack(k, axis=1) for k in ((a, b, d, e), (b, c, d, e), (c, a, d, e))], 1)
-    gone = np.stack([owner[one], owner[other], np.full(len(one), -1)], axis=1)
-    return _Moves(gone, come, np.zeros(len(new)), new)
+    wanted = poor[owner[one]] | poor[owner[other]]
+    wanted &= ~among(new, barred) & ~among(keys[one], np.sort(keys_of(fabric.facets, base)))
+    one, other = one[wanted], other[wanted]
+    (i, j, k), low, high = facets[one].T, tips[one], tips[other]
+    come = np.stack(
+        [np.stack([low, high, *pair], axis=1) for pair in ((i, j), (j, k), (k, i))], axis=1
+    )
+    before = _worth(np.stack([quality[owner[one]], quality[owner[other]]], axis=1))
+    after = dihedrals(judge.place, come.reshape(-1, 4)).reshape(-1, 3).min(axis=1, initial=np.inf)
+    good = np.flatnonzero(after - before > GAIN)
+    one, other, come, before = one[good], other[good], come[good], before[good]
+    count = len(good)
+    gone, more = np.full((count, MOST), -1), np.full((count, 4 * (MOST - 2), 4), -1)
+    gone[:, 0], gone[:, 1], more[:, :3] = owner[one], owner[other], come
+    index = np.repeat(fabric.cell_index[owner[one]][:, None], more.shape[1], axis=1)
+    none = np.full((count, 2, 3), -1)
+    chords = np.full((count, 2 * (MOST - 3) + 1, 2), -1)
+    chords[:, 0] = np.stack([tips[one], tips[other]], axis=1)
+    alike = fabric.cell_index[owner[one]] == fabric.cell_index[owner[other]]
+    moves = _Moves(gone, more, index, none, none, np.zeros(count, int), chords, before)
+    return _gaining(judge, moves.take(alike))
 
 
-def _three_to_two(fabric: Fabric, cells: Tetrahedra, around: Int[np.ndarray, " n"]) -> _Moves:
-    """Triples of cells around an edge, and two on both sides of the facet between the others."""
-    base = len(fabric.vertices)
-    pairs = list(combinations(range(4), 2))
-    edges = np.concatenate([cells[around][:, list(pair)] for pair in pairs])
-    rest = [tuple(k for k in range(4) if k not in pair) for pair in pairs]
-    others = np.concatenate([cells[around][:, list(pair)] for pair in rest])
-    owner = np.tile(around, 6)
-    keys = keys_of(edges, base)
-    order = np.argsort(keys, kind="stable")
-    _, first, counts = np.unique(keys[order], return_index=True, return_counts=True)
-    rows = order[first[counts == 3, None] + np.arange(3)]
-    ring = np.sort(others[rows].reshape(-1, 6), axis=1)
-    closed = (ring[:, ::2] == ring[:, 1::2]).all(axis=1)
-    rows, ring = rows[closed], ring[closed, ::2]
-    facets = np.concatenate([np.delete(cells[around], k, axis=1) for k in range(4)])
-    new = keys_of(ring, base)
-    free = ~np.isin(new, keys_of(facets, base))
-    rows, ring, new = rows[free], ring[free], new[free]
-    ends = edges[rows[:, 0]]
-    come = np.full((len(ring), 3, 4), -1)
-    for side in range(2):
-        come[:, side] = np.concatenate([ring, ends[:, side, None]], axis=1)
-    return _Moves(owner[rows], come, np.zeros(len(ring)), new)
-
-
-def _stays_up(fabric: Fabric, cells: Tetrahedra, moves: _Moves) -> Bool[np.ndarray, " n"]:
-    """Whether what comes fills what goes without folding over, in all tangent spaces around."""
-    store = fabric.vertices
-    # all five vertices are corners of the first two cells that come, or of all three
-    vertices = np.sort(moves.come.reshape(-1, 12), axis=1)
-    distinct = (np.diff(vertices, axis=1, prepend=-1) > 0) & (vertices >= 0)
-    five = vertices[distinct].reshape(-1, 5)
-    local = np.argmax(five[:, None, None] == moves.come[:, :, :, None], axis=3)
-    gone = np.where(moves.gone[:, :, None] >= 0, cells[moves.gone], -1)
-    local_gone = np.argmax(five[:, None, None] == gone[:, :, :, None], axis=3)
-    away = store.place[five] - store.place[five[:, :1]]
-    good, real = np.ones(len(five), bool), moves.come[:, :, 0] >= 0
-    for plane in range(5):
-        flat = np.einsum("nic,nkc->nki", store.rows[five[:, plane]], away)
-        whole = np.abs(_volumes(flat, local_gone, gone)).sum(axis=1)
-        new = np.abs(_volumes(flat, local, moves.come))
-        good &= (~real | (new >= FLAT * whole[:, None])).all(axis=1)
-        # those that fold over add up to more than what they fill
-        good &= new.sum(axis=1) <= (1.0 + 1e-9) * whole
+def _within(fabric: Fabric, moves: _Moves, limit: float) -> Bool[np.ndarray, " n"]:
+    """Whether no edge that comes deviates by more than a limit."""
+    good = np.ones(len(moves.gain), bool)
+    if not np.isfinite(limit):
+        return good
+    row, column = np.nonzero(moves.chords[:, :, 0] >= 0)
+    chords = np.sort(moves.chords[row, column], axis=1)
+    marks = np.where(column == moves.chords.shape[1] - 1, moves.mark[row], 0)
+    good[row[deviations(fabric, chords, marks) > limit]] = False
     return good
 
 
-def _volumes(
-    flat: Float[np.ndarray, "n 5 3"],
-    local: Int[np.ndarray, "n 3 4"],
-    cells: Int[np.ndarray, "n 3 4"],
-) -> Float[np.ndarray, "n 3"]:
-    """Volumes, times six, of cells in a tangent space; zero where there is none."""
-    corners = flat[np.arange(len(flat))[:, None, None], local]
-    sides = corners[:, :, 1:] - corners[:, :, :1]
-    volume = np.einsum("nki,nki->nk", sides[:, :, 0], np.cross(sides[:, :, 1], sides[:, :, 2]))
-    return np.where(cells[:, :, 0] >= 0, volume, 0.0)
-
-
-def _apart(moves: _Moves, count: int) -> _Moves:
+def _apart(moves: _Moves, count: int, base: int) -> _Moves:
     """Moves, best first, that neither share a cell nor make the same edge or facet."""
-    order = np.argsort(-moves.gain, kind="stable")
-    moves = moves.take(order)
-    taken, made, kept = np.zeros(count + 1, bool), set(), []
-    for number, (gone, key) in enumerate(zip(moves.gone.tolist(), moves.key.tolist(), strict=True)):
+    moves = moves.take(np.argsort(-moves.gain, kind="stable"))
+    chords = moves.chords
+    edges = np.where(chords[:, :, 0] >= 0, keys_of(chords.reshape(-1, 2), base).reshape(
+        chords.shape[:2]), -1)  # fmt: skip
+    # without a chord three cells become two on both sides of a facet
+    facet = np.sort(moves.come[:, :, 1:], axis=2).max(axis=1, initial=-1)
+    bare = (edges < 0).all(axis=1)
+    key = np.where(bare, -2 - keys_of(facet, base), -1)
+    taken, kept = np.zeros(count + 1, bool), []
+    made: set[int] = set()
+    rows = zip(moves.gone.tolist(), edges.tolist(), key.tolist(), strict=True)
+    for number, (gone, new, alone) in enumerate(rows):
         own = [cell for cell in gone if cell >= 0]
-        if taken[own].any() or key in made:
+        keys = {each for each in (*new, alone) if each != -1}
+        if taken[own].any() or not keys.isdisjoint(made):
             continue
         taken[own] = True
-        made.add(key)
+        made |= keys
         kept.append(number)
     return moves.take(np.array(kept, int))

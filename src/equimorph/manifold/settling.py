@@ -3,14 +3,13 @@
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.manifold.collapsing import collapse_edges
+from equimorph.manifold.bettering import bettered
 from equimorph.manifold.copies import copies, doubled, first_copies, with_copies
 from equimorph.manifold.deviations import Edges, Memory, chosen, known
 from equimorph.manifold.fabric import CURVES, Fabric
 from equimorph.manifold.leading import led_between, on_plain_curves
 from equimorph.manifold.on_edges import Places, chunks, recalled_on_edges, unmet
 from equimorph.manifold.patches import patch_around
-from equimorph.manifold.reconnection import reconnect
 from equimorph.manifold.smoothing import SHARP, smooth
 from equimorph.manifold.surgery import SHORT, angles, collapse, flip
 from equimorph.manifold.topology import keys_of
@@ -18,8 +17,6 @@ from equimorph.manifold.vertices import Vertices, gathered
 from equimorph.model import Journal, Progress, Silent
 
 ROUNDS = 200
-ALTERNATIONS, FEWER = 8, 0.98
-"""How often tetrahedra are reconnected and vertices taken out, as long as cells get fewer."""
 GROWN = 1.6
 """How much more tetrahedra there are when slivers are taken away anew."""
 PLACES = (0.5, 0.3, 0.7)
@@ -96,18 +93,13 @@ def told_apart(fabric: Fabric, memory: Memory) -> Fabric:
     return bisected(fabric, edges, those, memory)
 
 
-def tidied(fabric: Fabric, memory: Memory, fine: bool = False) -> Fabric:
+def tidied(fabric: Fabric, memory: Memory, fine: bool = False, limit: float = np.inf) -> Fabric:
     """Take slivers away; of triangles that are `fine` already also by moving vertices.
 
     Where cells are coarse, short edges may be all that keeps two folds apart.
     """
     if fabric.dimension == 3:
-        for _ in range(ALTERNATIONS):
-            cells = len(fabric.cells)
-            fabric = collapse_edges(reconnect(fabric, memory.cut), memory.cut)
-            if len(fabric.cells) > FEWER * cells:
-                break
-        return reconnect(fabric, memory.cut)
+        return bettered(fabric, memory, limit, fine)
     if fabric.dimension == 1:
         return fabric
     short = SHORT if fine else 0.0
@@ -151,6 +143,7 @@ def bisected(
         memory.stuck.clear()  # beside a fold that is better known they may succeed
     whole, more = with_copies(fabric, ends[at], more)
     memory.cut = np.concatenate([memory.cut, whole])
+    memory.put = np.concatenate([memory.put, len(fabric.vertices) + np.arange(len(whole))])
     return fabric.bisected(whole, more) if len(at) else fabric
 
 

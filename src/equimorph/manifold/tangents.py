@@ -120,6 +120,10 @@ class Ends:
     rows: Rows
     slopes: Float[np.ndarray, "edges m d"]
 
+    def take(self, some: Int[np.ndarray, " some"]) -> "Ends":
+        """Return some of the ends."""
+        return Ends(self.place[some], self.rows[some], self.slopes[some])
+
     def along(self, chord: Float[np.ndarray, "edges coordinates"]) -> Float[np.ndarray, "edges d"]:
         """Coordinates, in the frame, of the tangent vector that a chord is nearest to.
 

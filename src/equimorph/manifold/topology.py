@@ -76,6 +76,14 @@ def distinct(keys: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
     return keys[np.diff(keys, prepend=-1) > 0]
 
 
+def among(keys: Int[np.ndarray, " n"], known: Int[np.ndarray, " m"]) -> Bool[np.ndarray, " n"]:
+    """Which keys are among known ones that are in order."""
+    if len(known) == 0:
+        return np.zeros(len(keys), bool)
+    at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+    return np.asarray(known[at] == keys)
+
+
 def adjacency(cells: Cells) -> Adjacency:
     """Facets and links of segments, triangles or tetrahedra."""
     corners = cells.shape[1]
