@@ -55,6 +55,34 @@ def test_points_on_vertices_edges_and_the_sides_of_the_box(spring_set):
     assert [len(here.states) for here in found] == number
 
 
+def test_points_almost_on_grid_lines_keep_all_their_sheets(spring_set):
+    """From 1e-12 to 1e-6 off edges and vertices of the grid, on all sides of them."""
+    generator = np.random.default_rng(3)
+    x, grid = spring_set.coordinates, spring_set.kinds == 0
+    a, b = spring_set.cells[grid[spring_set.cells].all(axis=1)].T[:2]
+    share = generator.uniform(size=(len(a), 1))
+    on = np.concatenate([x[grid], share * x[a] + (1 - share) * x[b]])
+    off = 10.0 ** generator.uniform(-12, -6, (len(on), 1)) * generator.normal(size=on.shape)
+    points = np.clip(on + off, spring_set.box.lower, spring_set.box.upper)
+    found = spring_set.over(x_l=points[:, 0], F=points[:, 1])
+    number = [len(angles(*point)) for point in points]
+    assert [len(here.states) for here in found] == number
+
+
+@pytest.mark.parametrize("apart", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_both_states_are_found_next_to_a_fold_that_coarse_cells_miss(apart):
+    """F = ± (1 − x^⅔)^{3/2} times 1 ± `apart`, from its cusp at x = 1 on: three states or one."""
+    eset = lifted(Spring(), Box(x_l=(0.3, 1.3), F=(-0.5, 0.5)), intervals=(5, 6))
+    x = np.repeat(np.linspace(0.31, 0.97, 60), 4)
+    factor = np.tile([1 - apart, 1 + apart], 120) * np.tile([1, 1, -1, -1], 60)
+    load = (1 - np.cbrt(x) ** 2) ** 1.5 * factor
+    x, load = x[np.abs(load) < 0.5], load[np.abs(load) < 0.5]
+    within = np.abs(load) < (1 - np.cbrt(x) ** 2) ** 1.5
+    found = eset.over(x_l=x, F=load)
+    assert [len(here.states) for here in found] == np.where(within, 3, 1).tolist()
+    assert np.array_equal(found.index, found.states.index)
+
+
 def test_many_points_and_single_points_have_the_same_states(spring_set):
     at = random_points(spring_set.box, 20)
     found = spring_set.over(**at)

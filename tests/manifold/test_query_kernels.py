@@ -114,11 +114,12 @@ def test_points_are_sure_where_states_and_cells_have_the_same_parity():
     assert sure.tolist() == [True, False, False, True]
 
 
-def test_points_beyond_a_brim_are_tried():
-    cell, inside = np.array([0, 0, 0]), np.array([True, False, False])
-    weights = np.array([[0.2, 0.3, 0.5], [-0.1, 0.6, 0.5], [0.6, -0.1, 0.5]])
-    brims = np.array([[False, True, False]])
-    assert worth_trying((cell, weights), inside, brims).tolist() == [0, 2]
+def test_points_beyond_a_brim_or_within_a_nudge_of_it_are_tried():
+    cell, inside = np.zeros(5, int), np.array([True, False, False, False, False])
+    across = np.array([0.3, 0.6, -0.1, 1e-10, 1e-8])
+    weights = np.stack([[0.2, -0.1, 0.6, 0.5, 0.5], across, np.full(5, 0.5)], axis=1)
+    brims, maps = np.array([[False, True, False]]), np.ones((1, 3, 3))
+    assert worth_trying((cell, weights), inside, brims, maps, 1e-9).tolist() == [0, 2, 3]
 
 
 def test_exact_states_do_not_depend_on_those_beside_them():

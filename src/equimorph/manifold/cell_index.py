@@ -42,6 +42,12 @@ class Hits:
         columns = zip(*(vars(part).values() for part in parts), strict=True)
         return cls(*(np.concatenate(column) for column in columns))
 
+    def with_others(self, others: "Hits") -> "Hits":
+        """All pairs of both, each point's own first; `others` are sorted, too."""
+        place = np.searchsorted(self.point, others.point, side="right")
+        columns = zip(vars(self).values(), vars(others).values(), strict=True)
+        return Hits(*(np.insert(mine, place, more, axis=0) for mine, more in columns))
+
     def __len__(self) -> int:
         """Return the number of pairs."""
         return len(self.point)
@@ -61,11 +67,11 @@ class CellIndex:
     starts: Int[np.ndarray, " bins_and_one"]
     cells: Int[np.ndarray, " entries"]
     maps: Float[np.ndarray, "C corners corners"]
-    overhang: Float[np.ndarray, " C"]
+    overhang: Float[np.ndarray, "C corners"]
 
     @classmethod
     def of(
-        cls, corners: Float[np.ndarray, "C corners d"], overhang: Float[np.ndarray, " C"]
+        cls, corners: Float[np.ndarray, "C corners d"], overhang: Float[np.ndarray, "*some"]
     ) -> "CellIndex":
         """Index of cells.
 
@@ -74,8 +80,8 @@ class CellIndex:
         corners
             Corners of the cells.
         overhang
-            How far beyond each cell a point may lie to be found near it, in barycentric
-            coordinates.
+            How far beyond each cell, or across the facet opposite to each corner, a point may lie
+            to be found near it, in barycentric coordinates.
         """
         d = corners.shape[2]
         flat = corners.reshape(-1, d)
@@ -86,7 +92,9 @@ class CellIndex:
         low, high = unit.min(axis=1), unit.max(axis=1)
         extent = high - low
         counts = _bins(extent)
-        room = overhang[:, None] * extent
+        overhang = overhang.reshape(len(corners), -1) + np.zeros(d + 1)
+        # a corner moves by what the facets across from the others do
+        room = np.sort(overhang, axis=1)[:, 1:].sum(axis=1, keepdims=True) * extent
         first, last = (
             np.clip((side * counts).astype(int), 0, counts - 1)
             for side in (low - room, high + room)
@@ -99,6 +107,13 @@ class CellIndex:
         bins = self.lower, self.width, self.counts, self.starts, self.cells
         points = np.ascontiguousarray(points, dtype=float)
         return Hits(*cells_near(points, bins, self.maps, self.overhang, NUDGE))
+
+    def weights(
+        self, points: Float[np.ndarray, "n d"], cell: Int[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n corners"]:
+        """Barycentric coordinates of points, each in a cell of its own."""
+        unit, maps = (points - self.lower) / self.width, self.maps[cell]
+        return np.asarray(np.einsum("nij,nj->ni", maps[:, :, :-1], unit) + maps[:, :, -1])
 
 
 def _bins(extent: Float[np.ndarray, "C d"]) -> Int[np.ndarray, " d"]:

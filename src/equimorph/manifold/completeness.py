@@ -10,8 +10,8 @@ from equimorph.equilibria import search_points
 from equimorph.equilibria.newton import newton
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.mesh import BaseMesh
-from equimorph.manifold.over import lift_to
 from equimorph.manifold.pairing import Setting
+from equimorph.manifold.querying.moves import lift_to
 from equimorph.manifold.seeds import polished
 from equimorph.model import Findings, Journal, Progress, position, recalled, step_of
 from equimorph.structures import States

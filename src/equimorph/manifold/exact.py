@@ -7,7 +7,7 @@ from equimorph.linalg.simd import LANES
 from equimorph.manifold.querying.kernels import settle
 from equimorph.structures import Structure
 
-ITERATIONS = 12
+ITERATIONS = 40
 ROUND_OFF = 1e-14
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
 SETTLED = 2

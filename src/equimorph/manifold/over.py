@@ -8,11 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
-from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.linalg.lanes import in_background, threads
-from equimorph.manifold.cell_index import CellIndex, Hits
+from equimorph.manifold.cell_index import NUDGE, CellIndex, Hits
 from equimorph.manifold.exact import Lanes, Points, exact_states
 from equimorph.manifold.near_crossings import NearCrossings
 from equimorph.manifold.querying.kernels import (
@@ -22,6 +19,8 @@ from equimorph.manifold.querying.kernels import (
     root_shares,
     worth_trying,
 )
+from equimorph.manifold.querying.moves import lift_to, turned_back
+from equimorph.manifold.querying.rims import Rims, cells_beside
 from equimorph.manifold.topology import adjacency, senses
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
@@ -32,6 +31,8 @@ SAME = 1e-6
 """Distance in the metric below which two states over one point are the same."""
 CLOSEST = 1e-3
 """Least share of a cell between its fold and a guess: at the fold Newton's matrix is singular."""
+PARTNERS = 3
+"""Rounds in which states are looked for across folds, over points where some are missing."""
 CHUNK = 512
 """Points that are served together: their work arrays stay small."""
 
@@ -226,8 +227,9 @@ class Sheets:
 
     def _some(self, p: Points, first: int) -> tuple[Found, Hits | None]:
         """States over points that are sure, and the cells near the others; `first` is added."""
-        near = self.above.near(p[:, self.free])
-        hits = near.take(worth_trying((near.cell, near.weights), near.inside, self._brims))
+        near = self._near(p[:, self.free])
+        of_hits = near.cell, near.weights
+        hits = near.take(worth_trying(of_hits, near.inside, self._brims, self.above.maps, NUDGE))
         at = p[hits.point]
         guess = self._guess(hits)
         wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
@@ -235,8 +237,7 @@ class Sheets:
         good &= (index == wanted) & self.structure.resolved(z, at)
         mass = self.structure.mass
         found = one_of_each((hits.point, hits.inside), (z, good), guess, room, mass, SAME)
-        of_hits = hits.point, hits.cell, hits.inside
-        sure = balanced(of_hits, good, found, self._of_cells, len(p))
+        sure = balanced((hits.point, hits.cell, hits.inside), good, found, self._of_cells, len(p))
         doubtful = None
         if not sure.all():
             found = found[sure[hits.point[found]]]
@@ -244,6 +245,30 @@ class Sheets:
             doubtful = replace(doubtful, point=first + doubtful.point)
         kept = found[self._allowed(z[found], at[found])]
         return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
+
+    def _near(self, x: Float[np.ndarray, "points d"]) -> Hits:
+        """Cells near points, those beside the bands around rims that points lie in among them."""
+        near = self.above.near(x)
+        point, cell = self._rims.near(x)
+        if len(point) == 0:
+            return near
+        count, asked = len(self.cells), np.zeros(len(x), bool)
+        asked[point] = True
+        old = asked[near.point]
+        new = np.setdiff1d(point * count + cell, near.point[old] * count + near.cell[old])
+        point, cell = np.divmod(new, count)
+        more = Hits(point, cell, self.above.weights(x[point], cell), np.zeros(len(new), bool))
+        return near.with_others(more)
+
+    @cached_property
+    def _rims(self) -> Rims:
+        """Bands along folds and constraints, which straight cells miss."""
+        whole = adjacency(self.cells)
+        on = (self.folded | self.capped)[whole.facets].all(axis=1)
+        beside = cells_beside(whole)
+        index = np.where(beside >= 0, self.cell_index[beside], self.cell_index[beside[:, :1]])
+        on &= (whole.counts != 2) | (index != index[:, :1]).any(axis=1)
+        return Rims.of(self.points.p[:, self.free], whole, np.flatnonzero(on))
 
     def _guess(self, hits: Hits) -> Lanes:
         """Interpolation between the corners, at the nearest point of the cell.
@@ -284,16 +309,69 @@ class Sheets:
         z = np.concatenate([solved, lifted])
         point = np.concatenate([of_solved, owner[which]])
         numbers = np.unique(near.point)
-        lanes = [np.flatnonzero(point == number) for number in numbers]
-        kept = np.concatenate([own[_firsts(self.structure, z[own])] for own in lanes])
-        index = self.structure.index(z[kept], p[point[kept]])
-        # lifts from parts of sets leave them across folds
-        own = np.isin(index, self.cell_index)
-        z, point, index = z[kept[own]], point[kept[own]], index[own]
+        z, point, index = self._distinct(z, point, p)
+        for _ in range(PARTNERS):
+            more, of_more = self._partners(z, point, index, p, near)
+            if len(more) == 0:
+                break
+            before = len(z)
+            z, point, index = self._distinct(
+                np.concatenate([z, more]), np.concatenate([point, of_more]), p
+            )
+            if len(z) == before:
+                break
         for number in numbers:
             own, mine = point == number, near.point == number
             cell = self._nearest(z[own], index[own], guess[mine], near.take(mine))
             yield z[own], point[own], cell
+
+    def _distinct(
+        self, z: Lanes, point: Int[np.ndarray, " lanes"], p: Points
+    ) -> tuple[Float[np.ndarray, "m size"], Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+        """Different states over each point, those points, sorted, and the index."""
+        lanes = [np.flatnonzero(point == number) for number in np.unique(point)]
+        kept = np.concatenate(
+            [own[_firsts(self.structure, z[own])] for own in lanes] or [np.zeros(0, int)]
+        )
+        index = self.structure.index(z[kept], p[point[kept]])
+        # lifts from parts of sets leave them across folds
+        own = np.isin(index, self.cell_index)
+        return z[kept[own]], point[kept[own]], index[own]
+
+    def _partners(
+        self,
+        z: Lanes,
+        point: Int[np.ndarray, " lanes"],
+        index: Int[np.ndarray, " lanes"],
+        p: Points,
+        near: Hits,
+    ) -> tuple[Float[np.ndarray, "m size"], Int[np.ndarray, " m"]]:
+        """States that meet known ones in folds nearby, where parity tells that some are missing.
+
+        Out across the rims near the point, through the fold, and back.
+        """
+        inside, cell = near.inside, near.cell
+        sign, overturned = self._of_cells[:2]
+        above = np.where(overturned[cell], -sign[cell], sign[cell]) * inside
+        surplus = np.bincount(point, 1.0 - 2.0 * (index % 2), len(p)) - np.bincount(
+            near.point, above, len(p)
+        )
+        # cells without volume have no maps, and nothing is across from their corners
+        missed = (surplus[near.point] != 0.0) & np.isfinite(self.above.maps[cell, 0, 0])
+        hit, corner = np.nonzero(self._brims[cell] & missed[:, None])
+        out = -self.above.maps[cell[hit], corner, :-1] / self.above.width
+        length = np.linalg.norm(out, axis=1, keepdims=True)
+        sides = self.points.p[:, self.free][self.cells[cell[hit]]]
+        reach = np.ptp(sides, axis=1).max(axis=1, keepdims=True)
+        way = out / np.maximum(length, 1e-300) * reach
+        first, last = (np.searchsorted(point, near.point[hit], side) for side in ("left", "right"))
+        number = np.repeat(np.arange(len(hit)), last - first)
+        state = np.concatenate([np.zeros(0, int), *map(np.arange, first, last)])
+        velocity = np.zeros((len(state), p.shape[1]))
+        velocity[:, self.free] = way[number]
+        found, which = turned_back(States(self.structure, z[state], p[point[state]]), velocity)
+        found, of_found = self._exact(found, p, point[state[which]])
+        return found, of_found
 
     def _exact(
         self, starts: Lanes, p: Points, owner: Int[np.ndarray, " lanes"]
@@ -331,20 +409,3 @@ def _firsts(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
     """States that no earlier one is the same as."""
     u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
     return np.flatnonzero(~np.tril(cdist(u, u) <= SAME, -1).any(axis=1))
-
-
-def lift_to(
-    states: States, p: Points, constraints: tuple[Constraint, ...]
-) -> tuple[Float[np.ndarray, "arrived size"], Int[np.ndarray, " arrived"]]:
-    """Equilibria that straight lifts from `states` to p, one for each, reach; which they are."""
-    velocity = p - states.p
-    still = np.abs(velocity).max(axis=1, initial=0.0) == 0.0
-    moving = np.flatnonzero(~still)
-    line = ParameterLine(states.structure, states.p[moving].copy(), velocity[moving])
-    options = TraceOptions(
-        through_folds=True, through_branch_points=True, record=False, locate_passed=False
-    )
-    outcome = follow(line, states.z[moving].copy(), constraints, options)
-    arrived = outcome.code == ARRIVAL
-    which = np.concatenate([np.flatnonzero(still), moving[arrived]])
-    return np.concatenate([states.z[still], outcome.z[arrived]]), which

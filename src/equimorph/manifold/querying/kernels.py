@@ -13,17 +13,19 @@ def cells_near(points, bins, maps, overhang, nudge):
     """Pairs of a point and a cell near it; see `CellIndex.near`.
 
     points (n, d); bins: lower, width (d,), counts (d,), starts and cells of the bins.
-    Returns point, cell, weights (hits, d + 1), inside.
+    Returns point, cell, weights (hits, d + 1), inside. Points are inside, and in bins, after a
+    shift towards the middle of the box in a direction that no grid line has.
     """
     lower, width, counts, starts, cells = bins
     n, d = points.shape
-    unit, own, most = np.empty((n, d)), np.empty(n, np.int64), 0
+    unit, shift, own, most = np.empty((n, d)), np.empty((n, d)), np.empty(n, np.int64), 0
     for i in range(n):
         number = 0
         for k in range(d):
             unit[i, k] = (points[i, k] - lower[k]) / width[k]
-            place = min(max(int(unit[i, k] * counts[k]), 0), counts[k] - 1)
-            number = number * counts[k] + place
+            shift[i, k] = nudge * (0.5 + 0.1 * np.cos(1.0 + k) - unit[i, k])
+            place = int((unit[i, k] + shift[i, k]) * counts[k])
+            number = number * counts[k] + min(max(place, 0), counts[k] - 1)
         own[i] = number
         most += starts[number + 1] - starts[number]
     point, cell = np.empty(most, np.int64), np.empty(most, np.int64)
@@ -37,10 +39,9 @@ def cells_near(points, bins, maps, overhang, nudge):
                 weight, push = maps[c, r, d], 0.0
                 for k in range(d):
                     weight += maps[c, r, k] * unit[i, k]
-                    # towards the middle of the box, in a direction that no grid line has
-                    push += maps[c, r, k] * nudge * (0.5 + 0.1 * np.cos(1.0 + k) - unit[i, k])
+                    push += maps[c, r, k] * shift[i, k]
                 weights[count, r] = weight
-                if not weight > -overhang[c] - nudge:
+                if not max(weight, weight + push) > -overhang[c, r] - nudge:
                     near = False
                     break
                 if not weight + push >= 0.0:
@@ -104,14 +105,19 @@ def guesses(hits, cells, folded, z, closest):
 
 
 @njit(**ACCURATE)
-def worth_trying(hits, inside, brims):
-    """Hits on cells that contain their point, or that it lies beyond across a brim."""
+def worth_trying(hits, inside, brims, maps, nudge):
+    """Hits on cells that contain their point, or across whose brim, within a nudge, it lies."""
     cell, weights = hits
     out, count = np.empty(len(cell), np.int64), 0
     for i in range(len(cell)):
-        good = inside[i]
-        for k in range(weights.shape[1]):
-            good = good or (brims[cell[i], k] and weights[i, k] < 0.0)
+        good, c = inside[i], cell[i]
+        for r in range(weights.shape[1]):
+            if good or not brims[c, r]:
+                continue
+            slack = 0.0
+            for k in range(weights.shape[1] - 1):
+                slack += nudge * abs(maps[c, r, k])
+            good = weights[i, r] < slack
         if good:
             out[count] = i
             count += 1
