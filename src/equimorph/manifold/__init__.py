@@ -22,11 +22,11 @@ from equimorph.manifold.levels import (
     singular_set,
 )
 from equimorph.manifold.locate import Location, Place, locate
-from equimorph.manifold.over import StatesOver
 from equimorph.manifold.querying.moves import lift_to
 from equimorph.manifold.refinement import refine
 from equimorph.manifold.snap_graph import Snap, SnapGraph, snap_graph
 from equimorph.manifold.stability_distance import StabilityDistance, stability_distance
+from equimorph.manifold.states_over import StatesOver
 
 __all__ = [
     "INTERVALS",

@@ -11,8 +11,9 @@ from equimorph.errors import InputError
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.near_crossings import NearCrossings, of_set
-from equimorph.manifold.over import Sheets, StatesOver
+from equimorph.manifold.over import Sheets
 from equimorph.manifold.pairing import Setting
+from equimorph.manifold.states_over import StatesOver
 from equimorph.model import Box, Constraint, parameter_vector, position
 from equimorph.structures import States, Structure
 

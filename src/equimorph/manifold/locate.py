@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.nearest import Ground, Spot, local_minima, setting_of, spots
-from equimorph.manifold.over import StatesOver
+from equimorph.manifold.states_over import StatesOver
 from equimorph.manifold.topology import faces_of
 from equimorph.model import Descriptor, position
 from equimorph.structures import State, States, Structure
