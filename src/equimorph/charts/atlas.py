@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -10,6 +11,7 @@ from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.travel import AtlasPath, travel
+from equimorph.charts.uncrossed import at_crossings, first_copies
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.embedding import embed
@@ -69,7 +71,7 @@ class Transition:
     charts
         Numbers of both charts.
     kind
-        "cut" inside a stratum, or "fold".
+        "cut" inside a stratum, "fold", or "crossing" of sheets.
     states
         Exact states along it.
     coords
@@ -199,7 +201,32 @@ class Atlas:
                     both = (values[used], values[used].copy())
                     states = self.eset.points[used]
                     out.append(Transition((i, j), kind, states, both, local))
-        return tuple(out)
+        return (*out, *self._crossings())
+
+    def _crossings(self) -> list[Transition]:
+        """Curves along which charts of sheets that cross meet, pair by pair."""
+        flags = at_crossings(self.eset, self.whole)
+        if not flags.any():
+            return []
+        cell, corner = np.nonzero(flags[self.whole.cell_facets])
+        copies = first_copies(self.eset)
+        facets = np.sort(copies[self.whole.facets[self.whole.cell_facets[cell, corner]]], axis=1)
+        charts: dict[tuple[int, ...], set[int]] = {}
+        for row, chart in zip(facets.tolist(), self.chart[cell].tolist(), strict=True):
+            charts.setdefault(tuple(row), set()).add(chart)
+        meeting: dict[tuple[int, int], list[tuple[int, ...]]] = {}
+        for row, own in charts.items():
+            for pair in combinations(sorted(own), 2):
+                meeting.setdefault(pair, []).append(row)
+        out = []
+        for pair, rows in sorted(meeting.items()):
+            for piece in pieces(np.array(sorted(rows))):
+                used = piece if piece.ndim == 1 else np.unique(piece)
+                local = np.arange(len(used)) if piece.ndim == 1 else np.searchsorted(used, piece)
+                at = self.eset.coordinates[used]
+                both = (at, at.copy())
+                out.append(Transition(pair, "crossing", self.eset.points[used], both, local))
+        return out
 
     def locate(self, states: States | State) -> tuple[Int[np.ndarray, " n"], Points]:
         """Numbers of the charts of states, −1 for those that lie on none, and their coordinates."""

@@ -33,8 +33,8 @@ class Barrier:
     Parameters
     ----------
     kind
-        "fold" or "cap" where the near side ends; "tie" where the preference changes between two
-        states that both go on.
+        "fold", "crossing" or "cap" where the near side ends; "tie" where the preference changes
+        between two states that both go on.
     points
         Free parameters along it; a point (d = 1), a polyline (d = 2) or points of a surface.
     near, far

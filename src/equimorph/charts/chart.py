@@ -12,6 +12,7 @@ from equimorph.charts.domain import Domain
 from equimorph.charts.location import SAME, Cells, Found
 from equimorph.charts.sheets import Overlap, alone, overlaps, single_valued
 from equimorph.charts.solving import frames_anywhere
+from equimorph.charts.uncrossed import uncrossed
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.embedding import embed
@@ -93,7 +94,7 @@ class Chart(ABC):
     @cached_property
     def cells(self) -> Cells:
         """Cells of the set that the chart covers."""
-        return Cells(self.eset, self.coordinates, np.arange(len(self.eset.cells)))
+        return Cells(uncrossed(self.eset), self.coordinates, np.arange(len(self.eset.cells)))
 
     @cached_property
     def domain(self) -> Domain:

@@ -5,7 +5,7 @@ from jaxtyping import Int
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.cusp_points import cusps_on_edges
-from equimorph.manifold.fabric import Fabric, check_sheets_do_not_cross, fabric_of
+from equimorph.manifold.fabric import Fabric, fabric_of
 from equimorph.manifold.levels import fabric_setting, part_of
 
 
@@ -22,7 +22,6 @@ def cusped(eset: EquilibriumSet) -> EquilibriumSet:
     """A set with vertices at its cusps; the set itself if it has none."""
     if len(eset.names) != 2:
         return eset
-    check_sheets_do_not_cross(eset)
     fabric, cusps = with_cusps(fabric_of(fabric_setting(eset), eset))
     if len(cusps) == 0:
         return eset

@@ -12,11 +12,12 @@ from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.cusped import with_cusps
 from equimorph.charts.location import Cells
 from equimorph.charts.projection import check_cells
+from equimorph.charts.uncrossed import uncrossed
 from equimorph.charts.untangling import untangled
 from equimorph.charts.walking import Walker, Way, straightened
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.exact import exact_states
-from equimorph.manifold.fabric import Fabric, check_sheets_do_not_cross, fabric_of, squared_sides
+from equimorph.manifold.fabric import Fabric, fabric_of, squared_sides
 from equimorph.manifold.levels import fabric_setting, part_of
 from equimorph.manifold.points import REFINED
 from equimorph.manifold.topology import chains, flags_of, keys_of, labels
@@ -54,6 +55,7 @@ def dissect(eset: EquilibriumSet) -> Atlas:
         For an empty set.
     """
     check_cells(eset)
+    eset = uncrossed(eset)
     work = _Work.of(eset)
     if len(eset.names) > 1:
         work = work.cusped()
@@ -101,7 +103,6 @@ class _Work:
     @classmethod
     def of(cls, eset: EquilibriumSet) -> "_Work":
         """Nothing is cut: charts are strata."""
-        check_sheets_do_not_cross(eset)
         fabric = fabric_of(fabric_setting(eset), eset)
         number = np.arange(len(eset.strata))
         return cls(eset, replace(fabric, cell_index=eset.stratum.copy()), number)

@@ -26,8 +26,9 @@ class Edge:
     Parameters
     ----------
     kind
-        What it lies on: a "fold", a "cap" (constraint), the "box", a "cut" to another chart, a
-        "barrier", or "singular" where the coordinates themselves turn back.
+        What it lies on: a "fold", a "crossing" of other sheets, a "cap" (constraint), the "box", a
+        "cut" to another chart, a "barrier", or "singular" where the coordinates themselves turn
+        back.
     points
         A point (d = 1), a polyline (d = 2), or triangles (d = 3) in the coordinates.
     """

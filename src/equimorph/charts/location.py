@@ -14,7 +14,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.cell_index import CellIndex, Hits
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.over import rooted
-from equimorph.manifold.points import CORNER, FOLD
+from equimorph.manifold.points import CORNER, CROSSING, FOLD
 from equimorph.manifold.simplices import volumes
 from equimorph.manifold.topology import Adjacency, adjacency, flags_of, orientation
 from equimorph.structures import States
@@ -23,6 +23,8 @@ Lanes = Float[np.ndarray, "lanes size"]
 Points = Float[np.ndarray, "points d"]
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
 
+SINGULAR = (FOLD, CORNER, CROSSING)
+"""Kinds of vertices at which the Jacobian is singular."""
 OVERHANG = 0.3
 """How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried."""
 SAME = 1e-6
@@ -128,12 +130,12 @@ class Cells:
 
     @cached_property
     def _at_fold(self) -> Bool[np.ndarray, " own"]:
-        return np.asarray(np.isin(self.eset.kinds, (FOLD, CORNER))[self.corners].any(axis=1))
+        return np.asarray(np.isin(self.eset.kinds, SINGULAR)[self.corners].any(axis=1))
 
     @cached_property
     def _folded(self) -> Bool[np.ndarray, " V"]:
         """Vertices from which states move like the root of the way."""
-        return np.isin(self.eset.kinds, (FOLD, CORNER)) & self.coordinates.projecting
+        return np.isin(self.eset.kinds, SINGULAR) & self.coordinates.projecting
 
     def find(self, points: Points) -> Found:
         """States of the cells that have the coordinates of points."""
@@ -240,7 +242,7 @@ class Cells:
         From the nearest one; if the cell contains the point, from all.
         """
         z, p, good = known
-        far = np.isin(self.eset.kinds, (FOLD, CORNER))[self.corners[hits.cell[again]]]
+        far = np.isin(self.eset.kinds, SINGULAR)[self.corners[hits.cell[again]]]
         nearest = np.argsort(1e9 * far - hits.weights[again], axis=1)
         for k, place in enumerate(nearest.T):
             open_ = ~good[again] & ~far[np.arange(len(again)), place]
@@ -296,8 +298,8 @@ class Cells:
 def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
     """Facets where the cells end or the coordinates fold, and what they lie on.
 
-    "fold" of the set, "cap" (a constraint), "box", "cut" (other cells of the set follow), or
-    "singular" where the coordinates turn back without a fold.
+    "fold" of the set, "crossing" of other sheets, "cap" (a constraint), "box", "cut" (other cells
+    of the set follow), or "singular" where the coordinates turn back without a fold.
     """
     eset, whole = cells.eset, cells.whole
     d = whole.facets.shape[1]
@@ -313,6 +315,7 @@ def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
     for bound in (eset.box.lower, eset.box.upper):
         on_box |= (np.abs(lines - bound) <= SLACK * size).all(axis=1).any(axis=1)
     capped = np.isin(eset.kinds, (2, CORNER))[facets].all(axis=1)
+    met = (eset.kinds == CROSSING)[facets].all(axis=1)
     ended = whole.counts[some] == 1
     if cells.cut is not None:
         capped &= ~cells.cut[facets].all(axis=1)
@@ -320,9 +323,9 @@ def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
     if cells.cut is not None:  # where an edge could not be cut, whole cells are left out
         cut = (cells.cut | np.isin(eset.kinds, (FOLD, CORNER)))[facets].all(axis=1)
     kinds = np.select(
-        [flags_of(facets, np.concatenate(folds)), ended & on_box & outer, ended & capped & outer,
-         ended & cut, ended],
-        ["fold", "box", "cap", "cut", "hole"],
+        [flags_of(facets, np.concatenate(folds)), ended & on_box & outer, ended & met & outer,
+         ended & capped & outer, ended & cut, ended],
+        ["fold", "box", "crossing", "cap", "cut", "hole"],
         "singular",
     )  # fmt: skip
     return facets, kinds

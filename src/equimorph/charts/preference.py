@@ -15,7 +15,6 @@ from equimorph.manifold.fabric import (
     ON_CAP,
     ON_FOLD,
     Fabric,
-    check_sheets_do_not_cross,
     edges_of,
     fabric_of,
 )
@@ -23,7 +22,7 @@ from equimorph.manifold.level_cuts import About, Ends, cut_between
 from equimorph.manifold.levels import fabric_setting, part_of
 from equimorph.manifold.on_edges import on_edges
 from equimorph.manifold.over import rooted
-from equimorph.manifold.points import CAP, CORNER, FOLD, REFINED
+from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.topology import adjacency, flags_of, keys_of
 from equimorph.manifold.vertices import Vertices, vertices_of
 from equimorph.structures import States
@@ -106,7 +105,6 @@ class Preference:
 def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndarray, " V"], int]:
     """The preferred part of a set, which of its vertices lie on cuts, and edges without a cut."""
     eset = preference.cells.eset
-    check_sheets_do_not_cross(eset)
     fabric = fabric_of(fabric_setting(eset), eset)
     among = np.zeros(len(eset.cells), bool)
     among[preference.cells.numbers] = True
@@ -169,6 +167,9 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     eset, corners = preference.cells.eset, preference.cells.corners
     values = np.ones(len(eset.points))
     used = np.unique(corners)
+    met = used[eset.kinds[used] == CROSSING]
+    values[met] = np.where(_preferred_beside(preference, met), -1.0, 1.0)
+    used = used[eset.kinds[used] != CROSSING]
     states = eset.points[used]
     values[used] = np.where(preference.prefers(states.z, states.p), -1.0, 1.0)
     folded = np.isin(eset.kinds, (FOLD, CORNER))
@@ -188,6 +189,24 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     own = far < MOVED**2 * ((z[other[there.point]] - z[fold[there.point]]) ** 2 @ mass)
     values[fold[there.point[own]]] = -1.0
     return values
+
+
+def _preferred_beside(preference: Preference, met: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Whether beside vertices at crossings, each of one sheet there, this sheet is preferred."""
+    eset, corners = preference.cells.eset, preference.cells.corners
+    out = np.zeros(len(met), bool)
+    two = list(permutations(range(corners.shape[1]), 2))
+    pairs = np.concatenate([corners[:, list(each)] for each in two])
+    cell = np.tile(preference.cells.numbers, len(two))
+    regular = ~np.isin(eset.kinds, (FOLD, CORNER, CROSSING))
+    kept = np.flatnonzero(np.isin(pairs[:, 0], met) & regular[pairs[:, 1]])
+    _, first = np.unique(pairs[kept, 0], return_index=True)
+    vertex, other = pairs[kept[first]].T
+    points = preference.cells.values
+    there = preference.over((1.0 - BESIDE) * points[vertex] + BESIDE * points[other])
+    own = eset.stratum[there.cell] == eset.stratum[cell[kept[first]][there.point]]
+    out[np.searchsorted(met, vertex[there.point[own]])] = True
+    return out
 
 
 def _narrowed(

@@ -10,6 +10,7 @@ from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells
 from equimorph.charts.sheets import sheet_labels, single_valued
+from equimorph.charts.uncrossed import uncrossed
 from equimorph.charts.untangling import untangled
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
@@ -87,17 +88,17 @@ class DescriptorChart(Chart):
     @cached_property
     def cells(self) -> Cells:
         """Cells of the set; those that chords of folds have turned over are flipped."""
-        numbers = np.arange(len(self.eset.cells))
-        plain = Cells(self.eset, self.coordinates, numbers)
+        eset, numbers = uncrossed(self.eset), np.arange(len(self.eset.cells))
+        plain = Cells(eset, self.coordinates, numbers)
         if len(self.names) != 2:
             return plain
-        folds = [np.stack([fold[:-1], fold[1:]], axis=1) for fold in self.eset.folds]
+        folds = [np.stack([fold[:-1], fold[1:]], axis=1) for fold in eset.folds]
         fixed = np.concatenate([np.zeros((0, 2), int), *folds])
-        flipped, sheet = self.eset.cells.copy(), sheet_labels(plain)
+        flipped, sheet = eset.cells.copy(), sheet_labels(plain)
         for label in range(sheet.max() + 1):
             own = sheet == label
             flipped[own] = untangled(flipped[own], plain.values, fixed)
-        return Cells(replace(self.eset, cells=flipped), self.coordinates, numbers)
+        return Cells(replace(eset, cells=flipped), self.coordinates, numbers)
 
     @cached_property
     def singular(self) -> Level:

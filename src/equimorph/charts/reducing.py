@@ -17,6 +17,7 @@ from equimorph.charts.preference import Preference, preferred_part
 from equimorph.charts.projection import check_cells
 from equimorph.charts.rules import Rule, Scores, rule_of
 from equimorph.charts.sheets import typical_extent
+from equimorph.charts.uncrossed import uncrossed
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -149,7 +150,7 @@ def reduce(
         prefers no state at all.
     """
     check_cells(eset)
-    eset = cusped(eset)
+    eset = cusped(uncrossed(eset))
     rule = rule_of(prefer)
     among = np.flatnonzero((eset.cell_index == 0) | (not stable))
     if len(among) == 0:

@@ -23,6 +23,8 @@ Chooser = Callable[[Found, Points], Bool[np.ndarray, " found"]]
 Scoring = Callable[[Found], Scores]
 
 
+EQUAL = 1e-12
+"""Difference, relative to one and to their size, up to which scores are equal."""
 Identity = Mapping[str, str | int | float]
 
 
@@ -70,14 +72,25 @@ class _Least(Rule):
 
 
 def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np.ndarray, " found"]:
-    """Which states have the least finite score over their points; the highest of equal ones."""
-    height = elevation.function(found.states.z, found.states.p)
-    order = np.lexsort((-height, score, found.point))
-    first = np.ones(len(order), bool)
-    first[1:] = np.diff(found.point[order]) > 0
-    chosen = np.zeros(len(order), bool)
-    chosen[order[first]] = True
-    return np.asarray(chosen & np.isfinite(score))
+    """Which states have the least finite score over their points; the highest of equal ones.
+
+    Mirror images of equal height are told apart by a product with a fixed vector: up to round-off
+    they are equal, and which is preferred must not change from point to point.
+    """
+    states, n = found.states, found.states.structure.unknowns
+    height = elevation.function(states.z, states.p)
+    turn = states.z[:, :n] @ (states.structure.mass * np.cos(1.0 + np.arange(n)))
+    chosen = np.isfinite(score)
+    for value in (score, -height, -turn):
+        least = np.full(int(found.point.max(initial=-1)) + 1, np.inf)
+        np.minimum.at(least, found.point[chosen], value[chosen])
+        own = least[found.point]
+        chosen[chosen] = (value <= own + EQUAL * (1.0 + np.abs(own)))[chosen]
+    kept = np.flatnonzero(chosen)
+    order = kept[np.argsort(found.point[kept], kind="stable")]
+    out = np.zeros(len(chosen), bool)
+    out[order[np.diff(found.point[order], prepend=-1) > 0]] = True
+    return out
 
 
 def lowest(descriptor: Descriptor) -> Rule:

@@ -1,6 +1,6 @@
 """Ways over the cells of a set from chart to chart."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,13 +8,14 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from equimorph.charts.uncrossed import first_copies
 from equimorph.charts.walking import Walker, Way, straightened
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.exact import exact_states
 from equimorph.manifold.nearest import setting_of
 from equimorph.manifold.over import rooted
-from equimorph.manifold.points import CORNER, FOLD
+from equimorph.manifold.points import CORNER, CROSSING, FOLD
 from equimorph.manifold.topology import adjacency, faces_of
 from equimorph.structures import State, States
 
@@ -63,6 +64,8 @@ def travel(
 
     Shortest over edges, in the metric; over two parameters then pulled straight between folds.
     """
+    # ways may lead from sheet to sheet where these cross
+    eset = replace(eset, cells=first_copies(eset)[eset.cells])
     if start[1] == goal[1]:
         states = _stacked(eset, start[0], None, goal[0])
         return AtlasPath(states, _coords(eset, states), chart[[start[1]]])
@@ -124,7 +127,7 @@ def _pulled(eset: EquilibriumSet, path: list[int]) -> Way:
     """The way, straight in the parameters between its vertices on folds."""
     if eset.cells.shape[1] != 3:
         return list(path)
-    folded = np.isin(eset.kinds, (FOLD, CORNER))
+    folded = np.isin(eset.kinds, (FOLD, CORNER, CROSSING))
     stops = [0, *(k for k in range(1, len(path) - 1) if folded[path[k]]), len(path) - 1]
     way: Way = [path[0]]
     for a, b in pairwise(stops):
@@ -143,7 +146,7 @@ def _states_on(eset: EquilibriumSet, way: Way) -> States:
     share = np.array([0.0 if isinstance(s, int) else s[2] for s in way])
     weights = np.stack([1.0 - share, share], axis=1)
     p = np.einsum("nk,nkp->np", weights, eset.points.p[ends])
-    folded = np.isin(eset.kinds, (FOLD, CORNER))[ends]
+    folded = np.isin(eset.kinds, (FOLD, CORNER, CROSSING))[ends]
     some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
     weights[some] = rooted(weights[some], folded[some])
     z = np.einsum("nk,nki->ni", weights, eset.points.z[ends])

@@ -12,7 +12,6 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.errors import InputError
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.accounting import Complex
 from equimorph.manifold.equilibrium_set import EquilibriumSet
@@ -241,16 +240,6 @@ def shares(count: int) -> list[tuple[int, int]]:
 def held(mark: int, dimension: int) -> list[int]:
     """Free parameters that sides of the box hold."""
     return [k for k in range(dimension) if mark & (3 * SIDES << 2 * k)]
-
-
-def check_sheets_do_not_cross(eset: EquilibriumSet) -> None:
-    """Refuse sets that cross themselves, for tasks that need one tangent space at each state."""
-    if eset.crossings:
-        raise InputError(
-            "`eset` must be a set whose sheets do not cross; got one that crosses itself along "
-            f"{len(eset.crossings)} curves. Break its symmetry, for example by a small offset of a "
-            "fixed parameter."
-        )
 
 
 def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:

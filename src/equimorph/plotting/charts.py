@@ -27,12 +27,14 @@ _EDGES: dict[str, dict[str, Any]] = {
     "fold": {"color": style.INK, "linewidth": 1.2},
     "cut": {"color": style.ROUTE_COLOUR, "linewidth": 1.2, "linestyle": (0, (4, 1.5))},
     "singular": {"color": style.INK, "linewidth": 0.9, "linestyle": (0, (1, 1))},
+    "crossing": {"color": style.INK, "linewidth": 1.2, "linestyle": (0, (5, 1.5, 1, 1.5))},
     "cap": {"color": style.INK, "linewidth": 0.7, "linestyle": (0, (3, 2))},
     "box": {"color": style.INK, "linewidth": style.HAIRLINE},
 }
 _BARRIER: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 2.6, "zorder": 5}
 _LABELS = {
     "fold": "fold", "cut": "cut", "singular": "coordinates fold", "cap": "constraint",
+    "crossing": "branch points",
     "barrier": "barrier", "gap": "gap", "twice": "not single-valued", "inside": "one state",
 }  # fmt: skip
 _ROOM = 0.04
