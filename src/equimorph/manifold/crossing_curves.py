@@ -91,7 +91,7 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> Seeds:
         )
         outcome = follow(ParameterLine(setting.structure, p, way), z, setting.constraints, options)
         there = outcome.code == ARRIVAL
-        reached.append(polished(setting, mesh, goal[there], outcome.z[there]))
+        reached.append(polished(setting, mesh, goal[there], outcome.z[there])[0])
         back = np.flatnonzero(outcome.code == RETURN)
         z, p, edges, towards = outcome.z[back], p[back], edges[back], 1 - towards[back]
         if len(back) == 0:
