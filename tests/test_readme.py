@@ -41,7 +41,14 @@ def test_the_guide_prints_what_it_says(capsys):
     assert printed == said
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/extending.md"])
+def test_the_page_on_sets_prints_what_it_says(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    printed, said = ran(ROOT / "docs" / "sets.md", capsys)
+    assert printed == said
+    assert (tmp_path / "spring.ply").exists()
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/extending.md", "docs/sets.md"])
 def test_files_that_pages_name_exist(name):
     page = (ROOT / name).read_text(encoding="utf-8")
     named = re.findall(r"`((?:\w+/)+\w+\.(?:py|toml))`", page)
