@@ -7,25 +7,27 @@ amid all its vertices. Several closed fold curves on a sphere each bound a disc 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from equimorph.manifold.assembly import Discs
+from equimorph.manifold.confined import pin_confined
+from equimorph.manifold.coning import fans_of, upright_apexes
 from equimorph.manifold.crossing_points import pin_crossings
-from equimorph.manifold.mesh import SLACK
+from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.pairing import Pairing
 from equimorph.manifold.parting import Parts, closed_surfaces, part
-from equimorph.manifold.pins import Pinned, pin, recalled_pin
+from equimorph.manifold.pins import Pinned, recalled_pin
 from equimorph.manifold.points import AMID, CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.simplices import volumes
 from equimorph.manifold.spheres import Surfaces, find_spheres
 from equimorph.manifold.topology import distinct
 
 SHEETS = 2
 """To each of which a crossing belongs."""
-ON_FACE = 1e-9
-"""Barycentric coordinate below which a point lies on a face of a grid tetrahedron."""
+DIVIDED = 1 / 100
+"""Share of the largest grid tetrahedron below which none is divided lest a fold turn cells over."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,11 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     doubtful[closed.owner[~parts.whole]] = True
     middles = _middles(pairing, parts, doubtful)
     apexes = _apexes(pairing, parts, middles, doubtful)
+    apexes, overturned = upright_apexes(
+        parts, middles, apexes, pairing.points.p[:, pairing.setting.free]
+    )
+    own = closed.owner[parts.region_surface]
+    doubtful[own[overturned & ((parts.first_curve < 0) | _large(pairing.mesh)[own])]] = True
     filled = _coned(parts, middles, apexes, ~doubtful[closed.owner])
     return Balls(
         np.concatenate([spheres.plain, filled.corners]),
@@ -74,6 +81,12 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
         filled.crossing_owner,
         np.flatnonzero(doubtful),
     )
+
+
+def _large(mesh: BaseMesh) -> Bool[np.ndarray, " N"]:
+    """Grid tetrahedra that have not been divided often."""
+    size = np.abs(volumes(mesh.vertices[mesh.tetrahedra]))
+    return np.asarray(size > DIVIDED * size.max(initial=0.0))
 
 
 def _caps(
@@ -97,40 +110,9 @@ def _caps(
     for kind, own in (*singular.items(), (CAP, plain)):
         used = own[at] & ends.get(kind, np.True_)
         groups = _groups(at[used], points[used], np.flatnonzero(own))
-        caps[own] = _pinned(pairing, groups, kind, cap=True)
-        if kind == CAP:
-            for surface in np.flatnonzero(own & (caps < 0) & (around > 3)).tolist():
-                caps[surface] = _rim_apex(pairing, surfaces, surface)
+        caps[own] = _pinned(pairing, groups, kind, surfaces.owner[own], cap=True)
         lost |= own & (caps < 0) & ((kind != CAP) | (around > 3))
     return caps, lost
-
-
-def _rim_apex(pairing: Pairing, surfaces: Surfaces, surface: int) -> int:
-    """Point of a rim from which a lid can be drawn without any other point; −1 if there is none.
-
-    A constraint may have a kink, like the largest of several extrema that are equal: then Newton's
-    method finds no point on it amid the rim. Chords of the lid must be no sides of the surface, nor
-    lie in a face of the grid tetrahedron, where its neighbour could draw the same.
-    """
-    mesh, store = pairing.mesh, pairing.points
-    sides = surfaces.rims[surfaces.rim_surface == surface]
-    corners = surfaces.corners[surfaces.surface == surface]
-    known = {frozenset(pair) for each in corners.tolist() for pair in combinations(each, 2)}
-    rim = np.unique(sides)
-    frame = mesh.vertices[mesh.tetrahedra[surfaces.owner[surface]]]
-    place = store.p[rim][:, pairing.setting.free] - frame[0]
-    shares = np.linalg.solve((frame[1:] - frame[0]).T, place.T)
-    faces = np.abs(np.vstack([shares, 1.0 - shares.sum(axis=0)])) < ON_FACE
-    beside = {frozenset(pair) for pair in sides.tolist()}
-    for a, apex in enumerate(rim.tolist()):
-        chords = [
-            (b, frozenset((apex, other)))
-            for b, other in enumerate(rim.tolist())
-            if b != a and frozenset((apex, other)) not in beside
-        ]
-        if all(each not in known and not (faces[:, a] & faces[:, b]).any() for b, each in chords):
-            return int(apex)
-    return -1
 
 
 def _grouped(
@@ -164,7 +146,8 @@ def _middles(
     left = (middles < 0) & parts.whole[parts.curve_surface]
     for kind, own in ((FOLD, ~parts.curve_met), (CROSSING, parts.curve_met)):
         chosen = np.flatnonzero(left & own)
-        middles[chosen] = _pinned(pairing, _groups(at, points, chosen), kind)
+        owner = parts.closed.owner[parts.curve_surface[chosen]]
+        middles[chosen] = _pinned(pairing, _groups(at, points, chosen), kind, owner)
     wanted = np.flatnonzero(left)
     owner = parts.closed.owner[parts.curve_surface[wanted]]
     doubtful[owner[middles[wanted] < 0]] = True
@@ -190,10 +173,10 @@ def _apexes(
     whole = parts.whole[parts.region_surface]
     wanted = np.flatnonzero(~folded & (apexes < 0) & whole)
     at, points = _grouped(parts.region, parts.closed.corners, count)
-    found = np.array(_pinned(pairing, _groups(at, points, wanted), AMID), int)
+    owner = parts.closed.owner[parts.region_surface[wanted]]
+    found = np.array(_pinned(pairing, _groups(at, points, wanted), AMID, owner), int)
     apexes[wanted] = found
-    wrong = (found < 0) | (pairing.points.index[found] != parts.region_index[wanted])
-    doubtful[parts.closed.owner[parts.region_surface[wanted[wrong]]]] = True
+    doubtful[owner[found < 0]] = True
     return apexes
 
 
@@ -205,17 +188,16 @@ def _coned(
 ) -> Balls:
     """Tetrahedra from the apex of each region to its triangles and to the folds around it."""
     closed = parts.closed
-    middle = middles[parts.curve]
-    fans = np.concatenate([np.sort(parts.folds, axis=1), middle[:, None]], axis=1)
-    fan_surface = parts.curve_surface[parts.curve]
-    proper = wanted[fan_surface] & (fans[:, :2] != middle[:, None]).all(axis=1)
-    fans, fan_surface, beside = fans[proper], fan_surface[proper], parts.beside[proper]
+    fans, sides = fans_of(parts, middles)
+    proper = wanted[parts.curve_surface[parts.curve[sides]]]
+    fans, sides = fans[proper], sides[proper]
+    fan_surface, beside = parts.curve_surface[parts.curve[sides]], parts.beside[sides]
     facets = np.concatenate([closed.corners, fans, fans])
     region = np.concatenate([parts.region, beside[:, 0], beside[:, 1]])
     apex, surface = apexes[region], parts.region_surface[region]
     kept = wanted[surface] & (facets != apex[:, None]).all(axis=1)
     lids = closed.lid & wanted[closed.surface]
-    met = parts.curve_met[parts.curve[proper]]
+    met = parts.curve_met[parts.curve[sides]]
     return Balls(
         np.concatenate([facets, apex[:, None]], axis=1)[kept],
         parts.region_index[region[kept]],
@@ -231,66 +213,75 @@ def _coned(
 
 
 def _pinned(
-    pairing: Pairing, groups: Sequence[Sequence[int]], kind: int, *, cap: bool = False
+    pairing: Pairing,
+    groups: Sequence[Sequence[int]],
+    kind: int,
+    owner: Int[np.ndarray, " groups"],
+    *,
+    cap: bool = False,
 ) -> list[int]:
-    """Numbers of new exact points of a kind amid groups; −1 where none was found.
+    """Numbers of new exact points of a kind amid groups over grid tetrahedra; −1 where none is.
 
     Crossings belong to two surfaces, whose groups are the same; `cap`: on a constraint.
     """
     if kind == CROSSING:
-        return _shared(pairing, groups, cap=cap)
-    return _new(pairing, groups, kind, cap=cap)
+        return _shared(pairing, groups, owner, cap=cap)
+    return _new(pairing, groups, kind, owner, cap=cap)
 
 
-def _shared(pairing: Pairing, groups: Sequence[Sequence[int]], *, cap: bool) -> list[int]:
+def _shared(
+    pairing: Pairing,
+    groups: Sequence[Sequence[int]],
+    owner: Int[np.ndarray, " groups"],
+    *,
+    cap: bool,
+) -> list[int]:
     """Numbers of new crossings amid groups that are given twice."""
     keys = [tuple(group) for group in groups]
     once = {key: keys.count(key) for key in keys}
-    found = dict(zip(once, _new(pairing, list(once), CROSSING, cap=cap), strict=True))
+    over = dict(zip(keys, owner.tolist(), strict=True))
+    own = np.array([over[key] for key in once], int)
+    found = dict(zip(once, _new(pairing, list(once), CROSSING, own, cap=cap), strict=True))
     return [found[key] if once[key] == SHEETS else -1 for key in keys]
 
 
-def _new(pairing: Pairing, groups: Sequence[Sequence[int]], kind: int, *, cap: bool) -> list[int]:
+def _new(
+    pairing: Pairing,
+    groups: Sequence[Sequence[int]],
+    kind: int,
+    owner: Int[np.ndarray, " groups"],
+    *,
+    cap: bool,
+) -> list[int]:
     """Numbers of new exact points of a kind amid groups; −1 where none was found."""
     out = [-1] * len(groups)
     if not groups:
         return out
-    setting, store = pairing.setting, pairing.points
+    store = pairing.points
     pinned = recalled_pin(
-        pairing.journal, groups, kind, lambda: _pin_inside(pairing, groups, kind, cap=cap)
+        pairing.journal, groups, kind, lambda: _pin_inside(pairing, groups, kind, owner, cap=cap)
     )
-    lanes, singular = np.flatnonzero(pinned.found), kind in {FOLD, CORNER, CROSSING}
-    index = setting.structure.index(pinned.z[lanes], pinned.p[lanes]).tolist()
-    for lane, own in zip(lanes.tolist(), index, strict=True):
-        # at folds and crossings the count is round-off
-        low = int(store.index[list(groups[lane])].min()) if singular else own
+    for lane in np.flatnonzero(pinned.found).tolist():
+        # on folds and crossings that of the lower side, elsewhere that of all
+        low = int(store.index[list(groups[lane])].min())
         out[lane] = store.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out
 
 
 def _pin_inside(
-    pairing: Pairing, groups: Sequence[Sequence[int]], kind: int, *, cap: bool
+    pairing: Pairing,
+    groups: Sequence[Sequence[int]],
+    kind: int,
+    owner: Int[np.ndarray, " groups"],
+    *,
+    cap: bool,
 ) -> Pinned:
-    """Pin points in the box: where one would leave it, the parameter that leaves is held."""
-    setting, store = pairing.setting, pairing.points
-    axes = np.eye(len(setting.free))
-
-    def amid(groups: Sequence[Sequence[int]], axes: Float[np.ndarray, "k d"]) -> Pinned:
-        span = np.tile(axes, (len(groups), 1, 1))
-        if kind == CROSSING:
-            return pin_crossings(setting, store, groups, span, cap)
-        return pin(setting, store, groups, kind, span)
-
-    pinned = amid(groups, axes)
-    low, high = pairing.mesh.vertices.min(axis=0), pairing.mesh.vertices.max(axis=0)
-    for held in range(len(axes)):
-        free = pinned.p[:, setting.free]
-        outside = np.maximum(low - free, free - high) / (high - low)
-        worst = outside.argmax(axis=1) == held
-        lanes = np.flatnonzero(worst & (outside[:, held] > SLACK))
-        if len(lanes) == 0:
-            continue
-        again = amid([groups[lane] for lane in lanes.tolist()], np.delete(axes, held, axis=0))
-        pinned.z[lanes], pinned.p[lanes], pinned.found[lanes] = again.z, again.p, again.found
-    inside = pairing.mesh.covers(pinned.p[:, setting.free])
-    return Pinned(pinned.z, pinned.p, pinned.found & inside)
+    """Pin points inside their grid tetrahedra; crossings, which two surfaces share, in the box."""
+    setting, mesh = pairing.setting, pairing.mesh
+    span = np.tile(np.eye(len(setting.free)), (len(groups), 1, 1))
+    if kind == CROSSING:
+        pinned = pin_crossings(setting, pairing.points, groups, span, cap)
+        inside = mesh.covers(pinned.p[:, setting.free])
+        return Pinned(pinned.z, pinned.p, pinned.found & inside)
+    frames = mesh.vertices[mesh.tetrahedra[owner]]
+    return pin_confined(setting, pairing.points, groups, kind, span, frames)

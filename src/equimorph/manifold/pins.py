@@ -90,6 +90,7 @@ def pin(
     groups: Sequence[Sequence[int]],
     kind: int,
     span: Span,
+    shift: tuple[int, float] = (0, 0.0),
 ) -> Pinned:
     """Newton on F = 0 with further conditions, from the middle of each group of points.
 
@@ -103,8 +104,14 @@ def pin(
         The k orthonormal directions, in scaled free parameters, in which the parameters may move.
         As many conditions as are left put the point into the normal space of the group through
         its middle, so that it lies amid the group.
+    shift
+        A member of the groups, and the share of the way towards it at which the middle is taken.
     """
     z, p, deviations = middles(setting, points, groups)
+    member, share = shift
+    towards = np.array([group[member] for group in groups], int)
+    z += share * (points.z[towards] - z)
+    p += share * (points.p[towards] - p)
     fold, cap = kind in {FOLD, CORNER}, kind in {CAP, CORNER}
     rows = principal_directions(deviations, span.shape[1] - fold - cap)
     around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
