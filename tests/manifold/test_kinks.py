@@ -1,11 +1,14 @@
 """Constraints with kinks on coarse grids: every cell is that of its own sheet, and upright."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.manifold.consistency import contradicted, turned_off_folds
 from equimorph.manifold.topology import adjacency, senses
 from equimorph.model import Box, Constraint, Descriptor
 from oracles.complexes import SINGULAR, assert_faithful
@@ -99,3 +102,24 @@ def test_kinks_cut_the_three_sphere_without_wrong_cells(shape, weights, bound, g
 @given(weights, bounds, coarse)
 def test_random_kinks_cut_the_three_sphere_without_wrong_cells(shape, weights, bound, grid):
     assert_right(shape, weights, bound, grid)
+
+
+def test_the_audit_names_cells_of_a_wrong_index_and_sense():
+    """Of a clean set, one vertex is exchanged for that on the other sheet, or moved across."""
+    eset, _ = cut_off(roof_of, (1.1, 0.8, 1.5), 0.36, (2, 2, 5))
+    regular = ~np.isin(eset.kinds, SINGULAR)
+    own = np.flatnonzero(regular & (np.abs(eset.points.z[:, 0]) > 0.1))[0]
+    points = replace(eset.points, z=eset.points.z.copy())
+    points.z[own] *= -1.0
+    bad = contradicted(points, eset.kinds, eset.cells, eset.cell_index)
+    assert np.array_equal(bad, (eset.cells == own).any(axis=1))
+    assert not contradicted(eset.points, eset.kinds, eset.cells, eset.cell_index).any()
+    # a point pushed through the opposite facet turns its cell over
+    sense = senses(eset.cells, eset.cell_index, eset.coordinates, adjacency(eset.cells))
+    cell = np.flatnonzero(regular[eset.cells].all(axis=1))[0]
+    place = eset.coordinates.copy()
+    corners = place[eset.cells[cell]]
+    place[eset.cells[cell, 0]] = 2 * corners[1:].mean(axis=0) - corners[0]
+    turned = senses(eset.cells, eset.cell_index, place, adjacency(eset.cells)).overturned
+    assert turned_off_folds(eset.kinds, eset.cells, turned, place)[cell]
+    assert not turned_off_folds(eset.kinds, eset.cells, sense.overturned, eset.coordinates).any()

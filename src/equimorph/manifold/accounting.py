@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.cells import Cells
+from equimorph.manifold.consistency import contradicted, turned_off_folds
 from equimorph.manifold.crossing_curves import lonely
 from equimorph.manifold.equilibrium_set import (
     Boundary,
@@ -130,8 +131,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
-    coordinates = points.p[:, frame.setting.free]
-    parts = (corners, given.cell_index, crossed, whole, coordinates, component)
+    audit = _audit(given, lifting, (crossed, whole, component), boundaries, frame.setting)
     return EquilibriumSet(
         structure=frame.setting.structure,
         box=frame.box,
@@ -149,7 +149,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         boundaries=boundaries,
         components=_components(corners, given.cell_index, component, (whole, boundaries)),
         strata=strata,
-        audit=_audit(points, lifting, parts, boundaries),
+        audit=audit,
         mesh=frame.mesh,
         grid_vertex=given.grid_vertex,
         crossings=tuple(pieces(whole.facets[crossed])),
@@ -222,19 +222,15 @@ def _edges_of(whole: Adjacency, component: Int[np.ndarray, " C"]) -> list[int | 
 
 
 def _audit(
-    points: States,
+    given: Complex,
     lifting: Lifting,
-    parts: tuple[
-        Int[np.ndarray, "C corners"],
-        Int[np.ndarray, " C"],
-        Bool[np.ndarray, " F"],
-        Adjacency,
-        Float[np.ndarray, "V d"],
-        Int[np.ndarray, " C"],
-    ],
+    parts: tuple[Bool[np.ndarray, " F"], Adjacency, Int[np.ndarray, " C"]],
     boundaries: tuple[Boundary, ...],
+    setting: Setting,
 ) -> Audit:
-    corners, cell_index, crossed, whole, coordinates, component = parts
+    corners, cell_index, points = given.cells, given.cell_index, given.points
+    crossed, whole, component = parts
+    coordinates = points.p[:, setting.free]
     # of parts of sets two cells may be left at a crossing that belong to different sheets
     if crossed.any():
         cells, origin = parted(corners, whole.facets[crossed], len(points))
@@ -242,6 +238,8 @@ def _audit(
     else:
         sense = senses(corners, cell_index, coordinates, whole, component)
     edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
+    wrong = contradicted(points, given.kinds, corners, cell_index)
+    wrong |= turned_off_folds(given.kinds, corners, sense.overturned, coordinates / setting.scales)
     whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
     most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
     kinds = [boundary.kind for boundary in boundaries]
@@ -254,6 +252,7 @@ def _audit(
         contradictions=sense.contradictions
         + unbalanced(corners, whole, sense, crossed & whole_crossing),
         overturned=int(sense.overturned.sum()),
+        wrong=int(wrong.sum()),
         euler_characteristic=euler_characteristic(corners, edges),
         components=int(component.max(initial=-1)) + 1,
         loops=tuple((kind, kinds.count(kind)) for kind in sorted(set(kinds))),

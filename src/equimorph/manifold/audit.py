@@ -15,6 +15,8 @@ class Audit:
     Facets at which two sheets cross (`crossings`: four cells each, whose orientations cancel) are
     not counted among the non-manifold ones.
     `overturned` cells project against the orientation that their index demands: slivers at folds.
+    `wrong` cells, which must be none, do so away from folds and are no slivers, or have a vertex
+    whose negative eigenvalues, counted anew at every vertex, are not those of their index.
     Of the equilibria found by random search at random points, `recovered` were missing and have
     been added; in the last round, `missing` of `checked` were, which must be zero too.
 
@@ -53,6 +55,7 @@ class Audit:
     smallest_dihedral: float = 0.0
     changed: int = 0
     smallest_free_angle: float = 0.0
+    wrong: int = 0
 
     @property
     def missing_at_most(self) -> float:
@@ -75,6 +78,7 @@ class Audit:
             self.undecided,
             self.non_manifold,
             self.contradictions,
+            self.wrong,
             self.missing,
             self.unrefined,
             self.changed,
@@ -106,6 +110,7 @@ class Audit:
             *([("edges where sheets cross", str(self.crossings))] if self.crossings else []),
             ("orientation contradictions", str(self.contradictions)),
             ("overturned cells", str(self.overturned)),
+            ("cells of a wrong index or sense", str(self.wrong)),
             ("components", str(self.components)),
             ("Euler characteristic", str(self.euler_characteristic)),
             ("boundary loops", loops),

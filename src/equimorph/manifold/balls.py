@@ -276,12 +276,13 @@ def _pin_inside(
     *,
     cap: bool,
 ) -> Pinned:
-    """Pin points inside their grid tetrahedra; crossings, which two surfaces share, in the box."""
+    """Pin points inside their grid tetrahedra; crossings, and folds if need be, in the box."""
     setting, mesh = pairing.setting, pairing.mesh
     span = np.tile(np.eye(len(setting.free)), (len(groups), 1, 1))
     if kind == CROSSING:
         pinned = pin_crossings(setting, pairing.points, groups, span, cap)
-        inside = mesh.covers(pinned.p[:, setting.free])
-        return Pinned(pinned.z, pinned.p, pinned.found & inside)
-    frames = mesh.vertices[mesh.tetrahedra[owner]]
-    return pin_confined(setting, pairing.points, groups, kind, span, frames)
+    else:
+        frames = mesh.vertices[mesh.tetrahedra[owner]]
+        pinned = pin_confined(setting, pairing.points, groups, kind, span, frames)
+    inside = mesh.covers(pinned.p[:, setting.free])
+    return Pinned(pinned.z, pinned.p, pinned.found & inside)

@@ -21,8 +21,6 @@ TRIED = 8
 """Points of a group towards which is tried at most."""
 ON_FACE = 1e-9
 """Barycentric coordinate below which a point lies on a face of a grid cell."""
-BULGE = 0.02
-"""The same by which a fold may bulge beyond a face, between edges that it does not meet."""
 
 Frames = Float[np.ndarray, "lanes corners d"]
 
@@ -39,7 +37,8 @@ def pin_confined(
 
     Where the one in the normal space through the middle is not, those through points between the
     middle and one of the group are tried: near its own points a constraint with kinks is smooth,
-    and a fold does not leave the cell.
+    and a fold does not leave the cell. Folds may bulge beyond a face between edges that they do not
+    meet, and behind cusps: if none of their points is inside, the one least far outside is taken.
 
     Parameters
     ----------
@@ -51,7 +50,7 @@ def pin_confined(
     low = np.array([points.index[list(group)].min() for group in groups], int)
     sizes = np.array([len(group) for group in groups])
     z, p, _ = middles(setting, points, groups)
-    best = np.full(len(groups), -BULGE if kind == FOLD else ON_FACE)
+    best = np.full(len(groups), -np.inf if kind == FOLD else ON_FACE)
     found = np.zeros(len(groups), bool)
     towards = product(SHARES, range(min(TRIED, int(sizes.max(initial=0)))))
     for share, member in ((0.0, 0), *towards):

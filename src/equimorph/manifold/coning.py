@@ -31,18 +31,20 @@ def upright_apexes(
 
     Of a region with a lid the point on the constraint can be taken, of one between several folds
     the middle of another. Over the faces of its grid tetrahedron a region is coned upright from all
-    points inside, if the discs there are upright; those at cusps are not, at any scale, and do not
-    count at folds.
+    points inside, if the discs there are upright; those at cusps are not, at any scale, nor are
+    fans of several folds that meet there: regions at folds count only if they have a lid.
     """
     fans, sides = fans_of(parts, middles)
     facets = np.concatenate([parts.closed.corners, fans, fans])
     region = np.concatenate([parts.region, *parts.beside[sides].T])
     signs = _coherent(facets, region)
-    inner = np.concatenate([parts.closed.lid, np.ones(2 * len(fans), bool)])
-    inner |= (parts.first_curve < 0)[region]
     count = len(apexes)
+    lidded = np.zeros(count, bool)
+    lidded[parts.region[parts.closed.lid]] = True
+    folded = parts.first_curve >= 0
+    inner = np.concatenate([parts.closed.lid, np.ones(2 * len(fans), bool)]) | ~folded[region]
     best, least = apexes.copy(), np.full(count, np.inf)
-    for candidates in (apexes, *_others(parts, middles)):
+    for candidates in (apexes, *_others(parts, middles, lidded)):
         corners = np.concatenate([facets, candidates[region, None]], axis=1)
         volume = volumes(place[corners]) * signs
         total = np.bincount(region, volume, count)
@@ -50,17 +52,14 @@ def upright_apexes(
         share = np.bincount(region, over, count) / np.maximum(np.abs(total), 1e-300)
         better = (candidates >= 0) & (share < least - NOISE)
         best[better], least[better] = candidates[better], share[better]
-    return best, least > NOISE
+    return best, (least > NOISE) & (lidded | ~folded)
 
 
 def _others(
-    parts: Parts, middles: Int[np.ndarray, " curves"]
+    parts: Parts, middles: Int[np.ndarray, " curves"], lidded: Bool[np.ndarray, " regions"]
 ) -> tuple[Int[np.ndarray, " regions"], Int[np.ndarray, " regions"]]:
     """Other points from which regions can be coned: of their lid, and of their last curve."""
-    count = len(parts.region_surface)
-    lidded = np.zeros(count, bool)
-    lidded[parts.region[parts.closed.lid]] = True
-    last = np.full(count, -1)
+    last = np.full(len(lidded), -1)
     for side in parts.beside.T:
         np.maximum.at(last, side, parts.curve)
     caps = np.where(lidded, parts.closed.cap[parts.region_surface], -1)
