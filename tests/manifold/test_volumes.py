@@ -11,6 +11,10 @@ from equimorph.manifold import (
     refine,
     stability_distance,
 )
+from equimorph.manifold.embedding import embed
+from equimorph.manifold.fabric import fabric_of
+from equimorph.manifold.pairing import Setting
+from equimorph.manifold.pins import Aim, corrected
 from equimorph.manifold.simplices import volumes
 from equimorph.manifold.tetrahedra import dihedrals
 from equimorph.manifold.topology import (
@@ -273,6 +277,40 @@ def test_volume_of_the_bistable_region_of_the_spring():
     # stable states count twice there, and once elsewhere
     whole = 0.7 * 0.6 * 0.2
     assert projected_volume(eset, 0) == pytest.approx(whole + wanted, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_refined_arch_over_three_parameters_has_no_slivers():
+    """No dihedral angle below 5°, and random points of all cells within the accuracy.
+
+    From each the set is sought orthogonally to the tangent space at the nearest corner: what is
+    found is at least as far as the nearest point.
+    """
+    arch = Rod()
+    box = Box(Theta=(0.6, 1.4), Delta=(-0.6, 0.6), q=(0, 3))
+    coarse = lifted(arch, box, (6, 9, 5), within=[arch.max_curvature <= 20])
+    with unchecked():
+        fine = refine(coarse, 0.05)
+        assert fine.audit.smallest_dihedral > 5.0
+        assert fine.audit.unrefined == 0
+        names = [parameter.name for parameter in arch.parameters]
+        free = np.array([names.index(name) for name in fine.names])
+        setting = Setting(arch, fine.points.p[0], free, ())
+        fabric = fabric_of(setting, fine)
+        generator = np.random.default_rng(5)
+        cells = fabric.cells[generator.integers(len(fabric.cells), size=1000)]
+        share = generator.dirichlet(np.ones(4), 1000)
+        z, p = (
+            np.einsum("ck,cki->ci", share, each[cells]) for each in (fine.points.z, fine.points.p)
+        )
+        nearest = cells[np.arange(1000), share.argmax(axis=1)]
+        place, span = embed(setting, z, p), np.tile(np.eye(3), (1000, 1, 1))
+        aim = Aim(setting, False, False, span, place, fabric.vertices.rows[nearest])
+        found = corrected(aim, z, p, np.full(1000, 0.5))
+        assert found.found.all()
+        away = np.linalg.norm(embed(setting, found.z, found.p) - place, axis=1)
+    assert away.max() <= 0.05
+    assert_faithful(fine)
 
 
 def test_distances_from_the_edge_of_stability_in_three_parameters():
