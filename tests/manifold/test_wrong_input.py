@@ -5,7 +5,7 @@ import re
 import pytest
 
 from equimorph.errors import InputError
-from equimorph.manifold import equilibrium_set
+from equimorph.manifold import equilibrium_set, level_set, locate, restricted, singular_set
 from equimorph.model import Box
 from equimorph.structures import Rod, Spring
 from typecheck import unchecked
@@ -81,6 +81,48 @@ from typecheck import unchecked
 def test_wrong_problem_is_refused_by_name(box, options, message):
     with unchecked(), pytest.raises(InputError, match=f"^{re.escape(message)}$"):
         equilibrium_set(Spring(), box, **options)
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda e: e.at(x_l="wide", F=0.1), "`x_l` must be a number; got 'wide'."),
+        (lambda e: e.at(x_l=0.8, F=None), "`at` must lie in Box(x_l=(0.3, 1.3), F=(-0.5, 0.5)); "),
+        (
+            lambda e: e.at(x_l=[0.8, 0.9], F=[0.1, 0.1]),
+            "`at` must give one number each; got {'x_l': [0.8, 0.9], 'F': [0.1, 0.1]}. Use `over` ",
+        ),
+        (
+            lambda e: e.over(x_l=["wide"], F=[0.1]),
+            "`x_l` must be an array with one number for each point; got ['wide'].",
+        ),
+        (
+            lambda e: locate(e, [0.1, 0.2]),
+            "`measured` must be values by descriptor, or points (n, 2); got [0.1, 0.2].",
+        ),
+        (
+            lambda e: level_set(e, "angle", 0.1),
+            "`descriptor` must be a descriptor, like `rod.max_curvature`; got 'angle'.",
+        ),
+        (
+            lambda e: singular_set(e, ["angle", "length"]),
+            "`descriptors` must be a descriptor, like `rod.max_curvature`; got 'angle'.",
+        ),
+        (
+            lambda e: restricted(e, Spring().angle),
+            "`constraint` must be a constraint, like `rod.max_curvature <= 6`; got ",
+        ),
+    ],
+)
+def test_what_sets_are_asked_in_other_terms_is_refused(spring_set, ask, message):
+    with unchecked(), pytest.raises(InputError, match=f"^{re.escape(message)}"):
+        ask(spring_set)
+
+
+def test_what_is_no_structure_is_refused():
+    said = "^`structure` must be a structure, like `Rod\\(\\)`; got 'arch'\\.$"
+    with unchecked(), pytest.raises(InputError, match=said):
+        equilibrium_set("arch", Box(F=(-1, 1)))
 
 
 @pytest.mark.parametrize("within", ["angle <= 1", ["angle <= 1"], [Spring().angle], 3.0])

@@ -2,10 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
+from types import UnionType
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float
+
 from equimorph.errors import InputError
-from equimorph.model import Box, Constraint
+from equimorph.model import Box, Constraint, Descriptor
 
 
 def whole_number(name: str, value: Any, least: int) -> int:
@@ -40,6 +44,45 @@ def constraints(within: Any) -> tuple[Constraint, ...]:
     return tuple(within)
 
 
+def numbers(name: str, values: Any, *, each: str) -> Float[np.ndarray, "..."]:
+    """Values of a parameter as an array.
+
+    Raises
+    ------
+    InputError
+        If they are no numbers, with `each` for what is wanted.
+    """
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"`{name}` must be {each}; got {values!r}.") from None
+
+
+def check_kind(name: str, given: Any, kind: type | UnionType, wanted: str) -> None:
+    """Refuse what is not of a kind.
+
+    Raises
+    ------
+    InputError
+        With what is `wanted` instead.
+    """
+    if not isinstance(given, kind):
+        raise InputError(f"`{name}` must be {wanted}; got {given!r}.")
+
+
+def check_descriptors(name: str, given: Any) -> None:
+    """Refuse what is no sequence of descriptors, or none.
+
+    Raises
+    ------
+    InputError
+        With what was given.
+    """
+    each = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    for one in each:
+        check_kind(name, one, Descriptor, "a descriptor, like `rod.max_curvature`")
+
+
 def check_box(box: Any, fixed: Any) -> None:
     """Refuse what is no box, and fixed values that are not given by name.
 
@@ -48,8 +91,7 @@ def check_box(box: Any, fixed: Any) -> None:
     InputError
         With what is allowed instead.
     """
-    if not isinstance(box, Box):
-        raise InputError(f"`box` must be a box, like `Box(q=(0.0, 2.5))`; got {box!r}.")
+    check_kind("box", box, Box, "a box, like `Box(q=(0.0, 2.5))`")
     if fixed is not None and not isinstance(fixed, Mapping):
         raise InputError(f'`fixed` must give values by name, like `{{"q": 2.5}}`; got {fixed!r}.')
 

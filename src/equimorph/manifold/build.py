@@ -9,7 +9,13 @@ from jaxtyping import Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import account
-from equimorph.manifold.asked import check_accuracy, check_box, constraints, whole_number
+from equimorph.manifold.asked import (
+    check_accuracy,
+    check_box,
+    check_kind,
+    constraints,
+    whole_number,
+)
 from equimorph.manifold.bisection import bisect
 from equimorph.manifold.cells import CellFinder, Cells
 from equimorph.manifold.completeness import check, seeds_from
@@ -118,6 +124,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by ke
         journal of something else.
     """
     progress = progress or Silent()
+    check_kind("structure", structure, Structure, "a structure, like `Rod()`")
     check_box(box, fixed)
     if accuracy is not None:
         check_accuracy(accuracy)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.errors import InputError
+from equimorph.manifold.asked import numbers
 from equimorph.manifold.audit import Audit
 from equimorph.manifold.mesh import BaseMesh
 from equimorph.manifold.near_crossings import NearCrossings, of_set
@@ -124,7 +125,11 @@ class EquilibriumSet:
             For names that are not free, missing ones, or a point outside the box.
         """
         _check_names(self.names, at)
-        point = np.array([float(at[name]) for name in self.names])
+        point = np.array([numbers(name, at[name], each="a number") for name in self.names])
+        if point.ndim > 1:
+            raise InputError(
+                f"`at` must give one number each; got {dict(at)}. Use `over` for many."
+            )
         if not self.box.contains(point, slack=1e-12):
             raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
         p = self._corner.copy()
@@ -182,7 +187,8 @@ class EquilibriumSet:
     ) -> Float[np.ndarray, "points P"]:
         """All parameters over points of the box."""
         _check_names(self.names, at)
-        columns = [np.asarray(at[name], dtype=float) for name in self.names]
+        each = "an array with one number for each point"
+        columns = [numbers(name, at[name], each=each) for name in self.names]
         if any(column.ndim != 1 or len(column) != len(columns[0]) for column in columns):
             shapes = ", ".join(f"{name} {np.shape(at[name])}" for name in self.names)
             raise InputError(

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.manifold.accounting import Frame, Lifting, described
+from equimorph.manifold.asked import check_descriptors, check_kind
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.fabric import HOLE, ON_CAP, Fabric, fabric_of
@@ -53,8 +54,9 @@ def level_set(eset: EquilibriumSet, descriptor: Descriptor, value: float) -> Lev
     Raises
     ------
     InputError
-        If `value` is not finite.
+        If `value` is not finite, or what is no descriptor is given.
     """
+    check_kind("descriptor", descriptor, Descriptor, "a descriptor, like `rod.max_curvature`")
     if not np.isfinite(value):
         raise InputError(f"`value` must be finite; got {value!r}.")
     return _level(eset, lambda v: descriptor.function(v.z, v.p) - value)
@@ -69,13 +71,14 @@ def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Lev
     Raises
     ------
     InputError
-        For another number of descriptors.
+        For another number of descriptors, or what is none.
     """
     _check_count(eset, descriptors)
     return _level(eset, lambda v: jacobian(fabric_setting(eset), v, descriptors))
 
 
 def _check_count(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> None:
+    check_descriptors("descriptors", descriptors)
     d = len(eset.names)
     if len(descriptors) != d:
         raise InputError(
@@ -141,7 +144,14 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
     """Part of a set that obeys a further constraint, cut exactly along it.
 
     The audit counts edges that could not be cut as `unrefined`; there whole cells are left out.
+
+    Raises
+    ------
+    InputError
+        If it is no constraint.
     """
+    wanted = "a constraint, like `rod.max_curvature <= 6`"
+    check_kind("constraint", constraint, Constraint, wanted)
     fabric = _fabric(eset)
     cut = _cut(fabric, lambda v: constraint.excess(v.z, v.p))
     inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
+from equimorph.manifold.asked import check_kind
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.nearest import Ground, Spot, local_minima, setting_of, spots
 from equimorph.manifold.states_over import StatesOver
@@ -113,6 +114,7 @@ def locate(
         descriptors of other structures, shapes with other numbers of points than the structure
         draws, or an empty set.
     """
+    check_kind("measured", measured, Mapping | np.ndarray, "values by descriptor, or points (n, 2)")
     if len(eset.cells) == 0:
         raise InputError("`eset` must have states to compare with; got an empty set.")
     fit = _Shape.of(eset, measured, s) if isinstance(measured, np.ndarray) else ValueFit.of(
