@@ -133,6 +133,8 @@ def _tamed(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     best, fewest = fabric, None
     for _ in range(TRIALS):
         fabric = tidied(fabric, memory, fine=True, limit=tolerance)
+        # edges that come to lie on a fold may deviate from it
+        fabric = settled(fabric, tolerance, memory)
         faults = (int((known(fabric, memory).error > tolerance).sum()), sharp(fabric))
         if fewest is not None and faults >= fewest:
             return best
