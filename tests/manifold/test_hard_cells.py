@@ -13,10 +13,10 @@ from oracles.complexes import assert_faithful
 from typecheck import unchecked
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-FAST = {(0.0, 80.0), (2.5, 20.0), (12.0, 80.0)}
+FAST = {(0.0, 80.0), (1.0, 10.0), (2.5, 20.0), (12.0, 80.0)}
 CASES = [
     pytest.param(q, cap, marks=[] if (q, cap) in FAST else [pytest.mark.slow])
-    for q in (0.0, 2.5, 4.0, 6.0, 9.0, 12.0)
+    for q in (0.0, 1.0, 2.5, 4.0, 6.0, 9.0, 12.0)
     for cap in (10.0, 20.0, 40.0, 80.0)
 ]
 

@@ -11,6 +11,9 @@ from oracles.surfaces import sphere, torus
 from typecheck import unchecked
 
 
+CUBE = {"F": (0, 1), "x_l": (0.5, 1), "k": (1, 2)}
+
+
 def angles(x: float, force: float) -> np.ndarray:
     """All δ in (−π/2, π/2) with (1 − x/cos δ) sin δ = F/k, from a polynomial in w = e^{iδ}.
 
@@ -159,6 +162,17 @@ def test_a_constraint_hides_what_violates_it():
         np.testing.assert_allclose(
             np.sort(here.states.z[:, 0]), expected[expected <= 0.4], rtol=0, atol=1e-9
         )
+
+
+@pytest.mark.parametrize("box", [Box(F=(0, 1)), Box(F=(0, 1), x_l=(0.5, 1)), Box(**CUBE)])
+def test_a_set_without_states_has_none_over_any_point(box):
+    structure = Spring()
+    fixed = {name: value for name, value in (("x_l", 0.8), ("k", 1.0)) if name not in box.names}
+    eset = lifted(structure, box, fixed=fixed, within=[structure.angle <= -2.0])
+    assert (len(eset.cells), eset.audit.clean) == (0, True)
+    middle = dict(zip(box.names, box.lower + 0.5, strict=True))
+    assert len(eset.at(**middle)) == 0
+    assert len(eset.over(**{name: np.full(2, value) for name, value in middle.items()}).states) == 0
 
 
 def test_no_points_give_no_states(spring_set):

@@ -92,7 +92,7 @@ class CellIndex:
         low, high = unit.min(axis=1), unit.max(axis=1)
         extent = high - low
         counts = _bins(extent)
-        overhang = overhang.reshape(len(corners), -1) + np.zeros(d + 1)
+        overhang = np.ascontiguousarray(np.broadcast_to(overhang.T, (d + 1, len(corners))).T)
         # a corner moves by what the facets across from the others do
         room = np.sort(overhang, axis=1)[:, 1:].sum(axis=1, keepdims=True) * extent
         first, last = (

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -221,14 +222,39 @@ def _newton_step(
         conditions.append(cap_condition(aim, z, p))
     conditions += amid(aim, z, p)
     values = np.stack([each.value for each in conditions], axis=1)
-    rhs = -np.concatenate([structure.residual(z, p), values], axis=1)
+    rhs = np.zeros((len(z), 1 + aim.cap, z.shape[1] + len(conditions)))
+    rhs[:, 0] = -np.concatenate([structure.residual(z, p), values], axis=1)
+    if aim.cap:
+        rhs[:, 1, z.shape[1] + aim.fold] = 1.0
     columns = [structure.parameter_derivative(z, p, aim.direction(i)) for i in range(k)]
     border = (
         np.stack(columns, axis=1),
         np.stack([each.by_z for each in conditions], axis=1),
         np.stack([each.by_step for each in conditions], axis=1),
     )
-    return structure.solve(z, p, rhs[:, None], border).x[:, 0], b
+    solved = structure.solve(z, p, rhs, border).x
+    step = solved[:, 0]
+    if aim.cap:
+        step = step + _missed(aim, z, p, values[:, int(aim.fold)], solved) * solved[:, 1]
+    return step, b
+
+
+def _missed(
+    aim: Aim, z: Lanes, p: Parameters, value: Values, steps: Float[np.ndarray, "lanes 2 bordered"]
+) -> Float[np.ndarray, "lanes 1"]:
+    """How much of the second step must be added to the first so that it meets the constraint.
+
+    Where the place of the largest value lies between two elements, single unknowns raise the value
+    on one side only: its gradient has a kink. Along steps that keep F = 0 it is smooth.
+    """
+    slopes = np.empty((len(z), 2))
+    for k in range(2):
+        size = DIFFERENCE / np.maximum(np.abs(steps[:, k]).max(axis=1), 1e-300)
+        dz, along = np.split(size[:, None] * steps[:, k], [z.shape[1]], axis=1)
+        up = worst_excess(aim, z + dz, aim.moved(p, along))
+        slopes[:, k] = (up - worst_excess(aim, z - dz, aim.moved(p, -along))) / (2.0 * size)
+    share = -(value + slopes[:, 0]) / np.where(slopes[:, 1] == 0.0, np.inf, slopes[:, 1])
+    return np.asarray(np.nan_to_num(share, posinf=0.0, neginf=0.0)[:, None])
 
 
 def _fold_condition(aim: Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[Condition, Lanes]:
@@ -249,13 +275,15 @@ def _fold_condition(aim: Aim, z: Lanes, p: Parameters, b: Lanes) -> tuple[Condit
     return Condition(g, by_z, by_step), v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
+def worst_excess(aim: Aim, z: Lanes, p: Parameters) -> Values:
+    """Largest excess over the constraints."""
+    return np.asarray(np.max([c.excess(z, p) for c in aim.setting.constraints], axis=0))
+
+
 def cap_condition(aim: Aim, z: Lanes, p: Parameters) -> Condition:
     """Largest excess over the constraints, its gradients by central differences."""
     lanes, size = z.shape
-
-    def worst(z: Lanes, p: Parameters) -> Values:
-        return np.asarray(np.max([c.excess(z, p) for c in aim.setting.constraints], axis=0))
-
+    worst = partial(worst_excess, aim)
     shift = DIFFERENCE * np.eye(size)
     many = np.repeat(p, size, axis=0)
     up = worst((z[:, None] + shift).reshape(-1, size), many)
