@@ -10,7 +10,6 @@ from equimorph.structures import Spring
 from oracles.surfaces import sphere, torus
 from typecheck import unchecked
 
-
 CUBE = {"F": (0, 1), "x_l": (0.5, 1), "k": (1, 2)}
 
 
