@@ -12,7 +12,7 @@ from equimorph.structures import States
 
 SLIVER = 0.03
 """Height of a cell, relative to its longest edge, below which it may be overturned beside folds."""
-VANISHING = 1e-6
+VANISHING = 1e-4
 """Size of the eigenvalues that may count either way at folds and where sheets cross."""
 
 

@@ -23,7 +23,7 @@ from equimorph.manifold.topology import adjacency, keys_of, rows_of
 from equimorph.structures import States
 
 Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes P"]
+Parameters = Float[np.ndarray, "_ P"]
 Values = Float[np.ndarray, " lanes"]
 Cells = Int[np.ndarray, "C corners"]
 Facets = Int[np.ndarray, "n d"]

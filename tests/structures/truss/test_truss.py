@@ -209,6 +209,6 @@ def test_states_of_a_shallow_dome_are_found_close_to_it():
     dome = Truss(joints, bars, supports, {"F": {"C": (0.0, 0.0, -1.0)}})
     with unchecked():
         found = em.find_equilibria(dome, {"F": 0.0}, starts=60, runs=1)
-    assert len(found) > 50
+    assert len(found) > 20
     assert np.abs(found.z).max(axis=1).min() < 1e-12
     assert found.residual.max() < 1e-12

@@ -163,16 +163,17 @@ class TrussMechanics(DiscreteStructure):
     # --- states ---------------------------------------------------------------------------------
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Displacements within the size of the truss along each axis, half of them much smaller.
+        """Displacements within the size of the truss along each axis, every fourth of them much smaller.
 
         A shallow truss of many bars has its other states close to where it was built.
         """
         extent = np.ptp(self.network.places, axis=0)
         reach = np.broadcast_to(np.maximum(extent, 0.2 * extent.max()), self.network.held.shape)
         shape = (len(p), self.unknowns)
-        size = np.exp(generator.uniform(np.log(SMALLEST), 0.0, (len(p), 1)))
-        size[::2] = 1.0
-        return np.asarray(size * generator.uniform(-1.0, 1.0, shape) * reach[~self.network.held])
+        guesses = generator.uniform(-1.0, 1.0, shape) * reach[~self.network.held]
+        guesses[3::4] *= SMALLEST ** generator.uniform(0.0, 1.0, (len(guesses[3::4]), 1))
+        guesses[3:4] = 0.0  # as it was built
+        return np.asarray(guesses)
 
     def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
         """No bar has shrunk to a point, and all rest lengths are positive."""
