@@ -20,8 +20,11 @@ ASIDE = 1e-7
 """Distance across an edge, in ranges of the parameters, at which the other side is looked at."""
 JUMP = 1e-3
 """Distance in the metric from which on states on both sides are no neighbours."""
-SHORT = 1e-6
-"""Extent, in ranges of the parameters, of barriers that are round-off at a cusp."""
+SHORT = 2e-4
+"""Extent, in ranges of the parameters, of barriers that are round-off at a cusp.
+
+So near it, its wedge is less than ten times as wide as `ASIDE`: it opens like the power 3/2.
+"""
 BESIDE = 0.4
 """Distance from another barrier, in lengths of its edges, within which a barrier is its image."""
 
