@@ -163,7 +163,7 @@ class TrussMechanics(DiscreteStructure):
     # --- states ---------------------------------------------------------------------------------
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Displacements within the size of the truss along each axis, every fourth of them much smaller.
+        """Displacements within the size of the truss along each axis, every fourth much smaller.
 
         A shallow truss of many bars has its other states close to where it was built.
         """
