@@ -268,6 +268,7 @@ def _recover(pairing: Pairing, missing: States) -> None:
         around = np.unique([mesh.locate(point) for point in missing.p[:, pairing.setting.free]])
         sides = mesh.sides[around] if mesh.dimension == 2 else mesh.sides[mesh.faces[around]]
         longest = _longest(mesh, sides.reshape(len(around), -1))
+        pairing.fit()
         pairing.use_mesh(bisect(mesh, np.unique(longest), _off_zero(pairing.setting)))
 
 
