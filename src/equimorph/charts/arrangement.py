@@ -7,8 +7,9 @@ exactly. An edge that passes a vertex within one spacing is led through it.
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Edges
+
 Places = Float[np.ndarray, "places 2"]
-Edges = Int[np.ndarray, "edges 2"]
 Jumps = Int[np.ndarray, " edges"]
 Drawing = tuple[Places, Edges, Jumps]
 # Before merging or cutting there are others, and another number of them.

@@ -5,8 +5,9 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
+from equimorph.arrays import Points
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells, Found
@@ -17,8 +18,6 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.topology import Adjacency, adjacency, flags_of, pieces
 from equimorph.structures import State, States
-
-Points = Float[np.ndarray, "points d"]
 
 SAME = 1e-5
 """Distance, in the metric and scaled parameters, within which a state is the one of a chart."""

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Points
 from equimorph.charts.domain import Domain, Edge, kinds_along, wide
 from equimorph.charts.location import Cells, facet_kinds
 from equimorph.charts.preference import Preference
@@ -13,8 +14,6 @@ from equimorph.charts.regions import regions_within
 from equimorph.manifold.topology import flags_of, pieces
 from equimorph.model import Box
 from equimorph.structures import States
-
-Points = Float[np.ndarray, "points d"]
 
 ASIDE = 1e-7
 """Distance across an edge, in ranges of the parameters, at which the other side is looked at."""

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Points
 from equimorph.charts.coordinates import Coordinates
 from equimorph.charts.domain import Domain
 from equimorph.charts.location import SAME, Cells, Found
@@ -17,8 +18,6 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.embedding import embed
 from equimorph.structures import State, States
-
-Points = Float[np.ndarray, "points d"]
 
 STATUSES = ("inside", "gap", "barrier", "beyond the box", "not single-valued")
 """Where points lie; only those inside have a state."""

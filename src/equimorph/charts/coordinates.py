@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.charts.solving import Scalars, solved_on_the_set, solved_over_parameters
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -14,11 +15,7 @@ from equimorph.manifold.nearest import setting_of
 from equimorph.manifold.tangents import split_step
 from equimorph.model import Descriptor, position
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, "lanes d"]
-Rows = Float[np.ndarray, "lanes d coordinates"]
-Frames = Float[np.ndarray, "lanes d full"]
 Square = Float[np.ndarray, "lanes d d"]
 
 CENTRAL = 1e-5
@@ -51,8 +48,8 @@ class Coordinates(Scalars):
         guess: tuple[Lanes, Parameters],
         wanted: Values,
         planes: Callable[[Int[np.ndarray, " some"]], Rows],
-        folded: Bool[np.ndarray, " lanes"],
-    ) -> tuple[Lanes, Parameters, Bool[np.ndarray, " lanes"], Int[np.ndarray, " lanes"]]:
+        folded: Flags,
+    ) -> tuple[Lanes, Parameters, Flags, Int[np.ndarray, " lanes"]]:
         """States with given coordinates near guesses, whether they were found, and their index.
 
         Parameters

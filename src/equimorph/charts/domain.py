@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
+from equimorph.arrays import Points
 from equimorph.charts.arrangement import cross, winding
 from equimorph.manifold.cell_index import CellIndex
 from equimorph.manifold.simplices import volumes
 
-Points = Float[np.ndarray, "points d"]
 Loop = Float[np.ndarray, "_ 2"]
 
 THIN = 0.05

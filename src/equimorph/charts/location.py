@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Points
 from equimorph.charts.coordinates import Coordinates
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import follow
@@ -19,8 +20,6 @@ from equimorph.manifold.simplices import volumes
 from equimorph.manifold.topology import Adjacency, adjacency, flags_of, orientation
 from equimorph.structures import States
 
-Lanes = Float[np.ndarray, "lanes size"]
-Points = Float[np.ndarray, "points d"]
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
 
 SINGULAR = (FOLD, CORNER, CROSSING)
@@ -173,7 +172,7 @@ class Cells:
 
     def _polished(
         self, guess: Guess, hits: Hits, wanted: Float[np.ndarray, "hits d"]
-    ) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"], Bool[np.ndarray, " lanes"]]:
+    ) -> tuple[Lanes, Parameters, Flags]:
         """Exact states near guesses, where there are any that the cells may have."""
         folded = self._at_fold[hits.cell]
         z, p, good, index = self.coordinates.solved(
@@ -191,11 +190,11 @@ class Cells:
     def _allowed(
         self,
         z: Lanes,
-        p: Float[np.ndarray, "lanes parameters"],
-        good: Bool[np.ndarray, " lanes"],
+        p: Parameters,
+        good: Flags,
         index: Int[np.ndarray, " lanes"],
         cell: Int[np.ndarray, " lanes"],
-    ) -> Bool[np.ndarray, " lanes"]:
+    ) -> Flags:
         low, high = self._indices
         good = good & (index >= low[cell]) & (index <= high[cell])
         good &= self.eset.box.contains(p[:, self.coordinates.setting.free], slack=SLACK)
@@ -233,10 +232,10 @@ class Cells:
     def _again(
         self,
         hits: Hits,
-        known: tuple[Lanes, Float[np.ndarray, "lanes parameters"], Bool[np.ndarray, " lanes"]],
+        known: tuple[Lanes, Parameters, Flags],
         again: Int[np.ndarray, " n"],
         points: Points,
-    ) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"], Bool[np.ndarray, " lanes"]]:
+    ) -> tuple[Lanes, Parameters, Flags]:
         """Try doubtful hits from regular corners of their cells, by lifts or by Newton.
 
         From the nearest one; if the cell contains the point, from all.
@@ -261,7 +260,7 @@ class Cells:
         corner: Int[np.ndarray, " lanes"],
         wanted: Float[np.ndarray, "lanes d"],
         hits: Hits,
-    ) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"], Bool[np.ndarray, " lanes"]]:
+    ) -> tuple[Lanes, Parameters, Flags]:
         start = self.eset.points[corner]
         if not self.coordinates.projecting:
             return self._polished((start.z, start.p), hits, wanted)
@@ -274,9 +273,7 @@ class Cells:
         index = np.where(arrived, ended.index, -1)
         return ended.z, p, self._allowed(ended.z, p, arrived, index, hits.cell)
 
-    def _one_of_each(
-        self, z: Lanes, p: Float[np.ndarray, "lanes parameters"], hits: Hits
-    ) -> Int[np.ndarray, " kept"]:
+    def _one_of_each(self, z: Lanes, p: Parameters, hits: Hits) -> Int[np.ndarray, " kept"]:
         """One of the equal states over each point, rather from a cell that contains the point.
 
         Equal states have equal products with any vector, so that they are neighbours in its order.

@@ -5,19 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
+from equimorph.arrays import Flags, Lanes, Parameters, Points
 from equimorph.charts.location import Found
-from equimorph.charts.rules import (
-    Chooser,
-    Identity,
-    Points,
-    Rule,
-    first_of_each,
-    highest,
-    lowest,
-    nearest,
-)
+from equimorph.charts.rules import Chooser, Identity, Rule, first_of_each, highest, lowest, nearest
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.first_stable import OFF, STABLE, FirstStable
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
@@ -29,8 +21,6 @@ from equimorph.manifold.nearest import setting_of
 from equimorph.model import Box, Grid, parameter_vector, position
 from equimorph.structures import Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Ends = Callable[[Lanes, Parameters, Parameters], Lanes]
 """States at the ends of paths from unloaded states, their parameters, and those of the ends."""
 
@@ -225,7 +215,7 @@ class Unloaded:
         out[:, self.load] = self.low
         return out
 
-    def states(self, p: Parameters) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+    def states(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Natural states below points, and where there are any."""
         if self.sheet is None:
             z, good = self.structure.natural(self.parameters(p))

@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Points, Values
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.rules import Chooser, Scoring
 from equimorph.manifold import EquilibriumSet
@@ -26,10 +27,6 @@ from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.topology import adjacency, flags_of, keys_of
 from equimorph.manifold.vertices import Vertices, vertices_of
 from equimorph.structures import States
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Points = Float[np.ndarray, "points d"]
 
 DIFFERENT = 1e-4
 """Distance in the metric from which on two states over a point are different ones."""
@@ -56,12 +53,12 @@ class Preference:
         found = self.cells.find(points)
         return found.take(self.choose(found, points))
 
-    def prefers(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def prefers(self, z: Lanes, p: Parameters) -> Flags:
         """Whether states of the set are the preferred ones over their points."""
         both, points = self._with_others(z, p)
         return self.choose(both, points)[len(both.point) - len(z) :]
 
-    def excess(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    def excess(self, z: Lanes, p: Parameters) -> Values:
         """Function that is positive where another state is preferred.
 
         The score less that of the best other state, which is smooth where the preference changes;

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
+from equimorph.arrays import Points
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
 from equimorph.charts.chart import BARRIER, BEYOND, GAP, INSIDE, Chart, Charted
 from equimorph.charts.coordinates import Coordinates, coordinates_of
@@ -22,8 +23,6 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
-
-Points = Float[np.ndarray, "points d"]
 
 ON_BARRIER = 1e-9
 """Distance from a barrier, in ranges of the parameters, within which points lie on it."""

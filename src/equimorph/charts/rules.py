@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
+from equimorph.arrays import Points
 from equimorph.charts.location import Found
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -17,7 +18,6 @@ from equimorph.model import Descriptor
 from equimorph.structures import State, States
 
 Scores = Float[np.ndarray, " found"]
-Points = Float[np.ndarray, "points d"]
 Chooser = Callable[[Found, Points], Bool[np.ndarray, " found"]]
 """Which of the states over points are preferred: at most one over each."""
 Scoring = Callable[[Found], Scores]

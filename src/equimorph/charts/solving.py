@@ -3,18 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.tangents import border_of, placed_frames, split_step
 from equimorph.model import Descriptor
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, "lanes d"]
-Rows = Float[np.ndarray, "lanes d coordinates"]
-Frames = Float[np.ndarray, "lanes d full"]
-Solved = tuple[Lanes, Parameters, Bool[np.ndarray, " lanes"], Int[np.ndarray, " lanes"]]
+Solved = tuple[Lanes, Parameters, Flags, Int[np.ndarray, " lanes"]]
 
 ITERATIONS, QUICK = 20, 8
 LONGEST = 0.3
@@ -54,7 +51,7 @@ def solved_over_parameters(
     scalars: Scalars,
     guess: tuple[Lanes, Parameters],
     wanted: Values,
-    tried: Bool[np.ndarray, " lanes"],
+    tried: Flags,
 ) -> Solved:
     """States by Newton in those free parameters that are not given: quick, and singular at folds.
 
@@ -87,7 +84,7 @@ def solved_over_parameters(
 
 def _goes_on(
     round_: int, size: Float[np.ndarray, " lanes"], before: Float[np.ndarray, " lanes"]
-) -> Bool[np.ndarray, " lanes"]:
+) -> Flags:
     """Whether corrections shrink, after the first few."""
     return np.asarray((size <= SHRINKING * before) | (round_ < FREE) | (size < LAST))
 

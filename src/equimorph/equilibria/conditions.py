@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
+from equimorph.arrays import Values
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.following import Watch
 from equimorph.equilibria.lift import check_start
@@ -22,17 +23,17 @@ def places(structure: Structure, names: Sequence[str], count: int) -> Int[np.nda
     return np.array(found)
 
 
-def gap(at: Critical) -> Float[np.ndarray, " lanes"]:
+def gap(at: Critical) -> Values:
     """g: zero at singular states."""
     return at.g
 
 
-def quadratic(at: Critical) -> Float[np.ndarray, " lanes"]:
+def quadratic(at: Critical) -> Values:
     """vᵀF_zz[v, v]: zero at cusps."""
     return at.quadratic
 
 
-def cubic(at: Critical) -> Float[np.ndarray, " lanes"]:
+def cubic(at: Critical) -> Values:
     """Cubic coefficient: zero at swallowtails and where criticality changes."""
     return at.cubic
 
@@ -41,7 +42,7 @@ def branching(structure: Structure, name: str) -> Test:
     """vᵀF_p for one parameter: zero where its paths branch."""
     place = position(structure.parameters, name)
 
-    def test(at: Critical) -> Float[np.ndarray, " lanes"]:
+    def test(at: Critical) -> Values:
         dp = np.zeros_like(at.p)
         dp[:, place] = structure.scales[place]
         return at.along(dp)
@@ -60,7 +61,7 @@ def grazing(structure: Structure, constraint: Constraint, name: str) -> Test:
     place = position(structure.parameters, name)
     size, h = max(1.0, abs(constraint.bound)), 1e-4
 
-    def test(at: Critical) -> Float[np.ndarray, " lanes"]:
+    def test(at: Critical) -> Values:
         dp = np.zeros_like(at.p)
         dp[:, place] = structure.scales[place]
         column = structure.parameter_derivative(at.z, at.p, dp)

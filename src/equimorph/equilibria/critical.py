@@ -6,11 +6,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 THIRD_STEP = 2e-3
 """Step of differences for F_zzz, in the metric: of fourth order, with errors near 1e-11."""

@@ -1,9 +1,8 @@
 """Cubics through values and slopes at both ends of a step: what a scalar does in between."""
 
 import numpy as np
-from jaxtyping import Float
 
-Values = Float[np.ndarray, " lanes"]
+from equimorph.arrays import Values
 
 
 def least_inside(

@@ -6,11 +6,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT, squared_lengths
 from equimorph.structures import Advance, Structure, bordered_advance
-
-Lanes = Float[np.ndarray, "lanes size"]
-Values = Float[np.ndarray, " lanes"]
 
 
 @runtime_checkable
@@ -53,16 +51,16 @@ class Curve(Protocol):
     def take(self, lanes: Int[np.ndarray, " some"]) -> "Curve":
         """Return some of the lanes."""
 
-    def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def parameters(self, t: Values) -> Parameters:
         """p(t)."""
 
-    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"]]:
+    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
         """Unknowns and multipliers of the structure, and all parameters."""
 
-    def rate(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def rate(self, t: Values) -> Parameters:
         """dp/dt."""
 
-    def bend(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def bend(self, t: Values) -> Parameters:
         """d²p/dt²."""
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
@@ -74,8 +72,8 @@ class ParameterLine:
     """Straight line p(t) = start + t·velocity in parameter space."""
 
     structure: Structure
-    start: Float[np.ndarray, "lanes parameters"]
-    velocity: Float[np.ndarray, "lanes parameters"]
+    start: Parameters
+    velocity: Parameters
 
     @property
     def weight(self) -> Values:
@@ -87,7 +85,7 @@ class ParameterLine:
         start, velocity = (np.take(each, lanes, axis=0) for each in (self.start, self.velocity))
         return ParameterLine(self.structure, start, velocity)
 
-    def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def parameters(self, t: Values) -> Parameters:
         """p(t)."""
         # products of whole arrays: with rows of few numbers these cost a third
         along = np.repeat(t, self.velocity.shape[1]).reshape(self.velocity.shape)
@@ -105,15 +103,15 @@ class ParameterLine:
         """Whether the index changes where dt/ds vanishes, and only there."""
         return True
 
-    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"]]:
+    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
         """Return z and p(t)."""
         return z, self.parameters(t)
 
-    def rate(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def rate(self, t: Values) -> Parameters:
         """Velocity, the same for all t."""
         return self.velocity
 
-    def bend(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def bend(self, t: Values) -> Parameters:
         """Zero."""
         return np.zeros_like(self.velocity)
 
@@ -127,7 +125,7 @@ class NewtonHomotopy:
     """F(z, p) = (1 − t) F(z₀, p): from any guess z₀ at t = 0 to equilibria at t = 1."""
 
     structure: Structure
-    p: Float[np.ndarray, "lanes parameters"]
+    p: Parameters
     defect: Lanes
     """F(z₀, p)."""
 
@@ -140,7 +138,7 @@ class NewtonHomotopy:
         """Return some of the lanes."""
         return NewtonHomotopy(self.structure, self.p[lanes], self.defect[lanes])
 
-    def parameters(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def parameters(self, t: Values) -> Parameters:
         """Parameters, the same for all t."""
         return self.p + 0.0 * t[:, None]
 
@@ -154,15 +152,15 @@ class NewtonHomotopy:
         """Whether the index changes where dt/ds vanishes, and only there."""
         return True
 
-    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Float[np.ndarray, "lanes parameters"]]:
+    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
         """Return z and p."""
         return z, self.parameters(t)
 
-    def rate(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def rate(self, t: Values) -> Parameters:
         """Zero."""
         return np.zeros_like(self.p)
 
-    def bend(self, t: Values) -> Float[np.ndarray, "lanes parameters"]:
+    def bend(self, t: Values) -> Parameters:
         """Zero."""
         return np.zeros_like(self.p)
 

@@ -1,22 +1,21 @@
 """Newton that is pushed away from solutions already known."""
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
 
 
 def deflated_newton(
     structure: Structure,
     z: Lanes,
-    p: Float[np.ndarray, "lanes parameters"],
+    p: Parameters,
     known: Float[np.ndarray, "lanes roots unknowns"],
     *,
     iterations: int = 30,
     longest: float = 0.7,
-) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+) -> tuple[Lanes, Flags]:
     """Solve ``m(u) F(z; p) = 0`` with m = Π (1 + 1/‖u − uᵢ‖²) in the metric, uᵢ known solutions.
 
     The Newton step of the product is that of F, lengthened by 1/(1 − ∇(log m)·du): one solve as
@@ -55,7 +54,7 @@ def _lengthening(
     u: Float[np.ndarray, "lanes unknowns"],
     du: Float[np.ndarray, "lanes unknowns"],
     known: Float[np.ndarray, "lanes roots unknowns"],
-) -> Float[np.ndarray, " lanes"]:
+) -> Values:
     """1/(1 − ∇(log m)·du)."""
     gap = u[:, None] - known
     squared = gap**2 @ structure.mass

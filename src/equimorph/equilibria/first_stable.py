@@ -3,17 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped
+from jaxtyping import Float, Int, Shaped
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.normal_form import criticality
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, RETURN, TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 WAYS = ("lost", "stable", "snaps", "branches off", "constraint", "none")
 """What a real loading does, or why there is no state, in the order of their numbers."""
@@ -47,12 +45,12 @@ class _Walk:
     lane: Int[np.ndarray, " lanes"]
     z: Lanes
     p: Parameters
-    at: Float[np.ndarray, " lanes"]
+    at: Values
     way: Int[np.ndarray, " lanes"]
-    high: Bool[np.ndarray, " lanes"]
-    up: Bool[np.ndarray, " lanes"]
+    high: Flags
+    up: Flags
 
-    def take(self, some: Bool[np.ndarray, " lanes"]) -> "_Walk":
+    def take(self, some: Flags) -> "_Walk":
         """Return some of the lanes."""
         return _Walk(*(column[some] for column in vars(self).values()))
 
@@ -86,7 +84,7 @@ class FirstStable:
         self,
         z: Lanes,
         p: Parameters,
-        at: Float[np.ndarray, " lanes"],
+        at: Values,
         passed: Shaped[np.ndarray, " lanes"] | None = None,
     ) -> tuple[Lanes, Parameters, Int[np.ndarray, " lanes"]]:
         """States at loads `at` (other than the unloaded one), and numbers in `WAYS`.

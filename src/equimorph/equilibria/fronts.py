@@ -3,15 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Values
 from equimorph.equilibria import kernels
 from equimorph.equilibria.curves import Curve, dual, squared_length
 from equimorph.equilibria.kernels import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
-
-Lanes = Float[np.ndarray, "lanes size"]
-Values = Float[np.ndarray, " lanes"]
-Flags = Bool[np.ndarray, " lanes"]
 
 __all__ = [
     "ARRIVAL",

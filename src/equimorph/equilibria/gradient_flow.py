@@ -5,15 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria.newton import newton
 from equimorph.linalg import multiply
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
-Flags = Bool[np.ndarray, " lanes"]
-Some = Int[np.ndarray, " some"]
 
 LANDED, SADDLE, ESCAPED, STUCK, SLOW = range(5)
 WHY = {

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Lanes, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.fronts import Bracket, Front
 from equimorph.equilibria.location import (
@@ -25,9 +26,6 @@ from equimorph.equilibria.tracing import (
     TraceOptions,
 )
 from equimorph.model import Constraint
-
-Lanes = Float[np.ndarray, "lanes size"]
-Values = Float[np.ndarray, " lanes"]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Lanes, Some
 from equimorph.equilibria.cubics import least_inside
 from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.fronts import Front
@@ -27,7 +28,6 @@ from equimorph.equilibria.tracing import (
 
 Values = Float[np.ndarray, " points"]
 Flags = Bool[np.ndarray, " points"]
-Some = Int[np.ndarray, " some"]
 
 DOUBTFUL = 0.4
 """Least value of the test function between two points, as a share of those at its ends, from which
@@ -41,7 +41,7 @@ REGULAR_ENDS = (ARRIVAL, RETURN, CONSTRAINT)
 
 def with_hidden_events(
     curve: Curve,
-    z: Float[np.ndarray, "lanes size"],
+    z: Lanes,
     outcome: Outcome,
     options: TraceOptions,
     *,
@@ -114,7 +114,7 @@ def _before_ends(curve: Curve, points: Points, outcome: Outcome) -> Happenings:
     return Happenings.joined(found, size)
 
 
-def _points(curve: Curve, z: Float[np.ndarray, "lanes size"], outcome: Outcome) -> Points:
+def _points(curve: Curve, z: Lanes, outcome: Outcome) -> Points:
     """Starts, recorded points, and the ends that are regular ones."""
     lanes, none = np.arange(len(z)), np.zeros(len(z))
     index = curve.structure.index(z, curve.parameters(none))

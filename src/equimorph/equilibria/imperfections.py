@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import follow
@@ -16,10 +17,6 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, position
 from equimorph.structures import Structure
 from equimorph.structures.naming import descriptor_named
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 TWICE = 2.0
 """Ways to a corner that are gone beyond it."""

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
-from jaxtyping import Float, Shaped
+from jaxtyping import Shaped
 
+from equimorph.arrays import Values
 from equimorph.equilibria.lift import Path, lift
 from equimorph.equilibria.starts import check_starts, violated
 from equimorph.equilibria.tracing import TraceOptions
@@ -54,7 +55,7 @@ class LimitLoads:
         One line for lanes that need it: the constraint that was met, why a lane was lost.
     """
 
-    value: Float[np.ndarray, " lanes"]
+    value: Values
     kind: Shaped[np.ndarray, " lanes"]
     states: States
     criticality: Shaped[np.ndarray, " lanes"]

@@ -9,8 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.curves import (
     Curve,
@@ -22,9 +23,6 @@ from equimorph.equilibria.fronts import Bracket, Front
 from equimorph.equilibria.kernels import cubic_shares
 from equimorph.equilibria.roots import root_inside
 
-Lanes = Float[np.ndarray, "lanes size"]
-Values = Float[np.ndarray, " lanes"]
-Flags = Bool[np.ndarray, " lanes"]
 Some = Int[np.ndarray, " lanes"]
 
 NEWTON_STEPS = 24

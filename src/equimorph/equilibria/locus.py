@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.structures import Structure
 
 Point = Float[np.ndarray, " coordinates"]
 Points = Float[np.ndarray, "lanes coordinates"]
-Values = Float[np.ndarray, " lanes"]
 Test = Callable[[Critical], Values]
 
 DIFFERENCE = 1e-5
@@ -55,9 +55,7 @@ class Locus:
         """Coordinates of a state."""
         return np.concatenate([z, p[self.free], np.zeros(int(self.unfolded))])
 
-    def split(
-        self, x: Points
-    ) -> tuple[Float[np.ndarray, "lanes size"], Float[np.ndarray, "lanes parameters"]]:
+    def split(self, x: Points) -> tuple[Lanes, Parameters]:
         """z and all parameters."""
         size = self.structure.size
         p = np.tile(self.base, (len(x), 1))

@@ -3,8 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Some, Values
 from equimorph.equilibria import kernels
 from equimorph.equilibria.cubics import least_inside
 from equimorph.equilibria.curves import Curve, squared_length
@@ -31,9 +32,7 @@ from equimorph.equilibria.tracing import TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Advance
 
-Lanes = Float[np.ndarray, "lanes size"]
 Names = Int[np.ndarray, " lanes"]
-Some = Int[np.ndarray, " some"]
 Span = tuple[tuple[Front, Front], tuple[float, ...]]
 """Ends of a step and their lengths on the way; see `inside_step`."""
 
@@ -222,7 +221,7 @@ class Block:
         pitchfork, or passed two folds: a shorter one will not.
         """
         _, counts = self._scalars
-        doubtful: Bool[np.ndarray, " lanes"] = counts[kernels.STAGE, : self.active] == CONVERGED
+        doubtful: Flags = counts[kernels.STAGE, : self.active] == CONVERGED
         doubtful &= (counts[kernels.WHAT, : self.active] & BRANCH) != 0
         at = np.flatnonzero(doubtful)
         found = locate_branch_point(self._here.take(at), self._bracket(at, move)).found
@@ -362,10 +361,10 @@ def _slope(
     curve: Curve,
     constraint: Constraint,
     z: Lanes,
-    t: Float[np.ndarray, " lanes"],
+    t: Values,
     tangent_z: Lanes,
-    tangent_t: Float[np.ndarray, " lanes"],
-) -> Float[np.ndarray, " lanes"]:
+    tangent_t: Values,
+) -> Values:
     """Change of a constraint's excess per length along curves."""
     h = DIFFERENCE
     ahead, behind = (

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.outcome import LOST, MULTIPLE, Outcome
 from equimorph.equilibria.tracing import FOLD
 from equimorph.structures import Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Counts = Int[np.ndarray, " lanes"]
 
 VANISHED, LOCATED = 1e-4, 1e-8
@@ -69,16 +68,14 @@ def _several(
     return [int(n) for n in count]
 
 
-def multiplicity(
-    structure: Structure, z: Lanes, p: Parameters, near: Float[np.ndarray, " lanes"]
-) -> Counts:
+def multiplicity(structure: Structure, z: Lanes, p: Parameters, near: Values) -> Counts:
     """Number of eigenvalues of the constrained Hessian, in the metric, within ±near of zero."""
     nothing = np.zeros((len(z), 0, structure.size))
     above, below = (structure.solve(z, p, nothing, shift=sign * near) for sign in (1.0, -1.0))
     return np.asarray(above.negative - below.negative)
 
 
-def _small_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+def _small_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:
     """Harmonic mean of the eigenvalues, of the size of the smallest one: by a single solution."""
     n, mass = structure.unknowns, structure.mass
     vector = np.cos(1.7 * np.arange(n)) + 1.3

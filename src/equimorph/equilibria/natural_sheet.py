@@ -6,13 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
+from equimorph.arrays import Flags, Lanes, Parameters, Settings
 from equimorph.model import Grid, position
 from equimorph.structures import Structure
-
-Settings = Float[np.ndarray, "lanes 2"]
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Flags = Bool[np.ndarray, " lanes"]
 
 SHARE = 0.25
 """Largest correction of a step to a neighbour, relative to the step: beyond, it is not taken."""

@@ -1,21 +1,19 @@
 """Damped Newton at fixed parameters."""
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
 
 
 def newton(
     structure: Structure,
     z: Lanes,
-    p: Float[np.ndarray, "lanes parameters"],
+    p: Parameters,
     *,
     iterations: int = 60,
     longest: float = 0.7,
-) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+) -> tuple[Lanes, Flags]:
     """Solve F(z; p) = 0 from guesses; steps longer than `longest` in the metric are shortened.
 
     Returns

@@ -3,15 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.curves import Curve
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 SKEW = 1e-4
 """Quadratic over cubic coefficient, a length in the metric, from which on it counts as not zero."""

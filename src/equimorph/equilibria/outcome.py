@@ -7,8 +7,9 @@ from concurrent.futures import wait
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
+from equimorph.arrays import Lanes, Some, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.happenings import Happenings, locate_all
 from equimorph.equilibria.march import Block, Loss
@@ -27,10 +28,7 @@ from equimorph.errors import CancelledError
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.model import Constraint, Progress, Silent
 
-Lanes = Float[np.ndarray, "lanes size"]
-Values = Float[np.ndarray, " lanes"]
 Names = Int[np.ndarray, " lanes"]
-Some = Int[np.ndarray, " some"]
 
 LOST, CANCELLED, MULTIPLE = 0, -1, -3
 KINDS = {

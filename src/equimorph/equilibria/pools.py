@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
 from equimorph.equilibria.deflation import deflated_newton
 from equimorph.equilibria.newton import newton
@@ -13,7 +14,6 @@ from equimorph.equilibria.tracing import ARRIVAL, RETURN, TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
 Groups = Int[np.ndarray, " lanes"]
 
 SAME = 1e-6
@@ -50,7 +50,7 @@ class Ground:
     p: Float[np.ndarray, "groups parameters"]
     within: tuple[Constraint, ...]
 
-    def excess(self, z: Lanes, group: Groups) -> Float[np.ndarray, " lanes"]:
+    def excess(self, z: Lanes, group: Groups) -> Values:
         """Largest violation in units of its bound."""
         parts = [
             constraint.excess(z, self.p[group]) / max(1.0, abs(constraint.bound))
@@ -144,7 +144,7 @@ class Pools:
         self.failures.append(("a line was not followed to its end", group[lost]))
         self._polished(outcome.z[returned], group[returned])
 
-    def _directions(self, count: int) -> Float[np.ndarray, "lanes parameters"]:
+    def _directions(self, count: int) -> Parameters:
         """Random directions of length `REACH` among actuators and loads."""
         structure = self.ground.structure
         steered = np.array([parameter.role != "fixed" for parameter in structure.parameters])

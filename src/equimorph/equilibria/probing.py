@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Lanes
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.cubics import least_inside
 from equimorph.equilibria.curves import Curve, squared_length
@@ -100,7 +101,7 @@ def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> 
     return found
 
 
-def _determinant(curve: Curve, z: Float[np.ndarray, "lanes size"], t: Values) -> Values:
+def _determinant(curve: Curve, z: Lanes, t: Values) -> Values:
     """Determinant of F_z."""
     still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
     return curve.advance(np.ascontiguousarray(z), t, still, one, none).determinant

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.newton import newton
 from equimorph.equilibria.outcome import follow
@@ -13,10 +14,6 @@ from equimorph.equilibria.tracing import ARRIVAL, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, position
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 SAMPLES = 9
 """Values at which a range is looked at; between them parabolas tell the extremum."""
@@ -83,9 +80,7 @@ class _Range:
         out[lanes] = _highest(np.stack(excesses, axis=1)) if self.within else -1.0
         return out
 
-    def _moved(
-        self, z: Lanes, p: Parameters, value: float
-    ) -> tuple[Lanes, Parameters, Bool[np.ndarray, " lanes"]]:
+    def _moved(self, z: Lanes, p: Parameters, value: float) -> tuple[Lanes, Parameters, Flags]:
         velocity = np.zeros_like(p)
         velocity[:, self.at] = value - p[:, self.at]
         moving = np.flatnonzero(velocity[:, self.at] != 0.0)

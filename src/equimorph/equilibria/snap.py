@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes
 from equimorph.equilibria import gradient_flow as flows
 from equimorph.equilibria.gradient_flow import Flow, gradient_flow, implicit_step, metric_length
 from equimorph.equilibria.lift import check_start
@@ -13,7 +14,6 @@ from equimorph.errors import InputError
 from equimorph.model import parameter_vector
 from equimorph.structures import State, States, Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
 Mode = Float[np.ndarray, " unknowns"]
 
 CRITICAL = 1e-6

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool
 
+from equimorph.arrays import Flags
 from equimorph.errors import InputError
 from equimorph.model import Constraint
 from equimorph.structures import State, States
@@ -46,7 +46,7 @@ def check_starts(states: States) -> None:
         )
 
 
-def violated(states: States, within: Sequence[Constraint]) -> Bool[np.ndarray, " lanes"]:
+def violated(states: States, within: Sequence[Constraint]) -> Flags:
     """Which states exceed a bound by more than round-off."""
     over = np.zeros(len(states), bool)
     for c in within:

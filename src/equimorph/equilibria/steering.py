@@ -5,11 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.model import Descriptor
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 DIFFERENCE = 1e-3
 """Step of central differences of fourth order, relative to the scales of the parameters and to the

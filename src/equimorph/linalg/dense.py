@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Values
 from equimorph.linalg.kernels import count_negative, multiply_lanes
 
 
@@ -20,14 +21,12 @@ class BorderedSolution:
 
     x: Float[np.ndarray, "lanes sides bordered"]
     negative: Int[np.ndarray, " lanes"]
-    pivot_ratio: Float[np.ndarray, " lanes"]
-    pivoted: Bool[np.ndarray, " lanes"]
-    determinant: Float[np.ndarray, " lanes"]
+    pivot_ratio: Values
+    pivoted: Flags
+    determinant: Values
 
 
-def multiply(
-    x: Float[np.ndarray, "lanes size"], matrix: Float[np.ndarray, "size ..."]
-) -> Float[np.ndarray, "lanes ..."]:
+def multiply(x: Lanes, matrix: Float[np.ndarray, "size ..."]) -> Float[np.ndarray, "lanes ..."]:
     """``x @ matrix`` for a matrix or vector, every lane the same bit for bit in any batch.
 
     Libraries choose the order of summation by the number of rows.
@@ -87,7 +86,7 @@ def solve_bordered(
     return BorderedSolution(x, negative, ratio, pivoted, _determinant(matrix))
 
 
-def _determinant(matrix: Float[np.ndarray, "lanes n n"]) -> Float[np.ndarray, " lanes"]:
+def _determinant(matrix: Float[np.ndarray, "lanes n n"]) -> Values:
     with np.errstate(all="ignore"):
         product = np.linalg.det(matrix)
     return np.asarray(np.where(np.isfinite(product), product, np.nan))

@@ -63,7 +63,7 @@ INTERVALS = {1: (200,), 2: (47, 81), 3: (24, 24, 24)}
 """Of the grid, by the number of free parameters, if not given."""
 
 
-def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, all by keyword
+def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     structure: Structure,
     box: Box,
     *,

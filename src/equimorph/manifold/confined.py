@@ -11,8 +11,9 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Values
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.pins import Pinned, Span, Values, middles, pin
+from equimorph.manifold.pins import Pinned, Span, middles, pin
 from equimorph.manifold.points import AMID, CAP, FOLD, Points
 
 SHARES = (0.25, 0.5, 0.8, 0.95)

@@ -6,16 +6,13 @@ The last factorisation of Newton's iteration gives both, so that nothing is solv
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows, Values
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import NEWTON_STEPS, REACH
-from equimorph.manifold.tangents import Frames, Rows, border_of, orthonormal
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
+from equimorph.manifold.tangents import border_of, orthonormal
 
 LAST = 1e-8
 """Size of a step after which there is none: its error is its square."""
@@ -35,9 +32,9 @@ class Corrected:
     p: Parameters
     frames: Frames
     index: Int[np.ndarray, " lanes"]
-    found: Bool[np.ndarray, " lanes"]
+    found: Flags
 
-    def take(self, some: Bool[np.ndarray, " lanes"]) -> "Corrected":
+    def take(self, some: Flags) -> "Corrected":
         """Return some of the points."""
         return Corrected(*(column[some] for column in vars(self).values()))
 

@@ -8,12 +8,13 @@ equation vanishes (see `crossing_points`).
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Frames, Lanes, Parameters, Rows
 from equimorph.equilibria.critical import null_border
 from equimorph.manifold.crossing_points import reduction
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.pins import Aim
-from equimorph.manifold.tangents import Frames, Lanes, Parameters, Rows, placed_frames
+from equimorph.manifold.tangents import placed_frames
 
 Slopes = Float[np.ndarray, "lanes d"]
 

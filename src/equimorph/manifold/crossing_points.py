@@ -12,20 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.manifold.embedding import embed, principal_directions
 from equimorph.manifold.pairing import Setting
-from equimorph.manifold.pins import (
-    REACH,
-    Aim,
-    Lanes,
-    Parameters,
-    Pinned,
-    Values,
-    amid,
-    cap_condition,
-    middles,
-)
+from equimorph.manifold.pins import REACH, Aim, Pinned, amid, cap_condition, middles
 from equimorph.manifold.points import Points
 
 NEWTON_STEPS = 15

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Int
 
+from equimorph.arrays import Flags, Lanes
 from equimorph.equilibria import ParameterLine
 from equimorph.equilibria.curves import correction_size, squared_length
 from equimorph.model import Constraint
@@ -17,14 +18,14 @@ LONGEST = 0.5
 class Direct:
     """Points over the other ends, their index, and which of them can be trusted."""
 
-    z: Float[np.ndarray, "lanes size"]
+    z: Lanes
     index: Int[np.ndarray, " lanes"]
-    good: Bool[np.ndarray, " lanes"]
+    good: Flags
 
 
 def lift_directly(
     line: ParameterLine,
-    z: Float[np.ndarray, "lanes size"],
+    z: Lanes,
     index: Int[np.ndarray, " lanes"],
     constraints: tuple[Constraint, ...],
     steps: int = 1,
@@ -51,7 +52,7 @@ def lift_directly(
 
 def _step(
     line: ParameterLine,
-    z: Float[np.ndarray, "lanes size"],
+    z: Lanes,
     index: Int[np.ndarray, " lanes"],
     constraints: tuple[Constraint, ...],
 ) -> Direct:

@@ -3,10 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.manifold.pairing import Setting
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Coordinates = Float[np.ndarray, "lanes coordinates"]
 
 

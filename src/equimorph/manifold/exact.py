@@ -1,8 +1,9 @@
 """Newton at fixed parameters until states are exact to round-off."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes
 from equimorph.linalg.simd import LANES
 from equimorph.manifold.querying.kernels import settle
 from equimorph.structures import Structure
@@ -14,12 +15,11 @@ SETTLED = 2
 """Corrections after which a lane whose index is not the wanted one is given up."""
 
 Points = Float[np.ndarray, "points P"]
-Lanes = Float[np.ndarray, "lanes size"]
 
 
 def exact_states(
     structure: Structure, z: Lanes, p: Points, wanted: Int[np.ndarray, " lanes"] | None = None
-) -> tuple[Lanes, Bool[np.ndarray, " lanes"], Int[np.ndarray, " lanes"]]:
+) -> tuple[Lanes, Flags, Int[np.ndarray, " lanes"]]:
     """Newton at fixed parameters until the next correction would be round-off; and the index.
 
     Corrections shrink quadratically: the one after sizes a and b is about b (b/a)². Where there is

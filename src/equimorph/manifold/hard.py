@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Flags
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
@@ -137,9 +138,7 @@ def _ends(pairing: Pairing, traced: Traced) -> Int[np.ndarray, " lanes"]:
     return ends
 
 
-def _caps(
-    pairing: Pairing, outcome: Outcome, line: ParameterLine, good: Bool[np.ndarray, " lanes"]
-) -> dict[int, Inner]:
+def _caps(pairing: Pairing, outcome: Outcome, line: ParameterLine, good: Flags) -> dict[int, Inner]:
     """Points at which lanes left through a constraint."""
     lanes = np.flatnonzero(good & (outcome.code == CONSTRAINT))
     z, p = outcome.z[lanes], line.take(lanes).parameters(outcome.t[lanes])
@@ -153,7 +152,7 @@ def _inner(
     rays: Rays,
     outcome: Outcome,
     line: ParameterLine,
-    good: Bool[np.ndarray, " lanes"],
+    good: Flags,
 ) -> dict[int, list[Inner]]:
     """Folds and crossings of each lane in order, with one regular point between neighbours.
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.manifold.asked import check_kind
 from equimorph.manifold.equilibrium_set import EquilibriumSet
@@ -20,8 +21,6 @@ CANDIDATES = 12
 SAME = 1e-5
 """Distance in the metric below which two states are the same."""
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Values = Float[np.ndarray, "lanes m"]
 Measured = Mapping[Descriptor | str, float] | Float[np.ndarray, "points dims"]
 
@@ -247,7 +246,7 @@ def _places(
     eset: EquilibriumSet,
     found: Spot,
     value: Float[np.ndarray, " lanes"],
-    inside: Bool[np.ndarray, " lanes"],
+    inside: Flags,
 ) -> list[Place]:
     states = States(eset.structure, found.z, found.p)
     pieces = [pieces_of(eset, state) for state in states]

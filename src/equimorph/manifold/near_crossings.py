@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev
 
+from equimorph.arrays import Cells, Flags, Lanes, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.manifold.cell_index import Hits
 from equimorph.manifold.crossing_points import corrected_crossings
@@ -22,10 +23,7 @@ from equimorph.manifold.pins import Aim, Pinned, lower_index
 from equimorph.manifold.topology import adjacency, keys_of, rows_of
 from equimorph.structures import States
 
-Lanes = Float[np.ndarray, "lanes size"]
 Parameters = Float[np.ndarray, "_ P"]
-Values = Float[np.ndarray, " lanes"]
-Cells = Int[np.ndarray, "C corners"]
 Facets = Int[np.ndarray, "n d"]
 
 NEAR = 1e-4
@@ -64,7 +62,7 @@ class Centres:
     low: Int[np.ndarray, " lanes"]
     point: Int[np.ndarray, " lanes"]
 
-    def take(self, some: Int[np.ndarray, " n"] | Bool[np.ndarray, " lanes"]) -> "Centres":
+    def take(self, some: Int[np.ndarray, " n"] | Flags) -> "Centres":
         """Some of the crossing points."""
         return Centres(*(column[some] for column in vars(self).values()))
 
@@ -211,7 +209,7 @@ class NearCrossings:
         centres: Centres,
         p: Parameters,
         states: tuple[Lanes, Int[np.ndarray, " lanes"]],
-    ) -> Bool[np.ndarray, " lanes"]:
+    ) -> Flags:
         """Which states, given with their points, are such that `branches` finds."""
         z, point = states
         structure = self.setting.structure
@@ -229,7 +227,7 @@ class NearCrossings:
 
     def _along(
         self, centres: Centres, p: Parameters, s: Values
-    ) -> tuple[Lanes, Values, Values, Bool[np.ndarray, " lanes"]]:
+    ) -> tuple[Lanes, Values, Values, Flags]:
         """Points with amplitudes s over p, r and its slope there, and which could be found."""
         structure, at = self.setting.structure, p[centres.point]
         v = Critical(structure, centres.z, centres.p, centres.b).v

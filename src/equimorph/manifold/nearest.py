@@ -4,8 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Rows, Values
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.equilibrium_set import EquilibriumSet
 from equimorph.manifold.pairing import Setting
@@ -19,10 +20,7 @@ from equimorph.manifold.tangents import (
 )
 from equimorph.model import position
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Frames = Float[np.ndarray, "lanes k full"]
-Rows = Float[np.ndarray, "lanes d coordinates"]
 Residuals = Callable[[Lanes, Parameters], Float[np.ndarray, "lanes m"]]
 
 DIFFERENCE = 1e-5
@@ -54,7 +52,7 @@ class Spot:
     p: Parameters
     rows: Rows
 
-    def take(self, some: Int[np.ndarray, " n"] | Bool[np.ndarray, " lanes"]) -> "Spot":
+    def take(self, some: Int[np.ndarray, " n"] | Flags) -> "Spot":
         """Some of the points."""
         return Spot(self.z[some], self.p[some], self.rows[some])
 
@@ -116,14 +114,14 @@ class Ground:
 
     def moved(
         self, spot: Spot, frames: Frames, step: Float[np.ndarray, "lanes k"]
-    ) -> tuple[Spot, Bool[np.ndarray, " lanes"]]:
+    ) -> tuple[Spot, Flags]:
         """Points of the set orthogonally above steps, and whether there are any in the box."""
         dz, dp = split_step(self.setting, np.einsum("lk,lkf->lf", step, frames))
         rows = placed_frames(self.setting, frames)
         there, good = self.corrected(Spot(spot.z + dz, spot.p + dp, rows))
         return Spot(there.z, there.p, spot.rows), good
 
-    def corrected(self, spot: Spot) -> tuple[Spot, Bool[np.ndarray, " lanes"]]:
+    def corrected(self, spot: Spot) -> tuple[Spot, Flags]:
         """Points of the set orthogonally above points, and whether there are any in the box."""
         lanes, d = len(spot.z), len(self.setting.free)
         span = np.tile(np.eye(d), (lanes, 1, 1))
@@ -133,9 +131,7 @@ class Ground:
         good = pinned.found & self.eset.box.contains(pinned.p[:, self.setting.free], slack=1e-9)
         return Spot(pinned.z, pinned.p, spot.rows), good
 
-    def nearest(
-        self, spot: Spot, residuals: Residuals
-    ) -> tuple[Spot, Float[np.ndarray, " lanes"], Bool[np.ndarray, " lanes"]]:
+    def nearest(self, spot: Spot, residuals: Residuals) -> tuple[Spot, Values, Flags]:
         """Local minima of ``½‖r‖²`` from points on, the norms ‖r‖, and whether they are minima.
 
         Newton with the second derivatives measured along the set. Those that run against the box
@@ -191,7 +187,7 @@ class Ground:
 
     def _curved(
         self, spot: Spot, frames: Frames, residuals: Residuals
-    ) -> tuple[Float[np.ndarray, "lanes k k"], Bool[np.ndarray, " lanes"]]:
+    ) -> tuple[Float[np.ndarray, "lanes k k"], Flags]:
         """Second derivatives along the set, from gradients on both sides; and where there are."""
         lanes, k = frames.shape[:2]
         sides = np.concatenate([np.eye(k), -np.eye(k)])
@@ -218,8 +214,8 @@ class Ground:
         frames: Frames,
         step: Float[np.ndarray, "lanes k"],
         residuals: Residuals,
-        value: Float[np.ndarray, " lanes"],
-    ) -> tuple[Spot, Float[np.ndarray, " lanes"], Bool[np.ndarray, " lanes"]]:
+        value: Values,
+    ) -> tuple[Spot, Values, Flags]:
         """Points after steps, halved until the norm falls; the norms, and where it does."""
         best, norm = spot, value.copy()
         better, share = np.zeros(len(value), bool), np.ones(len(value))

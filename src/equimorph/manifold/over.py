@@ -8,9 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
+from equimorph.arrays import Lanes
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.cell_index import NUDGE, CellIndex, Hits
-from equimorph.manifold.exact import Lanes, Points, exact_states
+from equimorph.manifold.exact import Points, exact_states
 from equimorph.manifold.near_crossings import NearCrossings
 from equimorph.manifold.querying.kernels import (
     balanced,

@@ -9,9 +9,8 @@ from jaxtyping import Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from equimorph.arrays import Cells
 from equimorph.manifold.topology import adjacency, flags_of
-
-Cells = Int[np.ndarray, "C corners"]
 
 
 def parted(

@@ -6,18 +6,16 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.critical import null_border
 from equimorph.manifold.embedding import embed, principal_directions
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.points import CAP, CORNER, FOLD, Points
 from equimorph.model import Journal, recalled, step_of
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Span = Float[np.ndarray, "lanes k d"]
-Values = Float[np.ndarray, " lanes"]
 
 NEWTON_STEPS = 15
 DIFFERENCE = 1e-6
@@ -35,7 +33,7 @@ class Pinned:
 
     z: Lanes
     p: Parameters
-    found: Bool[np.ndarray, " lanes"]
+    found: Flags
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold.embedding import embed
@@ -17,9 +18,6 @@ from equimorph.manifold.snap_graph import stability_boundary
 from equimorph.manifold.tangents import placed_frames
 from equimorph.manifold.topology import faces_of
 from equimorph.structures import State, States
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 CANDIDATES = 12
 """Places of the boundary from which the nearest one is searched."""

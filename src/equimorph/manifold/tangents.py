@@ -7,18 +7,12 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.kernels import square_sides
 from equimorph.manifold.pairing import Setting
 from equimorph.structures.contract import Border
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Rows = Float[np.ndarray, "lanes d coordinates"]
-Frames = Float[np.ndarray, "lanes d full"]
-"""Bases of tangent spaces, orthonormal in the metric: changes of z and of the scaled free
-parameters."""
 
 CHUNK = 2048
 DIFFERENCE = 1e-5
@@ -104,7 +98,7 @@ def cap_slopes(
 ) -> Float[np.ndarray, "lanes d"]:
     """Slope along the frame of the largest excess over the constraints."""
 
-    def worst(sign: float, k: int) -> Float[np.ndarray, " lanes"]:
+    def worst(sign: float, k: int) -> Values:
         dz, dp = split_step(setting, sign * DIFFERENCE * frames[:, k])
         return np.asarray(np.max([c.excess(z + dz, p + dp) for c in setting.constraints], axis=0))
 

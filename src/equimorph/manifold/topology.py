@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from equimorph.arrays import Cells
 from equimorph.manifold.kernels import orient
 from equimorph.manifold.simplices import volumes
 
@@ -15,7 +16,6 @@ PAIR = 2
 """Corners of an edge."""
 
 Pairs = Int[np.ndarray, "n 2"]
-Cells = Int[np.ndarray, "C corners"]
 
 
 @dataclass(frozen=True)

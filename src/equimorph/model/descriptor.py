@@ -5,17 +5,18 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol, overload, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 
 Evaluate = Callable[
-    [Float[np.ndarray, "lanes size"], Float[np.ndarray, "lanes parameters"]],
-    Float[np.ndarray, " lanes"],
+    [Lanes, Parameters],
+    Values,
 ]
 
 Branches = Callable[
-    [Float[np.ndarray, "lanes size"], Float[np.ndarray, "lanes parameters"]],
+    [Lanes, Parameters],
     tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]],
 ]
 
@@ -41,11 +42,11 @@ class ManyStates(Protocol):
     """What a descriptor needs of a batch of states."""
 
     @property
-    def z(self) -> Float[np.ndarray, "lanes size"]:
+    def z(self) -> Lanes:
         """Unknowns and multipliers."""
 
     @property
-    def p(self) -> Float[np.ndarray, "lanes parameters"]:
+    def p(self) -> Parameters:
         """All parameters."""
 
     def __len__(self) -> int:
@@ -87,7 +88,7 @@ class Descriptor:
     @overload
     def __call__(  # type: ignore[overload-overlap]
         self, states: ManyStates
-    ) -> Float[np.ndarray, " lanes"]: ...
+    ) -> Values: ...
     @overload
     def __call__(self, states: OneState) -> float: ...
     def __call__(self, states: Any) -> Any:
@@ -142,14 +143,12 @@ class Constraint:
         """Return it as it is written."""
         return f"{self.descriptor.name} {self.sense} {self.bound:g}"
 
-    def excess(
-        self, z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
-    ) -> Float[np.ndarray, " lanes"]:
+    def excess(self, z: Lanes, p: Parameters) -> Values:
         """Amount by which states exceed the bound: positive where violated."""
         sign = 1.0 if self.sense == "<=" else -1.0
         return sign * (self.descriptor.function(z, p) - self.bound) - self.ease
 
-    def holds(self, states: ManyStates) -> Bool[np.ndarray, " lanes"]:
+    def holds(self, states: ManyStates) -> Flags:
         """Whether states obey the constraint."""
         return self.excess(states.z, states.p) <= 0.0
 
@@ -181,9 +180,7 @@ def combined(
             f"{', '.join(each.name for each in descriptors) or 'none'}."
         )
 
-    def value(
-        z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
-    ) -> Float[np.ndarray, " lanes"]:
+    def value(z: Lanes, p: Parameters) -> Values:
         return np.asarray(function(*(each.function(z, p) for each in descriptors)), dtype=float)
 
     return Descriptor(name, unit, value, name)
@@ -201,7 +198,7 @@ def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
     unit = descriptors[0].unit
 
     def branches(
-        z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
+        z: Lanes, p: Parameters
     ) -> tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]]:
         values = np.stack([each.function(z, p) for each in descriptors], axis=1)
         return values, np.tile(np.arange(float(len(descriptors))), (len(z), 1))

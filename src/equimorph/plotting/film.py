@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image
 
+from equimorph.arrays import Values
 from equimorph.charts.regions import count_regions
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
@@ -173,7 +174,7 @@ class _Reading(NamedTuple):
     label: str
     unit: str
     form: str
-    values: Float[np.ndarray, " lanes"]
+    values: Values
 
 
 def _readings(states: States, eset: EquilibriumSet, route: Route) -> list[_Reading]:

@@ -49,7 +49,7 @@ class _Plane:
         return np.array([self.across(state), self.up(state)])
 
 
-def level_plane(  # noqa: PLR0913  # knobs, by keyword
+def level_plane(
     eset: EquilibriumSet,
     plane: tuple[Descriptor, Descriptor],
     level: Descriptor,

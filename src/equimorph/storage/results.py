@@ -53,7 +53,7 @@ class Results:
     answers: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def write_results(  # noqa: PLR0913  # one for each kind of content
+def write_results(
     path: str | Path,
     eset: EquilibriumSet | None,
     height: Descriptor,

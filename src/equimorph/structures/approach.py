@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Values
 from equimorph.model.obstacle import Obstacle
 
 STEPS = 8
@@ -11,7 +12,6 @@ STARTS = np.array([0.0, 1.0])
 
 Arcs = Float[np.ndarray, "lanes arcs 4 2"]
 """Cubic arcs: both ends, and the derivatives there with respect to the share of the arc."""
-Values = Float[np.ndarray, " lanes"]
 
 
 def straight_arcs(corners: Float[np.ndarray, "lanes points 2"]) -> Arcs:

@@ -8,15 +8,14 @@ from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.model import Descriptor, Parameter, names_of
 from equimorph.structures.approach import straight_arcs
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Direction = tuple[Lanes, Parameters]
 Border = tuple[
     Float[np.ndarray, "lanes k size"],
@@ -24,7 +23,7 @@ Border = tuple[
     Float[np.ndarray, "lanes k k"],
 ]
 Majorant = Callable[[Direction, Direction], Lanes]
-Closing = tuple[Lanes, Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]
+Closing = tuple[Lanes, Values, Values]
 
 
 @dataclass(frozen=True)
@@ -37,13 +36,13 @@ class Advance:
     determinant: that of F_z where it costs nothing, else nan.
     """
 
-    dz: Float[np.ndarray, "lanes size"]
-    dt: Float[np.ndarray, " lanes"]
-    tangent_z: Float[np.ndarray, "lanes size"]
-    tangent_t: Float[np.ndarray, " lanes"]
-    residual: Float[np.ndarray, " lanes"]
+    dz: Lanes
+    dt: Values
+    tangent_z: Lanes
+    tangent_t: Values
+    residual: Values
     index: Int[np.ndarray, " lanes"]
-    determinant: Float[np.ndarray, " lanes"]
+    determinant: Values
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ class Structure(ABC):
             return self
 
     @abstractmethod
-    def energy(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    def energy(self, z: Lanes, p: Parameters) -> Values:
         """Potential energy E."""
 
     @abstractmethod
@@ -146,17 +145,15 @@ class Structure(ABC):
         p: Parameters,
         rhs: Float[np.ndarray, "lanes sides bordered"],
         border: Border | None = None,
-        shift: Float[np.ndarray, " lanes"] | None = None,
+        shift: Values | None = None,
     ) -> BorderedSolution:
         """Solve with the KKT matrix F_z − shift·mass, bordered by (columns, rows, corner)."""
 
     @abstractmethod
-    def natural(
-        self, p: Parameters
-    ) -> tuple[Float[np.ndarray, "lanes size"], Bool[np.ndarray, " lanes"]]:
+    def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded state from which the structure starts, and whether it was found."""
 
-    def may_be_natural(self, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def may_be_natural(self, p: Parameters) -> Flags:
         """Whether natural states are defined at parameters; they need not exist everywhere."""
         return np.ones(len(p), bool)
 
@@ -169,7 +166,7 @@ class Structure(ABC):
         """Random guesses, one per lane, spread over what equilibria may look like."""
 
     @abstractmethod
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether states lie within what the discretisation can represent."""
 
     @abstractmethod
@@ -195,7 +192,7 @@ class Structure(ABC):
         """Symmetries of the equilibrium set; none unless the structure says so."""
         return ()
 
-    def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    def error_estimate(self, z: Lanes, p: Parameters) -> Values:
         """Discretisation error of the unknowns; zero for discrete structures."""
         return np.zeros(len(z))
 
@@ -210,8 +207,8 @@ class Structure(ABC):
         p: Parameters,
         dp: Parameters,
         row: Lanes,
-        corner: Float[np.ndarray, " lanes"],
-        defect: Float[np.ndarray, " lanes"],
+        corner: Values,
+        defect: Values,
     ) -> Advance:
         """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
         residual = self.residual(z, p)

@@ -6,8 +6,9 @@ from dataclasses import fields
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.sparse import SparseLayout
@@ -15,11 +16,6 @@ from equimorph.model import parameter_vector
 from equimorph.structures.contract import Advance, Border, Structure, solved_advance
 from equimorph.structures.natural import continued, corrected
 from equimorph.structures.states import State
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
-Entries = Float[np.ndarray, "lanes entries"]
 
 BLOCK = 512
 """Lanes that take a Newton step together: the entries of their matrices stay in the cache."""
@@ -123,7 +119,7 @@ class DiscreteStructure(Structure):
             f"{name} = {force[worst]:.3g}. Give natural values closer to one."
         )
 
-    def natural(self, p: Parameters) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+    def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Natural state, continued from the default parameters."""
         start = np.where(np.isnan(self._reference), p, self._reference)
         return continued(self, self.natural_guess, start, p)

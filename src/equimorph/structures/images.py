@@ -6,10 +6,9 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Apply = Callable[[Lanes, Parameters], tuple[Lanes, Parameters]]
 Signs = Float[np.ndarray, " space"]
 Joints = Int[np.ndarray, " joints"]

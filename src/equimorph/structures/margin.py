@@ -4,8 +4,9 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.structures.contract import Structure
 
@@ -15,16 +16,15 @@ NEAR = 1e-3
 SWEEPS, CHUNK, SHARE = 8, 256, 1024
 """Most solves; lanes at a time; least lanes that are worth a thread of their own."""
 
-Values = Float[np.ndarray, " lanes"]
 Pairs = Float[np.ndarray, "lanes 2 unknowns"]
 
 
 def stability_margin(
     structure: Structure,
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
+    z: Lanes,
+    p: Parameters,
     error: float = RELATIVE,
-) -> Float[np.ndarray, " lanes"]:
+) -> Values:
     """Smallest σ of ``L_uu v + c_uᵀ μ = σ M v``, ``c_u v = 0``, per lane.
 
     Inverse iteration on pairs of vectors finds it for stable states in four or five solves, the
@@ -54,10 +54,10 @@ def stability_margin(
 
 def _by_pairs(
     structure: Structure,
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
+    z: Lanes,
+    p: Parameters,
     error: float,
-) -> tuple[Values, Bool[np.ndarray, " lanes"]]:
+) -> tuple[Values, Flags]:
     """Margins of stable states, and which of them are proved."""
     value, proved = np.empty(len(z)), np.zeros(len(z), bool)
     todo, vectors = np.arange(len(z)), np.tile(_first_pair(structure), (len(z), 1, 1))
@@ -89,10 +89,10 @@ def _first_pair(structure: Structure) -> Float[np.ndarray, "2 unknowns"]:
 
 def _swept(
     structure: Structure,
-    lanes: tuple[Float[np.ndarray, "lanes size"], Float[np.ndarray, "lanes parameters"]],
+    lanes: tuple[Lanes, Parameters],
     shift: Values,
     vectors: Pairs,
-) -> tuple[Pairs, Values, Values, Bool[np.ndarray, " lanes"]]:
+) -> tuple[Pairs, Values, Values, Flags]:
     """One solve for pairs of vectors, and their rotation to Ritz vectors.
 
     Returns the next pairs, orthonormal; the Rayleigh quotient of the first; the Ritz value of the
@@ -136,9 +136,9 @@ def _products(left: Pairs, right: Pairs) -> tuple[Values, Values, Values]:
 
 def _by_bisection(
     structure: Structure,
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
-) -> Float[np.ndarray, " lanes"]:
+    z: Lanes,
+    p: Parameters,
+) -> Values:
     """Margins of any states: bisection, then inverse iteration with the Rayleigh quotient."""
     low, high = _bracket(structure, z, p)
     for _ in range(12):
@@ -150,19 +150,19 @@ def _by_bisection(
 
 def _count_below(
     structure: Structure,
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
-    shift: Float[np.ndarray, " lanes"],
-) -> Float[np.ndarray, " lanes"]:
+    z: Lanes,
+    p: Parameters,
+    shift: Values,
+) -> Values:
     nothing = np.zeros((len(z), 0, structure.size))
     return structure.solve(z, p, nothing, shift=shift).negative - float(structure.constraints)
 
 
 def _bracket(
     structure: Structure,
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
-) -> tuple[Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]:
+    z: Lanes,
+    p: Parameters,
+) -> tuple[Values, Values]:
     """Numbers below and above the smallest eigenvalue, by doubling from zero."""
     some = _count_below(structure, z, p, np.zeros(len(z))) > 0
     low, high = np.where(some, -1.0, 0.0), np.where(some, 0.0, 1.0)
@@ -180,11 +180,11 @@ def _bracket(
 
 def _polish(
     structure: Structure,
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
-    low: Float[np.ndarray, " lanes"],
-    high: Float[np.ndarray, " lanes"],
-) -> Float[np.ndarray, " lanes"]:
+    z: Lanes,
+    p: Parameters,
+    low: Values,
+    high: Values,
+) -> Values:
     """Inverse iteration from a shift just below the smallest eigenvalue."""
     n, mass = structure.unknowns, structure.mass
     vector = np.tile(np.cos(1.7 * np.arange(n)) + 1.3, (len(z), 1))
@@ -209,7 +209,5 @@ def _polish(
     return np.asarray(value)
 
 
-def _settled(
-    value: Float[np.ndarray, " lanes"], previous: Float[np.ndarray, " lanes"]
-) -> Bool[np.ndarray, " lanes"]:
+def _settled(value: Values, previous: Values) -> Flags:
     return np.asarray(np.abs(value - previous) <= RELATIVE * np.maximum(np.abs(value), 1e-3))

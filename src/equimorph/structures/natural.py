@@ -3,12 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.structures.contract import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 STEPS = 12
 """Steps of the continuation from the parameters where the natural state is given."""
@@ -23,7 +20,7 @@ def continued(
     guess: Callable[[Parameters], Lanes],
     start: Parameters,
     p: Parameters,
-) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+) -> tuple[Lanes, Flags]:
     """Equilibria at `p`, continued along the straight line in the parameters from `start`.
 
     The guess at `start` is corrected; each step predicts by the change of the guess and corrects
@@ -40,9 +37,7 @@ def continued(
     return z, found
 
 
-def corrected(
-    structure: Structure, z: Lanes, p: Parameters
-) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+def corrected(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
     """Newton at fixed parameters, and whether it settled; balanced guesses stay as they are."""
     z = z.copy()
     settled = np.zeros(len(z), bool)

@@ -4,18 +4,14 @@ Compared with a number, each is a `Constraint` for any task: ``effort_of(arch, "
 """
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Box, Descriptor, position
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.structures.approach import nearest
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 
 def value_of(structure: Structure, name: str) -> Descriptor:

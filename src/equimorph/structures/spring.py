@@ -6,18 +6,14 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.linalg import BorderedSolution, solve_bordered
 from equimorph.model import Descriptor, Parameter, parameter_vector
 from equimorph.structures.contract import Direction, Majorant, Structure, Symmetry
 from equimorph.structures.states import State
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
-
 
 Term = tuple[float, dict[str, int]]
 """Factor and exponents of x, F, k, sec δ and tan δ."""
@@ -190,7 +186,7 @@ class Spring(Structure):
         columns, rows, corner = border
         return solve_bordered(hessian[:, None, None], columns, rows, corner, rhs)
 
-    def natural(self, p: Parameters) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+    def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded: the stress-free spring δ = arccos x_l for x_l < 1, else δ = 0."""
         return np.arccos(np.minimum(p[:, :1], 1.0)), np.ones(len(p), bool)
 
@@ -209,7 +205,7 @@ class Spring(Structure):
         """Angles between −1.5 and 1.5."""
         return generator.uniform(-1.5, 1.5, size=(len(p), 1))
 
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """|δ| < π/2: beyond, B would lie on the other side of infinity."""
         return np.asarray(np.abs(z[:, 0]) < 0.5 * np.pi)
 

@@ -6,8 +6,9 @@ from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.model import names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
@@ -18,8 +19,8 @@ class States:
     """A batch of equilibrium states of one structure, one per lane."""
 
     structure: Structure
-    z: Float[np.ndarray, "lanes size"]
-    p: Float[np.ndarray, "lanes parameters"]
+    z: Lanes
+    p: Parameters
 
     def __len__(self) -> int:
         """Number of states."""
@@ -32,7 +33,7 @@ class States:
     @overload
     def __getitem__(self, key: int | np.int64) -> "State": ...
     @overload
-    def __getitem__(self, key: str) -> Float[np.ndarray, " lanes"]: ...
+    def __getitem__(self, key: str) -> Values: ...
     @overload
     def __getitem__(self, key: slice | np.ndarray | list[int]) -> "States": ...
     def __getitem__(self, key: Any) -> Any:
@@ -48,7 +49,7 @@ class States:
         return f"States({self.structure.kind}: {len(self)})"
 
     @property
-    def parameters(self) -> dict[str, Float[np.ndarray, " lanes"]]:
+    def parameters(self) -> dict[str, Values]:
         """All parameters by name, one number for each state."""
         return {name: self[name] for name in names_of(self.structure.parameters)}
 
@@ -64,12 +65,12 @@ class States:
         return States(self.structure, self.z[keep], self.p[keep])
 
     @cached_property
-    def margin(self) -> Float[np.ndarray, " lanes"]:
+    def margin(self) -> Values:
         """Smallest eigenvalue of the constrained Hessian with respect to the mass matrix."""
         return stability_margin(self.structure, self.z, self.p)
 
     @cached_property
-    def energy(self) -> Float[np.ndarray, " lanes"]:
+    def energy(self) -> Values:
         """Potential energy E."""
         return self.structure.energy(self.z, self.p) * self.structure.energy_scale
 
@@ -79,17 +80,17 @@ class States:
         return np.asarray(self.z[:, self.structure.unknowns :])
 
     @cached_property
-    def residual(self) -> Float[np.ndarray, " lanes"]:
+    def residual(self) -> Values:
         """Largest absolute entry of F."""
         return np.asarray(np.abs(self.structure.residual(self.z, self.p)).max(axis=1))
 
     @cached_property
-    def error_estimate(self) -> Float[np.ndarray, " lanes"]:
+    def error_estimate(self) -> Values:
         """Estimated discretisation error; see the structure for what it bounds."""
         return self.structure.error_estimate(self.z, self.p)
 
     @cached_property
-    def resolved(self) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self) -> Flags:
         """Whether the discretisation represents the states."""
         return self.structure.resolved(self.z, self.p)
 

@@ -1,8 +1,8 @@
 """Which of several stable equilibria over one point is meant."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.arrays import Values
 from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -60,7 +60,7 @@ def chosen_start(eset: EquilibriumSet, section: StateSection | None, key: str) -
 
 def _nearest(here: States, near: dict[str, float], key: str) -> State:
     ((text, wanted),) = near.items()
-    values: Float[np.ndarray, " lanes"] = worst_named(here.structure, text)(here)
+    values: Values = worst_named(here.structure, text)(here)
     best = int(np.argmin(np.abs(values - wanted)))
     state = here[best]
     if abs(values[best] - wanted) > AGREEMENT:

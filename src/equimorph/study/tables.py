@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.arrays import Values
 from equimorph.model import Descriptor
 from equimorph.structures import States
 from equimorph.study import html
@@ -59,6 +59,6 @@ def table_of_states(
     return html.table(head, rows, ["" if index == 0 else "unstable" for index in states.index])
 
 
-def numbers(values: Float[np.ndarray, " lanes"]) -> list[str]:
+def numbers(values: Values) -> list[str]:
     """Return numbers for reading."""
     return [html.number(value) for value in values]

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.stats import chi2 as chi_squared
 
+from equimorph.arrays import Flags, Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.locate import ValueFit, different, pieces_of
@@ -55,7 +56,7 @@ class Resolving:
     """
 
     descriptor: Descriptor
-    values: Float[np.ndarray, " lanes"]
+    values: Values
     separation: float
 
 
@@ -90,12 +91,12 @@ class StateEstimate:
     status: Literal["known", "ambiguous", "refused"]
     why: str
     states: States
-    chi2: Float[np.ndarray, " lanes"]
-    weight: Float[np.ndarray, " lanes"]
-    margin: Float[np.ndarray, " lanes"]
+    chi2: Values
+    weight: Values
+    margin: Values
     stratum: Int[np.ndarray, " lanes"]
-    inside: Bool[np.ndarray, " lanes"]
-    standard_errors: Mapping[str, Float[np.ndarray, " lanes"]]
+    inside: Flags
+    standard_errors: Mapping[str, Values]
     next_measurement: Resolving | None = None
 
     def __repr__(self) -> str:
@@ -206,7 +207,7 @@ def _fit(eset: EquilibriumSet, measured: Measured, errors: Measured) -> ValueFit
 
 def _settled(
     eset: EquilibriumSet, residuals: Residuals, unstable: bool
-) -> tuple[Spot, Float[np.ndarray, " lanes"], Bool[np.ndarray, " lanes"]]:
+) -> tuple[Spot, Values, Flags]:
     """Best fits, their misfits, and whether they are minima; those on folds are none."""
     ground = Ground(setting_of(eset), eset)
     value = np.linalg.norm(residuals(eset.points.z, eset.points.p), axis=1)
@@ -225,7 +226,7 @@ def _settled(
 
 def _at_edge(
     ground: Ground, residuals: Residuals, value: Float[np.ndarray, " V"]
-) -> tuple[Spot, Float[np.ndarray, " lanes"]]:
+) -> tuple[Spot, Values]:
     """States at the edge of stability beyond which alone the fit would become better."""
     eset = ground.eset
     every = [_facets(piece, len(eset.names)) for piece in eset.folds]
@@ -255,15 +256,15 @@ def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
     return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
 
-def _weights(chi2: Float[np.ndarray, " lanes"]) -> Float[np.ndarray, " lanes"]:
+def _weights(chi2: Values) -> Values:
     likely = np.exp(-0.5 * (chi2 - chi2.min(initial=np.inf)))
     return np.asarray(likely / likely.sum())
 
 
 def _judged(
     states: States,
-    chi2: Float[np.ndarray, " lanes"],
-    weight: Float[np.ndarray, " lanes"],
+    chi2: Values,
+    weight: Values,
     freedom: int,
     confidence: float,
 ) -> tuple[Literal["known", "ambiguous", "refused"], str]:
@@ -311,9 +312,7 @@ def _coordinates(states: States) -> dict[Descriptor, float]:
     }
 
 
-def _standard_errors(
-    eset: EquilibriumSet, spot: Spot, residuals: Residuals
-) -> dict[str, Float[np.ndarray, " lanes"]]:
+def _standard_errors(eset: EquilibriumSet, spot: Spot, residuals: Residuals) -> dict[str, Values]:
     """Linearised: covariance (JᵀJ)⁻¹ of tangent coordinates, carried over to the parameters."""
     setting, d = setting_of(eset), len(eset.names)
     frames, _ = Ground(setting, eset).frames(spot)

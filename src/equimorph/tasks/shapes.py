@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.nearest import local_minima
@@ -61,7 +62,7 @@ class Shapes:
     why: str
     states: States
     index: Int[np.ndarray, " lanes"]
-    misfit: Float[np.ndarray, " lanes"]
+    misfit: Values
     routes: tuple[Route, ...]
     closest: State
     miss: Mapping[str, float]
@@ -91,7 +92,7 @@ class Shapes:
         return mine
 
     @cached_property
-    def margin(self) -> Float[np.ndarray, " lanes"]:
+    def margin(self) -> Values:
         """Stability margin of each solution."""
         return self.states.margin if len(self) else np.zeros(0)
 
@@ -237,7 +238,7 @@ def _numbers(
 def _answer(
     question: tuple[Predictor, Float[np.ndarray, " k"], tuple[Constraint, ...]],
     states: States,
-    misfit: Float[np.ndarray, " lanes"],
+    misfit: Values,
     order_by: tuple[Rank, list[Route]],
 ) -> Shapes:
     """Solutions in order."""
@@ -264,7 +265,7 @@ def _answer(
 
 def _solved(
     known: Predictor, wanted: Float[np.ndarray, "many k"], within: tuple[Constraint, ...]
-) -> list[tuple[States, Float[np.ndarray, " lanes"]]]:
+) -> list[tuple[States, Values]]:
     """Exact solutions of each question in the box and within constraints, each once."""
     structure, eset = known.eset.structure, known.eset
     spots, owner = _guesses(known, wanted)
@@ -293,7 +294,7 @@ def _solved(
 
 def _members(
     known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
-) -> tuple[States, Float[np.ndarray, " lanes"]]:
+) -> tuple[States, Values]:
     """Members of a family within the box and constraints."""
     states, misfit = _fitted(known, wanted, within)
     return states[misfit <= EXACT], misfit[misfit <= EXACT]
@@ -317,7 +318,7 @@ def _guesses(
 
 def _fitted(
     known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
-) -> tuple[States, Float[np.ndarray, " lanes"]]:
+) -> tuple[States, Values]:
     """Different fits of least squares."""
     states, misfit = best_fits(known, wanted, within)
     kept = _distinct(states)

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, position
@@ -230,9 +231,7 @@ def _compromise(
     def goal(columns: Float[np.ndarray, " columns"]) -> Objective:
         wanted = columns[len(structure.parameters) :]
 
-        def miss(
-            z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
-        ) -> Float[np.ndarray, " lanes"]:
+        def miss(z: Lanes, p: Parameters) -> Values:
             values = np.stack([each.function(z, p) for each in course.descriptors], axis=1)
             return np.asarray(0.5 * ((values - wanted) ** 2).sum(axis=1))
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.lifting.pieces import Pieces, approximated, interpolated
 from equimorph.equilibria.lifting.smooth import SmoothCurve
@@ -15,7 +16,6 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, Spline, position
 from equimorph.structures import States, Structure
 
-Parameters = Float[np.ndarray, "lanes parameters"]
 Value = float | np.ndarray | None
 Waypoint = Mapping[Any, Value]
 """Values by the names of parameters, and by descriptors."""
@@ -125,7 +125,7 @@ class Prepared:
     """A leg that begins at given states: its curve, and the unknowns to start with."""
 
     curve: Curve
-    z: Float[np.ndarray, "lanes size"]
+    z: Lanes
 
 
 def prepared(states: States, leg: Leg) -> Prepared:

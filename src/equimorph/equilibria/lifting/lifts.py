@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped
+from jaxtyping import Float, Int, Shaped
 
+from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.lifting.legs import Leg, listed, of_some, prepared
 from equimorph.equilibria.lifting.paths import Event
@@ -18,10 +19,7 @@ from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import States
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Words = Shaped[np.ndarray, " lanes"]
-Some = Int[np.ndarray, " some"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +82,8 @@ class Lifts:
 
     states: States
     kind: Words
-    at: Float[np.ndarray, " lanes"]
-    length: Float[np.ndarray, " lanes"]
+    at: Values
+    length: Values
     index: Int[np.ndarray, " lanes"]
     criticality: Words
     detail: dict[int, str]
@@ -108,7 +106,7 @@ class Lifts:
         return Event(str(self.kind[lane]), self.states[lane], float(self.at[lane]), *words)
 
     @property
-    def arrived(self) -> Bool[np.ndarray, " lanes"]:
+    def arrived(self) -> Flags:
         """Which were lifted to the end."""
         return np.asarray(self.kind == "arrived")
 

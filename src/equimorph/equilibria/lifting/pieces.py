@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev
 
+from equimorph.arrays import Values
 from equimorph.errors import InputError
 
-Values = Float[np.ndarray, " lanes"]
 Columns = Float[np.ndarray, "lanes columns"]
 Table = Float[np.ndarray, "curves pieces _ columns"]
 Function = Callable[[float], Float[np.ndarray, "curves columns"]]

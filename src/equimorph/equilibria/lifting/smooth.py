@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
-from equimorph.equilibria.curves import Lanes, Metric, Values
+from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.equilibria.curves import Metric
 from equimorph.equilibria.lifting.pieces import Pieces
 from equimorph.structures import Advance, Structure
-
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 
 @dataclass(frozen=True)

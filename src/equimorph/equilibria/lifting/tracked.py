@@ -6,12 +6,11 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria.curves import Lanes, Values
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.lifting.pieces import Pieces
 from equimorph.model import Descriptor
 from equimorph.structures import Advance, Structure
 
-Parameters = Float[np.ndarray, "lanes parameters"]
 Extended = Float[np.ndarray, "lanes extended"]
 Rows = Float[np.ndarray, "lanes k size"]
 

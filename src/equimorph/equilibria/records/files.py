@@ -1,13 +1,13 @@
 """What lanes leave behind as they march: steps in which something happened, and points."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
+from equimorph.arrays import Lanes
 from equimorph.equilibria.fronts import Bracket, Front
 from equimorph.equilibria.records import kernels
 from equimorph.equilibria.tracing import Points
 
-Lanes = Float[np.ndarray, "lanes size"]
 Places = tuple[np.ndarray, ...]
 Names = Int[np.ndarray, " points"]
 

@@ -8,16 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Some, Values
 from equimorph.equilibria import kernels as march
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.fronts import Bracket, Front, new_scalars
 from equimorph.equilibria.roots import kernels
 from equimorph.structures import Advance
 
-Values = Float[np.ndarray, " lanes"]
-Some = Int[np.ndarray, " some"]
 Scalar = Callable[[Some, Front], Float[np.ndarray, " some"]]
 
 VALUE = 1e-13
@@ -28,10 +27,10 @@ VALUE = 1e-13
 class Root:
     """Points where the scalar vanishes, their lengths from the start of the step, and success."""
 
-    z: Float[np.ndarray, "lanes size"]
+    z: Lanes
     t: Values
     at: Values
-    found: Bool[np.ndarray, " lanes"]
+    found: Flags
 
 
 def root_inside(

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Values
 from equimorph.errors import InputError
 from equimorph.linalg.condensed.bordered.kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered
@@ -83,7 +84,7 @@ class CondensedLayout:
             full[:, n:, n:] = trailing
         return full
 
-    def solve(  # noqa: PLR0913  # the bordered system has this many parts
+    def solve(
         self,
         diagonal: Float[np.ndarray, "lanes nodes"],
         border: Float[np.ndarray, "lanes m nodes"],
@@ -144,7 +145,7 @@ class CondensedLayout:
     ) -> tuple[
         Float[np.ndarray, "lanes sides bordered"],
         Int[np.ndarray, " lanes"],
-        Float[np.ndarray, " lanes"],
+        Values,
     ]:
         """Solutions, negative eigenvalues and pivot ratios by the condensed elimination."""
         lanes = len(arrays[0])
@@ -155,7 +156,7 @@ class CondensedLayout:
 
     def _refined(
         self, arrays: list[np.ndarray], x: Float[np.ndarray, "lanes sides bordered"]
-    ) -> tuple[Float[np.ndarray, "lanes sides bordered"], Bool[np.ndarray, " lanes"]]:
+    ) -> tuple[Float[np.ndarray, "lanes sides bordered"], Flags]:
         """Solutions after a step of iterative refinement, and which of them can be trusted."""
         diagonal, border, columns, rows, corner, rhs, trailing = arrays
         n = columns.shape[2]

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Values
 from equimorph.structures.energy.kernels import OPERATIONS
 from equimorph.structures.energy.tape import Tape
 
-Values = Float[np.ndarray, " lanes"]
 Interval = tuple[Values, Values]
 
 TURN = 2.0 * np.pi

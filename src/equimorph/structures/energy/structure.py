@@ -6,8 +6,9 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Descriptor, position
@@ -23,10 +24,6 @@ from equimorph.structures.energy.declared import (
 from equimorph.structures.energy.derivatives import Derivatives
 from equimorph.structures.energy.enclosures import can_enclose, enclosed
 from equimorph.structures.energy.tape import Tape, casadi, tape
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 
 class EnergyStructure(DiscreteStructure):
@@ -87,7 +84,7 @@ class EnergyStructure(DiscreteStructure):
 
     kind: ClassVar[str] = "energy"
 
-    def __init__(  # noqa: PLR0913  # all but three have defaults
+    def __init__(
         self,
         energy: Any,
         unknowns: Any,
@@ -220,7 +217,7 @@ class EnergyStructure(DiscreteStructure):
                 u[:, i] = generator.uniform(*unknown.range, len(p))
         return self._balanced(u, p)
 
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Unknowns are numbers within the limits of their meaning."""
         lower, upper = np.array([(each.lower, each.upper) for each in self._unknowns]).T
         u = z[:, : self.unknowns]

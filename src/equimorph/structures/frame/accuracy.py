@@ -1,13 +1,9 @@
 """What a finer frame says of the discretisation error."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.structures.frame.fields import FrameFields
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 REFINING = 6
 """Newton iterations on the finer frame, started from the interpolated state."""

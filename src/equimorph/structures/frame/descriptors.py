@@ -4,16 +4,12 @@ import re
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor, position
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.support import AXES
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 WRITTEN = (
     *("displacement(joint,axis)", "rotation(joint)", "rotation(member,joint)"),

@@ -6,12 +6,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy.polynomial import legendre
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.structures.frame.mechanics import FrameMechanics
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 FINE = 21
 """Places in each element among which an extremum of the curvature is sought."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
@@ -22,9 +23,6 @@ from equimorph.structures.frame.support import support_data
 from equimorph.structures.frame.symmetry import symmetries
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.unit_system import Quantity, unit_system
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 WALKED = 17
 """Places along a member where it is drawn."""
@@ -83,7 +81,7 @@ class Frame(FrameFields):
     0.49346
     """
 
-    def __init__(  # noqa: PLR0913  # a network has that many parts
+    def __init__(
         self,
         joints: Mapping[str, Sequence[Quantity]],
         members: Iterable[Any],
@@ -183,7 +181,7 @@ class Frame(FrameFields):
         del data["kind"]
         return Frame(**{**data, "degree": min(data["degree"] + 4, 16)})
 
-    def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    def error_estimate(self, z: Lanes, p: Parameters) -> Values:
         """Bound of the errors of displacements, turns of ends and max |κ|, by a higher degree.
 
         Displacements and curvature are relative to the mean length of the members.

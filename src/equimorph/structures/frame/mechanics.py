@@ -4,8 +4,9 @@ from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Entries, Flags, Lanes, Nodal, Parameters, Scalars, Values
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
@@ -15,13 +16,7 @@ from equimorph.structures.frame.kernels import linearise_lanes
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.tables import Tables
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
-Entries = Float[np.ndarray, "lanes entries"]
-Nodal = Float[np.ndarray, "lanes nodes"]
 Points = Float[np.ndarray, "lanes points"]
-Scalars = Float[np.ndarray, "lanes scalars"]
 
 RESOLVED = 1e-3
 """Largest of the two highest Legendre coefficients of a turn in a resolved element."""
@@ -213,7 +208,7 @@ class FrameMechanics(DiscreteStructure):
         held = np.unique(part[(model.place < 0) | (model.springs > 0.0)])
         return np.setdiff1d(part, held)
 
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of ψ are small in every element.
 
         What nothing keeps from turning is the same after a whole turn: less than half of one

@@ -6,13 +6,12 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.mechanics import FrameMechanics
 from equimorph.structures.images import exchanged, images, is_symmetry
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Matrix = Float[np.ndarray, "scalars scalars"]
 
 

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Nodal, Parameters
 from equimorph.structures.contract import Direction
-
-Lanes = Float[np.ndarray, "lanes size"]
-Nodal = Float[np.ndarray, "lanes nodes"]
 
 MORE = 1.0 + 1e-12
 """Covers the round-off of the bounds themselves."""
@@ -53,7 +51,7 @@ class ClampedBound:
         return turn, up, dz[:, -2:-1] * self.weights
 
 
-def spread_to_ends(reach: Lanes, ends: Float[np.ndarray, "lanes parameters"]) -> Nodal:
+def spread_to_ends(reach: Lanes, ends: Parameters) -> Nodal:
     """Changes of the angles at all nodes; those of the ends are |Θ| + |Δ|."""
     outer = ends[:, :1] + ends[:, 1:2]
     return np.concatenate([outer, reach[:, :-2], outer], axis=1)

@@ -3,14 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Parameters, Values
 from equimorph.structures.rod.interface import Mechanics
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
-Flags = Bool[np.ndarray, " lanes"]
 
 FIRST_STEP = 0.25
 SMALLEST_STEP = 1e-8

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
 from equimorph.structures.peaks import peaks, stations
@@ -14,9 +15,6 @@ from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.validity import clearance
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 Extrema = Float[np.ndarray, "lanes extrema"]
 
 WRITTEN = (
@@ -176,9 +174,7 @@ def _fraction(text: str) -> float:
         raise InputError(f"`s` must be a number or a fraction like 1/3; got {text!r}.") from None
 
 
-def discretisation_error(
-    rod: Mechanics, finer: Mechanics, z: Lanes, p: Parameters
-) -> Float[np.ndarray, " lanes"]:
+def discretisation_error(rod: Mechanics, finer: Mechanics, z: Lanes, p: Parameters) -> Values:
     """Twice the largest change of max |κ|, of κ(s) and of y(s) after Newton on a finer rod."""
     matrix = rod.mesh.interpolation(finer.mesh.nodes[finer.unknown_nodes])
     fine = np.concatenate([rod.nodal_angles(z, p) @ matrix.T, z[:, rod.unknowns :]], axis=1)

@@ -4,11 +4,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.interface import Mechanics
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Sizes = Float[np.ndarray, "lanes nodes"]
 Nodes = Int[np.ndarray, "lanes places"]
 

@@ -4,8 +4,9 @@ from abc import ABC, abstractmethod
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.structures.contract import (
     Advance,
@@ -16,11 +17,6 @@ from equimorph.structures.contract import (
     solved_advance,
 )
 from equimorph.structures.rod.discretisation import Mesh
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Nodal = Float[np.ndarray, "lanes nodes"]
-Values = Float[np.ndarray, " lanes"]
 
 LARGEST_TAIL = 1e-3
 """Highest Legendre coefficients of θ, in radians, of an element that represents its part."""
@@ -125,7 +121,7 @@ class Mechanics(ABC):
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random guesses."""
 
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of θ are small in every element."""
         return self.tail(z, p) < LARGEST_TAIL
 

@@ -1,8 +1,9 @@
 """Rods as structures: mechanics inside, the user's units outside."""
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.structures.approach import smooth_arcs
 from equimorph.structures.contract import (
@@ -16,10 +17,6 @@ from equimorph.structures.contract import (
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.units import Units
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 ARCS = 128
 """Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""
@@ -102,7 +99,7 @@ class Measured(Structure):
         """Random guesses."""
         return self.mechanics.sample(p, generator)
 
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of θ are small in every element."""
         return self.mechanics.resolved(z, p)
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Nodal, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply
 from equimorph.linalg.condensed import PIVOT_GUARD
@@ -23,10 +24,6 @@ from equimorph.structures.rod.interface import Mechanics
 from equimorph.structures.rod.kernels import advance_lanes
 from equimorph.structures.rod.loads import LoadShape
 from equimorph.structures.rod.recovery import Recovery
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Nodal = Float[np.ndarray, "lanes nodes"]
 
 PARAMETERS = 4
 
@@ -103,15 +100,13 @@ class ClampedMechanics(Mechanics):
         z, p = self._checked((z, p))
         return self.recovery.fields(z, p, s)
 
-    def largest_curvature(
-        self, z: Lanes, p: Parameters
-    ) -> tuple[Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]:
+    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the first arclength where it is."""
         z, p = self._checked((z, p))
         return self.recovery.largest_curvature(z, p)
 
     def kkt(
-        self, z: Lanes, p: Parameters, shift: Float[np.ndarray, " lanes"] | None = None
+        self, z: Lanes, p: Parameters, shift: Values | None = None
     ) -> tuple[Nodal, Float[np.ndarray, "lanes 2 nodes"]]:
         """F_z − shift·mass as `layout` takes it: diagonal beside the stiffness, constraints."""
         z, p = self._checked((z, p))
@@ -123,7 +118,7 @@ class ClampedMechanics(Mechanics):
 
     # --- contract ---------------------------------------------------------------------------
 
-    def energy(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    def energy(self, z: Lanes, p: Parameters) -> Values:
         """∫ θ'²/(8π²) − q ∫ ρ sin θ."""
         theta = self.nodal_angles(z, p)
         bending = 0.5 * np.einsum("li,li->l", multiply(theta, self.layout.assembled), theta)
@@ -171,7 +166,7 @@ class ClampedMechanics(Mechanics):
         p: Parameters,
         rhs: Float[np.ndarray, "lanes sides bordered"],
         border: tuple[Any, Any, Any] | None = None,
-        shift: Float[np.ndarray, " lanes"] | None = None,
+        shift: Values | None = None,
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered."""
         diagonal, gradients = self.kkt(z, p, shift)
@@ -187,8 +182,8 @@ class ClampedMechanics(Mechanics):
         p: Parameters,
         dp: Parameters,
         row: Lanes,
-        corner: Float[np.ndarray, " lanes"],
-        defect: Float[np.ndarray, " lanes"],
+        corner: Values,
+        defect: Values,
     ) -> Advance:
         """Fused kernel; lanes with an unsafe pivot take the general solve."""
         lanes = len(z)

@@ -4,14 +4,11 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.structures.rod.continuation import Part, follow, newton
 from equimorph.structures.rod.interface import Mechanics
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 SMALLEST = 1e-3
 """End angles, √(Θ² + Δ²), below which the way leads over larger ones with the same ratio: the rod

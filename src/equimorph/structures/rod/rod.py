@@ -5,8 +5,9 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Parameter, names_of, parameter_vector
 from equimorph.structures.rod import descriptors
@@ -24,9 +25,6 @@ from equimorph.structures.rod.natural import Natural, Outcome, natural_arch
 from equimorph.structures.states import State, States
 from equimorph.structures.unit_system import Quantity, unit_system
 from equimorph.structures.units import rod_units
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")
@@ -140,7 +138,7 @@ class Rod(Described):
     kind: ClassVar[str] = "rod"
     endless_in: ClassVar[str] = "max_curvature"
 
-    def __init__(  # noqa: PLR0913  # a default for everything
+    def __init__(  # noqa: PLR0913  # what a rod can have
         self,
         load: LoadSpec | None = None,
         span: Quantity | None = None,
@@ -258,12 +256,12 @@ class Rod(Described):
         raw = np.einsum("ij,lj->li", self._raw_matrix[m:-1, m:], y)
         return natural_rod(self._raw, raw)
 
-    def natural(self, p: Parameters) -> tuple[Lanes, Bool[np.ndarray, " lanes"]]:
+    def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded rod, continued from its stress-free shape."""
         natural = self._natural(p)
         return natural.z, natural.outcome == Outcome.FOUND
 
-    def may_be_natural(self, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def may_be_natural(self, p: Parameters) -> Flags:
         """Θ > 0 for the arch: the straight rod has no upright side."""
         return p[:, 0] > 0.0 if self._general is None else np.ones(len(p), bool)
 
@@ -302,7 +300,7 @@ class Rod(Described):
             "curvature, or choose ends nearer to the stress-free ones."
         )
 
-    def natural_states(self, p: Parameters) -> tuple[States, Bool[np.ndarray, " lanes"]]:
+    def natural_states(self, p: Parameters) -> tuple[States, Flags]:
         """Natural states of many settings, and which of them were found."""
         z, found = self.natural(p)
         return States(self, z, p), found
@@ -330,7 +328,7 @@ class Rod(Described):
         """How ends A and B are supported."""
         return (End(), End()) if self._general is None else self._general.supports
 
-    def error_estimate(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    def error_estimate(self, z: Lanes, p: Parameters) -> Values:
         """Bound of the errors of curvature and height, by solving again with a higher degree.
 
         Twice the largest change of max |κ|, and of κ(s) and y(s) at 25 arclengths; the heights'

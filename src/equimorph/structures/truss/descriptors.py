@@ -6,13 +6,10 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, position
 from equimorph.structures.truss.mechanics import TrussMechanics
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 WRITTEN = (
     "force(bar), utilisation(bar), max_utilisation, displacement(joint, axis), travel(load), "

@@ -4,8 +4,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
@@ -16,11 +17,7 @@ from equimorph.structures.truss.network import Network
 from equimorph.structures.truss.strain import Energies
 from equimorph.structures.unit_system import UnitSystem
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 BarValues = Float[np.ndarray, "lanes bars"]
-Entries = Float[np.ndarray, "lanes entries"]
 
 SHORTEST = 1e-6
 """Length of a bar, relative to its rest length, at which its joints count as one."""
@@ -175,7 +172,7 @@ class TrussMechanics(DiscreteStructure):
         guesses[3:4] = 0.0  # as it was built
         return np.asarray(guesses)
 
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """No bar has shrunk to a point, and all rest lengths are positive."""
         g, l0 = self.lengths(z, p)
         return np.asarray(((l0 > 0.0) & (g > (SHORTEST * l0) ** 2)).all(axis=1))

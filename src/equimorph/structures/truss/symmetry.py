@@ -5,12 +5,10 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.images import exchanged, images, is_symmetry
 from equimorph.structures.truss.mechanics import TrussMechanics
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 
 def symmetries(truss: TrussMechanics) -> tuple[Symmetry, ...]:

@@ -8,6 +8,7 @@ from typing import Any, get_args
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
@@ -19,8 +20,6 @@ from equimorph.structures.truss.strain import Energies, Strain
 from equimorph.structures.truss.symmetry import symmetries
 from equimorph.structures.unit_system import Quantity, unit_system
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Patterns = Mapping[str, Mapping[str, Any]]
 
 TINY = 1e-300
@@ -80,7 +79,7 @@ class Truss(TrussMechanics):
     State(truss: F=0; index 0)
     """
 
-    def __init__(  # noqa: PLR0913  # four have defaults
+    def __init__(
         self,
         joints: Mapping[str, Sequence[Quantity]],
         bars: Iterable[Any],

@@ -6,19 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import ParameterLine, TraceOptions, follow, newton
 from equimorph.equilibria.outcome import KINDS
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.errors import InputError
 from equimorph.structures import States, Structure
-from equimorph.tasks.calibration.measured import (
-    Columns,
-    Lanes,
-    Measurement,
-    by_data,
-    derivative,
-)
-from equimorph.tasks.calibration.unknowns import Parameters, Unknowns, Vector
+from equimorph.tasks.calibration.measured import Columns, Measurement, by_data, derivative
+from equimorph.tasks.calibration.unknowns import Unknowns, Vector
 
 Residuals = Float[np.ndarray, " numbers"]
 Jacobian = Float[np.ndarray, "numbers k"]

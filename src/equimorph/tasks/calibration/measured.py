@@ -8,12 +8,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import States, Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Columns = Float[np.ndarray, "lanes columns"]
 
 STEP = 1e-3

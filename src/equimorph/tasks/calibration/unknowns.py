@@ -7,6 +7,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Parameters
 from equimorph.errors import InputError
 from equimorph.model import position
 from equimorph.structures import States, Structure
@@ -14,7 +15,6 @@ from equimorph.structures import States, Structure
 Kind = Literal["value", "offset", "gain", "data"]
 Wanted = Mapping[str | tuple[str, ...], Kind]
 Vector = Float[np.ndarray, " k"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 
 @dataclass(frozen=True, eq=False)

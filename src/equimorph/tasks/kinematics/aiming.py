@@ -1,16 +1,13 @@
 """Newton's method for states of a set whose descriptors take given values."""
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Values
 from equimorph.manifold.pairing import Setting
 from equimorph.manifold.tangents import split_step
 from equimorph.model import Descriptor
 from equimorph.tasks.optimising.plane import Spots
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Frames = Float[np.ndarray, "lanes d full"]
 
 DIFFERENCE = 1e-5
 ITERATIONS, LONGEST = 30, 0.3
@@ -24,7 +21,7 @@ def aimed(
     at: Spots,
     descriptors: tuple[Descriptor, ...],
     wanted: Float[np.ndarray, "lanes k"],
-) -> tuple[Lanes, Parameters, Bool[np.ndarray, " lanes"]]:
+) -> tuple[Lanes, Parameters, Flags]:
     """Solve F(z; p) = 0 and S(z, p) = S* from guesses near a set.
 
     Each step is a correction onto the set and a move along its tangent space: folds are regular
@@ -93,7 +90,7 @@ def corrected_frames(setting: Setting, at: Spots) -> tuple[Float[np.ndarray, "la
     return raw[:, 0], frames
 
 
-def lengths(setting: Setting, step: Float[np.ndarray, "lanes full"]) -> Float[np.ndarray, " lanes"]:
+def lengths(setting: Setting, step: Float[np.ndarray, "lanes full"]) -> Values:
     """Lengths of steps in the metric and scaled parameters."""
     n, d = setting.structure.unknowns, len(setting.free)
     squared = step[:, :n] ** 2 @ setting.structure.mass

@@ -1,9 +1,10 @@
 """All states of a set at which fewer descriptors than free parameters take given values."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
+from equimorph.arrays import Edges
 from equimorph.manifold import Level, level_set
 from equimorph.manifold.embedding import embed
 from equimorph.manifold.topology import pieces
@@ -14,8 +15,6 @@ from equimorph.tasks.optimising.plane import Spots, spots_of
 
 NEAR = 1.0
 """Farthest way from the prediction, in lengths of the edge, of a state that belongs to it."""
-
-Edges = Int[np.ndarray, "edges 2"]
 
 
 def family(known: Predictor, wanted: Float[np.ndarray, " k"]) -> Level:

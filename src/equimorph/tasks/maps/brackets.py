@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Edges
 from equimorph.structures import Structure
 from equimorph.tasks.maps.samples import Sampler, Samples, difference, joined
-
-Edges = Int[np.ndarray, "edges 2"]
 
 RATIO = 2.0
 """Difference over an edge relative to the smaller of its neighbours' in line that is suspicious."""

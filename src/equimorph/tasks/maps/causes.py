@@ -6,11 +6,12 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Int
 
+from equimorph.arrays import Edges, Flags, Settings
 from equimorph.equilibria.locus import Test
 from equimorph.equilibria.natural_sheet import NaturalSheet
-from equimorph.tasks.maps.brackets import Brackets, Edges
+from equimorph.tasks.maps.brackets import Brackets
 from equimorph.tasks.maps.polish import TestsOf
-from equimorph.tasks.maps.samples import Samples, Settings
+from equimorph.tasks.maps.samples import Samples
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Paths(Protocol):
     def suspects(self, vertices: Samples, edges: Edges) -> Bool[np.ndarray, " edges"]:
         """Edges to look at, besides those over which the map changes much."""
 
-    def known(self, side: Samples) -> Bool[np.ndarray, " lanes"]:
+    def known(self, side: Samples) -> Flags:
         """Whether the map says something at settings, so that they can be compared."""
 
     def unexplained(self, pairs: Brackets) -> np.ndarray:

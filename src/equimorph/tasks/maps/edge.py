@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from equimorph.arrays import Settings
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.model import Constraint
 from equimorph.tasks.maps.brackets import Brackets, grid_edges, narrowed
 from equimorph.tasks.maps.curves import Places, half_length
-from equimorph.tasks.maps.samples import Samples, Settings
+from equimorph.tasks.maps.samples import Samples
 from equimorph.tasks.maps.unloaded import LOST, unloaded
 
 DIVISIONS = 14

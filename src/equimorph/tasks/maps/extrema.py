@@ -1,8 +1,9 @@
 """Where the extremum of a descriptor along the structure goes over to another place."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
+from equimorph.arrays import Values
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.locus import Test
 from equimorph.model import Descriptor
@@ -25,7 +26,7 @@ def at_two_places(
     moved = where & (np.abs(places[:, 0] - places[:, 1]) > ELSEWHERE)
 
     def difference(lanes: Int[np.ndarray, " some"]) -> Test:
-        def test(at: Critical) -> Float[np.ndarray, " lanes"]:
+        def test(at: Critical) -> Values:
             values, found = branches(at.z, at.p)
             near = np.tile(here[lanes], (len(at.z) // len(lanes), 1))
             away = np.abs(found[:, None] - near[:, :, None])

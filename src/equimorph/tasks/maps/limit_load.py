@@ -4,9 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-import numpy as np
-from jaxtyping import Float
-
+from equimorph.arrays import Settings, Values
 from equimorph.equilibria import LimitLoad, TraceOptions, limit_load
 from equimorph.equilibria.natural_sheet import natural_sheet
 from equimorph.errors import InputError
@@ -16,7 +14,6 @@ from equimorph.tasks.maps.actuator_map import ActuatorMap, settings_of, unloaded
 from equimorph.tasks.maps.curves import curves_through, places_on
 from equimorph.tasks.maps.edge import edge_of_definition
 from equimorph.tasks.maps.rays import KINDS, Rays
-from equimorph.tasks.maps.samples import Settings
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,14 +41,14 @@ class LimitLoadMap(ActuatorMap):
         """
         return limit_load(self.rest(setting), self.load, within=self.within, bound=self.bound)
 
-    def rays(self, settings: Settings) -> Float[np.ndarray, " lanes"]:
+    def rays(self, settings: Settings) -> Values:
         """Limit loads at many settings; not numbers where there is none."""
         place = position(self.structure.parameters, self.load)
         options = TraceOptions(record=False)
         return Rays(self.sheet, place, self.within, self.bound, options)(settings).value
 
 
-def limit_load_map(  # noqa: PLR0913  # the knobs of the public face, most by keyword
+def limit_load_map(
     structure: Structure,
     grid: Grid,
     load: str,

@@ -3,18 +3,19 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
+from equimorph.arrays import Edges, Flags, Settings, Values
 from equimorph.equilibria import TraceOptions
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.first_stable import WAYS, FirstStable
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.model import Constraint, Descriptor
-from equimorph.tasks.maps.brackets import Brackets, Edges
+from equimorph.tasks.maps.brackets import Brackets
 from equimorph.tasks.maps.causes import Cause
 from equimorph.tasks.maps.extrema import at_two_places
-from equimorph.tasks.maps.samples import Samples, Settings
+from equimorph.tasks.maps.samples import Samples
 from equimorph.tasks.maps.unloaded import LOST, START_KINDS, unloaded
 
 KINDS = (*START_KINDS, *WAYS[1:])
@@ -97,7 +98,7 @@ class Passages:
                     found.append(Cause.of("gap", (limit, test), met, side))
         return found
 
-    def _level(self, critical: Critical) -> Float[np.ndarray, " lanes"]:
+    def _level(self, critical: Critical) -> Values:
         """Load less the given one, in its scale."""
         scale = self.sheet.structure.scales[self.load]
         return np.asarray((critical.p[:, self.load] - self.at) / scale)
@@ -107,7 +108,7 @@ class Passages:
         del vertices
         return np.zeros(len(edges), bool)
 
-    def known(self, side: Samples) -> Bool[np.ndarray, " lanes"]:
+    def known(self, side: Samples) -> Flags:
         """Whether paths could start and were not lost."""
         return np.asarray(side.kind > LOST)
 
@@ -139,5 +140,5 @@ def _forks(pairs: Brackets, back: int) -> list[tuple[Samples, Bool[np.ndarray, "
     return found
 
 
-def _reached(side: Samples) -> Bool[np.ndarray, " lanes"]:
+def _reached(side: Samples) -> Flags:
     return np.asarray((side.kind >= STABLE) & (side.kind <= OFF))

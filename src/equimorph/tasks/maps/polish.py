@@ -4,16 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Test
 from equimorph.structures import Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Pairs = Float[np.ndarray, "lanes 2 extended"]
-Values = Float[np.ndarray, " lanes"]
 TestsOf = Callable[[Int[np.ndarray, " some"]], tuple[Test, Test]]
 
 ITERATIONS = 10
@@ -91,7 +89,7 @@ def polished(
     p: Parameters,
     free: Int[np.ndarray, "lanes 2"],
     tests: TestsOf,
-) -> tuple[Lanes, Parameters, Bool[np.ndarray, " lanes"]]:
+) -> tuple[Lanes, Parameters, Flags]:
     """States near guesses at which two tests vanish, in two parameters; and whether they are found.
 
     Newton's method on F = 0 and the tests, in a basis of the kernel of [F_z F_p] that is regular at

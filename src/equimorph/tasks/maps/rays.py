@@ -3,18 +3,19 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
+from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD
 from equimorph.model import Constraint
-from equimorph.tasks.maps.brackets import Brackets, Edges
+from equimorph.tasks.maps.brackets import Brackets
 from equimorph.tasks.maps.causes import Cause
 from equimorph.tasks.maps.extrema import at_two_places
-from equimorph.tasks.maps.samples import Samples, Settings
+from equimorph.tasks.maps.samples import Samples
 from equimorph.tasks.maps.unloaded import LOST, START_KINDS, unloaded
 
 KINDS = (*START_KINDS, "fold", "branch point", "constraint", "none below the bound")
@@ -101,7 +102,7 @@ class Rays:
         alike = np.einsum("li,li,i->l", v[a], v[b], structure.mass)
         return np.asarray((np.abs(alike) > ALIKE) & (alike * slope[a] * slope[b] < 0.0))
 
-    def known(self, side: Samples) -> Bool[np.ndarray, " lanes"]:
+    def known(self, side: Samples) -> Flags:
         """Whether there is a limit load."""
         return np.asarray(np.isfinite(side.value))
 
@@ -126,13 +127,13 @@ def _meets(side: Samples, k: int) -> Bool[np.ndarray, " pairs"]:
 
 def _places(
     within: tuple[Constraint, ...],
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
-) -> Float[np.ndarray, " lanes"]:
+    z: Lanes,
+    p: Parameters,
+) -> Values:
     """Number of the constraint that was met, plus where on the structure its extremum lies."""
     excess = np.array([c.excess(z, p) / max(1.0, abs(c.bound)) for c in within])
     which = excess.argmax(axis=0)
-    place: Float[np.ndarray, " lanes"] = 2.0 * which
+    place: Values = 2.0 * which
     for k, constraint in enumerate(within):
         at = np.flatnonzero(which == k)
         if constraint.descriptor.place is not None and len(at):

@@ -4,12 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Int, Shaped
 
+from equimorph.arrays import Lanes, Parameters, Settings, Values
 from equimorph.structures import Structure
-
-Settings = Float[np.ndarray, "lanes 2"]
-Values = Float[np.ndarray, " lanes"]
 
 
 @dataclass(frozen=True)
@@ -36,8 +34,8 @@ class Samples:
     value: Values
     kind: Int[np.ndarray, " lanes"]
     place: Values
-    z: Float[np.ndarray, "lanes size"]
-    p: Float[np.ndarray, "lanes parameters"]
+    z: Lanes
+    p: Parameters
     passed: Shaped[np.ndarray, " lanes"]
 
     def take(self, lanes: Int[np.ndarray, " some"]) -> "Samples":

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from equimorph.arrays import Settings
 from equimorph.equilibria.first_stable import none_passed
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.model import Constraint
-from equimorph.tasks.maps.samples import Samples, Settings
+from equimorph.tasks.maps.samples import Samples
 
 START_KINDS = ("undefined unloaded", "no natural state", "lost")
 """Why there is no path at a setting, or that it was lost; the first statuses of every map."""

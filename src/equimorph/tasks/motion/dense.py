@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.model import Constraint
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.motion.course import Course
@@ -112,8 +113,8 @@ def _predicted(
 
 def _from_first(
     structure: Structure,
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
+    z: Lanes,
+    p: Parameters,
 ) -> Float[np.ndarray, " others"]:
     """Distances of states from the first one."""
     u = (z[1:] - z[0])[:, : structure.unknowns] ** 2 @ structure.mass

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.steering import answers, slopes_along
 from equimorph.model import Descriptor
 from equimorph.structures import Structure
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 EXACT = 1e-10
 """Last correction, in the metric and scaled parameters, of a point that counts as found."""
@@ -60,8 +58,8 @@ class Found:
 
     z: Lanes
     p: Parameters
-    first: Float[np.ndarray, " lanes"]
-    good: Bool[np.ndarray, " lanes"]
+    first: Values
+    good: Flags
 
 
 def at_targets(
@@ -110,7 +108,7 @@ def _correction(
     return away[:, 0] + np.einsum("lk,lki->li", step, dz), np.einsum("lk,lki->li", step, dp)
 
 
-def _length(structure: Structure, dz: Lanes, dp: Parameters) -> Float[np.ndarray, " lanes"]:
+def _length(structure: Structure, dz: Lanes, dp: Parameters) -> Values:
     """Length of changes in the metric and scaled parameters."""
     u = dz[:, : structure.unknowns] ** 2 @ structure.mass
     return np.asarray(np.sqrt(u + ((dp / structure.scales) ** 2).sum(axis=1)))

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Pair, Values
 from equimorph.model import Box
 
-Pair = Float[np.ndarray, " 2"]
-Function = Callable[[Float[np.ndarray, "lanes 2"]], Float[np.ndarray, " lanes"]]
+Function = Callable[[Float[np.ndarray, "lanes 2"]], Values]
 
 NINE = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), indexing="ij"), -1).reshape(-1, 2)
 DIRECTIONS = 12
@@ -53,9 +53,7 @@ def climb(function: Function, start: Pair, radius: Pair, box: Box) -> Top:
     return Top(here, value, np.full(2, np.nan), False)
 
 
-def _values(
-    function: Function, settings: Float[np.ndarray, "lanes 2"], box: Box
-) -> Float[np.ndarray, " lanes"]:
+def _values(function: Function, settings: Float[np.ndarray, "lanes 2"], box: Box) -> Values:
     inside = np.clip(settings, box.lower, box.upper)
     return np.nan_to_num(function(inside), nan=-np.inf)
 

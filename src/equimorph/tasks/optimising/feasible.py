@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Cells, Flags, Lanes, Parameters
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.tasks.optimising.descent import descend
@@ -36,8 +37,6 @@ MET = 1e-8
 """Relative excess over a bound that counts as none."""
 STARTS = 24
 """Cells from which the largest excess is made as small as possible where no state obeys."""
-
-Cells = Int[np.ndarray, "C corners"]
 
 
 @dataclass(frozen=True)
@@ -184,7 +183,7 @@ def _inside(eset: EquilibriumSet, cells: Cells, weights: Float[np.ndarray, "C co
     return Spots(z, p, rows)
 
 
-def _restored(programme: Programme, guess: Spots) -> tuple[Spots, Bool[np.ndarray, " lanes"]]:
+def _restored(programme: Programme, guess: Spots) -> tuple[Spots, Flags]:
     """States that obey all constraints, near points; and where there are any."""
     here, alive = settled(programme.setting, guess.z, guess.p, guess.rows)
     kept = np.zeros(len(guess), bool)
@@ -209,9 +208,9 @@ def _restored(programme: Programme, guess: Spots) -> tuple[Spots, Bool[np.ndarra
 
 def _stable(
     programme: Programme,
-    z: Float[np.ndarray, "lanes size"],
-    p: Float[np.ndarray, "lanes parameters"],
-) -> Bool[np.ndarray, " lanes"]:
+    z: Lanes,
+    p: Parameters,
+) -> Flags:
     """Whether states are stable, or on the boundary."""
     edge = np.abs(programme.constraints[-1].excess(z, p)) <= MET
     return np.asarray(edge | (programme.setting.structure.index(z, p) == 0))
@@ -241,9 +240,7 @@ def _lowest_around(
 def _largest(constraints: tuple[Constraint, ...]) -> Descriptor:
     """Largest relative excess, with all as branches."""
 
-    def each(
-        z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
-    ) -> Float[np.ndarray, "lanes K"]:
+    def each(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes K"]:
         return np.stack([c.excess(z, p) / max(1.0, abs(c.bound)) for c in constraints], axis=1)
 
     return Descriptor(

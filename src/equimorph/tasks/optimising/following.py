@@ -51,7 +51,7 @@ Where = Callable[[Float[np.ndarray, " columns"]], Objective]
 """Objective at given parameters and targets."""
 
 
-def follow_optimum(  # noqa: PLR0913  # the knobs of the public face, all by keyword
+def follow_optimum(
     start: Start,
     objective: Descriptor,
     to: Leg | Sequence[Leg],

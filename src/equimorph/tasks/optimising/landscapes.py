@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Flags, Lanes, Values
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.errors import InputError
@@ -147,7 +148,7 @@ def landscape(  # the knobs of the public face, most by keyword
 
 def _allowed(
     eset: EquilibriumSet, over: StatesOver, within: Sequence[Constraint], start: State | None
-) -> Bool[np.ndarray, " lanes"]:
+) -> Flags:
     """Stable states that obey the constraints, on the piece of the start."""
     good = over.index == 0
     for constraint in within:
@@ -159,7 +160,7 @@ def _allowed(
 
 
 def _best(
-    value: Float[np.ndarray, " lanes"], point: Int[np.ndarray, " lanes"], count: int
+    value: Values, point: Int[np.ndarray, " lanes"], count: int
 ) -> Int[np.ndarray, " points"]:
     """Number of the state with the least value over each point, −1 without one."""
     best = np.full(count, -1)
@@ -198,9 +199,7 @@ def _barriers(
     return Barriers(settings[pairs[apart]], value[pairs[apart]], kind)
 
 
-def _lifted(
-    a: States, b: States
-) -> tuple[Bool[np.ndarray, " lanes"], Float[np.ndarray, "lanes size"]]:
+def _lifted(a: States, b: States) -> tuple[Flags, Lanes]:
     """Whether states stay stable on the way to the parameters of others, and where they end."""
     line = ParameterLine(a.structure, a.p.copy(), b.p - a.p)
     ended = follow(line, a.z.copy(), (), TraceOptions(record=False))

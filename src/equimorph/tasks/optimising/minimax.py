@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Pair
 from equimorph.model import Box
 from equimorph.tasks.optimising.quadratic import Quadratic, solve
 
-Pair = Float[np.ndarray, " 2"]
 Pieces = Callable[[Float[np.ndarray, "lanes 2"]], Float[np.ndarray, "lanes m"]]
 
 ITERATIONS = 30

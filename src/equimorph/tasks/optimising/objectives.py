@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.model import Descriptor
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Branches = tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]]
 
 
@@ -27,7 +26,7 @@ class Objective:
         """Whether it may have kinks at its minima."""
         return self.sign > 0.0 and self.descriptor.branches is not None
 
-    def values(self, z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    def values(self, z: Lanes, p: Parameters) -> Values:
         """Values to be made small."""
         return np.asarray(self.sign * self.descriptor.function(z, p))
 

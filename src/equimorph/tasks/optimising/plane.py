@@ -3,8 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.equilibria.steering import answers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.embedding import embed
@@ -14,10 +15,6 @@ from equimorph.manifold.pins import Aim, corrected
 from equimorph.manifold.tangents import placed_frames, split_step, tangent_frames
 from equimorph.structures import State
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Frames = Float[np.ndarray, "lanes d full"]
-Rows = Float[np.ndarray, "lanes d coordinates"]
 Steps = Float[np.ndarray, "lanes d"]
 
 ANYWHERE = 1e3
@@ -36,7 +33,7 @@ class Spots:
         """Number of points."""
         return len(self.z)
 
-    def take(self, some: Int[np.ndarray, " n"] | Bool[np.ndarray, " lanes"]) -> "Spots":
+    def take(self, some: Int[np.ndarray, " n"] | Flags) -> "Spots":
         """Some of the points."""
         return Spots(self.z[some], self.p[some], self.rows[some])
 
@@ -82,9 +79,7 @@ def stepped(setting: Setting, at: Spots, frames: Frames, steps: Steps) -> tuple[
     return at.z + dz, at.p + dp
 
 
-def settled(
-    setting: Setting, z: Lanes, p: Parameters, rows: Rows
-) -> tuple[Spots, Bool[np.ndarray, " lanes"]]:
+def settled(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> tuple[Spots, Flags]:
     """Points of the set orthogonally above points, in planes, and where there are any."""
     d = len(setting.free)
     span = np.tile(np.eye(d), (len(z), 1, 1))

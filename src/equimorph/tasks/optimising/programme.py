@@ -5,18 +5,15 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Frames, Lanes, Parameters
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.pairing import Setting
 from equimorph.model import Constraint
 from equimorph.structures import value_of
 from equimorph.tasks.optimising.objectives import Objective, matched
 from equimorph.tasks.optimising.plane import Spots, plane_of, settled, stepped
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Frames = Float[np.ndarray, "lanes d full"]
 
 DIFFERENCE = 1e-5
 """Step of first derivatives along the tangent space, in the metric."""
@@ -37,7 +34,7 @@ class Expansion:
     g: Float[np.ndarray, "lanes k"]
     g_slope: Float[np.ndarray, "lanes k d"]
     g_bend: Float[np.ndarray, "lanes k d d"]
-    known: Bool[np.ndarray, " lanes"]
+    known: Flags
 
 
 @dataclass(frozen=True)
@@ -162,7 +159,7 @@ def _slopes(values: Float[np.ndarray, "lanes n m"]) -> Float[np.ndarray, "lanes 
 def _bends(
     middle: Float[np.ndarray, "lanes m"],
     values: Float[np.ndarray, "lanes n m"],
-    known: Bool[np.ndarray, " lanes"],
+    known: Flags,
 ) -> Float[np.ndarray, "lanes m d d"]:
     half = values.shape[1] // 2
     d = int((np.sqrt(8 * half + 1) - 1) / 2)

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Pair
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Locus, Spot, Test, advance, settle
 from equimorph.model import position
 from equimorph.structures import State
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
-
-Pair = Float[np.ndarray, " 2"]
 
 ITERATIONS = 20
 LONGEST, LEVEL = 0.05, 1e-12

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria import Corner, corners_of, worst_over
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -19,9 +20,6 @@ from equimorph.tasks.optimising.plane import Spots, rows_at
 from equimorph.tasks.optimising.programme import Programme
 from equimorph.tasks.optimising.stability import stability
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 Branches = Float[np.ndarray, "lanes m"]
 
 ROOMS = (1.1, 1.02, 1.005)

@@ -1,13 +1,10 @@
 """The stability boundary as a smooth function."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import Structure, margin_of
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 SWEEPS = 5
 SHIFT = -1e-7
@@ -20,7 +17,7 @@ def stability(structure: Structure, margin: float) -> Constraint:
     if margin > 0.0:
         return margin_of(structure) >= margin
 
-    def value(z: Lanes, p: Parameters) -> Float[np.ndarray, " lanes"]:
+    def value(z: Lanes, p: Parameters) -> Values:
         return nearest_eigenvalue(structure, z, p)
 
     return Descriptor(STABLE, "1", value, STABLE, structure.signature) >= 0.0
@@ -31,9 +28,7 @@ def is_stability(constraint: Constraint) -> bool:
     return constraint.descriptor.name in (STABLE, "stability_margin")
 
 
-def nearest_eigenvalue(
-    structure: Structure, z: Lanes, p: Parameters
-) -> Float[np.ndarray, " lanes"]:
+def nearest_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:
     """Eigenvalue of the constrained Hessian nearest to zero, in the metric, by inverse iteration.
 
     Near the stability boundary it is the margin to round-off; far from it, about as large.

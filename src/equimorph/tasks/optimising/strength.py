@@ -6,17 +6,15 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Settings, Values
 from equimorph.equilibria import LimitLoad
 from equimorph.errors import InputError
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
 from equimorph.tasks.optimising.climbing import climb
 from equimorph.tasks.optimising.minimax import raised
 from equimorph.tasks.optimising.ridges import BESIDE, highest, settings_beside
-
-Settings = Float[np.ndarray, "lanes 2"]
-Values = Float[np.ndarray, " lanes"]
 
 CANDIDATES = 4
 ROBUST = 2
@@ -214,7 +212,7 @@ def _level(curve: MapCurve) -> float:
     return float(np.nan_to_num(curve.values[:, 1]).max(initial=0.0))
 
 
-def _near_curves(lmap: LimitLoadMap, settings: Settings) -> Bool[np.ndarray, " lanes"]:
+def _near_curves(lmap: LimitLoadMap, settings: Settings) -> Flags:
     """Settings closer than two grid steps to a curve on which the map is not smooth."""
     places = [curve.points for curve in lmap.curves]
     if not places:

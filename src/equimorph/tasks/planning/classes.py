@@ -7,6 +7,7 @@ from heapq import heappop, heappush
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Edges
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, eased
@@ -17,7 +18,7 @@ from equimorph.tasks.planning.admission import (
     route_along,
     violation,
 )
-from equimorph.tasks.planning.homology import Edges, cocycles
+from equimorph.tasks.planning.homology import cocycles
 from equimorph.tasks.planning.links import Demands, links
 from equimorph.tasks.planning.network import Ends, network_of, no_route, own_links, with_ends
 from equimorph.tasks.planning.objectives import Wish, objective_of
@@ -31,7 +32,7 @@ LABELS = 8
 Class = tuple[int, ...]
 
 
-def alternatives(  # noqa: PLR0913  # as `plan`
+def alternatives(
     eset: EquilibriumSet,
     start: State,
     goal: State,

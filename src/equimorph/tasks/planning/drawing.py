@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Values
 from equimorph.equilibria import newton
 from equimorph.model import Box
 from equimorph.structures import States
-from equimorph.tasks.planning.links import Demands, Values, links
+from equimorph.tasks.planning.links import Demands, links
 from equimorph.tasks.planning.objectives import Places
 
 Room = tuple[Box, Int[np.ndarray, " d"]]

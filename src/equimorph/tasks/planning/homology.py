@@ -12,7 +12,8 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-Edges = Int[np.ndarray, "edges 2"]
+from equimorph.arrays import Edges
+
 Triangles = Int[np.ndarray, "triangles 3"]
 Values = Int[np.ndarray, "edges holes"]
 

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import Outcome, follow
 from equimorph.equilibria.tracing import ARRIVAL
@@ -14,10 +15,6 @@ from equimorph.model import Constraint
 from equimorph.structures import States
 from equimorph.tasks.planning.objectives import Objective
 from equimorph.tasks.route import FINE
-
-Lanes = Float[np.ndarray, "lanes size"]
-Flags = Bool[np.ndarray, " lanes"]
-Values = Float[np.ndarray, " lanes"]
 
 CLOSE = 0.05
 """Largest step in the metric where the stability margin is watched along a lift."""
@@ -68,9 +65,7 @@ def links(source: States, target: States, demands: Demands) -> tuple[Flags, Valu
     return linked, cost
 
 
-def straight_lifts(
-    source: States, p: Float[np.ndarray, "lanes parameters"], demands: Demands
-) -> tuple[Lanes, Flags, Values]:
+def straight_lifts(source: States, p: Parameters, demands: Demands) -> tuple[Lanes, Flags, Values]:
     """Where straight lifts to parameters end; whether they got there admissibly; their costs."""
     structure, z = source.structure, source.z.copy()
     velocity = p - source.p

@@ -5,11 +5,12 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from equimorph.arrays import Flags, Values
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.topology import faces_of
 from equimorph.model import Constraint
 from equimorph.structures import State, States
-from equimorph.tasks.planning.links import Demands, Flags, Values, links, shortest
+from equimorph.tasks.planning.links import Demands, links, shortest
 from equimorph.tasks.planning.objectives import ROUGH, Objective
 from equimorph.tasks.prepared import kept
 

@@ -31,7 +31,7 @@ Dips between the points that are watched need a reserve.
 """
 
 
-def plan(  # noqa: PLR0913  # the knobs of the public face, all by keyword
+def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     eset: EquilibriumSet,
     start: Start,
     goal: State,

@@ -6,7 +6,6 @@ from jaxtyping import Float
 from equimorph.model import Constraint
 from equimorph.structures import States
 
-Values = Float[np.ndarray, " lanes"]
 Slopes = Float[np.ndarray, "lanes constraints directions"]
 
 STEP = 1e-5

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Values
 from equimorph.equilibria import check_start, way_points
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, Descriptor, eased, position
@@ -44,7 +45,7 @@ class SamplingOptions:
             raise InputError(f"`reach` must be a positive number; got {self.reach!r}.")
 
 
-def plan_sampled(  # noqa: PLR0913  # all but three by keyword
+def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     start: State,
     goal: State | None,
     actuators: Box,
@@ -238,9 +239,9 @@ class _Search:
     def _pushed(
         self,
         states: States,
-        now: Float[np.ndarray, " lanes"],
+        now: Values,
         a: Float[np.ndarray, "lanes d"],
-        s: Float[np.ndarray, " lanes"],
+        s: Values,
     ) -> Float[np.ndarray, "lanes d"]:
         """Settings near the given ones that the constraints, linearised at nodes, allow."""
         course, within = self.course, self.demands.constraints

@@ -1,8 +1,9 @@
 """Paths over a mesh made straight, and drawn to where they cost least."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
+from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.equilibria import ParameterLine, TraceOptions, newton
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
@@ -127,9 +128,7 @@ def _divided(corners: States, demands: Demands) -> States:
     return corners
 
 
-def _lifted(
-    states: States, p: Float[np.ndarray, "lanes parameters"], demands: Demands
-) -> tuple[Float[np.ndarray, "lanes size"], Bool[np.ndarray, " lanes"]]:
+def _lifted(states: States, p: Parameters, demands: Demands) -> tuple[Lanes, Flags]:
     """States lifted straight to parameters, and whether they arrived."""
     line = ParameterLine(states.structure, states.p.copy(), p - states.p)
     outcome = follow(line, states.z.copy(), demands.constraints, TraceOptions(record=False))

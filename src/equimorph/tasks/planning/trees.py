@@ -5,12 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.model import Box
 from equimorph.structures import State, States
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 Numbers = Int[np.ndarray, " lanes"]
 
 FINAL = 0.2

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.steering import steering
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -115,9 +116,7 @@ def jacobian_of(
     """det ∂S/∂p along the set, per scales of the parameters: zero where they do not steer."""
     free = np.array([position(structure.parameters, name) for name in names])
 
-    def value(
-        z: Float[np.ndarray, "lanes size"], p: Float[np.ndarray, "lanes parameters"]
-    ) -> Float[np.ndarray, " lanes"]:
+    def value(z: Lanes, p: Parameters) -> Values:
         return np.asarray(np.linalg.det(steering(structure, z, p, free, descriptors)))
 
     return Descriptor("jacobian", "", value, "det J_S")

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Parameters, Values
 from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.equilibria.outcome import KINDS
 from equimorph.equilibria.starts import check_starts
@@ -200,10 +201,10 @@ class _Rays:
 
     def _furthest(
         self,
-        p: Float[np.ndarray, "lanes parameters"],
-        velocity: Float[np.ndarray, "lanes parameters"],
-        scale: Float[np.ndarray, " lanes"],
-    ) -> Float[np.ndarray, " lanes"]:
+        p: Parameters,
+        velocity: Parameters,
+        scale: Values,
+    ) -> Values:
         """Multiples of rays that stay within the meaning of all parameters."""
         most = scale.copy()
         for place in self.places:

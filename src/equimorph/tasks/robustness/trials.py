@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
+from equimorph.arrays import Parameters, Values
 from equimorph.equilibria import lift, way_points
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Schedule, names_of, position
@@ -134,9 +135,7 @@ def random_trials(  # all but three by keyword
     return Trials(names, offsets, kind, np.maximum(lifts.at - 1.0, 0.0), lifts.states)
 
 
-def _leg(
-    names: tuple[str, ...], p: Float[np.ndarray, "lanes parameters"]
-) -> dict[str, Float[np.ndarray, " lanes"]]:
+def _leg(names: tuple[str, ...], p: Parameters) -> dict[str, Values]:
     return {name: p[:, k].copy() for k, name in enumerate(names)}
 
 

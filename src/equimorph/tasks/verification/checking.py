@@ -77,7 +77,7 @@ class Verification:
         return Path(states, self.at, _lengths(states), np.zeros(len(states), int), (end,))
 
 
-def verify(  # noqa: PLR0913  # all but two by keyword
+def verify(
     schedule: Schedule | Sequence[Mapping[str, float]],
     start: State | None = None,
     *,

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags
 from equimorph.equilibria import Event, Lifts, TraceOptions, lift, newton
 from equimorph.model import Constraint, names_of
 from equimorph.structures import State, States
@@ -88,7 +89,7 @@ def _true(lifts: Lifts, goals: States) -> int:
     return int(bad[0]) if len(bad) else len(goals)
 
 
-def _there(lifts: Lifts) -> Bool[np.ndarray, " lanes"]:
+def _there(lifts: Lifts) -> Flags:
     """Which lifts came to their goals."""
     return np.asarray(lifts.arrived | ((lifts.kind == "lost") & (lifts.at > 1.0 - AT_GOAL)))
 

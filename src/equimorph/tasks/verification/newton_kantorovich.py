@@ -10,14 +10,12 @@ All bounds are componentwise, in the maximum norm with weights s, so that they h
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Flags, Lanes, Values
 from equimorph.structures import Direction, Majorant, States, Structure
 from equimorph.tasks.verification.sampled import sampled_bound
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 Matrices = Float[np.ndarray, "lanes size size"]
 
 DIFFERENCE = 1e-4
@@ -55,7 +53,7 @@ class Bounds:
         Stability margin that is kept all along, 0 if none was proved.
     """
 
-    proved: Bool[np.ndarray, " lanes"]
+    proved: Flags
     error: Values
     unique: Values
     at_ends: Float[np.ndarray, "lanes 2"]
@@ -204,7 +202,7 @@ def _margins(
 
 def _keeps(
     middle: States, matrix: Matrices, around: tuple[Majorant, Direction], shift: Values
-) -> Bool[np.ndarray, " lanes"]:
+) -> Flags:
     """Whether segments keep more than a margin in their tubes."""
     (bound, tube), structure = around, middle.structure
     still, mass = np.zeros_like(tube[1]), np.zeros(structure.size)

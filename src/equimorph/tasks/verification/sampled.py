@@ -3,10 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.structures import Direction, Majorant, Structure
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Tensor = Float[np.ndarray, "lanes size entries entries"]
 
 MOST_ENTRIES = 80

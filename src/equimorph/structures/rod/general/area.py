@@ -6,10 +6,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Nodal, Values
 from equimorph.linalg.dense import multiply
 from equimorph.structures.rod.discretisation import Mesh
-
-Nodal = Float[np.ndarray, "lanes nodes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +41,7 @@ class EnclosedArea:
         np.add.at(total, self.mesh.element_nodes, self.rows)
         return total
 
-    def value(self, theta: Nodal) -> Float[np.ndarray, " lanes"]:
+    def value(self, theta: Nodal) -> Values:
         """V."""
         return np.asarray((np.cos(theta) * multiply(np.sin(theta), self.matrix.T)).sum(axis=1))
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Parameter
 from equimorph.model.parameter import Role
@@ -230,7 +231,7 @@ class Description:
         return matrix
 
     def line_load(
-        self, p: Float[np.ndarray, "lanes parameters"], matrix: Matrix, s: Float[np.ndarray, " n"]
+        self, p: Parameters, matrix: Matrix, s: Float[np.ndarray, " n"]
     ) -> Float[np.ndarray, "lanes n 2"]:
         """Dead load per arclength, in the user's units; matrix: what `mechanics` returns."""
         out = np.zeros((len(p), len(s), 2))
@@ -241,7 +242,7 @@ class Description:
         return out
 
     def point_forces(
-        self, p: Float[np.ndarray, "lanes parameters"], matrix: Matrix
+        self, p: Parameters, matrix: Matrix
     ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "lanes n 2"]]:
         """Arclengths of point forces, and the forces in the user's units."""
         terms = [each for each in self._amplitudes(p, matrix) if isinstance(each[0], PointForce)]
@@ -250,9 +251,7 @@ class Description:
             forces[:, i] = amplitude[:, None] * np.array(one.direction)
         return np.array([float(one.s) for one, _ in terms]), forces
 
-    def _amplitudes(
-        self, p: Float[np.ndarray, "lanes parameters"], matrix: Matrix
-    ) -> list[tuple[Any, Float[np.ndarray, " lanes"]]]:
+    def _amplitudes(self, p: Parameters, matrix: Matrix) -> list[tuple[Any, Values]]:
         """Every term with its amplitude, in the user's units."""
         columns, out = matrix[:, -len(self.parameters) - 1 : -1], []
         for name, terms in self.terms.items():

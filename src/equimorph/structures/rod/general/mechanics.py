@@ -3,8 +3,9 @@
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, CondensedLayout
 from equimorph.linalg.condensed import PIVOT_GUARD
@@ -28,11 +29,6 @@ from equimorph.structures.rod.general.step.kernels import advance_lanes
 from equimorph.structures.rod.general.symmetry import mirrors
 from equimorph.structures.rod.interface import LARGEST_TAIL, Mechanics
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Nodal = Float[np.ndarray, "lanes nodes"]
-Values = Float[np.ndarray, " lanes"]
-Scalars = Float[np.ndarray, "lanes scalars"]
 Points = Float[np.ndarray, "lanes points"]
 
 SMOOTH = 1e-6
@@ -123,7 +119,7 @@ class GeneralMechanics(Mechanics):
         """max_s |κ(s)| and where it occurs."""
         return self._fields.largest_curvature(self.nodal_angles(z, p), self.scalars(z, p))
 
-    def resolved(self, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether θ is smooth in every element, and the rod's equations integrated there meet it.
 
         Forces much above the buckling load of an element, like high pressure, amplify the error of

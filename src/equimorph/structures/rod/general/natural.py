@@ -4,14 +4,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.polynomial import legendre
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.structures.rod.continuation import Part, follow, newton
 from equimorph.structures.rod.discretisation import reference_element
 from equimorph.structures.rod.general.mechanics import GeneralMechanics
 from equimorph.structures.rod.general.model import RodModel
 from equimorph.structures.rod.natural import Natural, Outcome
-
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 
 def natural_rod(rod: GeneralMechanics, p: Parameters) -> Natural:
@@ -50,9 +48,7 @@ def natural_rod(rod: GeneralMechanics, p: Parameters) -> Natural:
     return out
 
 
-def _stress_free(
-    rod: GeneralMechanics, p: Parameters
-) -> tuple[Parameters, Float[np.ndarray, "lanes size"]]:
+def _stress_free(rod: GeneralMechanics, p: Parameters) -> tuple[Parameters, Lanes]:
     """Stress-free shape: the places of its ends as parameters, and its state."""
     model, lanes, start = rod.model, len(p), p.copy()
     fine = reference_element(model.fine.along.shape[2] - 1)

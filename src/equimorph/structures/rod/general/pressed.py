@@ -3,9 +3,10 @@
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Entries
+
 Angles = Float[np.ndarray, "lanes unknowns"]
 Square = Float[np.ndarray, "unknowns unknowns"]
-Entries = Float[np.ndarray, "lanes entries"]
 
 BLOCK = 128
 """Matrices put together at a time: calls cost little beside them."""

@@ -6,11 +6,10 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.rod.general.model import RodModel
 
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Matrix = Float[np.ndarray, "scalars scalars"]
 
 SAME = 1e-9

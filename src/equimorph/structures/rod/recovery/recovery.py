@@ -7,13 +7,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy.polynomial import legendre, polynomial
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.loads import LoadShape
 from equimorph.structures.rod.recovery.kernels import fields_lanes, largest_lanes
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 
 LOAD_DEGREE = 16
 NEGLIGIBLE = 1e-13
@@ -60,9 +58,7 @@ class Recovery:
         over_lanes(fields_lanes, shared, [z, p], [out])
         return out.reshape(len(z), len(s), 4)
 
-    def largest_curvature(
-        self, z: Lanes, p: Parameters
-    ) -> tuple[Float[np.ndarray, " lanes"], Float[np.ndarray, " lanes"]]:
+    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the first arclength where it is."""
         out, place = np.empty(len(z)), np.empty(len(z))
         over_lanes(largest_lanes, self.extremum_data, [z, p], [out, place])

@@ -3,11 +3,12 @@
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import Values
+
 SAMPLES = 129
 POLISHING = 4
 
 Curve = Float[np.ndarray, "lanes samples 4"]
-Values = Float[np.ndarray, " lanes"]
 
 
 def stations() -> Float[np.ndarray, " samples"]:

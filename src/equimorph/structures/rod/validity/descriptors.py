@@ -1,8 +1,8 @@
 """Validity of the planar model, as descriptors and as warnings."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures.rod.general.ends import End
@@ -10,10 +10,6 @@ from equimorph.structures.rod.general.mechanics import GeneralMechanics
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.validity.contact import closest_approach, stations
 from equimorph.structures.rod.validity.lateral import LateralStiffness, lateral_margin
-
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
-Values = Float[np.ndarray, " lanes"]
 
 
 def clearance(rod: Measured, apart: float) -> Descriptor:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.polynomial import legendre
 
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.general.ends import FREE, End
@@ -15,8 +16,6 @@ from equimorph.structures.rod.general.mechanics import GeneralMechanics
 from equimorph.structures.rod.profiles import at_nodes, profile
 
 FOUR_PI_SQUARED = 4.0 * np.pi**2
-Lanes = Float[np.ndarray, "lanes size"]
-Parameters = Float[np.ndarray, "lanes parameters"]
 Fine = Float[np.ndarray, "lanes elements fine"]
 
 
@@ -45,7 +44,7 @@ class LateralStiffness:
 def lateral_margin(
     rod: GeneralMechanics, ends: tuple[End, End], stiffness: LateralStiffness, z: Lanes,
     p: Parameters,
-) -> Float[np.ndarray, " lanes"]:  # fmt: skip
+) -> Values:  # fmt: skip
     """Smallest eigenvalue of the second variation for movements out of the plane.
 
     A small rotation φ about the tangent and ψ about the normal twists the rod by φ' − κψ and bends

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
+from equimorph.arrays import Scalars, Values
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.rod.discretisation import Reference, reference_element
 from equimorph.structures.rod.general.area import EnclosedArea
@@ -20,8 +21,6 @@ from equimorph.structures.rod.general.fields.kernels import (
 from equimorph.structures.rod.general.model import RodModel
 
 Angles = Float[np.ndarray, "lanes nodes"]
-Scalars = Float[np.ndarray, "lanes scalars"]
-Values = Float[np.ndarray, " lanes"]
 
 NEAR = 0.97
 """Share of the largest nodal curvature from which on an element may hold the largest one."""

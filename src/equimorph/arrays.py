@@ -1,0 +1,41 @@
+"""Array shapes that appear throughout the package; the batch axis is `lanes`.
+
+Aliases for shapes that only one module uses stay in that module.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+# one row for each lane of a batch
+Lanes = Float[np.ndarray, "lanes size"]
+"""Unknowns and multipliers z = (u, λ) of each lane."""
+Parameters = Float[np.ndarray, "lanes parameters"]
+"""All parameters p of the structure, in its order, for each lane."""
+Values = Float[np.ndarray, " lanes"]
+"""One scalar a lane."""
+Flags = Bool[np.ndarray, " lanes"]
+"""One truth value a lane."""
+Nodal = Float[np.ndarray, "lanes nodes"]
+"""A field at the nodes of the discretisation."""
+Entries = Float[np.ndarray, "lanes entries"]
+"""Entries of the KKT matrix in the layout of its structure."""
+Scalars = Float[np.ndarray, "lanes scalars"]
+"""Several scalars a lane."""
+Settings = Float[np.ndarray, "lanes 2"]
+"""Two parameters a lane."""
+Frames = Float[np.ndarray, "lanes d full"]
+"""Orthonormal bases of tangent spaces: changes of z and of the scaled free parameters."""
+Rows = Float[np.ndarray, "lanes d coordinates"]
+"""Rows of conditions in the metric coordinates of the set."""
+
+# points, edges and cells of complexes
+Points = Float[np.ndarray, "points d"]
+"""Places in the space of the free parameters."""
+Edges = Int[np.ndarray, "edges 2"]
+"""Numbers of the two ends of each edge."""
+Cells = Int[np.ndarray, "C corners"]
+"""Numbers of the corners of each cell."""
+Some = Int[np.ndarray, " some"]
+"""Numbers of selected rows."""
+Pair = Float[np.ndarray, " 2"]
+"""Two numbers."""

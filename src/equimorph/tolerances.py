@@ -1,0 +1,16 @@
+"""Tolerances that several modules share, in groups; each says the scale that it is measured in.
+
+A tolerance that only one algorithm uses stands beside that algorithm.
+"""
+
+# Identity: two things nearer than this are the same.
+SAME_STATE = 1e-6
+"""Distance of two states in the structure's metric."""
+
+# Convergence: an iteration has ended.
+CONVERGED = 1e-10
+"""Last Newton correction in the structure's metric: at round-off."""
+
+# Difference: steps of finite differences.
+CENTRAL_DIFFERENCE = 1e-6
+"""Step of central differences, in units of the scales of what varies."""
