@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from equimorph.equilibria import find_equilibria
-from equimorph.manifold.kernels import match_or_add
+from equimorph.manifold.geometry.kernels import match_or_add
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from equimorph.manifold import equilibrium_set, refine
-from equimorph.manifold.corners import corner_angles, squeezed
-from equimorph.manifold.fabric import fabric_of
-from equimorph.manifold.levels import fabric_setting
+from equimorph.manifold.complex.marked_complex import fabric_of
+from equimorph.manifold.queries.levels import fabric_setting
+from equimorph.manifold.refining.corners import corner_angles, squeezed
 from equimorph.model import Box
 from oracles.surfaces import transcriticals
 from typecheck import unchecked

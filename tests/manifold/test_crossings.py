@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from equimorph import lift, plotting, storage
 from equimorph.manifold import EquilibriumSet, equilibrium_set, locate, refine, restricted
-from equimorph.manifold.corners import squeezed
-from equimorph.manifold.fabric import fabric_of
-from equimorph.manifold.levels import fabric_setting
-from equimorph.manifold.surgery import angles
-from equimorph.manifold.topology import adjacency
+from equimorph.manifold.complex.marked_complex import fabric_of
+from equimorph.manifold.geometry.topology import adjacency
+from equimorph.manifold.queries.levels import fabric_setting
+from equimorph.manifold.refining.corners import squeezed
+from equimorph.manifold.refining.surgery import angles
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
 from oracles.complexes import assert_crossings, assert_faithful, assert_upright

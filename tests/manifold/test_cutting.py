@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from equimorph.manifold.cutting import (
+from equimorph.manifold.lifting.polygon_cuts import (
     can_be_triangulated,
     chords_to_split,
     cut,

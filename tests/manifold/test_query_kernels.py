@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from equimorph.manifold.cell_index import NUDGE, CellIndex
-from equimorph.manifold.exact import exact_states
-from equimorph.manifold.over import CLOSEST, rooted
-from equimorph.manifold.querying.kernels import balanced, guesses, one_of_each, worth_trying
+from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
+from equimorph.manifold.lookup.over import CLOSEST, rooted
 from equimorph.structures import Spring
 
 

@@ -9,17 +9,24 @@ from hypothesis import strategies as st
 
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, refine
-from equimorph.manifold.accounting import Complex
-from equimorph.manifold.cusp_points import with_cusps_beside
-from equimorph.manifold.fabric import ON_FOLD, RIM, Fabric, _bisected, edges_of, fabric_of
-from equimorph.manifold.leading import led_between
-from equimorph.manifold.on_edges import on_edges, unmet
-from equimorph.manifold.pairing import Setting
-from equimorph.manifold.patches import patch_around
-from equimorph.manifold.simplices import volumes
-from equimorph.manifold.smoothing import smooth
-from equimorph.manifold.surgery import angles, collapse, flip, smallest_angle
-from equimorph.manifold.topology import adjacency, chains, euler_characteristic
+from equimorph.manifold.complex.description import Complex
+from equimorph.manifold.complex.edge_points import on_edges, unmet
+from equimorph.manifold.complex.marked_complex import (
+    ON_FOLD,
+    RIM,
+    Fabric,
+    _bisected,
+    edges_of,
+    fabric_of,
+)
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.topology import adjacency, chains, euler_characteristic
+from equimorph.manifold.queries.cusps import with_cusps_beside
+from equimorph.manifold.refining.leading import led_between
+from equimorph.manifold.refining.patches import patch_around
+from equimorph.manifold.refining.smoothing import smooth
+from equimorph.manifold.refining.surgery import angles, collapse, flip, smallest_angle
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
 from oracles.complexes import (

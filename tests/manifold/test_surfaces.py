@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from equimorph.manifold import build, equilibrium_set
-from equimorph.manifold.seeds import seeds
+from equimorph.manifold.lifting.seeds import seeds
 from equimorph.model import Box, Descriptor
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 from oracles.polynomial import Polynomial, Sum, bead_on_a_circle

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equimorph.manifold.topology import (
+from equimorph.manifold.geometry.topology import (
     adjacency,
     chains,
     euler_characteristic,

@@ -11,20 +11,20 @@ from equimorph.manifold import (
     refine,
     stability_distance,
 )
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.fabric import fabric_of
-from equimorph.manifold.pairing import Setting
-from equimorph.manifold.pins import Aim, corrected
-from equimorph.manifold.simplices import volumes
-from equimorph.manifold.tetrahedra import dihedrals
-from equimorph.manifold.topology import (
+from equimorph.manifold.complex.marked_complex import fabric_of
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import Aim, corrected
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.topology import (
     adjacency,
     euler_characteristic,
     keys_of,
     labels,
     orientation,
 )
-from equimorph.manifold.volumes import volumes_over
+from equimorph.manifold.lifting.volumes import volumes_over
+from equimorph.manifold.refining.tetrahedra import dihedrals
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
 from oracles.complexes import assert_faithful, assert_folds_are_singular

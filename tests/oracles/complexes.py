@@ -4,11 +4,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.fabric import fabric_of
-from equimorph.manifold.levels import fabric_setting
-from equimorph.manifold.parted_sheets import parted
-from equimorph.manifold.simplices import volumes
-from equimorph.manifold.topology import (
+from equimorph.manifold.complex.marked_complex import fabric_of
+from equimorph.manifold.complex.separate_sheets import parted
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.topology import (
     adjacency,
     faces_of,
     flags_of,
@@ -16,6 +15,7 @@ from equimorph.manifold.topology import (
     orientation,
     projected_volume,
 )
+from equimorph.manifold.queries.levels import fabric_setting
 
 REGULAR = (0, 3, 5, 6)
 FOLDED = (1, 4)

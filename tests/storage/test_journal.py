@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from equimorph.errors import CancelledError, InputError
-from equimorph.manifold import EquilibriumSet, equilibrium_set, flooding, hard, on_edges, refine
+from equimorph.manifold import EquilibriumSet, equilibrium_set, refine
+from equimorph.manifold.complex import edge_points
+from equimorph.manifold.lifting import flood, traced_edges
 from equimorph.model import Box, Journal, Progress
 from equimorph.storage import open_journal
 from equimorph.storage.journal import MARK
@@ -130,7 +132,11 @@ def test_what_is_in_the_journal_is_not_computed_again(
     whole, content = finished
     path = tmp_path / "journal"
     path.write_bytes(content)
-    for module, name in ((flooding, "lift_directly"), (hard, "follow"), (on_edges, "on_edges")):
+    for module, name in (
+        (flood, "lift_directly"),
+        (traced_edges, "follow"),
+        (edge_points, "on_edges"),
+    ):
         monkeypatch.setattr(module, name, None)
     with open_journal(path) as journal:
         assert same(spring(None, journal), whole)

@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.manifold.locate import pieces_of
+from equimorph.manifold.queries.locate import pieces_of
 from equimorph.structures import Rod, Spring, State
 from equimorph.tasks import plan, verify
 from typecheck import unchecked

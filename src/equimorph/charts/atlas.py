@@ -15,8 +15,8 @@ from equimorph.charts.travel import AtlasPath, travel
 from equimorph.charts.uncrossed import at_crossings, first_copies
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.topology import Adjacency, adjacency, flags_of, pieces
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, pieces
 from equimorph.structures import State, States
 
 SAME = 1e-5

@@ -11,7 +11,7 @@ from equimorph.charts.domain import Domain, Edge, kinds_along, wide
 from equimorph.charts.location import Cells, facet_kinds
 from equimorph.charts.preference import Preference
 from equimorph.charts.regions import regions_within
-from equimorph.manifold.topology import flags_of, pieces
+from equimorph.manifold.geometry.topology import flags_of, pieces
 from equimorph.model import Box
 from equimorph.structures import States
 

@@ -16,7 +16,7 @@ from equimorph.charts.solving import frames_anywhere
 from equimorph.charts.uncrossed import uncrossed
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.embedding import embed
+from equimorph.manifold.geometry.embedding import embed
 from equimorph.structures import State, States
 
 STATUSES = ("inside", "gap", "barrier", "beyond the box", "not single-valued")

@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from scipy.spatial import cKDTree
 
 from equimorph.charts.location import Cells
-from equimorph.manifold.cell_index import CellIndex
-from equimorph.manifold.topology import labels
+from equimorph.manifold.geometry.topology import labels
+from equimorph.manifold.lookup.cell_index import CellIndex
 
 TOUCHING = 1e-7
 """Depth of an overlap, in sizes of cells, up to which cells only touch."""

@@ -10,9 +10,9 @@ from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.charts.solving import Scalars, solved_on_the_set, solved_over_parameters
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.exact import exact_states
-from equimorph.manifold.nearest import setting_of
-from equimorph.manifold.tangents import split_step
+from equimorph.manifold.geometry.tangents import split_step
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.manifold.queries.nearest import setting_of
 from equimorph.model import Descriptor, position
 
 Values = Float[np.ndarray, "lanes d"]

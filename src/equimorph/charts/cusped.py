@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.cusp_points import cusps_on_edges
-from equimorph.manifold.fabric import Fabric, fabric_of
-from equimorph.manifold.levels import fabric_setting, part_of
+from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
+from equimorph.manifold.queries.cusps import cusps_on_edges
+from equimorph.manifold.queries.levels import fabric_setting, part_of
 
 
 def with_cusps(fabric: Fabric) -> tuple[Fabric, Int[np.ndarray, " cusps"]]:

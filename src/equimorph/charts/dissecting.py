@@ -16,12 +16,12 @@ from equimorph.charts.uncrossed import uncrossed
 from equimorph.charts.untangling import untangled
 from equimorph.charts.walking import Walker, Way, straightened
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.exact import exact_states
-from equimorph.manifold.fabric import Fabric, fabric_of, squared_sides
-from equimorph.manifold.levels import fabric_setting, part_of
-from equimorph.manifold.points import REFINED
-from equimorph.manifold.topology import chains, flags_of, keys_of, labels
-from equimorph.manifold.vertices import Vertices, vertices_of
+from equimorph.manifold.complex.marked_complex import Fabric, fabric_of, squared_sides
+from equimorph.manifold.complex.vertices import Vertices, vertices_of
+from equimorph.manifold.geometry.points import REFINED
+from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labels
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.manifold.queries.levels import fabric_setting, part_of
 from equimorph.structures import States
 
 RINGS = 3

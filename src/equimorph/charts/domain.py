@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 
 from equimorph.arrays import Points
 from equimorph.charts.arrangement import cross, winding
-from equimorph.manifold.cell_index import CellIndex
-from equimorph.manifold.simplices import volumes
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.lookup.cell_index import CellIndex
 
 Loop = Float[np.ndarray, "_ 2"]
 

@@ -12,12 +12,12 @@ from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.cell_index import CellIndex, Hits
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.over import rooted
-from equimorph.manifold.points import CORNER, CROSSING, FOLD
-from equimorph.manifold.simplices import volumes
-from equimorph.manifold.topology import Adjacency, adjacency, flags_of, orientation
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
+from equimorph.manifold.lookup.cell_index import CellIndex, Hits
+from equimorph.manifold.lookup.over import rooted
 from equimorph.structures import States
 
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]

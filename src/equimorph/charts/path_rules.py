@@ -17,7 +17,7 @@ from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.nearest import setting_of
+from equimorph.manifold.queries.nearest import setting_of
 from equimorph.model import Box, Grid, parameter_vector, position
 from equimorph.structures import Structure
 

@@ -11,21 +11,21 @@ from equimorph.arrays import Flags, Lanes, Parameters, Points, Values
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.rules import Chooser, Scoring
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.exact import exact_states
-from equimorph.manifold.fabric import (
+from equimorph.manifold.complex.cuts import About, Ends, cut_between
+from equimorph.manifold.complex.edge_points import on_edges
+from equimorph.manifold.complex.marked_complex import (
     ON_CAP,
     ON_FOLD,
     Fabric,
     edges_of,
     fabric_of,
 )
-from equimorph.manifold.level_cuts import About, Ends, cut_between
-from equimorph.manifold.levels import fabric_setting, part_of
-from equimorph.manifold.on_edges import on_edges
-from equimorph.manifold.over import rooted
-from equimorph.manifold.points import CAP, CORNER, CROSSING, FOLD, REFINED
-from equimorph.manifold.topology import adjacency, flags_of, keys_of
-from equimorph.manifold.vertices import Vertices, vertices_of
+from equimorph.manifold.complex.vertices import Vertices, vertices_of
+from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
+from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.manifold.lookup.over import rooted
+from equimorph.manifold.queries.levels import fabric_setting, part_of
 from equimorph.structures import States
 
 DIFFERENT = 1e-4

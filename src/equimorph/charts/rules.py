@@ -12,8 +12,8 @@ from equimorph.arrays import Points
 from equimorph.charts.location import Found
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.nearest import setting_of
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.queries.nearest import setting_of
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
 

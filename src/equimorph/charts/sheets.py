@@ -10,8 +10,8 @@ from equimorph.charts.arrangement import outline
 from equimorph.charts.domain import Domain, Edge, Loop, kinds_along, wide
 from equimorph.charts.location import Cells, facet_kinds
 from equimorph.charts.regions import Regions, regions_within
-from equimorph.manifold.cell_index import CellIndex
-from equimorph.manifold.topology import keys_of, labels, pieces
+from equimorph.manifold.geometry.topology import keys_of, labels, pieces
+from equimorph.manifold.lookup.cell_index import CellIndex
 
 FLAT = 0.5
 FEW = 3

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
-from equimorph.manifold.pairing import Setting
-from equimorph.manifold.tangents import border_of, placed_frames, split_step
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.tangents import border_of, placed_frames, split_step
 from equimorph.model import Descriptor
 
 Values = Float[np.ndarray, "lanes d"]

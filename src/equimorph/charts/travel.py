@@ -11,12 +11,12 @@ from scipy.sparse.csgraph import dijkstra
 from equimorph.charts.uncrossed import first_copies
 from equimorph.charts.walking import Walker, Way, straightened
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.exact import exact_states
-from equimorph.manifold.nearest import setting_of
-from equimorph.manifold.over import rooted
-from equimorph.manifold.points import CORNER, CROSSING, FOLD
-from equimorph.manifold.topology import adjacency, faces_of
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.topology import adjacency, faces_of
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.manifold.lookup.over import rooted
+from equimorph.manifold.queries.nearest import setting_of
 from equimorph.structures import State, States
 
 

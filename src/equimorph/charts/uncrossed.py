@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.parted_sheets import parted
-from equimorph.manifold.points import CROSSING
-from equimorph.manifold.topology import Adjacency, adjacency, flags_of, pieces
+from equimorph.manifold.complex.separate_sheets import parted
+from equimorph.manifold.geometry.points import CROSSING
+from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, pieces
 
 
 def uncrossed(eset: EquilibriumSet) -> EquilibriumSet:

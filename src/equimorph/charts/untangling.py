@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.manifold.simplices import volumes
-from equimorph.manifold.topology import adjacency, keys_of, orientation
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.topology import adjacency, keys_of, orientation
 
 ROUNDS = 6
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.topology import Adjacency, adjacency
+from equimorph.manifold.geometry.topology import Adjacency, adjacency
 
 AT_VERTEX = 1e-6
 """Share of an edge within which a way that crosses it runs through its end."""

@@ -1,16 +1,18 @@
 """The equilibrium set as a simplicial complex: lifting, folds, strata, audit."""
 
-from equimorph.manifold.audit import Audit
 from equimorph.manifold.build import INTERVALS, equilibrium_set
-from equimorph.manifold.components import Components, components
-from equimorph.manifold.cusp_points import Cusps, cusps
-from equimorph.manifold.equilibrium_set import (
+from equimorph.manifold.complex.audit import Audit
+from equimorph.manifold.complex.equilibrium_set import (
     Boundary,
     Component,
     EquilibriumSet,
     Stratum,
 )
-from equimorph.manifold.levels import (
+from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.lookup.straight_lifts import lift_to
+from equimorph.manifold.queries.components import Components, components
+from equimorph.manifold.queries.cusps import Cusps, cusps
+from equimorph.manifold.queries.levels import (
     Division,
     Level,
     cell_sizes,
@@ -21,12 +23,10 @@ from equimorph.manifold.levels import (
     restricted,
     singular_set,
 )
-from equimorph.manifold.locate import Location, Place, locate
-from equimorph.manifold.querying.moves import lift_to
-from equimorph.manifold.refinement import refine
-from equimorph.manifold.snap_graph import Snap, SnapGraph, snap_graph
-from equimorph.manifold.stability_distance import StabilityDistance, stability_distance
-from equimorph.manifold.states_over import StatesOver
+from equimorph.manifold.queries.locate import Location, Place, locate
+from equimorph.manifold.queries.snap_graph import Snap, SnapGraph, snap_graph
+from equimorph.manifold.queries.stability_distance import StabilityDistance, stability_distance
+from equimorph.manifold.refining.refinement import refine
 
 __all__ = [
     "INTERVALS",

@@ -8,25 +8,26 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph.errors import InputError
-from equimorph.manifold.accounting import account
-from equimorph.manifold.asked import (
+from equimorph.manifold.complex.arguments import (
     check_accuracy,
     check_box,
     check_kind,
     constraints,
     whole_number,
 )
-from equimorph.manifold.bisection import bisect
-from equimorph.manifold.cells import CellFinder, Cells
-from equimorph.manifold.completeness import check, seeds_from
-from equimorph.manifold.crossing_curves import flood_crossings
-from equimorph.manifold.equilibrium_set import EquilibriumSet
-from equimorph.manifold.flooding import flood
-from equimorph.manifold.mesh import BaseMesh, Lines, coarse_grid, grid_lines, grid_mesh
-from equimorph.manifold.pairing import Pairing, Setting, start_pairing
-from equimorph.manifold.questions import question_of_set
-from equimorph.manifold.refinement import refined
-from equimorph.manifold.seeds import Seeds, is_symmetric, seeds
+from equimorph.manifold.complex.base_mesh import BaseMesh, Lines, coarse_grid, grid_lines, grid_mesh
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.questions import question_of_set
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.lifting.account import account
+from equimorph.manifold.lifting.bisection import bisect
+from equimorph.manifold.lifting.cells import CellFinder, Cells
+from equimorph.manifold.lifting.completeness import check, seeds_from
+from equimorph.manifold.lifting.crossing_branches import flood_crossings
+from equimorph.manifold.lifting.flood import flood
+from equimorph.manifold.lifting.pairing import Pairing, start_pairing
+from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
+from equimorph.manifold.refining.refinement import refined
 from equimorph.model import (
     Box,
     Constraint,

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 from equimorph.equilibria import Path, newton
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet
-from equimorph.manifold.topology import adjacency, pieces
+from equimorph.manifold.geometry.topology import adjacency, pieces
 from equimorph.model import position
 from equimorph.structures import States
 from equimorph.tasks import Route

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.topology import pieces
+from equimorph.manifold.geometry.topology import pieces
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.symbols import constraint_label, descriptor_label, parameter_label

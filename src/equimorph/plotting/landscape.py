@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
-from equimorph.manifold.topology import chains
+from equimorph.manifold.geometry.topology import chains
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.map_panel import GROUND, new_map_axes, value_colours, write_legend

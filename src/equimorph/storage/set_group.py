@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import Audit, Boundary, Component, EquilibriumSet, Stratum
-from equimorph.manifold.mesh import BaseMesh
+from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.model import Box, Constraint, Descriptor, names_of
 from equimorph.storage.hdf import add_dimension, get, get_json, put, put_json
 from equimorph.structures import States, Structure

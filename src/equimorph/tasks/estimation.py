@@ -11,8 +11,10 @@ from scipy.stats import chi2 as chi_squared
 from equimorph.arrays import Flags, Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.locate import ValueFit, different, pieces_of
-from equimorph.manifold.nearest import (
+from equimorph.manifold.geometry.tangents import fold_slopes, split_step
+from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.queries.locate import ValueFit, different, pieces_of
+from equimorph.manifold.queries.nearest import (
     DIFFERENCE,
     Ground,
     Residuals,
@@ -21,8 +23,6 @@ from equimorph.manifold.nearest import (
     setting_of,
     spots,
 )
-from equimorph.manifold.tangents import fold_slopes, split_step
-from equimorph.manifold.topology import faces_of
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, shape_coordinate
 

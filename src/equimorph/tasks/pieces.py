@@ -5,9 +5,9 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from equimorph.manifold import EquilibriumSet, part, restricted
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.locate import cell_of, pieces_of
-from equimorph.manifold.nearest import setting_of
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.queries.locate import cell_of, pieces_of
+from equimorph.manifold.queries.nearest import setting_of
 from equimorph.model import Constraint
 from equimorph.structures import State
 

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.topology import faces_of
+from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint, Descriptor
 
 _KEPT: WeakKeyDictionary[EquilibriumSet, dict[Any, Any]] = WeakKeyDictionary()

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
-from equimorph.manifold.nearest import local_minima
+from equimorph.manifold.queries.nearest import local_minima
 from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.kinematics import Predictor, aimed, best_fits, family, predictor

@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Values
-from equimorph.manifold.pairing import Setting
-from equimorph.manifold.tangents import split_step
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.tangents import split_step
 from equimorph.model import Descriptor
 from equimorph.tasks.optimising.plane import Spots
 

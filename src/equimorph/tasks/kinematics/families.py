@@ -6,8 +6,8 @@ from scipy.spatial import cKDTree
 
 from equimorph.arrays import Edges
 from equimorph.manifold import Level, level_set
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.topology import pieces
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.topology import pieces
 from equimorph.structures import States
 from equimorph.tasks.kinematics.aiming import aimed
 from equimorph.tasks.kinematics.prediction import Predictor

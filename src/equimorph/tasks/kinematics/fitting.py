@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from equimorph.manifold.nearest import local_minima
+from equimorph.manifold.queries.nearest import local_minima
 from equimorph.model import Constraint, combined
 from equimorph.structures import States
 from equimorph.tasks.kinematics.prediction import Predictor

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.pairing import Setting
-from equimorph.manifold.topology import faces_of
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Descriptor
 from equimorph.tasks.optimising.plane import Spots, plane_of
 from equimorph.tasks.prepared import kept, vertex_values

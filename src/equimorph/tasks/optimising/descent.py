@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Frames
-from equimorph.manifold.embedding import embed
+from equimorph.manifold.geometry.embedding import embed
 from equimorph.tasks.optimising.plane import Spots, frames_of, settled, stepped, together
 from equimorph.tasks.optimising.programme import Expansion, Programme
 from equimorph.tasks.optimising.quadratic import Answer, Quadratic, solve

@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from equimorph.equilibria import Event, Leg
 from equimorph.errors import InputError
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.pairing import Setting
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import Setting
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States, Structure, value_of
 from equimorph.tasks.known import Start, known_state

@@ -13,7 +13,7 @@ from equimorph.equilibria import ParameterLine, TraceOptions, follow
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, StatesOver
-from equimorph.manifold.locate import pieces_of
+from equimorph.manifold.queries.locate import pieces_of
 from equimorph.model import Constraint, Descriptor, Grid
 from equimorph.structures import State, States
 

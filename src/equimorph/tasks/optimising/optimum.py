@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from equimorph.equilibria import check_start, newton
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.nearest import local_minima
+from equimorph.manifold.queries.nearest import local_minima
 from equimorph.model import Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate, certificate

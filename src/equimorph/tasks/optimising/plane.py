@@ -8,11 +8,11 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.equilibria.steering import answers
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.embedding import embed
-from equimorph.manifold.nearest import setting_of, spots
-from equimorph.manifold.pairing import Setting
-from equimorph.manifold.pins import Aim, corrected
-from equimorph.manifold.tangents import placed_frames, split_step, tangent_frames
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import Aim, corrected
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
+from equimorph.manifold.queries.nearest import setting_of, spots
 from equimorph.structures import State
 
 Steps = Float[np.ndarray, "lanes d"]

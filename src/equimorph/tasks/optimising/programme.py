@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Flags, Frames, Lanes, Parameters
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.pairing import Setting
+from equimorph.manifold.geometry.setting import Setting
 from equimorph.model import Constraint
 from equimorph.structures import value_of
 from equimorph.tasks.optimising.objectives import Objective, matched

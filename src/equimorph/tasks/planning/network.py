@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 
 from equimorph.arrays import Flags, Values
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.topology import faces_of
+from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint
 from equimorph.structures import State, States
 from equimorph.tasks.planning.links import Demands, links, shortest

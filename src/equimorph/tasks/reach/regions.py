@@ -10,9 +10,9 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, cell_sizes
-from equimorph.manifold.cell_index import CellIndex
-from equimorph.manifold.simplices import volumes
-from equimorph.manifold.topology import adjacency, flags_of, pieces
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.topology import adjacency, flags_of, pieces
+from equimorph.manifold.lookup.cell_index import CellIndex
 from equimorph.model import Descriptor
 from equimorph.structures import States
 

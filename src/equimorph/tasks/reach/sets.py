@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet, divided, part, refine
-from equimorph.manifold.topology import adjacency, labels
+from equimorph.manifold.geometry.topology import adjacency, labels
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.pieces import cell_near, stable_piece

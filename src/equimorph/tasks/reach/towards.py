@@ -11,7 +11,7 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.steering import steering
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.locate import cell_of
+from equimorph.manifold.queries.locate import cell_of
 from equimorph.model import Constraint, Descriptor, Schedule, position
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.planning import plan

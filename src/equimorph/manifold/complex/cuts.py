@@ -1,0 +1,209 @@
+"""Cuts of complexes where a function changes its sign: exact vertices on the edges it crosses."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.complex.edge_points import on_edges
+from equimorph.manifold.complex.marked_complex import Fabric, edges_of
+from equimorph.manifold.complex.shared_edges import first_copies, with_copies
+from equimorph.manifold.complex.vertices import Vertices
+from equimorph.manifold.geometry.topology import keys_of
+
+TRIALS = 60
+ELSEWHERE = (0.5, 0.25, 0.75, 0.1, 0.9)
+"""Where between the bounds of a root a vertex is tried if there is none where it is expected."""
+ROUND_OFF = 1e-12
+"""Part of the range of a function below which its values count as zero."""
+STILL = 1e-11
+"""Share of an edge by which the last step moves at most."""
+
+Values = Float[np.ndarray, " V"]
+Function = Callable[[Vertices], Values]
+Ends = Int[np.ndarray, "n 2"]
+About = tuple[int, Int[np.ndarray, " n"]]
+Between = Callable[
+    [Fabric, Ends, About, Float[np.ndarray, "n 2"]], tuple[Bool[np.ndarray, " n"], Vertices]
+]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A fabric cut along a level, values at its vertices, and how many edges could not be cut."""
+
+    fabric: Fabric
+    values: Values
+    lost: int
+
+    @property
+    def on_level(self) -> Bool[np.ndarray, " V"]:
+        """Vertices on the level."""
+        return np.asarray(self.values == 0.0)
+
+
+def cut_between(
+    fabric: Fabric, values: Values, between: Between, function: Function | None = None
+) -> Cut:
+    """Put vertices on edges whose ends have values of different signs, until there are none.
+
+    Parameters
+    ----------
+    values
+        At the vertices of the fabric; new vertices have the value zero.
+    between
+        Finds the new vertices: of a fabric, edges, their mark and indices, and their values; tells
+        on which edges it found some.
+    function
+        Gives values to vertices that cuts of one sheet put on another that crosses it, in place of
+        zero: it may depend on the sheet.
+    """
+    base, found = 1 << 31, _Found.nothing(fabric.vertices)
+    while True:
+        ends, of_cells = edges_of(fabric.cells, len(fabric.vertices))
+        crossed = values[ends[:, 0]] * values[ends[:, 1]] < 0.0
+        marks, keys = fabric.edge_marks(ends), keys_of(ends, base)
+        lowest = np.full(len(ends), np.iinfo(int).max)
+        for side in of_cells.T:
+            np.minimum.at(lowest, side, fabric.cell_index)
+        # cuts lead from new vertices, where the function vanishes: most edges that are crossed
+        # at all are so from the beginning, and their vertices are found side by side
+        fresh = np.flatnonzero(crossed & ~np.isin(keys, found.asked))
+        for mark in np.unique(marks[fresh]).tolist():
+            own = fresh[marks[fresh] == mark]
+            done, more = between(fabric, ends[own], (mark, lowest[own]), values[ends[own]])
+            found = found.joined(keys[own], done, more)
+        lost = found.asked[found.row < 0]
+        chosen = _one_per_cell(crossed & ~np.isin(keys, lost), of_cells)
+        if len(chosen) == 0:
+            return Cut(fabric, values, len(lost))
+        chosen = chosen[first_copies(fabric, ends[chosen], marks[chosen])]
+        for mark in np.unique(marks[chosen]).tolist():
+            own = chosen[marks[chosen] == mark]
+            more = found.of(keys[own])
+            cut, whole = with_copies(fabric, ends[own], more)
+            others = whole.take(np.arange(len(more), len(whole)))
+            known = function(others) if function else np.zeros(len(others))
+            known = np.where(np.abs(known) <= ROUND_OFF * np.abs(values).max(), 0.0, known)
+            fabric = fabric.bisected(cut, whole)
+            values = np.concatenate([values, np.zeros(len(more)), known])
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Edges that were asked about, by their keys, and their vertices; row −1: there is none."""
+
+    asked: Int[np.ndarray, " n"]
+    row: Int[np.ndarray, " n"]
+    vertices: Vertices
+
+    @classmethod
+    def nothing(cls, like: Vertices) -> "_Found":
+        """No edges yet."""
+        none = np.zeros(0, int)
+        return cls(none, none, like.take(none))
+
+    def joined(
+        self, keys: Int[np.ndarray, " more"], done: Bool[np.ndarray, " more"], more: Vertices
+    ) -> "_Found":
+        """These edges and more of them."""
+        row = np.full(len(keys), -1)
+        row[done] = len(self.vertices) + np.arange(len(more))
+        asked = np.concatenate([self.asked, keys])
+        return _Found(asked, np.concatenate([self.row, row]), self.vertices.joined(more))
+
+    def of(self, keys: Int[np.ndarray, " some"]) -> Vertices:
+        """Vertices on edges that have some."""
+        order = np.argsort(self.asked)
+        return self.vertices.take(self.row[order[np.searchsorted(self.asked[order], keys)]])
+
+
+def _one_per_cell(
+    crossed: Bool[np.ndarray, " E"], of_cells: Int[np.ndarray, "C sides"]
+) -> Int[np.ndarray, " n"]:
+    """Crossed edges, no two of one cell; as many as agree on an order that looks random."""
+    rank = np.where(crossed, (np.arange(len(crossed)) * 2654435761) % 4294967296 + 1, 0)
+    best = rank[of_cells].max(axis=1)
+    beaten = np.zeros(len(crossed), bool)
+    for side in of_cells.T:
+        beaten[side[rank[side] < best]] = True
+    return np.flatnonzero(crossed & ~beaten)
+
+
+def roots(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    about: tuple[int, Int[np.ndarray, " n"]],
+    known: Float[np.ndarray, "n 2"],
+    value_of: Callable[[Vertices, Int[np.ndarray, " some"]], Float[np.ndarray, " some"]],
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Vertices where a function vanishes on edges, by regula falsi (Illinois).
+
+    Parameters
+    ----------
+    about
+        The mark of the edges, and the index of each.
+    known
+        Values at both ends, of different signs.
+    value_of
+        Values at vertices on the edges whose numbers are the second argument.
+
+    Returns
+    -------
+    Edges on which a root was found, and the roots in the order of these edges.
+    """
+    low, high = np.zeros(len(ends)), np.ones(len(ends))
+    at_low, at_high = known.T.copy()
+    small = ROUND_OFF * np.maximum(np.abs(at_low), np.abs(at_high))
+    todo, done = np.arange(len(ends)), np.zeros(len(ends), bool)
+    moved = np.zeros(len(ends), int)
+    lanes, found, last = [], [], np.full(len(ends), np.inf)
+    for _ in range(TRIALS):
+        t = low[todo] - at_low[todo] * (high - low)[todo] / (at_high - at_low)[todo]
+        good, at, t = _somewhere(
+            fabric, ends[todo], (about[0], about[1][todo]), (low[todo], high[todo]), t
+        )
+        todo, t = todo[good], t[good]
+        value = value_of(at, todo)
+        ended = (np.abs(value) <= small[todo]) | (np.abs(t - last[todo]) < STILL)
+        last[todo] = t
+        found.append(at.take(np.flatnonzero(ended)))
+        lanes.append(todo[ended])
+        done[todo[ended]] = True
+        todo, t, value = todo[~ended], t[~ended], value[~ended]
+        if len(todo) == 0:
+            break
+        left = value * at_low[todo] > 0.0
+        low[todo], high[todo] = np.where(left, t, low[todo]), np.where(left, high[todo], t)
+        # an end that stays twice counts half, so that it does not stay for ever
+        share = np.where(moved[todo] == np.where(left, -1, 1), 0.5, 1.0)
+        at_low[todo] = np.where(left, value, share * at_low[todo])
+        at_high[todo] = np.where(left, share * at_high[todo], value)
+        moved[todo] = np.where(left, -1, 1)
+    whole = found[0]
+    for more in found[1:]:
+        whole = whole.joined(more)
+    return done, whole.take(np.argsort(np.concatenate(lanes)))
+
+
+def _somewhere(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    about: tuple[int, Int[np.ndarray, " n"]],
+    bounds: tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]],
+    t: Float[np.ndarray, " n"],
+) -> tuple[Bool[np.ndarray, " n"], Vertices, Float[np.ndarray, " n"]]:
+    """Vertices on edges at the places that are proposed, or elsewhere between the bounds."""
+    (low, high), t = bounds, t.copy()
+    good, at = on_edges(fabric, ends, *about, t)
+    order = np.flatnonzero(good)
+    for share in ELSEWHERE:
+        left = np.flatnonzero(~good)
+        if len(left) == 0:
+            break
+        t[left] = low[left] + share * (high - low)[left]
+        more, vertices = on_edges(fabric, ends[left], about[0], about[1][left], t[left])
+        good[left[more]] = True
+        at, order = at.joined(vertices), np.concatenate([order, left[more]])
+    return good, at.take(np.argsort(order)), t

@@ -1,0 +1,220 @@
+"""From a complex to an equilibrium set: pieces, folds, boundaries and the audit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.manifold.complex.audit import Audit
+from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.complex.consistency import contradicted, turned_off_folds
+from equimorph.manifold.complex.equilibrium_set import (
+    Boundary,
+    Component,
+    EquilibriumSet,
+    Stratum,
+)
+from equimorph.manifold.complex.separate_sheets import parted
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.topology import (
+    PAIR,
+    Adjacency,
+    adjacency,
+    euler_characteristic,
+    flags_of,
+    keys_of,
+    labels,
+    pieces,
+    senses,
+    unbalanced,
+)
+from equimorph.model import Box
+from equimorph.structures import States
+
+SHEETS_AT_A_CROSSING = 4
+"""Cells around a facet in which two sheets cross."""
+
+
+@dataclass(frozen=True)
+class Complex:
+    """Vertices, cells and marked facets, from which everything else about a set follows.
+
+    index: negative eigenvalues at the vertices, kinds and grid_vertex as in `EquilibriumSet`;
+    folds, caps, crossings (n, d): facets on folds, on constraints and where sheets cross.
+    """
+
+    points: States
+    kinds: Int[np.ndarray, " V"]
+    index: Int[np.ndarray, " V"]
+    grid_vertex: Int[np.ndarray, " V"]
+    cells: Int[np.ndarray, "C corners"]
+    cell_index: Int[np.ndarray, " C"]
+    folds: Int[np.ndarray, "f d"]
+    caps: Int[np.ndarray, "c d"]
+    crossings: Int[np.ndarray, "x d"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a set is about: the problem and the grid."""
+
+    setting: Setting
+    mesh: BaseMesh
+    box: Box
+    fixed: Mapping[str, float]
+    intervals: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Lifting:
+    """The part of the audit that tells how the lifting of the grid went; see `Audit`."""
+
+    unpaired: int
+    conflicts: int
+    retraced: int
+    parity_violations: int
+    undecided: int
+    bisected: int
+
+
+def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
+    """Pieces, folds, boundaries and audit of a complex."""
+    corners, points = given.cells, given.points
+    whole = adjacency(corners)
+    folds, caps, crossed = (
+        flags_of(whole.facets, each) for each in (given.folds, given.caps, given.crossings)
+    )
+    component = labels(len(corners), whole.links)
+    parting = folds | crossed
+    stratum = labels(len(corners), whole.links[whole.manifold & ~parting[whole.across]])
+    boundaries = _boundaries(whole, {"cap": caps, "crossing": crossed, "fold": folds})
+    strata = tuple(
+        Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
+        for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
+    )
+    audit = _audit(given, lifting, (crossed, whole, component), boundaries, frame.setting)
+    return EquilibriumSet(
+        structure=frame.setting.structure,
+        box=frame.box,
+        fixed=frame.fixed,
+        constraints=frame.setting.constraints,
+        intervals=frame.intervals,
+        points=points,
+        kinds=given.kinds,
+        index=given.index,
+        cells=corners,
+        cell_index=given.cell_index,
+        component=component,
+        stratum=stratum,
+        folds=tuple(pieces(whole.facets[folds])),
+        boundaries=boundaries,
+        components=_components(corners, given.cell_index, component, (whole, boundaries)),
+        strata=strata,
+        audit=audit,
+        mesh=frame.mesh,
+        grid_vertex=given.grid_vertex,
+        crossings=tuple(pieces(whole.facets[crossed])),
+    )
+
+
+def _boundaries(
+    whole: Adjacency, flagged: Mapping[str, Bool[np.ndarray, " F"]]
+) -> tuple[Boundary, ...]:
+    """Pieces of the boundary; of facets of several kinds the first counts."""
+    once = whole.counts == 1
+    base = int(whole.facets.max(initial=0)) + 1
+    marked, left = {}, once
+    for kind, flags in flagged.items():
+        marked[kind] = keys_of(whole.facets[left & flags], base)
+        left = left & ~flags
+    out = []
+    for piece in pieces(whole.facets[once]):
+        keys = keys_of(_facets_of(piece, whole.facets.shape[1]), base)
+        amounts = {kind: int(np.isin(keys, own).sum()) for kind, own in marked.items()}
+        amounts["box"] = len(keys) - sum(amounts.values())
+        kinds = [kind for kind, amount in amounts.items() if amount]
+        out.append(Boundary(piece, kinds[0] if len(kinds) == 1 else "mixed"))
+    return tuple(out)
+
+
+def _facets_of(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+    """Facets of a piece of the boundary: a point, a polyline or triangles."""
+    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+
+
+def _components(
+    corners: Int[np.ndarray, "C corners"],
+    cell_index: Int[np.ndarray, " C"],
+    component: Int[np.ndarray, " C"],
+    given: tuple[Adjacency, tuple[Boundary, ...]],
+) -> tuple[Component, ...]:
+    whole, boundaries = given
+    edges = _edges_of(whole, component)
+    at_loops = np.array([boundary.vertices.flat[0] for boundary in boundaries], int)
+    out = []
+    for k in range(component.max(initial=-1) + 1):
+        own = component == k
+        held = np.zeros(int(corners.max(initial=0)) + 1, bool)
+        held[corners[own]] = True
+        out.append(
+            Component(
+                int(own.sum()),
+                euler_characteristic(corners[own], edges[k]),
+                int(held[at_loops].sum()),
+                tuple(np.unique(cell_index[own]).tolist()),
+            )
+        )
+    return tuple(out)
+
+
+def _edges_of(whole: Adjacency, component: Int[np.ndarray, " C"]) -> list[int | None]:
+    """Number of edges of each component, where it is known: where edges are facets."""
+    many = component.max(initial=-1) + 1
+    if whole.facets.shape[1] != PAIR:
+        return [None] * many
+    of_facet = np.zeros(len(whole.facets), int)
+    of_facet[whole.cell_facets] = component[:, None]
+    return list(np.bincount(of_facet, minlength=many).tolist())
+
+
+def _audit(
+    given: Complex,
+    lifting: Lifting,
+    parts: tuple[Bool[np.ndarray, " F"], Adjacency, Int[np.ndarray, " C"]],
+    boundaries: tuple[Boundary, ...],
+    setting: Setting,
+) -> Audit:
+    corners, cell_index, points = given.cells, given.cell_index, given.points
+    crossed, whole, component = parts
+    coordinates = points.p[:, setting.free]
+    # of parts of sets two cells may be left at a crossing that belong to different sheets
+    if crossed.any():
+        cells, origin = parted(corners, whole.facets[crossed], len(points))
+        sense = senses(cells, cell_index, coordinates[origin], adjacency(cells))
+    else:
+        sense = senses(corners, cell_index, coordinates, whole, component)
+    edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
+    wrong = contradicted(points, given.kinds, corners, cell_index)
+    wrong |= turned_off_folds(given.kinds, corners, sense.overturned, coordinates / setting.scales)
+    whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
+    most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
+    kinds = [boundary.kind for boundary in boundaries]
+    return Audit(
+        vertices=len(points),
+        cells=len(corners),
+        **vars(lifting),
+        non_manifold=int((whole.counts > most).sum()),
+        crossings=int(crossed.sum()),
+        contradictions=sense.contradictions
+        + unbalanced(corners, whole, sense, crossed & whole_crossing),
+        overturned=int(sense.overturned.sum()),
+        wrong=int(wrong.sum()),
+        euler_characteristic=euler_characteristic(corners, edges),
+        components=int(component.max(initial=-1)) + 1,
+        loops=tuple((kind, kinds.count(kind)) for kind in sorted(set(kinds))),
+        largest_residual=float(points.residual.max(initial=0.0)),
+        checked=0,
+        missing=0,
+        recovered=0,
+    )

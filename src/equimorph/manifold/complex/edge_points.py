@@ -1,0 +1,331 @@
+"""Exact vertices on the edges of a complex."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.complex.marked_complex import (
+    ON_CAP,
+    ON_CROSSING,
+    ON_FOLD,
+    SIDES,
+    TETRAHEDRA,
+    Fabric,
+    held,
+)
+from equimorph.manifold.complex.vertices import Vertices, free_vertices, vertices_of
+from equimorph.manifold.geometry.corrections import Corrected, corrected_amid
+from equimorph.manifold.geometry.crossing_points import corrected_crossings
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
+from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.tangents import Cubics, Ends, split_step
+from equimorph.model import Findings, Journal, all_recalled, step_of
+
+CHUNK = 512
+"""Edges that are worked on together: their work arrays stay small, and threads share the chunks."""
+REACH = 0.3
+"""How far from its prediction a new vertex may be corrected, relative to its edge."""
+EXCESS = 0.35
+"""How much longer the parts of an edge may be than they would be on a straight one, relative to
+it."""
+SAME = 1e-7
+"""Distance in the metric below which two vertices are one."""
+MET = (0, -2, -1)
+WEIGHTS = np.array([0.36, 0.48, 0.8])
+"""Coordinates, and a direction in them, along which vertices are in order."""
+BESIDE = 0.05
+"""How near to a side of the box, relative to its edge, a vertex may lie where the set bulges over
+that side."""
+ALONG = 0.5
+"""Least cosine of the angle between an edge and the set at its new vertex."""
+
+
+def chunks(
+    chosen: Int[np.ndarray, " n"], marks: Int[np.ndarray, " E"]
+) -> list[Int[np.ndarray, " k"]]:
+    """Edges in chunks of equal marks; those on curves first, because they take longest."""
+    parts: list[Int[np.ndarray, " k"]] = []
+    for mark in np.unique(marks[chosen])[::-1].tolist():
+        own = chosen[marks[chosen] == mark]
+        parts.extend(own[at : at + CHUNK] for at in range(0, len(own), CHUNK))
+    return parts
+
+
+Tried = tuple[Bool[np.ndarray, " n"], Vertices]
+"""For which edges vertices were found, and these."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Edges with a mark in common, and where along them vertices are wanted.
+
+    lowest: index of the cells around; of those with the lowest one, where they differ.
+    """
+
+    ends: Int[np.ndarray, "n 2"]
+    mark: int
+    lowest: Int[np.ndarray, " n"]
+    t: Float[np.ndarray, " n"]
+
+
+def recalled_on_edges(journal: Journal, fabric: Fabric, parts: Sequence[Places]) -> list[Tried]:
+    """Exact vertices on edges, from a journal if it has them; see `on_edges`."""
+
+    def compute(part: Places) -> Findings:
+        found, vertices = on_edges(fabric, part.ends, part.mark, part.lowest, part.t, rough=True)
+        return found, *vertices.columns.values()
+
+    steps = [step_of(f"bisect {part.mark}", part.ends, part.t) for part in parts]
+    findings = all_recalled(journal, steps, [partial(compute, part) for part in parts])
+    return [(found, Vertices(*columns)) for found, *columns in findings]
+
+
+def unmet(fabric: Fabric, tried: Sequence[Tried]) -> list[Tried]:
+    """Of vertices found on edges those that are not in use already.
+
+    Where cells are too coarse, an edge may lead over another vertex, which its middle finds again.
+    """
+    used = np.zeros(len(fabric.vertices), bool)
+    used[fabric.cells] = True
+    known = np.flatnonzero(used)
+    place = fabric.vertices.place
+    key = place[known][:, MET] @ WEIGHTS
+    order = np.argsort(key)
+    known, key = known[order], key[order]
+    out = []
+    for found, vertices in tried:
+        own = vertices.place[:, MET] @ WEIGHTS
+        first, last = (np.searchsorted(key, own + gap) for gap in (-SAME, SAME))
+        new = np.ones(len(own), bool)
+        for lane in np.flatnonzero(last > first).tolist():
+            there = place[known[first[lane] : last[lane]]]
+            new[lane] = np.linalg.norm(there - vertices.place[lane], axis=1).min() > SAME
+        kept = found.copy()
+        kept[found] = new
+        out.append((found, vertices) if new.all() else (kept, vertices.take(np.flatnonzero(new))))
+    return out
+
+
+def on_edges(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    mark: int,
+    lowest: Int[np.ndarray, " n"],
+    t: Float[np.ndarray, " n"],
+    *,
+    rough: bool = False,
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Exact vertices at places t along edges with a mark, and for which edges they were found.
+
+    Their tangent spaces may be `rough`: those at the start of the last step of Newton.
+    """
+    found, vertices = _orthogonally(fabric, ends, mark, lowest, t, rough=rough)
+    left = np.flatnonzero(~found)
+    if fabric.dimension != TETRAHEDRA or mark & ON_CROSSING or len(left) == 0:
+        return found, vertices
+    again, more = _beside_sides(fabric, ends[left], mark, lowest[left], t[left])
+    at = np.concatenate([np.flatnonzero(found), left[again]])
+    found[left[again]] = True
+    return found, vertices.joined(more).take(np.argsort(at))
+
+
+def _beside_sides(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    mark: int,
+    lowest: Int[np.ndarray, " n"],
+    t: Float[np.ndarray, " n"],
+) -> Tried:
+    """Vertices on edges that the set bulges over a side of the box from, and for which edges.
+
+    They keep the parameter that the side holds.
+    """
+    setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
+    first, second = (fabric.end(ends, side, mark) for side in range(2))
+    z, p = _predicted(fabric, ends, mark, t)
+    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
+    plane = first.rows + turned @ second.rows
+    length = np.linalg.norm(second.place - first.place, axis=1)
+    place = _embedded(fabric, z, p)
+    freely = _on_curves(fabric, mark, (z, p), (place, plane, length), first)
+    found = np.zeros(len(ends), bool)
+    for k in range(d):
+        free = freely.p[:, setting.free[k]]
+        beyond = (free < fabric.box[0, k]) | (free > fabric.box[1, k])
+        a, b = store.p[ends, setting.free[k]].T
+        there = a + t * (b - a)
+        room = np.abs(there[:, None] - fabric.box[:, k]).min(axis=1) / setting.scales[k]
+        own = np.flatnonzero(freely.found & beyond & (room > BESIDE * length) & ~found)
+        if len(own) == 0:
+            continue
+        near = z[own], p[own].copy()
+        near[1][:, setting.free[k]] = there[own]
+        end = first.take(own)
+        row = plane[own][:, :, plane.shape[2] - d + k]
+        end = replace(end, slopes=np.concatenate([end.slopes, row[:, None]], axis=1))
+        place[own] = _embedded(fabric, *near)
+        given = (place[own], plane[own], length[own])
+        pinned = _on_curves(fabric, mark | SIDES << 2 * k, near, given, end)
+        z[own], p[own], found[own] = pinned.z, pinned.p, pinned.found
+    return _accepted(fabric, (ends, mark, lowest, t), Pinned(z, p, found), place, plane)
+
+
+def _accepted(
+    fabric: Fabric,
+    about: tuple[Int[np.ndarray, "n 2"], int, Int[np.ndarray, " n"], Float[np.ndarray, " n"]],
+    at: Pinned,
+    place: Float[np.ndarray, "n coordinates"],
+    plane: Float[np.ndarray, "n d coordinates"],
+) -> Tried:
+    """Those vertices on edges that are close to where they were looked for, and of the index."""
+    ends, mark, lowest, t = about
+    first, second = (fabric.vertices.place[ends[:, side]] for side in range(2))
+    length = np.linalg.norm(second - first, axis=1)
+    here = _embedded(fabric, at.z, at.p)
+    found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
+    for end, part in ((first, t), (second, 1.0 - t)):
+        found &= np.linalg.norm(here - end, axis=1) <= (part + EXCESS) * length
+    free = at.p[:, fabric.setting.free]
+    found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
+    vertices = _counted(fabric, mark, at, (found, lowest), plane)
+    good = _along(replace(fabric, vertices=vertices), mark, (second - first)[found])
+    found[found] = good
+    return found, vertices.take(np.flatnonzero(good))
+
+
+def _orthogonally(
+    fabric: Fabric,
+    ends: Int[np.ndarray, "n 2"],
+    mark: int,
+    lowest: Int[np.ndarray, " n"],
+    t: Float[np.ndarray, " n"],
+    *,
+    rough: bool = False,
+) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    """Vertices corrected orthogonally to the mean of the tangent spaces at both ends of edges."""
+    setting, store = fabric.setting, fabric.vertices
+    first, second = (fabric.end(ends, side, mark) for side in range(2))
+    z, p = _predicted(fabric, ends, mark, t)
+    # the second space seen from the first, so that both bases point the same way
+    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
+    plane = first.rows + turned @ second.rows
+    place = _embedded(fabric, z, p)
+    length = np.linalg.norm(second.place - first.place, axis=1)
+    if mark == 0 and rough:
+        at: Corrected | Pinned = corrected_amid(setting, (z, p), place, plane, length)
+    else:
+        at = _on_curves(fabric, mark, (z, p), (place, plane, length), first)
+    here = _embedded(fabric, at.z, at.p)
+    found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
+    for end, part in ((first, t), (second, 1.0 - t)):
+        found &= np.linalg.norm(here - end.place, axis=1) <= (part + EXCESS) * length
+    free = at.p[:, setting.free]
+    found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
+    if isinstance(at, Corrected):
+        found &= at.index == lowest
+        vertices = free_vertices(setting, at if found.all() else at.take(found))
+    else:
+        if mark & ON_CROSSING:
+            lowest = store.index[ends].max(axis=1)
+        vertices = _counted(fabric, mark, at, (found, lowest), plane)
+    good = _along(replace(fabric, vertices=vertices), mark, (second.place - first.place)[found])
+    found[found] = good
+    return found, vertices if good.all() else vertices.take(np.flatnonzero(good))
+
+
+def _predicted(
+    fabric: Fabric, ends: Int[np.ndarray, "n 2"], mark: int, t: Float[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]]:
+    """Points at places t on the cubics over edges."""
+    setting, store = fabric.setting, fabric.vertices
+    first, second = (fabric.end(ends, side, mark) for side in range(2))
+    z, p = store.z[ends], store.p[ends]
+    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
+    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
+    frames = store.frame[ends[:, 0]], store.frame[ends[:, 1]]
+    bend = Cubics(first, second).step(frames, chord, t)
+    dz, dp = split_step(setting, t[:, None] * chord + bend)
+    z, p = z[:, 0] + dz, p[:, 0] + dp
+    for k in held(mark, fabric.dimension):
+        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
+    return z, p
+
+
+def _on_curves(
+    fabric: Fabric,
+    mark: int,
+    states: tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]],
+    near: tuple[
+        Float[np.ndarray, "n coordinates"],
+        Float[np.ndarray, "n d coordinates"],
+        Float[np.ndarray, " n"],
+    ],
+    end: Ends,
+) -> Pinned:
+    """Points on folds, constraints, crossings or sides of the box near places with planes."""
+    setting, d = fabric.setting, fabric.dimension
+    place, plane, length = near
+    inside = replace(end, rows=plane).allowed
+    rows = np.swapaxes(inside, 1, 2) @ plane
+    span = np.delete(np.eye(d), held(mark, d), axis=0)
+    aim = Aim(
+        setting,
+        bool(mark & ON_FOLD),
+        bool(mark & ON_CAP),
+        np.tile(span, (len(place), 1, 1)),
+        place,
+        rows,
+    )
+    return (corrected_crossings if mark & ON_CROSSING else corrected)(aim, *states, length)
+
+
+def _counted(
+    fabric: Fabric,
+    mark: int,
+    at: Pinned,
+    wanted: tuple[Bool[np.ndarray, " n"], Int[np.ndarray, " n"]],
+    plane: Float[np.ndarray, "n d coordinates"],
+) -> Vertices:
+    """Vertices on folds and so on where they were found; of these, only those of the right index.
+
+    What was found and the index are `wanted`; the former is changed.
+    """
+    (found, lowest), setting = wanted, fabric.setting
+    fold, cap, crossing = (bool(mark & each) for each in (ON_FOLD, ON_CAP, ON_CROSSING))
+    count = lower_index if fold or crossing else _index
+    found[found] = count(setting, at.z[found], at.p[found]) == lowest[found]
+    kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
+    others = (lowest[found], np.full(found.sum(), -1))
+    kinds = np.full(found.sum(), CROSSING if crossing else kind[fold, cap])
+    states = (at.z[found], at.p[found])
+    return vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
+
+
+def _along(
+    fabric: Fabric, mark: int, chords: Float[np.ndarray, "n coordinates"]
+) -> Bool[np.ndarray, " n"]:
+    """Whether edges lead along the set, as seen at their new vertices, which are all there are.
+
+    A point on another fold nearby sees its edge at a large angle.
+    """
+    own = np.tile(np.arange(len(chords))[:, None], (1, 2))
+    flat = fabric.end(own, 0, mark).nearest(chords)
+    return np.asarray(np.linalg.norm(flat, axis=1) >= ALONG * np.linalg.norm(chords, axis=1))
+
+
+def _index(
+    setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Int[np.ndarray, " n"]:
+    return setting.structure.index(z, p)
+
+
+def _embedded(
+    fabric: Fabric, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Float[np.ndarray, "n coordinates"]:
+    setting = fabric.setting
+    u = z[:, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
+    return np.concatenate([u, p[:, setting.free] / setting.scales], axis=1)

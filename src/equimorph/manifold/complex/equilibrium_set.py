@@ -1,0 +1,244 @@
+"""The equilibrium set over one to three parameters: a simplicial complex of exact states."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.errors import InputError
+from equimorph.manifold.complex.arguments import numbers
+from equimorph.manifold.complex.audit import Audit
+from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.lookup.near_crossings import NearCrossings, of_set
+from equimorph.manifold.lookup.over import Sheets
+from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.model import Box, Constraint, parameter_vector, position
+from equimorph.structures import States, Structure
+
+
+@dataclass(frozen=True)
+class Component:
+    """A connected piece of the set: size, topology, the indices that occur on it."""
+
+    cells: int
+    euler_characteristic: int
+    loops: int
+    indices: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """A connected piece of constant index."""
+
+    index: int
+    cells: int
+    component: int
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A connected piece of the boundary: on the box ("box") or a constraint ("cap").
+
+    Of parts of sets also on a "fold" or a "crossing"; "mixed" if on several of these.
+
+    vertices: one point (d = 1), a loop with the first vertex repeated (d = 2; an arc between ends
+    of crossings, where there are such), or triangles, one a row (d = 3).
+    """
+
+    vertices: Int[np.ndarray, "..."]
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumSet:
+    """Equilibria over a box in d = 1, 2 or 3 free parameters, with their connections.
+
+    Vertices are exact states: over the grid, on folds, on constraints. Cells are segments,
+    triangles or tetrahedra of constant index; folds lie between cells of different index.
+
+    Parameters
+    ----------
+    points
+        States of the vertices.
+    kinds
+        0 over the grid, 1 on a fold, 2 on a constraint, 3 between folds of one grid edge, 4 where a
+        fold meets a constraint, 5 amid others over a grid tetrahedron, 6 added by refinement, 7
+        where two sheets cross.
+    index
+        Negative eigenvalues at the vertices; on folds that of the lower side.
+    cells, cell_index, component, stratum
+        Vertices of each cell, its index, and the numbers of the pieces that it belongs to.
+    folds
+        Connected folds: points (d = 1), vertices along each fold curve, closed ones with the first
+        repeated (d = 2), or fold surfaces as triangles, one a row (d = 3).
+    crossings
+        Branch points of the set, in the same form: there two smooth sheets cross, as the symmetric
+        and the asymmetric states do in symmetric slices.
+    """
+
+    structure: Structure
+    box: Box
+    fixed: Mapping[str, float]
+    constraints: tuple[Constraint, ...]
+    intervals: tuple[int, ...]
+    points: States
+    kinds: Int[np.ndarray, " V"]
+    index: Int[np.ndarray, " V"]
+    cells: Int[np.ndarray, "C corners"]
+    cell_index: Int[np.ndarray, " C"]
+    component: Int[np.ndarray, " C"]
+    stratum: Int[np.ndarray, " C"]
+    folds: tuple[Int[np.ndarray, "..."], ...]
+    boundaries: tuple[Boundary, ...]
+    components: tuple[Component, ...]
+    strata: tuple[Stratum, ...]
+    audit: Audit
+    mesh: BaseMesh
+    grid_vertex: Int[np.ndarray, " V"]
+    """Vertex of `mesh` below each vertex of the complex, −1 for those not over the grid."""
+    crossings: tuple[Int[np.ndarray, "..."], ...] = ()
+
+    def __repr__(self) -> str:
+        """Box, size and whether the audit is clean."""
+        state = "clean" if self.audit.clean else "NOT clean"
+        return f"EquilibriumSet({self.box}: {len(self.cells)} cells; audit {state})"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Free parameters."""
+        return self.box.names
+
+    @cached_property
+    def coordinates(self) -> Float[np.ndarray, "V d"]:
+        """Free parameters of the vertices."""
+        return np.stack([self.points[name] for name in self.names], axis=1)
+
+    def parameters_at(self, at: Mapping[str, float]) -> Float[np.ndarray, " P"]:
+        """All parameters over a point of the box.
+
+        Raises
+        ------
+        InputError
+            For names that are not free, missing ones, or a point outside the box.
+        """
+        _check_names(self.names, at)
+        point = np.array([numbers(name, at[name], each="a number") for name in self.names])
+        if point.ndim > 1:
+            raise InputError(
+                f"`at` must give one number each; got {dict(at)}. Use `over` for many."
+            )
+        if not self.box.contains(point, slack=1e-12):
+            raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
+        p = self._corner.copy()
+        p[self._free] = point
+        return p
+
+    @cached_property
+    def _corner(self) -> Float[np.ndarray, " P"]:
+        """All parameters at the lower corner of the box."""
+        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
+        return parameter_vector(self.structure.parameters, {**self.fixed, **low})
+
+    @cached_property
+    def _free(self) -> Int[np.ndarray, " d"]:
+        """Places of the free parameters."""
+        return np.array([position(self.structure.parameters, name) for name in self.names])
+
+    def at(self, **at: float) -> States:
+        """Exact states over one point of the box, sorted by energy; see `over`."""
+        states = self._sheets.over(self.parameters_at(at)[None])[0]
+        return states[np.argsort(states.energy, kind="stable")] if len(states) > 1 else states
+
+    def over(self, **at: Float[np.ndarray, " points"]) -> StatesOver:
+        """Exact states over many points of the box, with the pieces of the set that they lie on.
+
+        The cells above a point give guesses, which Newton corrects. Where they leave a doubt, as
+        close to curved folds, all known equilibria nearby are lifted to the point. Beside crossings
+        of sheets all roots of the reduced equation are returned; states of these sheets that are
+        closer together than 1e-5 in the metric are one.
+
+        Parameters
+        ----------
+        at
+            Values of each free parameter, one per point.
+
+        Raises
+        ------
+        InputError
+            For names that are not free, missing ones, different numbers of values, or points
+            outside the box.
+        """
+        p = self._parameters_over(at)
+        states, point, cell = self._sheets.over(p)
+        known = cell >= 0
+        stratum, component = (
+            np.where(known, label[cell], -1) if len(label) else cell
+            for label in (self.stratum, self.component)
+        )
+        index = np.where(known, self.cell_index[cell], -1) if len(self.cells) else cell
+        index[~known] = states[~known].index
+        return StatesOver(states, point, cell, index, stratum, component, len(p))
+
+    def _parameters_over(
+        self, at: Mapping[str, Float[np.ndarray, " points"]]
+    ) -> Float[np.ndarray, "points P"]:
+        """All parameters over points of the box."""
+        _check_names(self.names, at)
+        each = "an array with one number for each point"
+        columns = [numbers(name, at[name], each=each) for name in self.names]
+        if any(column.ndim != 1 or len(column) != len(columns[0]) for column in columns):
+            shapes = ", ".join(f"{name} {np.shape(at[name])}" for name in self.names)
+            raise InputError(
+                "`at` must give one number for each point, equally many values of each parameter; "
+                f"got shapes {shapes}."
+            )
+        points = np.stack(columns, axis=1)
+        outside = np.flatnonzero(~self.box.contains(points, slack=1e-12))
+        if len(outside):
+            worst = dict(zip(self.names, points[outside[0]].tolist(), strict=True))
+            raise InputError(f"`at` must lie in {self.box}; got {worst} (point {outside[0]}).")
+        p = np.tile(self._corner, (len(points), 1))
+        p[:, self._free] = points
+        return p
+
+    @cached_property
+    def _sheets(self) -> Sheets:
+        """The cells, made ready for queries."""
+        caps = [piece.vertices for piece in self.boundaries if piece.kind != "box"]
+        folded, capped = np.zeros((2, len(self.points)), bool)
+        singular = (*self.folds, *self.crossings)
+        for flags, pieces in ((folded, singular), (capped, caps)):
+            for piece in pieces:
+                flags[piece] = True
+        return Sheets(
+            self.points,
+            self._free,
+            self.cells,
+            self.cell_index,
+            self.component,
+            folded,
+            capped,
+            self.constraints,
+            self._near_crossings(),
+        )
+
+    def _near_crossings(self) -> NearCrossings | None:
+        """Facets along which sheets cross, if they do."""
+        if not self.crossings:
+            return None
+        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
+        setting = Setting(self.structure, self.parameters_at(low), self._free, self.constraints)
+        d = len(self.names)
+        pieces = [
+            np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+            for piece in self.crossings
+        ]
+        return of_set(setting, self.points, self.cells, np.concatenate(pieces))
+
+
+def _check_names(names: tuple[str, ...], at: Mapping[str, object]) -> None:
+    if set(at) != set(names):
+        raise InputError(f"`at` must give {' and '.join(names)}; got {', '.join(at) or 'nothing'}.")

@@ -1,0 +1,320 @@
+"""A complex whose cells are being cut and rearranged: vertices with tangent frames, marked facets.
+
+Marks say on what a facet lies: a fold, a constraint, sides of the box. Vertices that are added to
+an edge must lie on what the edge lies on.
+"""
+
+from collections import deque
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.linalg.lanes import results_of
+from equimorph.manifold.complex.description import Complex
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.separate_sheets import parted
+from equimorph.manifold.complex.vertices import Vertices, on_constraints, vertices_of
+from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
+from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.tangents import (
+    Ends,
+    best_corners,
+)
+from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of, senses
+from equimorph.structures import States
+
+ON_FOLD, ON_CAP, SIDES = 1, 2, 4
+"""Marks; from `SIDES` on two for each free parameter: its lower and its upper bound."""
+ON_CROSSING = 1 << 19
+"""Mark of facets at which another sheet crosses."""
+CURVES = ON_FOLD | ON_CAP | ON_CROSSING
+HOLE, RIM = 1 << 20, 1 << 21
+"""Marks of facets on the boundary that lie on nothing: the set is incomplete there, or cells beyond
+are set apart."""
+TRIANGLES, TETRAHEDRA = 2, 3
+"""Dimension of their cells."""
+AT_ONCE = 4096
+"""Cells or edges that one thread looks at in one go."""
+ON_BOX = 1e-9
+
+
+@dataclass(frozen=True)
+class Fabric:
+    """Vertices, cells with their index, and marked facets.
+
+    Where sheets cross, each of their parts has vertices of its own (see `parted_sheets`).
+
+    box: lower and upper bounds of the free parameters; squared: lengths of the sides of the cells,
+    squared, in the order 01, 02, 12 and so on; sense: sign that the areas of triangles in the free
+    parameters have, unless they are overturned; empty in other dimensions. Corners of tetrahedra
+    are so ordered that all are oriented alike, and most project as the parity of their index says.
+    """
+
+    setting: Setting
+    box: Float[np.ndarray, "2 d"]
+    vertices: Vertices
+    cells: Int[np.ndarray, "C corners"]
+    cell_index: Int[np.ndarray, " C"]
+    facets: Int[np.ndarray, "F d"]
+    marks: Int[np.ndarray, " F"]
+    squared: Float[np.ndarray, "C sides"]
+    sense: Int[np.ndarray, " T"]
+
+    @property
+    def dimension(self) -> int:
+        """Number of free parameters."""
+        return len(self.setting.free)
+
+    def edge_marks(self, edges: Int[np.ndarray, "E 2"]) -> Int[np.ndarray, " E"]:
+        """All marks of the facets around each edge; `edges` with sorted ends."""
+        base = len(self.vertices)
+        pairs = combinations(range(self.facets.shape[1]), 2)
+        own = [keys_of(self.facets[:, list(pair)], base) for pair in pairs]
+        if len(self.facets) == 0 or not own:
+            return np.zeros(len(edges), int)
+        known, inverse = np.unique(np.concatenate(own), return_inverse=True)
+        marks = np.zeros(len(known), int)
+        np.bitwise_or.at(marks, inverse, np.tile(self.marks, len(own)))
+        keys = keys_of(edges, base)
+        at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+        return np.where(known[at] == keys, marks[at], 0)
+
+    @property
+    def vertex_marks(self) -> Int[np.ndarray, " V"]:
+        """All marks of the facets around each vertex."""
+        out = np.zeros(len(self.vertices), int)
+        for column in self.facets.T:
+            np.bitwise_or.at(out, column, self.marks)
+        return out
+
+    def end(self, edges: Int[np.ndarray, "edges 2"], side: int, mark: int) -> Ends:
+        """One end of edges with a mark: its point, frame, and what stays zero along the edges."""
+        store, d, at = self.vertices, self.dimension, edges[:, side]
+        rows, slopes = store.rows[at], []
+        if mark & ON_FOLD:
+            slopes.append(self._fold_slopes(edges, side))
+        if mark & ON_CAP:
+            slopes.append(store.cap_slope[at])
+        if mark & ON_CROSSING:
+            slopes.append(store.crossing_slope[at])
+        slopes.extend(rows[:, :, rows.shape[2] - d + k] for k in held(mark, d))
+        stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, d))
+        return Ends(store.place[at], rows, stacked)
+
+    def _fold_slopes(
+        self, edges: Int[np.ndarray, "edges 2"], side: int
+    ) -> Float[np.ndarray, "edges d"]:
+        """Slopes of what vanishes on folds; where a fold passes a crossing, across its edges.
+
+        There the slope is zero, because it vanishes on the crossing, too.
+        """
+        store, at = self.vertices, edges[:, side]
+        slopes = store.fold_slope[at]
+        hub = np.flatnonzero((store.kinds[at] == CROSSING) & (self.dimension == TRIANGLES))
+        if len(hub):
+            chord = store.place[edges[hub, 1 - side]] - store.place[at[hub]]
+            x, y = np.einsum("nkc,nc->kn", store.rows[at[hub]], chord)
+            slopes[hub] = np.stack([-y, x], axis=1)
+        return np.asarray(slopes)
+
+    def only(self, cells: Bool[np.ndarray, " C"]) -> "Fabric":
+        """Some of the cells, with all facets."""
+        return replace(
+            self,
+            cells=self.cells[cells],
+            cell_index=self.cell_index[cells],
+            squared=self.squared[cells],
+            sense=self.sense[cells] if self.dimension == TRIANGLES else self.sense,
+        )
+
+    def overturned(
+        self, cells: Int[np.ndarray, "n corners"], sense: Int[np.ndarray, " n"]
+    ) -> Bool[np.ndarray, " n"]:
+        """Which of some cells project against their sense."""
+        place = self.vertices.place
+        flat = place[:, place.shape[1] - self.dimension :]
+        if len(cells) > len(flat):
+            flat = np.ascontiguousarray(flat)
+        return np.asarray(volumes(flat[cells]) * sense < 0.0)
+
+    @property
+    def parity(self) -> Int[np.ndarray, " C"]:
+        """Sense of triangles on the set: that over the parameters changes with their index."""
+        return np.asarray(self.sense * np.where(self.cell_index % 2 == 0, 1, -1))
+
+    def backward(
+        self, cells: Int[np.ndarray, "n 3"], parity: Int[np.ndarray, " n"]
+    ) -> Bool[np.ndarray, " n"]:
+        """Which triangles look backwards, on average, in the tangent planes at their corners."""
+        cells, store = np.ascontiguousarray(cells), self.vertices
+        total = np.empty(len(cells))
+        tasks = [
+            partial(look_back, store.place, store.rows, cells[at:stop], total[at:stop])
+            for at, stop in shares(len(cells))
+        ]
+        deque(results_of(tasks), maxlen=0)
+        return np.asarray(total * parity <= 0.0)
+
+    def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
+        """Cut edges at new vertices, and all cells and facets around them.
+
+        Cells with several of the edges are cut at the first of them first, so that neighbours agree
+        on what they share.
+        """
+        base = len(self.vertices)
+        cells, of_cells = _bisected(self.cells, edges, base)
+        facets, of_facets = _bisected(self.facets, edges, base)
+        vertices = self.vertices.joined(more)
+        squared = self.squared[of_cells]
+        changed = np.flatnonzero((cells >= base).any(axis=1))
+        squared[changed] = squared_sides(vertices.place, cells[changed])
+        return replace(
+            self,
+            vertices=vertices,
+            squared=squared,
+            cells=cells,
+            cell_index=self.cell_index[of_cells],
+            sense=self.sense[of_cells] if self.dimension == TRIANGLES else self.sense,
+            facets=facets,
+            marks=self.marks[of_facets],
+        )
+
+    @property
+    def points(self) -> Int[np.ndarray, " V"]:
+        """For each vertex the first one that is the same point."""
+        shared = self.vertices.shared
+        own = np.arange(len(shared))
+        copies = np.flatnonzero(shared >= 0)
+        _, first, inverse = np.unique(shared[copies], return_index=True, return_inverse=True)
+        own[copies] = copies[first[inverse]]
+        return own
+
+    @property
+    def numbers(self) -> Int[np.ndarray, " V"]:
+        """Numbers of the vertices in the complex; −1 for those that it leaves out."""
+        points = self.points
+        used = np.zeros(len(points), bool)
+        used[points[self.cells]] = True
+        return np.asarray(np.where(used, np.cumsum(used) - 1, -1)[points])
+
+    def complex(self) -> Complex:
+        """Return what is needed to describe the set; vertices without cells are left out."""
+        number = self.numbers
+        _, used = np.unique(number, return_index=True)
+        own, used = self.vertices, used[number[used] >= 0]
+        facets = [number[self.facets[(self.marks & m) > 0]] for m in (ON_FOLD, ON_CAP, ON_CROSSING)]
+        folds, caps, crossings = (each[(each >= 0).all(axis=1)] for each in facets)
+        return Complex(
+            States(self.setting.structure, own.z[used], own.p[used]),
+            own.kinds[used],
+            own.index[used],
+            own.grid_vertex[used],
+            number[self.cells],
+            self.cell_index,
+            folds,
+            caps,
+            crossings,
+        )
+
+
+def squared_sides(
+    place: Float[np.ndarray, "V coordinates"], cells: Int[np.ndarray, "n corners"]
+) -> Float[np.ndarray, "n sides"]:
+    """Squared lengths of the sides 01, 02, 12 and so on of cells."""
+    corners = cells.shape[1]
+    out = np.empty((len(cells), corners * (corners - 1) // 2))
+    square_sides(place, np.ascontiguousarray(cells), out)
+    return out
+
+
+def shares(count: int) -> list[tuple[int, int]]:
+    """Where the shares of so many things begin and end that threads are handed."""
+    return [(at, min(at + AT_ONCE, count)) for at in range(0, count, AT_ONCE)]
+
+
+def held(mark: int, dimension: int) -> list[int]:
+    """Free parameters that sides of the box hold."""
+    return [k for k in range(dimension) if mark & (3 * SIDES << 2 * k)]
+
+
+def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
+    """Return a set as a fabric: its sheets are parted where they cross."""
+    d = len(eset.names)
+    crossings, folds = (
+        np.concatenate([np.zeros((0, d), int), *(_facets(piece, d) for piece in pieces)])
+        for pieces in (eset.crossings, eset.folds)
+    )
+    cells, origin = parted(eset.cells, crossings, len(eset.points))
+    cells = cells.copy()
+    z, p = eset.points.z[origin], eset.points.p[origin]
+    whole = adjacency(cells)
+    sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
+    rows = best_corners(setting, z, p, cells, sense.signs)
+    others = (eset.index[origin], eset.grid_vertex[origin])
+    vertices = vertices_of(setting, (z, p), eset.kinds[origin], others, rows)
+    common = np.where(np.isin(origin, crossings), origin, -1)
+    vertices = replace(vertices, shared=common)
+    known = origin[whole.facets]
+    folded, crossed = (flags_of(known, each) for each in (folds, crossings))
+    outer = whole.counts == 1
+    marks = np.where(folded, ON_FOLD, 0) | np.where(crossed, ON_CROSSING, 0)
+    outer_marks = _outer_marks(setting, eset, known[outer])
+    # of parts of sets folds are boundaries, too
+    marks[outer] |= np.where(marks[outer] > 0, outer_marks & ~HOLE, outer_marks)
+    marked = marks > 0
+    box = np.stack([eset.box.lower, eset.box.upper])
+    if d == TETRAHEDRA:
+        against = sense.signs < 0
+        cells[against] = cells[against][:, [0, 1, 3, 2]]
+    squared = squared_sides(vertices.place, cells)
+    facets = (whole.facets[marked], marks[marked])
+    upright = sense.signs * np.where(eset.cell_index % 2 == 0, 1, -1)
+    upright = upright if d == TRIANGLES else np.zeros(0, int)
+    return Fabric(setting, box, vertices, cells, eset.cell_index, *facets, squared, upright)
+
+
+def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+
+
+def _outer_marks(
+    setting: Setting, eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]
+) -> Int[np.ndarray, " n"]:
+    """On what facets of the boundary lie: on a side of the box, else on the constraint."""
+    places = eset.coordinates[facets]
+    size = eset.box.upper - eset.box.lower
+    marks = np.zeros(len(facets), int)
+    for side, bound in enumerate((eset.box.lower, eset.box.upper)):
+        on = (np.abs(places - bound) <= ON_BOX * size).all(axis=1)
+        for k in range(len(size)):
+            marks |= np.where(on[:, k], SIDES << (2 * k + side), 0)
+    capped = np.isin(eset.kinds, (CAP, CORNER))
+    met = np.flatnonzero(eset.kinds == CROSSING)
+    capped[met] = on_constraints(setting, eset.points.z[met], eset.points.p[met])
+    return np.where(marks > 0, marks, np.where(capped[facets].all(axis=1), ON_CAP, HOLE))
+
+
+def _bisected(
+    rows: Int[np.ndarray, "n k"], edges: Int[np.ndarray, "E 2"], base: int
+) -> tuple[Int[np.ndarray, "m k"], Int[np.ndarray, " m"]]:
+    """Rows cut at vertices ``base + e`` on edges e that they hold, and the rows they come from."""
+    cut, owner = cut_rows(np.ascontiguousarray(rows), np.ascontiguousarray(edges), base)
+    return cut, owner
+
+
+def edges_of(
+    cells: Int[np.ndarray, "C corners"], base: int
+) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, "C sides"]]:
+    """All edges, sorted, and the numbers of those of each cell (pairs 01, 02, 12 and so on)."""
+    pairs = np.array(list(combinations(range(cells.shape[1]), 2)))
+    ends, of_cells = (
+        np.empty((cells.shape[0] * len(pairs), 2), int),
+        np.empty((len(cells), len(pairs)), int),
+    )
+    count = number_edges(np.ascontiguousarray(cells), pairs, base, ends, of_cells)
+    return ends[:count].copy(), of_cells

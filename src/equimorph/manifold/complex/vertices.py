@@ -1,0 +1,171 @@
+"""Vertices of a complex that is being cut and rearranged: exact points with tangent frames."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.geometry.corrections import Corrected
+from equimorph.manifold.geometry.crossing_frames import crossing_frames
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.tangents import (
+    cap_slopes,
+    fold_slopes,
+    placed_frames,
+    tangent_frames,
+)
+
+ROOM = 2
+"""Vertices that there is room for when they are copied, relative to those that there are."""
+ON_BOUND = 1e-7
+
+
+@dataclass
+class _Room:
+    """Arrays with room for vertices beyond those in use; the first who needs it takes it."""
+
+    arrays: dict[str, np.ndarray]
+    used: int
+
+
+@dataclass(frozen=True)
+class Vertices:
+    """Exact points with their tangent frames."""
+
+    z: Float[np.ndarray, "V size"]
+    p: Float[np.ndarray, "V P"]
+    kinds: Int[np.ndarray, " V"]
+    index: Int[np.ndarray, " V"]
+    grid_vertex: Int[np.ndarray, " V"]
+    place: Float[np.ndarray, "V coordinates"]
+    frame: Float[np.ndarray, "V d full"]
+    rows: Float[np.ndarray, "V d coordinates"]
+    fold_slope: Float[np.ndarray, "V d"]
+    """Slope, along the frame, of what vanishes on folds; zero off folds. So for the others."""
+    cap_slope: Float[np.ndarray, "V d"]
+    crossing_slope: Float[np.ndarray, "V d"]
+    shared: Int[np.ndarray, " V"]
+    """Number that vertices have in common which are the same point of several sheets; else −1."""
+    room: _Room | None = field(default=None, repr=False, compare=False, kw_only=True)
+
+    def __len__(self) -> int:
+        """Return the number of vertices."""
+        return len(self.z)
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """All that is known of each vertex."""
+        return {name: column for name, column in vars(self).items() if name != "room"}
+
+    def take(self, some: Int[np.ndarray, " some"]) -> "Vertices":
+        """Return some of the vertices."""
+        return replace(self, **{k: column[some] for k, column in self.columns.items()}, room=None)
+
+    def joined(self, *more: "Vertices") -> "Vertices":
+        """Return these vertices and more.
+
+        Copied only if there is no room behind them, so that many additions cost as much as few.
+        """
+        room, count = self.room, len(self) + sum(map(len, more))
+        if room is None or not self._before(room) or count > len(room.arrays["z"]):
+            room = self._roomy(ROOM * count)
+        for each in more:
+            for name, column in each.columns.items():
+                room.arrays[name][room.used : room.used + len(each)] = column
+            room.used += len(each)
+        return replace(self, **{k: array[:count] for k, array in room.arrays.items()}, room=room)
+
+    def _before(self, room: _Room) -> bool:
+        """Whether the room behind these vertices is free."""
+        same = (column.base is room.arrays[name] for name, column in self.columns.items())
+        return room.used == len(self) and all(same)
+
+    def _roomy(self, capacity: int) -> _Room:
+        """Return a copy of these vertices with room for more."""
+        arrays = {}
+        for name, column in self.columns.items():
+            arrays[name] = np.empty((capacity, *column.shape[1:]), column.dtype)
+            arrays[name][: len(self)] = column
+        return _Room(arrays, len(self))
+
+
+def gathered(parts: Sequence[Vertices], place: Int[np.ndarray, " V"]) -> Vertices:
+    """Vertices of several parts, part by part, each in its place."""
+    first, cuts = parts[0], np.cumsum([len(part) for part in parts])[:-1]
+    columns = {}
+    for name, column in first.columns.items():
+        columns[name] = np.empty((len(place), *column.shape[1:]), column.dtype)
+        for part, own in zip(parts, np.split(place, cuts), strict=True):
+            columns[name][own] = part.columns[name]
+    return replace(first, **columns, room=None)
+
+
+def vertices_of(
+    setting: Setting,
+    states: tuple[Float[np.ndarray, "V size"], Float[np.ndarray, "V P"]],
+    kinds: Int[np.ndarray, " V"],
+    others: tuple[Int[np.ndarray, " V"], Int[np.ndarray, " V"]],
+    rows: Float[np.ndarray, "V d coordinates"],
+) -> Vertices:
+    """Vertices with their frames; `others` are index and grid vertex, `rows` nearby planes."""
+    z, p = states
+    crossing = kinds == CROSSING
+    d = len(setting.free)
+    frame = np.empty((len(z), d, z.shape[1] + d))
+    folds, caps, crossings = (np.zeros((len(z), d)) for _ in range(3))
+    plain, met = np.flatnonzero(~crossing), np.flatnonzero(crossing)
+    frame[plain] = tangent_frames(setting, z[plain], p[plain], rows[plain])
+    if len(met):
+        frame[met], crossings[met] = crossing_frames(setting, z[met], p[met], rows[met])
+    capped = np.isin(kinds, (CAP, CORNER))
+    capped[met] = on_constraints(setting, z[met], p[met])
+    for out, function, wanted in (
+        (folds, fold_slopes, np.isin(kinds, (FOLD, CORNER))),
+        (caps, cap_slopes, capped),
+    ):
+        own = np.flatnonzero(wanted)
+        if len(own):
+            out[own] = function(setting, z[own], p[own], frame[own])
+    return _with_slopes(setting, states, kinds, others, frame, (folds, caps, crossings))
+
+
+def free_vertices(setting: Setting, at: Corrected) -> Vertices:
+    """Vertices inside sheets."""
+    count, d = at.frames.shape[:2]
+    kinds, nowhere = np.full(count, REFINED), np.full(count, -1)
+    slopes = np.zeros((3, count, d))
+    return _with_slopes(
+        setting,
+        (at.z, at.p),
+        kinds,
+        (at.index, nowhere),
+        at.frames,
+        (slopes[0], slopes[1], slopes[2]),
+    )
+
+
+def _with_slopes(
+    setting: Setting,
+    states: tuple[Float[np.ndarray, "V size"], Float[np.ndarray, "V P"]],
+    kinds: Int[np.ndarray, " V"],
+    others: tuple[Int[np.ndarray, " V"], Int[np.ndarray, " V"]],
+    frame: Float[np.ndarray, "V d full"],
+    slopes: tuple[Float[np.ndarray, "V d"], Float[np.ndarray, "V d"], Float[np.ndarray, "V d"]],
+) -> Vertices:
+    """Vertices with all that is known of them, in the coordinates of the embedding, too."""
+    place, placed = embed(setting, *states), placed_frames(setting, frame)
+    lone = np.full(len(kinds), -1)
+    return Vertices(*states, kinds, *others, place, frame, placed, *slopes, lone)
+
+
+def on_constraints(
+    setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Bool[np.ndarray, " n"]:
+    """Whether states lie on the bound of a constraint."""
+    out = np.zeros(len(z), bool)
+    for constraint in setting.constraints if len(z) else ():
+        out |= np.abs(constraint.excess(z, p)) < ON_BOUND
+    return out

@@ -1,0 +1,106 @@
+"""Known points of the equilibrium set: over grid vertices, on edges, inside triangles."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.geometry.kernels import match_or_add
+from equimorph.structures import Structure
+
+GRID, FOLD, CAP, BETWEEN, CORNER, AMID, REFINED, CROSSING = 0, 1, 2, 3, 4, 5, 6, 7
+"""Kinds of points: over a grid vertex, on a fold, on a constraint, between folds on an edge, on a
+fold and a constraint at once, amid others over a grid tetrahedron, added by refinement, where two
+sheets cross."""
+
+SAME = 1e-6
+"""Distance in the metric below which two polished equilibria over one vertex are the same."""
+
+
+@dataclass
+class Points:
+    """Growing store of points; those over a grid vertex are found again by their configuration.
+
+    `vertex` is the grid vertex or −1; `edge` the grid edge on which an extra point lies, or −1.
+    """
+
+    structure: Structure
+    z: Float[np.ndarray, "capacity size"]
+    p: Float[np.ndarray, "capacity parameters"]
+    index: Int[np.ndarray, " capacity"]
+    kind: Int[np.ndarray, " capacity"]
+    vertex: Int[np.ndarray, " capacity"]
+    edge: Int[np.ndarray, " capacity"]
+    following: Int[np.ndarray, " capacity"]
+    head: Int[np.ndarray, " vertices"]
+    count: int = 0
+
+    @classmethod
+    def empty(cls, structure: Structure, vertices: int) -> "Points":
+        """Return a store without points over so many grid vertices."""
+        none = np.zeros(0, int)
+        return cls(
+            structure,
+            np.zeros((0, structure.size)),
+            np.zeros((0, len(structure.parameters))),
+            none, none, none, none, none,
+            np.full(vertices, -1),
+        )  # fmt: skip
+
+    def _reserve(self, extra: int) -> None:
+        capacity = len(self.z)
+        if self.count + extra <= capacity:
+            return
+        grown = max(2 * capacity, self.count + extra, 64)
+        for name in ("z", "p", "index", "kind", "vertex", "edge", "following"):
+            old = getattr(self, name)
+            new = np.full((grown, *old.shape[1:]), -1, dtype=old.dtype)
+            new[:capacity] = old
+            setattr(self, name, new)
+
+    def over_vertices(
+        self,
+        vertices: Int[np.ndarray, " some"],
+        z: Float[np.ndarray, "some size"],
+        p: Float[np.ndarray, "some parameters"],
+        index: Int[np.ndarray, " some"],
+    ) -> tuple[Int[np.ndarray, " some"], Bool[np.ndarray, " some"]]:
+        """Numbers of polished equilibria over vertices, known or added, and which are new."""
+        self._reserve(len(vertices))
+        ids, new = np.empty(len(vertices), int), np.empty(len(vertices), bool)
+        self.count = match_or_add(
+            vertices, np.ascontiguousarray(z), self.structure.mass, SAME, self.head,
+            self.following, self.z, self.count, ids, new,
+        )  # fmt: skip
+        at = ids[new]
+        self.p[at], self.index[at], self.kind[at] = p[new], index[new], GRID
+        self.vertex[at], self.edge[at] = vertices[new], -1
+        return ids, new
+
+    def add(
+        self,
+        z: Float[np.ndarray, " size"],
+        p: Float[np.ndarray, " parameters"],
+        index: int,
+        kind: int,
+        edge: int = -1,
+    ) -> int:
+        """Add an extra point; return its number."""
+        self._reserve(1)
+        at = self.count
+        self.z[at], self.p[at], self.index[at], self.kind[at] = z, p, index, kind
+        self.vertex[at], self.edge[at], self.following[at] = -1, edge, -1
+        self.count += 1
+        return at
+
+    def grow_vertices(self, vertices: int) -> None:
+        """Make room for new grid vertices."""
+        self.head = np.concatenate([self.head, np.full(vertices - len(self.head), -1)])
+
+    def over(self, vertex: int) -> list[int]:
+        """Points over one grid vertex."""
+        found, node = [], int(self.head[vertex])
+        while node >= 0:
+            found.append(node)
+            node = int(self.following[node])
+        return found

@@ -1,0 +1,241 @@
+"""Tangent spaces of the set at its vertices, and how far straight edges are from it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.kernels import square_sides
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.structures.contract import Border
+
+CHUNK = 2048
+DIFFERENCE = 1e-5
+S_SHAPE = 0.1
+"""Farthest a cubic whose slopes at both ends are the same leaves its chord: √3/18, in slopes."""
+
+
+def tangent_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
+    """Orthonormal bases of the tangent spaces at points of the set, regular at folds, too.
+
+    ``[F_z F_p; R] t_i = (0, e_i)`` with rows R of the embedding that span nearby spaces, whose
+    orientation the bases take over.
+    """
+    out = np.empty((len(z), rows.shape[1], z.shape[1] + rows.shape[1]))
+    for at in range(0, len(z), CHUNK):
+        own = slice(at, at + CHUNK)
+        out[own] = _frames(setting, z[own], p[own], rows[own])
+    return out
+
+
+def border_of(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Border:
+    """Border ``[F_z F_p; R]`` of F_z by the free parameters, in their scales, and by planes R."""
+    structure, free = setting.structure, setting.free
+    lanes, size, d, n = len(z), z.shape[1], len(free), structure.unknowns
+    columns = np.empty((lanes, d, size))
+    for k in range(d):
+        dp = np.zeros_like(p)
+        dp[:, free[k]] = setting.scales[k]
+        columns[:, k] = structure.parameter_derivative(z, p, dp)
+    by_z = np.zeros((lanes, d, size))
+    by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(structure.mass)
+    return columns, by_z, np.ascontiguousarray(rows[:, :, n:])
+
+
+def _frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
+    lanes, size, d = len(z), z.shape[1], len(setting.free)
+    rhs = np.zeros((lanes, d, size + d))
+    rhs[:, :, size:] = np.eye(d)
+    return orthonormal(
+        setting, setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
+    )
+
+
+def orthonormal(setting: Setting, frames: Frames) -> Frames:
+    """Bases of the same tangent spaces, orthonormal in the metric and oriented alike."""
+    placed = placed_frames(setting, frames)
+    lower = np.linalg.cholesky(placed @ np.swapaxes(placed, 1, 2))
+    out = np.empty_like(frames)
+    for i in range(frames.shape[1]):
+        row = frames[:, i]
+        for j in range(i):
+            row = row - lower[:, i, j, None] * out[:, j]
+        out[:, i] = row / lower[:, i, i, None]
+    return out
+
+
+def placed_frames(setting: Setting, frames: Frames) -> Rows:
+    """Bases of tangent spaces in the coordinates of the embedding."""
+    n, d = setting.structure.unknowns, len(setting.free)
+    u = frames[:, :, :n] * np.sqrt(setting.structure.mass)
+    return np.concatenate([u, frames[:, :, frames.shape[2] - d :]], axis=2)
+
+
+def split_step(setting: Setting, step: Float[np.ndarray, "lanes full"]) -> tuple[Lanes, Parameters]:
+    """Changes of z and of all parameters of a step along a tangent space."""
+    d = len(setting.free)
+    dp = np.zeros((len(step), len(setting.base)))
+    dp[:, setting.free] = step[:, step.shape[1] - d :] * setting.scales
+    return np.ascontiguousarray(step[:, : step.shape[1] - d]), dp
+
+
+def fold_slopes(
+    setting: Setting, z: Lanes, p: Parameters, frames: Frames
+) -> Float[np.ndarray, "lanes d"]:
+    """Slope along the frame of the function that vanishes on folds."""
+    critical = Critical(setting.structure, z, p, null_border(setting.structure, z, p))
+    steps = (split_step(setting, frames[:, k]) for k in range(frames.shape[1]))
+    return np.stack([critical.second(*step) for step in steps], axis=1)
+
+
+def cap_slopes(
+    setting: Setting, z: Lanes, p: Parameters, frames: Frames
+) -> Float[np.ndarray, "lanes d"]:
+    """Slope along the frame of the largest excess over the constraints."""
+
+    def worst(sign: float, k: int) -> Values:
+        dz, dp = split_step(setting, sign * DIFFERENCE * frames[:, k])
+        return np.asarray(np.max([c.excess(z + dz, p + dp) for c in setting.constraints], axis=0))
+
+    slopes = [worst(1.0, k) - worst(-1.0, k) for k in range(frames.shape[1])]
+    return np.stack(slopes, axis=1) / (2.0 * DIFFERENCE)
+
+
+@dataclass(frozen=True)
+class Ends:
+    """One end of edges: its point, tangent space, and the slopes of what must stay zero on them."""
+
+    place: Float[np.ndarray, "edges coordinates"]
+    rows: Rows
+    slopes: Float[np.ndarray, "edges m d"]
+
+    def take(self, some: Int[np.ndarray, " some"]) -> "Ends":
+        """Return some of the ends."""
+        return Ends(self.place[some], self.rows[some], self.slopes[some])
+
+    def along(self, chord: Float[np.ndarray, "edges coordinates"]) -> Float[np.ndarray, "edges d"]:
+        """Coordinates, in the frame, of the tangent vector that a chord is nearest to.
+
+        As long as the chord.
+        """
+        flat = self.nearest(chord)
+        length = np.linalg.norm(flat, axis=1)
+        share = np.linalg.norm(chord, axis=1) / np.maximum(length, 1e-300)
+        # where chord and tangent space are far apart, the vector stays short
+        return np.asarray(flat * np.minimum(share, 2.0)[:, None])
+
+    def nearest(
+        self, chord: Float[np.ndarray, "edges coordinates"]
+    ) -> Float[np.ndarray, "edges d"]:
+        """Orthogonal projections of chords, in the frame."""
+        flat = np.einsum("edc,ec->ed", self.rows, chord)
+        if self.slopes.shape[1]:
+            basis = self.allowed
+            flat = np.einsum("edk,ek->ed", basis, np.einsum("edk,ed->ek", basis, flat))
+        return np.asarray(flat)
+
+    @property
+    def allowed(self) -> Float[np.ndarray, "edges d k"]:
+        """Orthonormal directions in the frame along which the conditions stay zero."""
+        m = self.slopes.shape[1]
+        columns = np.swapaxes(self.slopes, 1, 2)
+        return np.asarray(np.linalg.qr(columns, mode="complete")[0][:, :, m:])
+
+
+@dataclass(frozen=True)
+class Cubics:
+    """Curves over edges that touch the tangent spaces at both ends.
+
+    They leave the chord c by ``t(1 − t)² n₀ − t²(1 − t) n₁`` with nᵢ = tᵢ − c: in the middle by
+    (n₀ − n₁)/8.
+    """
+
+    first: Ends
+    second: Ends
+
+    @cached_property
+    def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        chord = self.second.place - self.first.place
+        return chord, self.first.along(chord), self.second.along(chord)
+
+    @property
+    def error(self) -> Float[np.ndarray, " edges"]:
+        """How far the curves are from their chords."""
+        chord, a, b = self._along
+        off_a = np.einsum("ed,edc->ec", a, self.first.rows) - chord
+        off_b = np.einsum("ed,edc->ec", b, self.second.rows) - chord
+        middle = np.linalg.norm(off_a - off_b, axis=1) / 8.0
+        slope = np.maximum(np.linalg.norm(off_a, axis=1), np.linalg.norm(off_b, axis=1))
+        return np.asarray(np.maximum(middle, S_SHAPE * slope))
+
+    def step(
+        self,
+        frames: tuple[Frames, Frames],
+        chord: Float[np.ndarray, "edges full"],
+        t: Float[np.ndarray, " edges"],
+    ) -> Float[np.ndarray, "edges full"]:
+        """Step from the chords, changes of z and of the scaled parameters, to the curves at t.
+
+        `frames` are those at both ends.
+        """
+        _, a, b = self._along
+        off_a = np.einsum("ed,edf->ef", a, frames[0]) - chord
+        off_b = np.einsum("ed,edf->ef", b, frames[1]) - chord
+        share = t[:, None]
+        return np.asarray(share * (1 - share) ** 2 * off_a - share**2 * (1 - share) * off_b)
+
+
+def best_corners(
+    setting: Setting,
+    z: Lanes,
+    p: Parameters,
+    cells: Int[np.ndarray, "C corners"],
+    signs: Int[np.ndarray, " C"] | None = None,
+) -> Rows:
+    """Orthonormal bases of the planes of the cell around each vertex that is the least slender.
+
+    Oriented as the cells are with the given signs, if these matter.
+    """
+    place = embed(setting, z, p)
+    corners, count = cells.shape[1], len(cells)
+    owner = cells.T.ravel()
+    breadth = _breadths(place, cells).T.ravel()
+    order = np.lexsort((-breadth, owner))
+    first = order[np.diff(owner[order], prepend=-1) > 0]
+    corner, cell = np.divmod(first, count)
+    others = np.stack([np.delete(np.arange(corners), k) for k in range(corners)])[corner]
+    sides = place[cells[cell[:, None], others]] - place[cells[cell, corner]][:, None]
+    sides /= np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-300)
+    basis, share = np.linalg.qr(np.swapaxes(sides, 1, 2))
+    if signs is None:
+        return np.ascontiguousarray(np.swapaxes(basis, 1, 2))
+    turned = np.linalg.det(share) * signs[cell] * (-1) ** corner < 0
+    basis[turned, :, 0] *= -1.0
+    return np.ascontiguousarray(np.swapaxes(basis, 1, 2))
+
+
+def _breadths(
+    place: Float[np.ndarray, "V coordinates"], cells: Int[np.ndarray, "C corners"]
+) -> Float[np.ndarray, "C corners"]:
+    """How far the sides from each corner are from dependent: the determinant of their cosines."""
+    corners = cells.shape[1]
+    pairs = list(combinations(range(corners), 2))
+    squared = np.empty((len(cells), len(pairs)))
+    square_sides(place, np.ascontiguousarray(cells), squared)
+    length = np.zeros((len(cells), corners, corners))
+    for (i, j), own in zip(pairs, squared.T, strict=True):
+        length[:, i, j] = length[:, j, i] = own
+    out = np.empty((len(cells), corners))
+    for k in range(corners):
+        rest = np.delete(np.arange(corners), k)
+        own = np.maximum(length[:, k, rest], 1e-300)
+        inner = length[:, rest[:, None], rest]
+        cosines = 0.5 * (own[:, :, None] + own[:, None, :] - inner)
+        cosines /= np.sqrt(own[:, :, None] * own[:, None, :])
+        out[:, k] = np.linalg.det(cosines)
+    return out

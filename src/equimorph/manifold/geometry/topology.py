@@ -1,0 +1,287 @@
+"""Topology of simplicial complexes: facets, components, strata, boundary pieces, orientation."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from equimorph.arrays import Cells
+from equimorph.manifold.geometry.kernels import orient
+from equimorph.manifold.geometry.simplices import volumes
+
+PAIR = 2
+"""Corners of an edge."""
+
+Pairs = Int[np.ndarray, "n 2"]
+
+
+@dataclass(frozen=True)
+class Adjacency:
+    """Facets of cells, and how cells hang together across them.
+
+    facets (F, d), sorted, with their cell counts; cell_facets (C, d + 1): facet opposite to each
+    corner; links: pairs of cells that share a facet (where more than two do, a chain of them), with
+    that facet.
+    """
+
+    facets: Int[np.ndarray, "F d"]
+    counts: Int[np.ndarray, " F"]
+    cell_facets: Int[np.ndarray, "C corners"]
+    links: Int[np.ndarray, "N 2"]
+    across: Int[np.ndarray, " N"]
+
+    @property
+    def manifold(self) -> Bool[np.ndarray, " N"]:
+        """Links across facets of exactly two cells."""
+        return np.asarray(self.counts[self.across] == 2)
+
+
+def keys_of(rows: Int[np.ndarray, "n k"], base: int) -> Int[np.ndarray, " n"]:
+    """One number per sorted row of vertices below `base`."""
+    assert base ** rows.shape[1] < 2**63, "more vertices than fit into a key"
+    if rows.shape[1] == 2:  # much cheaper than sorting pairs
+        return np.asarray(np.minimum(*rows.T) * base + np.maximum(*rows.T))
+    keys = np.zeros(len(rows), np.int64)
+    for column in np.sort(rows, axis=1).T:
+        keys = keys * base + column
+    return keys
+
+
+def rows_of(keys: Int[np.ndarray, " n"], base: int, length: int) -> Int[np.ndarray, "n k"]:
+    """Rows of vertices that `keys_of` made keys of."""
+    columns = []
+    for _ in range(length):
+        keys, column = np.divmod(keys, base)
+        columns.append(column)
+    return np.stack(columns[::-1], axis=1)
+
+
+def faces_of(cells: Cells, size: int) -> Int[np.ndarray, "n size"]:
+    """All distinct faces of cells with so many corners."""
+    base = int(cells.max(initial=0)) + 1
+    sides = [cells[:, list(chosen)] for chosen in combinations(range(cells.shape[1]), size)]
+    keys = distinct(np.concatenate([keys_of(side, base) for side in sides]))
+    return rows_of(keys, base, size)
+
+
+def distinct(keys: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+    """Return distinct numbers, none negative, in order.
+
+    Sorting beats the hashing of `np.unique` several times over.
+    """
+    keys = np.sort(keys)
+    return keys[np.diff(keys, prepend=-1) > 0]
+
+
+def among(keys: Int[np.ndarray, " n"], known: Int[np.ndarray, " m"]) -> Bool[np.ndarray, " n"]:
+    """Which keys are among known ones that are in order."""
+    if len(known) == 0:
+        return np.zeros(len(keys), bool)
+    at = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+    return np.asarray(known[at] == keys)
+
+
+def adjacency(cells: Cells) -> Adjacency:
+    """Facets and links of segments, triangles or tetrahedra."""
+    corners = cells.shape[1]
+    base = int(cells.max(initial=0)) + 1
+    keys = np.stack([keys_of(np.delete(cells, k, axis=1), base) for k in range(corners)], axis=1)
+    order, starts = _groups(keys.ravel())
+    counts = np.diff(starts)
+    number = np.repeat(np.arange(len(counts)), counts)
+    of_cells = np.empty(keys.size, int)
+    of_cells[order] = number
+    same = np.flatnonzero(np.diff(number) == 0)
+    return Adjacency(
+        rows_of(keys.ravel()[order[starts[:-1]]], base, corners - 1),
+        counts,
+        of_cells.reshape(-1, corners),
+        np.stack([order[same], order[same + 1]], axis=1) // corners,
+        number[same],
+    )
+
+
+def _groups(
+    keys: Int[np.ndarray, " n"],
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " starts"]]:
+    """Order of numbers, equal ones as they come, and where each group of these starts, and ends.
+
+    Most groups have at most two: then the fast sort, which may exchange equal ones, is put right.
+    """
+    order = np.argsort(keys)
+    first = np.flatnonzero(np.diff(keys[order], prepend=-1) > 0)
+    starts = np.append(first, len(keys))
+    if (np.diff(starts) > 2).any():
+        return np.argsort(keys, kind="stable"), starts
+    pairs = first[np.diff(starts) == 2]
+    ends = np.sort(order[pairs[:, None] + np.arange(2)], axis=1)
+    order[pairs], order[pairs + 1] = ends.T
+    return order, starts
+
+
+def flags_of(
+    facets: Int[np.ndarray, "F d"], chosen: Int[np.ndarray, "n d"]
+) -> Bool[np.ndarray, " F"]:
+    """Which of the facets are among the chosen ones."""
+    base = max(int(facets.max(initial=0)), int(chosen.max(initial=0))) + 1
+    return np.isin(keys_of(facets, base), keys_of(chosen, base))
+
+
+def labels(cells: int, links: Pairs) -> Int[np.ndarray, " C"]:
+    """Connected pieces of cells over links, largest first."""
+    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(cells, cells))
+    _, label = connected_components(graph, directed=False)
+    sizes = np.bincount(label)
+    rank = np.empty(len(sizes), int)
+    rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))
+    return np.asarray(rank[label])
+
+
+def euler_characteristic(cells: Cells, edges: int | None = None) -> int:
+    """Vertices − edges + triangles − tetrahedra; the number of edges may be known."""
+    corners = cells.shape[1]
+    numbers = [
+        np.count_nonzero(np.bincount(cells.ravel())),
+        *(
+            edges if edges is not None and k == PAIR else len(faces_of(cells, k))
+            for k in range(2, corners)
+        ),
+    ]
+    signs = (-1) ** np.arange(corners)
+    return int(signs @ [*numbers, len(cells)])
+
+
+def pieces(facets: Int[np.ndarray, "n d"]) -> list[Int[np.ndarray, "..."]]:
+    """Connected pieces of points, edges or triangles.
+
+    Points come one by one, edges as polylines (see `chains`), triangles as arrays of them.
+    """
+    if facets.shape[1] == 1:
+        return list(facets)
+    if facets.shape[1] == 2:
+        return chains(facets)
+    label = labels(len(facets), adjacency(facets).links) if len(facets) else np.zeros(0, int)
+    return [facets[label == k] for k in range(label.max(initial=-1) + 1)]
+
+
+def chains(pairs: Pairs) -> list[Int[np.ndarray, "..."]]:
+    """Polylines along edges, split where other than two meet; closed ones repeat the start."""
+    if len(pairs) == 0:
+        return []
+    around: dict[int, list[int]] = {}
+    for number, (a, b) in enumerate(pairs.tolist()):
+        around.setdefault(a, []).append(number)
+        around.setdefault(b, []).append(number)
+    used = np.zeros(len(pairs), bool)
+    out = []
+    starts = [v for v, edges in around.items() if len(edges) != 2]
+    for start in [*starts, *around]:
+        for number in around[start]:
+            if used[number] or (start not in starts and used[around[start][0]]):
+                continue
+            line, at, edge = [start], start, number
+            while True:
+                used[edge] = True
+                a, b = pairs[edge]
+                at = int(b if at == a else a)
+                line.append(at)
+                onward = [e for e in around[at] if not used[e]]
+                if len(around[at]) != 2 or not onward:
+                    break
+                edge = onward[0]
+            out.append(np.array(line))
+    return out
+
+
+def orientation(cells: Cells, whole: Adjacency) -> tuple[Int[np.ndarray, " C"], int]:
+    """Signs that orient all cells coherently, and the number of contradictions."""
+    count = len(cells)
+    induced = _induced_signs(cells)
+    a, b = whole.links[whole.manifold].T
+    shared = whole.across[whole.manifold]
+    sign = -_sign_at(whole, induced, a, shared) * _sign_at(whole, induced, b, shared)
+    both = np.concatenate([np.stack([a, b, sign], 1), np.stack([b, a, sign], 1)])
+    both = both[np.argsort(both[:, 0] * count + both[:, 1])]
+    starts = np.concatenate([[0], np.cumsum(np.bincount(both[:, 0], minlength=count))])
+    signs = np.zeros(count, np.int64)
+    columns = [np.ascontiguousarray(both[:, k]) for k in (1, 2)]
+    return signs, int(orient(count, starts, columns[0], columns[1], signs)) // 2
+
+
+def _induced_signs(cells: Cells) -> Int[np.ndarray, "C corners"]:
+    """Orientation that each cell gives its facets, relative to their vertices in order."""
+    corners = cells.shape[1]
+    signs = np.empty(cells.shape, np.int64)
+    for k in range(corners):
+        rest = np.delete(cells, k, axis=1)
+        turned = sum(
+            (rest[:, i] > rest[:, j]).astype(int) for i, j in combinations(range(corners - 1), 2)
+        )
+        signs[:, k] = (-1) ** (k + np.asarray(turned))
+    return signs
+
+
+def _sign_at(
+    whole: Adjacency,
+    induced: Int[np.ndarray, "C corners"],
+    cell: Int[np.ndarray, " N"],
+    facet: Int[np.ndarray, " N"],
+) -> Int[np.ndarray, " N"]:
+    corner = (whole.cell_facets[cell] == facet[:, None]).argmax(axis=1)
+    return np.asarray(induced[cell, corner])
+
+
+def projected_volume(
+    coordinates: Float[np.ndarray, "V d"], cells: Cells
+) -> Float[np.ndarray, " C"]:
+    """Signed volumes of the cells over the space of the free parameters."""
+    return volumes(coordinates[cells])
+
+
+@dataclass(frozen=True)
+class Senses:
+    """How cells are oriented.
+
+    signs: coherent orientation of the manifold patches, in which the projected volume of most cells
+    has the sign of the parity of their index; overturned: cells that project against it.
+    """
+
+    signs: Int[np.ndarray, " C"]
+    contradictions: int
+    overturned: Bool[np.ndarray, " C"]
+
+
+def senses(
+    cells: Cells,
+    index: Int[np.ndarray, " C"],
+    coordinates: Float[np.ndarray, "V d"],
+    whole: Adjacency,
+    component: Int[np.ndarray, " C"] | None = None,
+) -> Senses:
+    """Orientation of cells with the index that each has.
+
+    Patches end where more than two cells share a facet; where none do, they are the components,
+    which may be known.
+    """
+    signs, contradictions = orientation(cells, whole)
+    manifold = whole.manifold
+    if component is None or not manifold.all():
+        component = labels(len(cells), whole.links[manifold])
+    volume = projected_volume(coordinates, cells) * signs * np.where(index % 2 == 0, 1, -1)
+    total = np.sign(np.bincount(component, weights=volume, minlength=1)).astype(int)
+    return Senses(signs * total[component], contradictions, volume * total[component] < 0)
+
+
+def unbalanced(
+    cells: Cells, whole: Adjacency, sense: Senses, facets: Bool[np.ndarray, " F"]
+) -> int:
+    """Number of the facets whose cells, with the orientation of their index, do not cancel.
+
+    As they do where sheets cross: det [F_z F_p; tᵀ] changes its sign along each of them.
+    """
+    induced = _induced_signs(cells) * sense.signs[:, None]
+    total = np.bincount(whole.cell_facets.ravel(), weights=induced.ravel())
+    return int((total[facets] != 0).sum()) if len(cells) else 0

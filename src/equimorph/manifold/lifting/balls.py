@@ -1,0 +1,288 @@
+"""Sheet lifting, part five: discs close into spheres around tetrahedra, filled by coning.
+
+A sphere of four triangles of one index bounds one tetrahedron. Others are coned from an exact point
+inside: on the fold surface that parts two indices, on the constraint that cuts the ball off, else
+amid all its vertices. Several closed fold curves on a sphere each bound a disc of the fold surface.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.geometry.crossing_points import pin_crossings
+from equimorph.manifold.geometry.exact_points import Pinned, recalled_pin
+from equimorph.manifold.geometry.points import AMID, CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.topology import distinct
+from equimorph.manifold.lifting.cones import fans_of, upright_apexes
+from equimorph.manifold.lifting.discs import Discs
+from equimorph.manifold.lifting.inner_points import pin_confined
+from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.sphere_regions import Parts, closed_surfaces, part
+from equimorph.manifold.lifting.spheres import Surfaces, find_spheres
+
+SHEETS = 2
+"""To each of which a crossing belongs."""
+DIVIDED = 1 / 100
+"""Share of the largest grid tetrahedron below which none is divided lest a fold turn cells over."""
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Tetrahedra with their index, their facets on folds, on constraints and where sheets cross.
+
+    owner, fold_owner, cap_owner, crossing_owner: grid tetrahedra below them; doubtful: those over
+    which a ball could not be closed and cut without doubt.
+    """
+
+    corners: Int[np.ndarray, "n 4"]
+    index: Int[np.ndarray, " n"]
+    owner: Int[np.ndarray, " n"]
+    folds: Int[np.ndarray, "f 3"]
+    fold_owner: Int[np.ndarray, " f"]
+    caps: Int[np.ndarray, "c 3"]
+    cap_owner: Int[np.ndarray, " c"]
+    crossings: Int[np.ndarray, "x 3"]
+    crossing_owner: Int[np.ndarray, " x"]
+    doubtful: Int[np.ndarray, " k"]
+
+
+def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Balls:
+    """Fill all spheres over wanted grid tetrahedra."""
+    spheres = find_spheres(pairing.mesh, discs, wanted)
+    doubtful = np.zeros(len(pairing.mesh.tetrahedra), bool)
+    doubtful[spheres.doubtful] = True
+    caps, lost = _caps(pairing, spheres.others)
+    doubtful[spheres.others.owner[lost]] = True
+    crossing = pairing.points.kind == CROSSING
+    closed = closed_surfaces(spheres.others, caps, ~doubtful[spheres.others.owner], crossing)
+    parts = part(closed)
+    doubtful[closed.owner[~parts.whole]] = True
+    middles = _middles(pairing, parts, doubtful)
+    apexes = _apexes(pairing, parts, middles, doubtful)
+    apexes, overturned = upright_apexes(
+        parts, middles, apexes, pairing.points.p[:, pairing.setting.free]
+    )
+    own = closed.owner[parts.region_surface]
+    doubtful[own[overturned & ((parts.first_curve < 0) | _large(pairing.mesh)[own])]] = True
+    filled = _coned(parts, middles, apexes, ~doubtful[closed.owner])
+    return Balls(
+        np.concatenate([spheres.plain, filled.corners]),
+        np.concatenate([spheres.plain_index, filled.index]),
+        np.concatenate([spheres.plain_owner, filled.owner]),
+        filled.folds,
+        filled.fold_owner,
+        filled.caps,
+        filled.cap_owner,
+        filled.crossings,
+        filled.crossing_owner,
+        np.flatnonzero(doubtful),
+    )
+
+
+def _large(mesh: BaseMesh) -> Bool[np.ndarray, " N"]:
+    """Grid tetrahedra that have not been divided often."""
+    size = np.abs(volumes(mesh.vertices[mesh.tetrahedra]))
+    return np.asarray(size > DIVIDED * size.max(initial=0.0))
+
+
+def _caps(
+    pairing: Pairing, surfaces: Surfaces
+) -> tuple[Int[np.ndarray, " S"], Bool[np.ndarray, " S"]]:
+    """Points on the constraint from which open surfaces are closed, and where one is missing.
+
+    −1 where none is needed: a rim of three points can be closed by their triangle.
+    """
+    count = len(surfaces.owner)
+    amount = np.bincount(surfaces.surface, minlength=count)
+    around = np.bincount(surfaces.rim_surface, minlength=count)
+    at, points = _grouped(surfaces.rim_surface, surfaces.rims, count)
+    ends = {kind: pairing.points.kind[points] == kind for kind in (CORNER, CROSSING)}
+    ended = {kind: np.bincount(at[own], minlength=count) for kind, own in ends.items()}
+    every = sum(ended.values())
+    # a fold runs from corner to corner, maybe far from the middle of the rim
+    singular = {kind: (own == 2) & (every == 2) for kind, own in ended.items()}
+    plain = (every == 0) & (around > 0) & (amount > 3)
+    caps, lost = np.full(count, -1), (every > 0) & ~np.logical_or(*singular.values())
+    for kind, own in (*singular.items(), (CAP, plain)):
+        used = own[at] & ends.get(kind, np.True_)
+        groups = _groups(at[used], points[used], np.flatnonzero(own))
+        caps[own] = _pinned(pairing, groups, kind, surfaces.owner[own], cap=True)
+        lost |= own & (caps < 0) & ((kind != CAP) | (around > 3))
+    return caps, lost
+
+
+def _grouped(
+    group: Int[np.ndarray, " n"], points: Int[np.ndarray, "n k"], groups: int
+) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+    """Distinct points of each group, in order: their groups and their numbers."""
+    base = int(points.max(initial=0)) + 1
+    at, own = np.divmod(distinct((group[:, None] * base + points).ravel()), base)
+    return at, own
+
+
+def _groups(
+    at: Int[np.ndarray, " m"], points: Int[np.ndarray, " m"], numbers: Int[np.ndarray, " k"]
+) -> list[list[int]]:
+    """Points of the groups with these numbers."""
+    first, last = np.searchsorted(at, numbers), np.searchsorted(at, numbers, side="right")
+    every = points.tolist()
+    return [every[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True)]
+
+
+def _middles(
+    pairing: Pairing, parts: Parts, doubtful: Bool[np.ndarray, " N"]
+) -> Int[np.ndarray, " curves"]:
+    """Exact point inside every curve: a fold, or a crossing; it can be on the constraint."""
+    count = len(parts.curve_surface)
+    at, points = _grouped(parts.curve, parts.folds, count)
+    cap = parts.closed.cap[parts.curve_surface]
+    middles = np.full(count, -1)
+    own = points == cap[at]
+    middles[at[own]] = points[own]
+    left = (middles < 0) & parts.whole[parts.curve_surface]
+    for kind, own in ((FOLD, ~parts.curve_met), (CROSSING, parts.curve_met)):
+        chosen = np.flatnonzero(left & own)
+        owner = parts.closed.owner[parts.curve_surface[chosen]]
+        middles[chosen] = _pinned(pairing, _groups(at, points, chosen), kind, owner)
+    wanted = np.flatnonzero(left)
+    owner = parts.closed.owner[parts.curve_surface[wanted]]
+    doubtful[owner[middles[wanted] < 0]] = True
+    return middles
+
+
+def _apexes(
+    pairing: Pairing,
+    parts: Parts,
+    middles: Int[np.ndarray, " curves"],
+    doubtful: Bool[np.ndarray, " N"],
+) -> Int[np.ndarray, " regions"]:
+    """Apex of every region: on a fold, on the constraint, else amid its vertices."""
+    count = len(parts.region_surface)
+    folded = parts.first_curve >= 0
+    apexes: Int[np.ndarray, " regions"] = parts.closed.cap[parts.region_surface]
+    apexes[folded] = middles[parts.first_curve[folded]]
+    size = np.bincount(parts.region, minlength=count)
+    four = np.flatnonzero(~folded & (apexes < 0) & (size == 4))
+    by_region = np.argsort(parts.region, kind="stable")
+    first = np.cumsum(size) - size
+    apexes[four] = parts.closed.corners[by_region[first[four]], 0]
+    whole = parts.whole[parts.region_surface]
+    wanted = np.flatnonzero(~folded & (apexes < 0) & whole)
+    at, points = _grouped(parts.region, parts.closed.corners, count)
+    owner = parts.closed.owner[parts.region_surface[wanted]]
+    found = np.array(_pinned(pairing, _groups(at, points, wanted), AMID, owner), int)
+    apexes[wanted] = found
+    doubtful[owner[found < 0]] = True
+    return apexes
+
+
+def _coned(
+    parts: Parts,
+    middles: Int[np.ndarray, " curves"],
+    apexes: Int[np.ndarray, " regions"],
+    wanted: Bool[np.ndarray, " S"],
+) -> Balls:
+    """Tetrahedra from the apex of each region to its triangles and to the folds around it."""
+    closed = parts.closed
+    fans, sides = fans_of(parts, middles)
+    proper = wanted[parts.curve_surface[parts.curve[sides]]]
+    fans, sides = fans[proper], sides[proper]
+    fan_surface, beside = parts.curve_surface[parts.curve[sides]], parts.beside[sides]
+    facets = np.concatenate([closed.corners, fans, fans])
+    region = np.concatenate([parts.region, beside[:, 0], beside[:, 1]])
+    apex, surface = apexes[region], parts.region_surface[region]
+    kept = wanted[surface] & (facets != apex[:, None]).all(axis=1)
+    lids = closed.lid & wanted[closed.surface]
+    met = parts.curve_met[parts.curve[sides]]
+    return Balls(
+        np.concatenate([facets, apex[:, None]], axis=1)[kept],
+        parts.region_index[region[kept]],
+        closed.owner[surface[kept]],
+        fans[~met],
+        closed.owner[fan_surface[~met]],
+        closed.corners[lids],
+        closed.owner[closed.surface[lids]],
+        fans[met],
+        closed.owner[fan_surface[met]],
+        np.zeros(0, int),
+    )
+
+
+def _pinned(
+    pairing: Pairing,
+    groups: Sequence[Sequence[int]],
+    kind: int,
+    owner: Int[np.ndarray, " groups"],
+    *,
+    cap: bool = False,
+) -> list[int]:
+    """Numbers of new exact points of a kind amid groups over grid tetrahedra; −1 where none is.
+
+    Crossings belong to two surfaces, whose groups are the same; `cap`: on a constraint.
+    """
+    if kind == CROSSING:
+        return _shared(pairing, groups, owner, cap=cap)
+    return _new(pairing, groups, kind, owner, cap=cap)
+
+
+def _shared(
+    pairing: Pairing,
+    groups: Sequence[Sequence[int]],
+    owner: Int[np.ndarray, " groups"],
+    *,
+    cap: bool,
+) -> list[int]:
+    """Numbers of new crossings amid groups that are given twice."""
+    keys = [tuple(group) for group in groups]
+    once = {key: keys.count(key) for key in keys}
+    over = dict(zip(keys, owner.tolist(), strict=True))
+    own = np.array([over[key] for key in once], int)
+    found = dict(zip(once, _new(pairing, list(once), CROSSING, own, cap=cap), strict=True))
+    return [found[key] if once[key] == SHEETS else -1 for key in keys]
+
+
+def _new(
+    pairing: Pairing,
+    groups: Sequence[Sequence[int]],
+    kind: int,
+    owner: Int[np.ndarray, " groups"],
+    *,
+    cap: bool,
+) -> list[int]:
+    """Numbers of new exact points of a kind amid groups; −1 where none was found."""
+    out = [-1] * len(groups)
+    if not groups:
+        return out
+    store = pairing.points
+    pinned = recalled_pin(
+        pairing.journal, groups, kind, lambda: _pin_inside(pairing, groups, kind, owner, cap=cap)
+    )
+    for lane in np.flatnonzero(pinned.found).tolist():
+        # on folds and crossings that of the lower side, elsewhere that of all
+        low = int(store.index[list(groups[lane])].min())
+        out[lane] = store.add(pinned.z[lane], pinned.p[lane], low, kind)
+    return out
+
+
+def _pin_inside(
+    pairing: Pairing,
+    groups: Sequence[Sequence[int]],
+    kind: int,
+    owner: Int[np.ndarray, " groups"],
+    *,
+    cap: bool,
+) -> Pinned:
+    """Pin points inside their grid tetrahedra; crossings, and folds if need be, in the box."""
+    setting, mesh = pairing.setting, pairing.mesh
+    span = np.tile(np.eye(len(setting.free)), (len(groups), 1, 1))
+    if kind == CROSSING:
+        pinned = pin_crossings(setting, pairing.points, groups, span, cap)
+    else:
+        frames = mesh.vertices[mesh.tetrahedra[owner]]
+        pinned = pin_confined(setting, pairing.points, groups, kind, span, frames)
+    inside = mesh.covers(pinned.p[:, setting.free])
+    return Pinned(pinned.z, pinned.p, pinned.found & inside)

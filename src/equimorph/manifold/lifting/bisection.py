@@ -1,0 +1,160 @@
+"""Bisection of edges of a base mesh, with everything around them."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.complex.base_mesh import BaseMesh
+
+
+def bisect(
+    mesh: BaseMesh, chosen: Int[np.ndarray, " some"], mirrored: tuple[bool, ...]
+) -> BaseMesh:
+    """Split edges at their midpoints, and the triangles and tetrahedra around them.
+
+    Where the midpoint lies on a line of symmetry the edge is split off it.
+
+    Edges are split one after the other; one that shares a cell with an earlier one of the same
+    call waits for another call, so that every cell is split at most once.
+    """
+    growth = _Growth.of(mesh)
+    touched = np.zeros(len(mesh.cells), bool)
+    by_triangle, by_tetrahedron = _around(mesh, chosen)
+    for edge in chosen.tolist():
+        cells = (by_triangle if mesh.dimension == 2 else by_tetrahedron)[edge]
+        if touched[cells].any():
+            continue
+        touched[cells] = True
+        _split(growth, mesh, edge, mirrored, (by_triangle[edge], by_tetrahedron[edge]))
+    return growth.mesh(mesh)
+
+
+@dataclass
+class _Growth:
+    """Rows of a mesh that is being bisected: old arrays, changed in place, and rows to append."""
+
+    triangles: Int[np.ndarray, "T 3"]
+    sides: Int[np.ndarray, "T 3"]
+    tetrahedra: Int[np.ndarray, "N 4"]
+    faces: Int[np.ndarray, "N 4"]
+    vertices: list[Float[np.ndarray, " d"]] = field(default_factory=list)
+    edges: list[tuple[int, int]] = field(default_factory=list)
+    more_triangles: list[tuple[list[int], list[int]]] = field(default_factory=list)
+    more_tetrahedra: list[tuple[list[int], list[int]]] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, mesh: BaseMesh) -> "_Growth":
+        """Nothing split yet."""
+        triangles, tetrahedra = mesh.triangles.copy(), mesh.tetrahedra.copy()
+        return cls(triangles, mesh.sides.copy(), tetrahedra, mesh.faces.copy())
+
+    def mesh(self, old: BaseMesh) -> BaseMesh:
+        """Put the rows together."""
+
+        def joined(rows: np.ndarray, more: list[list[int]]) -> np.ndarray:
+            return np.concatenate([rows, np.array(more, int).reshape(-1, rows.shape[1])])
+
+        return replace(
+            old,
+            vertices=np.concatenate([old.vertices, *(each[None] for each in self.vertices)]),
+            edges=np.concatenate([old.edges, np.array(self.edges, int).reshape(-1, 2)]),
+            triangles=joined(self.triangles, [row[0] for row in self.more_triangles]),
+            sides=joined(self.sides, [row[1] for row in self.more_triangles]),
+            tetrahedra=joined(self.tetrahedra, [row[0] for row in self.more_tetrahedra]),
+            faces=joined(self.faces, [row[1] for row in self.more_tetrahedra]),
+        )
+
+
+def _around(
+    mesh: BaseMesh, chosen: Int[np.ndarray, " some"]
+) -> tuple[dict[int, list[int]], dict[int, list[int]]]:
+    """Triangles and tetrahedra that contain each of some edges."""
+    wanted = np.zeros(len(mesh.edges), bool)
+    wanted[chosen] = True
+    triangles: dict[int, list[int]] = {int(edge): [] for edge in chosen}
+    tetrahedra: dict[int, list[int]] = {int(edge): [] for edge in chosen}
+    has = wanted[mesh.sides]
+    for triangle, side in zip(*np.nonzero(has), strict=True):
+        triangles[int(mesh.sides[triangle, side])].append(int(triangle))
+    for cell in np.flatnonzero(has.any(axis=1)[mesh.faces].any(axis=1)):
+        sides = np.unique(mesh.sides[mesh.faces[cell]])
+        for edge in sides[wanted[sides]]:
+            tetrahedra[int(edge)].append(int(cell))
+    return triangles, tetrahedra
+
+
+def _split(
+    growth: _Growth,
+    mesh: BaseMesh,
+    edge: int,
+    mirrored: tuple[bool, ...],
+    around: tuple[list[int], list[int]],
+) -> None:
+    """Split an edge and the triangles and tetrahedra around it, none of which was split before."""
+    a, b = mesh.edges[edge].tolist()
+    middle = len(mesh.vertices) + len(growth.vertices)
+    growth.vertices.append(_between(mesh.vertices[a], mesh.vertices[b], mirrored))
+    first_edge, half_edges = len(mesh.edges), {}
+    for end in (a, b):
+        half_edges[end] = first_edge + len(growth.edges)
+        growth.edges.append((end, middle))
+    cuts: dict[int, int] = {}
+    halves: dict[tuple[int, int], int] = {}
+    for t in around[0]:
+        k = mesh.sides[t].tolist().index(edge)
+        first, second, apex = (int(mesh.triangles[t, (k + m) % 3]) for m in range(3))
+        to_apex, from_apex = int(mesh.sides[t, (k + 1) % 3]), int(mesh.sides[t, (k + 2) % 3])
+        cuts[apex] = cut = first_edge + len(growth.edges)
+        growth.edges.append((apex, middle))
+        growth.triangles[t] = [first, middle, apex]
+        growth.sides[t] = [half_edges[first], cut, from_apex]
+        halves[apex, first] = t
+        halves[apex, second] = len(mesh.triangles) + len(growth.more_triangles)
+        growth.more_triangles.append(([middle, second, apex], [half_edges[second], to_apex, cut]))
+    for cell in around[1]:
+        _split_tetrahedron(growth, mesh, cell, (a, b, middle), (cuts, halves))
+
+
+def _split_tetrahedron(
+    growth: _Growth,
+    mesh: BaseMesh,
+    cell: int,
+    ends: tuple[int, int, int],
+    known: tuple[dict[int, int], dict[tuple[int, int], int]],
+) -> None:
+    """Part a tetrahedron by the triangle through the middle of the edge and the other corners."""
+    a, b, middle = ends
+    cuts, halves = known
+    corners, faces = mesh.tetrahedra[cell].tolist(), mesh.faces[cell].tolist()
+    at = {corner: k for k, corner in enumerate(corners)}
+    c, d = (corner for corner in corners if corner not in {a, b})
+    far = _side_between(mesh, faces[at[a]], (c, d))
+    wall = len(mesh.triangles) + len(growth.more_triangles)
+    growth.more_triangles.append(([middle, c, d], [cuts[c], far, cuts[d]]))
+    parts = []
+    for kept, lost in ((a, b), (b, a)):
+        part, sides = corners.copy(), faces.copy()
+        part[at[lost]] = middle
+        # opposite to the middle lies what lay opposite to the lost corner
+        sides[at[kept]] = wall
+        sides[at[c]], sides[at[d]] = halves[d, kept], halves[c, kept]
+        parts.append((part, sides))
+    growth.tetrahedra[cell], growth.faces[cell] = parts[0]
+    growth.more_tetrahedra.append(parts[1])
+
+
+def _side_between(mesh: BaseMesh, triangle: int, pair: tuple[int, int]) -> int:
+    """Side of a triangle between two of its corners."""
+    sides: list[int] = mesh.sides[triangle].tolist()
+    return next(side for side in sides if set(mesh.edges[side].tolist()) == set(pair))
+
+
+def _between(
+    a: Float[np.ndarray, " d"], b: Float[np.ndarray, " d"], mirrored: tuple[bool, ...]
+) -> Float[np.ndarray, " d"]:
+    """Middle of an edge, or a point beside it if the middle lies on a line of symmetry."""
+    middle = 0.5 * (a + b)
+    on_line: Bool[np.ndarray, " d"] = np.array(mirrored)
+    on_line = on_line & (np.abs(middle) < 1e-9 * np.abs(b - a).max())
+    return np.asarray(0.6 * a + 0.4 * b if on_line.any() else middle)

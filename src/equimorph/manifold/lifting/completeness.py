@@ -1,0 +1,140 @@
+"""Are there equilibria that a set lacks? Ask an independent search, and lift what it finds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria import search_points
+from equimorph.equilibria.newton import newton
+from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.lifting.seeds import polished
+from equimorph.manifold.lookup.straight_lifts import lift_to
+from equimorph.model import Findings, Journal, Progress, position, recalled, step_of
+from equimorph.structures import States
+
+APART = 1e-5
+"""Distance in the metric above which two equilibria are two."""
+STARTS = 200
+SCATTERED = 2000
+"""Random points, with one random guess each, from which Newton starts beside the searches."""
+ITERATIONS = 40
+"""Of Newton's method from there, at most."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """How many equilibria a search found, and those of them that the set lacks."""
+
+    found: int
+    missing: States
+
+
+def check(
+    eset: EquilibriumSet,
+    generator: np.random.Generator,
+    points: int,
+    progress: Progress,
+    journal: Journal,
+) -> Check:
+    """Search at random points, half of them anywhere in the box, half below the set.
+
+    Thoroughly at `points`, and from one guess each at `SCATTERED` others: so pieces over a small
+    part of the box are seen, too.
+    """
+    progress.report("independent checks", 0, points)
+    chosen = [
+        _in_the_box(eset, generator)
+        if number % 2 == 1 or len(eset.cells) == 0
+        else _below(eset, generator)
+        for number in range(points)
+    ]
+    places = [dict(zip(eset.names, point.tolist(), strict=True)) for point in chosen]
+    if not places:
+        return Check(0, eset.points[:0])
+    seed = int(generator.integers(2**31))
+    step = step_of("check", np.stack(chosen))
+    found, z, p = recalled(journal, step, lambda: _missing(eset, places, seed))
+    return Check(int(found), States(eset.structure, z, p))
+
+
+def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) -> Findings:
+    """How many equilibria the searches find, and those that the set lacks."""
+    searched = search_points(
+        eset.structure,
+        np.stack([eset.parameters_at(at) for at in places]),
+        within=eset.constraints,
+        starts=STARTS,
+        seed=seed,
+    )
+    scattered = _scattered(eset, SCATTERED, np.random.default_rng(seed))
+    found = _together([*searched, scattered])
+    lacking = _lacking(found, eset)
+    return np.array(len(found)), lacking.z, lacking.p
+
+
+def _together(parts: Sequence[States]) -> States:
+    """All states of some batches, at least one."""
+    z, p = (np.concatenate(columns) for columns in ([q.z for q in parts], [q.p for q in parts]))
+    return States(parts[0].structure, z, p)
+
+
+def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator) -> States:
+    """Equilibria to which Newton leads from random guesses, each over its own point of the box."""
+    structure, names = eset.structure, eset.names
+    middle = dict(zip(names, (0.5 * (eset.box.lower + eset.box.upper)).tolist(), strict=True))
+    p = np.tile(eset.parameters_at(middle), (count, 1))
+    free = [position(structure.parameters, name) for name in names]
+    p[:, free] = generator.uniform(eset.box.lower, eset.box.upper, (count, len(free)))
+    z, found = newton(structure, structure.sample(p, generator), p, iterations=ITERATIONS)
+    found[found] = structure.resolved(z[found], p[found])
+    for constraint in eset.constraints:
+        found[found] = constraint.excess(z[found], p[found]) <= 0.0
+    return States(structure, z[found], p[found])
+
+
+def _lacking(found: States, eset: EquilibriumSet) -> States:
+    """Those of the states, each over its own point, that a set lacks."""
+    known = eset.over(**{name: found[name] for name in eset.names})
+    n, mass = eset.structure.unknowns, eset.structure.mass
+    gap = np.sqrt((known.states.z - found.z[known.point])[:, :n] ** 2 @ mass)
+    closest = np.full(len(found), np.inf)
+    np.minimum.at(closest, known.point, gap)
+    return found[np.flatnonzero(closest > APART)]
+
+
+def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:
+    cell = eset.cells[generator.integers(len(eset.cells))]
+    return np.asarray(generator.dirichlet(np.ones(len(cell))) @ eset.coordinates[cell])
+
+
+def _in_the_box(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:
+    return np.asarray(generator.uniform(eset.box.lower, eset.box.upper))
+
+
+def seeds_from(setting: Setting, mesh: BaseMesh, missing: States) -> Findings:
+    """Equilibria over the corners of grid cells around states and around their mirror images.
+
+    Vertices, unknowns, parameters, index, and the number of the state that each comes from.
+    """
+    states = _together([missing, *_images(setting, missing)])
+    cells = np.array([mesh.locate(point) for point in states.p[:, setting.free]], dtype=int)
+    vertices = mesh.cells[cells]
+    origin = np.repeat(np.arange(len(states)), vertices.shape[1])
+    targets = setting.parameters(mesh.vertices[vertices.ravel()])
+    z, which = lift_to(states[origin], targets, setting.constraints)
+    found, good = polished(setting, mesh, vertices.ravel()[which], z)
+    return (*found, origin[which][good])
+
+
+def _images(setting: Setting, states: States) -> list[States]:
+    """Mirror images at the same values of the parameters that are not free."""
+    images = []
+    for symmetry in setting.structure.symmetries():
+        z, p = symmetry.apply(states.z, states.p)
+        kept = (np.delete(p - setting.base, setting.free, axis=1) == 0.0).all(axis=1)
+        images.append(States(states.structure, z[kept], p[kept]))
+    return images

@@ -1,0 +1,156 @@
+"""Both curves through every point at which curves over an edge cross.
+
+Where only one is known, the other is started by branch switching. If the other is known but was
+lifted in a step that did not notice the crossing, it is traced again in finer steps.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria.critical import null_border
+from equimorph.equilibria.fronts import Front, step_along
+from equimorph.equilibria.outcome import follow
+from equimorph.equilibria.tracing import ARRIVAL, RETURN
+from equimorph.manifold.geometry.crossing_points import reduction
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import Aim
+from equimorph.manifold.lifting.flood import flood
+from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.seeds import Seeds, polished
+from equimorph.manifold.lifting.traced_edges import EFFORTS
+from equimorph.model import Progress, recalled, step_of
+
+DISTANCES = (0.03, 0.003, 0.0003)
+"""Lengths of the first step from a crossing, in the metric, tried one after the other."""
+TURNS = 4
+"""How often a new curve may turn back before it has reached a vertex."""
+CURVES = 2
+"""Through each crossing."""
+
+
+def flood_crossings(pairing: Pairing, progress: Progress) -> None:
+    """Flood, and go on until both curves through each crossing are known, if they can be."""
+    flood(pairing, progress)
+    for number in range(EFFORTS - 1):
+        alone = lonely(pairing)
+        if len(alone) == 0:
+            return
+        if number == 0:
+            _switch(pairing, alone)
+        else:
+            _trace_again(pairing, alone)
+        flood(pairing, progress)
+
+
+def lonely(pairing: Pairing) -> Int[np.ndarray, " n"]:
+    """Crossings of edges in use through which other than two curves lead."""
+    curves, used = pairing.curves, pairing.mesh.edges_in_use
+    through = {point: 0 for edge, own in pairing.crossings.items() if used[edge] for point in own}
+    for curve, inner in curves.inner.items():
+        for point in inner:
+            if point in through and pairing.alive(curve):
+                through[point] += 1
+    return np.array([point for point, count in through.items() if 0 < count != CURVES], int)
+
+
+def _trace_again(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
+    """Forget plain curves over the edges of crossings, and have them traced with more care."""
+    edges = set(pairing.points.edge[alone].tolist())
+    curves = pairing.curves
+    for curve, edge in enumerate(curves.edge):
+        if edge in edges and pairing.alive(curve):
+            pairing.forget(curve)
+    for edge in edges:
+        pairing.effort[edge] = min(pairing.effort[edge] + 1, EFFORTS - 1)
+
+
+def _switch(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
+    """Enter the equilibria over vertices that the curves through crossings lead to."""
+    step = step_of("switch", alone)
+    pairing.points.over_vertices(*recalled(pairing.journal, step, lambda: _beyond(pairing, alone)))
+    pairing.fit()
+
+
+def _beyond(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> Seeds:
+    """Equilibria over vertices that the curves through crossings lead to."""
+    store, mesh, setting = pairing.points, pairing.mesh, pairing.setting
+    reached = []
+    ends = setting.parameters(mesh.vertices[mesh.edges[store.edge[alone]].ravel()])
+    ends = ends.reshape(len(alone), 2, -1)
+    line = ParameterLine(setting.structure, ends[:, 0].copy(), ends[:, 1] - ends[:, 0])
+    owner, front = _starts(pairing, alone, line)
+    towards = (front.tangent_t > 0.0).astype(int)
+    z, p = front.z, line.take(owner).parameters(front.t)
+    edges = store.edge[alone[owner]]
+    for _ in range(TURNS):
+        goal = mesh.edges[edges, towards]
+        way = setting.parameters(mesh.vertices[goal]) - p
+        options = TraceOptions(
+            through_folds=True, through_branch_points=True, first_step=0.005, record=False
+        )
+        outcome = follow(ParameterLine(setting.structure, p, way), z, setting.constraints, options)
+        there = outcome.code == ARRIVAL
+        reached.append(polished(setting, mesh, goal[there], outcome.z[there])[0])
+        back = np.flatnonzero(outcome.code == RETURN)
+        z, p, edges, towards = outcome.z[back], p[back], edges[back], 1 - towards[back]
+        if len(back) == 0:
+            break
+    vertices, z, p, index = (np.concatenate(column) for column in zip(*reached, strict=True))
+    return vertices, z, p, index
+
+
+def _starts(
+    pairing: Pairing, alone: Int[np.ndarray, " n"], line: ParameterLine
+) -> tuple[Int[np.ndarray, " m"], Front]:
+    """Points on the half-branches at each crossing, and which crossing each belongs to."""
+    store = pairing.points
+    z, p = store.z[alone], store.p[alone]
+    t = np.einsum("li,li->l", p - line.start, line.velocity) / (line.velocity**2).sum(axis=1)
+    tangents = _tangents(pairing, line, z, p)
+    owner = np.repeat(np.arange(len(alone)), 4)
+    here = Front(z[owner], t[owner], *tangents, np.zeros(len(owner), int))
+    good = np.zeros(len(owner), bool)
+    there = here
+    for distance in DISTANCES:
+        todo = np.flatnonzero(~good)
+        if len(todo) == 0:
+            break
+        front, found = step_along(
+            line.take(owner[todo]), here.take(todo), np.full(len(todo), distance)
+        )
+        inside = found & (front.t > 0.0) & (front.t < 1.0)
+        wide = Front(*(each.copy() for each in vars(there).values()))
+        for name, column in vars(wide).items():
+            column[todo[inside]] = getattr(front, name)[inside]
+        there, good[todo[inside]] = wide, True
+    at = np.flatnonzero(good)
+    return owner[at], there.take(at)
+
+
+def _tangents(
+    pairing: Pairing,
+    line: ParameterLine,
+    z: Float[np.ndarray, "n size"],
+    p: Float[np.ndarray, "n P"],
+) -> tuple[Float[np.ndarray, "m size"], Float[np.ndarray, " m"]]:
+    """Unit tangents of the four half-branches at crossings: isotropic vectors of the Hessian."""
+    setting = pairing.setting
+    structure = setting.structure
+    span = line.velocity[:, setting.free] / setting.scales
+    length = np.linalg.norm(span, axis=1)
+    place = embed(setting, z, p)
+    aim = Aim(
+        setting, False, False, (span / length[:, None])[:, None], place, place[:, None][:, :0]
+    )
+    known = reduction(aim, z, p, null_border(structure, z, p))
+    values, vectors = np.linalg.eigh(known.hessian)
+    low, high = np.sqrt(np.maximum(-values[:, :1], 0.0)), np.sqrt(np.maximum(values[:, 1:], 0.0))
+    pair = [high * vectors[:, :, 0] + sign * low * vectors[:, :, 1] for sign in (1.0, -1.0)]
+    four = np.stack([sign * each for each in pair for sign in (1.0, -1.0)], axis=1)
+    dz = np.einsum("lfk,lki->lfi", four, known.along_z).reshape(-1, z.shape[1])
+    dt = (four[:, :, 1] / length[:, None]).ravel()
+    weight = np.repeat(line.weight, 4)
+    n = structure.unknowns
+    norm = np.sqrt(dz[:, :n] ** 2 @ structure.mass + (weight * dt) ** 2)
+    return dz / norm[:, None], dt / norm

@@ -1,0 +1,222 @@
+"""Polygons of two sheets that cross over one grid triangle share the chords of their crossing.
+
+Each crossing point lies on two polygons. Where a fold of one of the sheets crosses that chord, too,
+all meet in a hub: an exact crossing point at which a test function of the fold vanishes.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import brentq
+
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.manifold.geometry.crossing_points import corrected_crossings, pin_crossings
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, lower_index
+from equimorph.manifold.geometry.points import CROSSING
+from equimorph.manifold.lifting.disc_plans import Plan, chord_of, planes
+from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.polygon_cuts import MEETING, TURN, Chord
+
+Ways = list[list[Chord]]
+
+COMBINATIONS = 256
+"""Ways to cut all polygons over a triangle beyond which it is undecided at once."""
+SHEETS = 2
+"""To each of which a crossing belongs."""
+HUB = 1e-13
+"""Precision of the place of a hub, relative to its chord."""
+NEAR, FAR = 1e-6, 1e-3
+"""The same where a second eigenvalue vanishes: what is wanted, and what is good enough."""
+SKEW = 1e-4
+"""Quadratic over cubic coefficient, a length in the metric, below which it counts as zero."""
+
+
+def join_crossings(plans: list[Plan], ways: list[Ways]) -> list[Ways]:
+    """Ways to cut polygons that agree on the chords along which their sheets cross."""
+    ways, groups = list(ways), _by_triangle(plans)
+    for own in groups.values():
+        choices = [ways[k] or _around_a_hub(plans[k]) for k in own]
+        size = int(np.prod([len(each) for each in choices]))
+        fitting = [
+            combination
+            for combination in (product(*choices) if size <= COMBINATIONS else [])
+            if _agree([plans[k] for k in own], combination)
+        ]
+        for place, k in enumerate(own):
+            ways[k] = [fitting[0][place]] if len(fitting) == 1 else []
+    return ways
+
+
+def _by_triangle(plans: list[Plan]) -> dict[int, list[int]]:
+    """Numbers of the plans with crossings, by grid triangle."""
+    groups: dict[int, list[int]] = {}
+    for k, plan in enumerate(plans):
+        if plan.those(MEETING):
+            groups.setdefault(plan.polygon.triangle, []).append(k)
+    return groups
+
+
+def _around_a_hub(plan: Plan) -> Ways:
+    """Chord of the crossing if fold points and crossings follow each other in turn."""
+    singular = [point for point in plan.points if plan.singular(point)]
+    kinds = [plan.singular(point) for point in singular]
+    met = plan.those(MEETING)
+    in_turn = kinds in ([TURN, MEETING] * SHEETS, [MEETING, TURN] * SHEETS)
+    return [[chord_of(*met)]] if in_turn else []
+
+
+def _agree(plans: list[Plan], ways: Iterable[list[Chord]]) -> bool:
+    """Whether each chord between crossings is that of two polygons."""
+    count: dict[Chord, int] = {}
+    for plan, way in zip(plans, ways, strict=True):
+        for chord in way:
+            if plan.singular(chord[0]) == MEETING:
+                count[chord] = count.get(chord, 0) + 1
+    return all(number == SHEETS for number in count.values())
+
+
+def put_hubs(pairing: Pairing, plans: list[Plan]) -> set[int]:
+    """Lead folds that cross a chord of a crossing through a hub; return triangles without one."""
+    lost: set[int] = set()
+    plans = [plan for plan in plans if CROSSING in plan.kinds.values()]
+    for hub in [plan for plan in plans if plan.those(TURN) and _joined(plan) < _singular(plan)]:
+        triangle, chord = hub.polygon.triangle, hub.chords[0]
+        point = _hub(pairing, triangle, chord)
+        if point is None:
+            lost.add(triangle)
+            continue
+        for plan in plans:
+            if plan.polygon.triangle == triangle and chord in plan.chords:
+                plan.middle[chord] = point
+        hub.chords = [chord, *((fold, point) for fold in hub.those(TURN))]
+    return lost
+
+
+def _joined(plan: Plan) -> int:
+    return 2 * len(plan.chords)
+
+
+def _singular(plan: Plan) -> int:
+    return len(plan.those(TURN)) + len(plan.those(MEETING))
+
+
+def split_crossings(
+    pairing: Pairing, plans: list[Plan], wanted: set[tuple[int, Chord]]
+) -> list[int]:
+    """Put exact points on chords of crossings, for both sheets; return triangles without one."""
+    known = {(plan.polygon.triangle, chord) for plan in plans for chord in plan.middle}
+    todo = sorted(wanted - known)
+    points = _pinned(pairing, todo, cap=False)
+    at = dict(zip(todo, points, strict=True))
+    for plan in plans:
+        for chord in plan.chords:
+            point = at.get((plan.polygon.triangle, chord))
+            if point is not None:
+                plan.middle[chord] = point
+    return [triangle for (triangle, _), point in at.items() if point is None]
+
+
+def pin_ends(pairing: Pairing, plans: list[Plan]) -> list[int | None]:
+    """Where crossings leave through a constraint, the same point for both sheets."""
+    keys = [(plan.polygon.triangle, tuple(sorted(plan.those(MEETING)))) for plan in plans]
+    groups = {
+        (key[0], (plan.points[0], plan.points[-1], *key[1])): key
+        for key, plan in zip(keys, plans, strict=True)
+        if keys.count(key) == SHEETS
+    }
+    first = {key: group for group, key in reversed(groups.items())}
+    points = _pinned(pairing, list(first.values()), cap=True)
+    at = dict(zip(first, points, strict=True))
+    return [at.get(key) for key in keys]
+
+
+def _pinned(
+    pairing: Pairing, wanted: Sequence[tuple[int, tuple[int, ...]]], *, cap: bool
+) -> list[int | None]:
+    """Numbers of new crossing points amid points over triangles; None where none was found."""
+    if not wanted:
+        return []
+    setting, store = pairing.setting, pairing.points
+    span = planes(pairing, [triangle for triangle, _ in wanted])
+    pinned = pin_crossings(setting, store, [group for _, group in wanted], span, cap)
+    good = pinned.found & pairing.mesh.covers(pinned.p[:, setting.free])
+    low = lower_index(setting, pinned.z, pinned.p)
+    return [
+        store.add(pinned.z[k], pinned.p[k], int(low[k]), CROSSING) if good[k] else None
+        for k in range(len(wanted))
+    ]
+
+
+def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
+    """Crossing between two others at which a fold of a sheet crosses, too.
+
+    There the quadratic coefficient of the reduced equation changes its sign; at pitchforks, where
+    it is zero all along, the cubic one does, or its inverse if another eigenvalue vanishes.
+    """
+    if chord in pairing.hubs:
+        return pairing.hubs[chord]
+    setting, store, ends = pairing.setting, pairing.points, list(chord)
+    z, p = store.z[ends], store.p[ends]
+    place = embed(setting, z, p)
+    way = place[1] - place[0]
+    length = float(np.linalg.norm(way))
+    span, rows = planes(pairing, [triangle]), (way / length)[None, None]
+    sense = null_border(setting.structure, z[:1], p[:1])[0]
+    quadratic, cubic = _coefficients(pairing, z, p, sense)
+    other = int(np.ptp(lower_index(setting, z, p)))
+    skew = (np.abs(quadratic) > SKEW * np.abs(cubic)).any()
+    found: list[Pinned] = []
+
+    def test(share: float) -> float:
+        aim = Aim(setting, False, False, span, (place[0] + share * way)[None], rows)
+        guess_z, guess_p = ((1.0 - share) * each[:1] + share * each[1:] for each in (z, p))
+        pinned = corrected_crossings(aim, guess_z, guess_p, np.array([length]))
+        if not pinned.found[0]:
+            raise _NoCrossingError
+        found.append(pinned)
+        values = _coefficients(pairing, pinned.z, pinned.p, sense)
+        return float(1.0 / values[1][0] if other else values[1 - skew][0])
+
+    try:
+        _halve(test) if other else test(brentq(test, 0.0, 1.0, xtol=HUB))
+    except (_NoCrossingError, ValueError):
+        return None
+    index = int(store.index[ends].min())
+    pairing.hubs[chord] = store.add(found[-1].z[0], found[-1].p[0], index, CROSSING)
+    return pairing.hubs[chord]
+
+
+def _halve(test: Callable[[float], float]) -> None:
+    """Go near a change of sign, at which the test itself may fail: another eigenvalue vanishes."""
+    low, high = 0.0, 1.0
+    sign = np.sign(test(low))
+    while high - low > NEAR:
+        middle = 0.5 * (low + high)
+        try:
+            same = test(middle) * sign > 0.0
+        except _NoCrossingError:
+            if high - low > FAR:
+                raise
+            return
+        low, high = (middle, high) if same else (low, middle)
+
+
+class _NoCrossingError(Exception):
+    """Raised where the search for a hub leaves the crossing."""
+
+
+def _coefficients(
+    pairing: Pairing,
+    z: Float[np.ndarray, "n size"],
+    p: Float[np.ndarray, "n P"],
+    sense: Float[np.ndarray, " size"],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Quadratic and cubic coefficient with null vectors that do not point against `sense`."""
+    structure, n = pairing.setting.structure, pairing.setting.structure.unknowns
+    b = null_border(structure, z, p)
+    norm = np.sqrt(b[:, :n] ** 2 @ structure.mass)
+    at = Critical(structure, z, p, np.ascontiguousarray(b * norm[:, None]))
+    return at.quadratic * np.sign(at.v @ sense), at.cubic

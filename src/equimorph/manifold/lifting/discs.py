@@ -1,0 +1,352 @@
+"""Sheet lifting, part four: polygons become triangulated discs that fit together."""
+
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import pin, recalled_pin
+from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.topology import flags_of
+from equimorph.manifold.lifting.crossing_branches import lonely
+from equimorph.manifold.lifting.crossing_discs import (
+    join_crossings,
+    pin_ends,
+    put_hubs,
+    split_crossings,
+)
+from equimorph.manifold.lifting.disc_plans import SINGULAR, Plan, chord_of, planes
+from equimorph.manifold.lifting.fold_normals import existence_normals
+from equimorph.manifold.lifting.loops import Loops, Polygon
+from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.polygon_cuts import (
+    MEETING,
+    TURN,
+    Chord,
+    Piece,
+    chords_to_split,
+    cut,
+    match_folds,
+    triangulate,
+)
+
+SAME_SIDE = 0.3
+"""Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
+
+
+@dataclass(frozen=True)
+class Discs:
+    """Triangulated discs over the grid triangles.
+
+    corners (n, 3): points; index: of each triangle; owner: the grid triangle below it; folds,
+    caps, crossings: their sides on folds, on constraints, and where sheets cross; doubtful: grid
+    triangles whose polygons could not be closed and cut without doubt. met: which sides ab,
+    bc, ca of each triangle lie on crossings; sheet: number, over its grid triangle, of the smooth
+    sheet that it belongs to.
+    """
+
+    corners: Int[np.ndarray, "n 3"]
+    index: Int[np.ndarray, " n"]
+    owner: Int[np.ndarray, " n"]
+    met: Bool[np.ndarray, "n 3"]
+    sheet: Int[np.ndarray, " n"]
+    folds: Int[np.ndarray, "f 2"]
+    caps: Int[np.ndarray, "c 2"]
+    crossings: Int[np.ndarray, "x 2"]
+    doubtful: Int[np.ndarray, " k"]
+
+
+@dataclass
+class _Found:
+    """What is known of the discs that are not plain triangles."""
+
+    corners: list[tuple[int, int, int]] = field(default_factory=list)
+    index: list[int] = field(default_factory=list)
+    owner: list[int] = field(default_factory=list)
+    sheet: list[int] = field(default_factory=list)
+    folds: set[Chord] = field(default_factory=set)
+    caps: set[Chord] = field(default_factory=set)
+    crossings: set[Chord] = field(default_factory=set)
+    undecided: set[int] = field(default_factory=set)
+
+
+def assemble(pairing: Pairing, loops: Loops) -> Discs:
+    """Triangulate all polygons; plain ones are triangles already."""
+    found = _Found()
+    found.undecided.update(loops.ambiguous, loops.broken)
+    found.undecided.update(_alone(pairing))
+    plans = [_plan(pairing, polygon) for polygon in loops.polygons]
+    _close(pairing, plans, found)
+    plans = _join_folds(pairing, plans, found)
+    _split_chords(pairing, plans, found)
+    _fill(pairing, plans, found)
+    corners = np.concatenate([loops.plain, np.array(found.corners, int).reshape(-1, 3)])
+    crossings = np.array(sorted(found.crossings), int).reshape(-1, 2)
+    return Discs(
+        corners,
+        np.concatenate([pairing.points.index[loops.plain[:, 0]], np.array(found.index, int)]),
+        np.concatenate([loops.plain_triangle, np.array(found.owner, int)]),
+        _on(corners, crossings),
+        np.concatenate([np.zeros(len(loops.plain), int), np.array(found.sheet, int)]),
+        np.array(sorted(found.folds), int).reshape(-1, 2),
+        np.array(sorted(found.caps), int).reshape(-1, 2),
+        crossings,
+        np.array(sorted(found.undecided), int),
+    )
+
+
+def _on(corners: Int[np.ndarray, "n 3"], chosen: Int[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n 3"]:
+    """Which sides ab, bc, ca of triangles are among the chosen ones."""
+    if len(chosen) == 0:
+        return np.zeros(corners.shape, bool)
+    sides = (corners[:, [k, (k + 1) % 3]] for k in range(3))
+    return np.stack([flags_of(side, chosen) for side in sides], axis=1)
+
+
+def _alone(pairing: Pairing) -> list[int]:
+    """Grid triangles beside crossings through which other than two curves lead."""
+    edges = pairing.points.edge[lonely(pairing)]
+    return np.flatnonzero(np.isin(pairing.mesh.sides, edges).any(axis=1)).tolist()
+
+
+def _plan(pairing: Pairing, polygon: Polygon) -> Plan:
+    mesh, store = pairing.mesh, pairing.points
+    at_edge = {edge: 1 << k for k, edge in enumerate(mesh.sides[polygon.triangle].tolist())}
+    at_corner = {
+        vertex: (1 << k) | (1 << (k + 2) % 3)
+        for k, vertex in enumerate(mesh.triangles[polygon.triangle].tolist())
+    }
+    points = np.array(polygon.points)
+    vertices, edges = store.vertex[points].tolist(), store.edge[points].tolist()
+    sides = {
+        point: at_corner[vertex] if vertex >= 0 else at_edge[edge]
+        for point, vertex, edge in zip(polygon.points, vertices, edges, strict=True)
+    }
+    kinds = {point: int(store.kind[point]) for point in polygon.points}
+    return Plan(polygon, list(polygon.points), sides, kinds)
+
+
+def _same_side(plan: Plan, chord: Chord) -> bool:
+    """Whether two points lie on one side of the grid triangle."""
+    first, second = plan.on(chord)
+    return bool(first & second)
+
+
+def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
+    """Close open polygons along the constraint, through a corner if a singular curve leaves there.
+
+    That is a fold, or where another sheet crosses.
+    """
+    wanted = [(plan, _through(plan)) for plan in plans if plan.polygon.open]
+    found.caps.update(
+        chord_of(plan.points[0], plan.points[-1]) for plan, kind in wanted if not kind
+    )
+    wanted = [(plan, kind) for plan, kind in wanted if kind]
+    pairs = [(plan, (plan.points[0], plan.points[-1]), kind) for plan, kind in wanted]
+    extra = _pinned(pairing, pairs)
+    crossing = [k for k, (_, kind) in enumerate(wanted) if kind == CROSSING]
+    ends = pin_ends(pairing, [wanted[k][0] for k in crossing])
+    for k, point in zip(crossing, ends, strict=True):
+        extra[k] = point
+    for (plan, _), point in zip(wanted, extra, strict=True):
+        if point is None:
+            found.undecided.add(plan.polygon.triangle)
+            continue
+        found.caps.update({chord_of(plan.points[0], point), chord_of(plan.points[-1], point)})
+        plan.append(point, int(pairing.points.kind[point]))
+
+
+def _through(plan: Plan) -> int:
+    """Kind of the point through which an open polygon is closed; 0 for none.
+
+    Where the ends of a fold and of a crossing are both missing, no point is found.
+    """
+    if len(plan.those(TURN)) % 2:
+        return CORNER
+    if len(plan.those(MEETING)) % 2:
+        return CROSSING
+    return CAP if _same_side(plan, (plan.points[0], plan.points[-1])) else 0
+
+
+def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan]:
+    """Decide which folds of each polygon belong together; return plans where that is certain."""
+    index = pairing.points.index
+    ways = [
+        match_folds(plan.points, plan.singular, lambda point: int(index[point])) for plan in plans
+    ]
+    several = [k for k, each in enumerate(ways) if len(each) > 1]
+    continuous = _continuous(pairing, [(plans[k], ways[k]) for k in several])
+    for k, each in zip(several, continuous, strict=True):
+        ways[k] = each
+    ways = join_crossings(plans, ways)
+    decided = []
+    for plan, each in zip(plans, ways, strict=True):
+        if len(each) == 1:
+            plan.chords = each[0]
+            decided.append(plan)
+        else:
+            found.undecided.add(plan.polygon.triangle)
+    # what is said of a crossing must be said of both sheets
+    crossed = [bool(plan.those(MEETING)) for plan in decided]
+    decided = [
+        plan
+        for plan, own in zip(decided, crossed, strict=True)
+        if not (own and plan.polygon.triangle in found.undecided)
+    ]
+    lost = put_hubs(pairing, decided)
+    found.undecided.update(lost)
+    return [plan for plan in decided if plan.polygon.triangle not in lost]
+
+
+def _continuous(
+    pairing: Pairing, choices: list[tuple[Plan, list[list[Chord]]]]
+) -> list[list[list[Chord]]]:
+    """Ways in which every chord joins folds whose sheets lie on the same side.
+
+    In the narrow wedge behind a cusp two fold curves run side by side at every scale: there only
+    the side on which the sheets exist tells them apart.
+    """
+    at = [
+        (number, fold)
+        for number, (plan, ways) in enumerate(choices)
+        for fold in sorted({fold for way in ways for chord in way for fold in chord})
+        if plan.singular(fold) == TURN
+    ]
+    if not at:
+        return [ways for _, ways in choices]
+    normals = existence_normals(pairing.setting, pairing.points, np.array([fold for _, fold in at]))
+    flat = _along_sides(pairing, [choices[number][0].polygon.triangle for number, _ in at], normals)
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    normal = dict(zip(at, flat, strict=True))
+    return [
+        [
+            way
+            for way in ways
+            if all(
+                normal[number, a] @ normal[number, b] > SAME_SIDE
+                for a, b in way
+                if plan.singular(a) == TURN
+            )
+        ]
+        for number, (plan, ways) in enumerate(choices)
+    ]
+
+
+def _along_sides(
+    pairing: Pairing, triangles: list[int], normals: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n 2"]:
+    """Components of normals to curves in coordinates in which their grid triangles are equilateral.
+
+    So angles between them do not depend on the scales of the parameters.
+    """
+    mesh = pairing.mesh
+    corners = mesh.vertices[mesh.triangles[triangles]] / pairing.setting.scales
+    sides = corners[:, 1:] - corners[:, :1]
+    first, second = np.einsum("nkd,nd->kn", sides, normals)
+    return np.stack([first, (2.0 * second - first) / np.sqrt(3.0)], axis=1)
+
+
+def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
+    """Put an exact point on chords that would lie on a grid edge, or block triangulation."""
+    wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
+    folds = [(plan, chord) for plan, chord in wanted if plan.singular(chord[0]) == TURN]
+    extra = _pinned(pairing, [(plan, chord, FOLD) for plan, chord in folds])
+    for (plan, chord), point in zip(folds, extra, strict=True):
+        if point is None:
+            found.undecided.add(plan.polygon.triangle)
+        else:
+            plan.middle[chord] = point
+    met = {
+        (plan.polygon.triangle, chord)
+        for plan, chord in wanted
+        if plan.singular(chord[0]) == MEETING
+    }
+    # beside a constraint the crossing might leave between the ends of its chord
+    met |= {
+        (plan.polygon.triangle, chord)
+        for plan in plans
+        for chord in plan.chords
+        if plan.polygon.open and plan.singular(chord[0]) == MEETING and chord not in plan.middle
+        if set(chord) <= set(plan.polygon.points)
+    }
+    found.undecided.update(split_crossings(pairing, plans, met))
+
+
+def _chords_to_split(plan: Plan) -> list[Chord]:
+    """Chords that need a point of their own; see `chords_to_split`."""
+    place = {point: at for at, point in enumerate(plan.points)}
+    chords = {(place[a], place[b]): (a, b) for a, b in plan.chords if {a, b} <= set(place)}
+    chosen = chords_to_split(tuple(plan.on(plan.points)), tuple(chords))
+    return [chords[chord] for chord in chosen]
+
+
+def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int | None]:
+    """Numbers of new exact points of some kind between pairs; None where none was found."""
+    out: list[int | None] = [None] * len(wanted)
+    for kind in (FOLD, CAP, CORNER):
+        own = [k for k, each in enumerate(wanted) if each[2] == kind]
+        if not own:
+            continue
+        pairs = [wanted[k][1] for k in own]
+        span = planes(pairing, [wanted[k][0].polygon.triangle for k in own])
+        pinned = recalled_pin(
+            pairing.journal,
+            pairs,
+            kind,
+            partial(pin, pairing.setting, pairing.points, pairs, kind, span),
+        )
+        good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
+        lows = pairing.points.index[np.array(pairs)].min(axis=1)
+        for lane, low in zip(np.flatnonzero(good).tolist(), lows[good].tolist(), strict=True):
+            out[own[lane]] = pairing.points.add(pinned.z[lane], pinned.p[lane], low, kind)
+    return out
+
+
+def _fill(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
+    """Cut polygons and triangulate their pieces, all pieces with equally many corners together."""
+    by_size: dict[int, list[tuple[Plan, Piece, int]]] = {}
+    for number, plan in enumerate(plans):
+        plan.sheet = number
+        for chord in plan.chords:
+            marked = found.crossings if plan.singular(chord[0]) == MEETING else found.folds
+            if chord in plan.middle:
+                marked.update(chord_of(end, plan.middle[chord]) for end in chord)
+            else:
+                marked.add(chord_of(*chord))
+        for piece in cut(plan.points, plan.chords, plan.middle):
+            index = _index(pairing, piece)
+            if index is None or len(piece) < 3:
+                found.undecided.add(plan.polygon.triangle)
+            else:
+                by_size.setdefault(len(piece), []).append((plan, piece, index))
+    for pieces in by_size.values():
+        _triangulate(pairing, pieces, found)
+
+
+def _index(pairing: Pairing, piece: Piece) -> int | None:
+    """Index of the points of a piece that are not on folds; None if they differ."""
+    kind, own = pairing.points.kind, pairing.points.index
+    index = {int(own[point]) for point in piece if int(kind[point]) not in SINGULAR}
+    return index.pop() if len(index) == 1 else None
+
+
+def _triangulate(pairing: Pairing, pieces: list[tuple[Plan, Piece, int]], found: _Found) -> None:
+    """Enter the triangles of pieces with equally many corners."""
+    store = pairing.points
+    corners = np.array([piece for _, piece, _ in pieces])
+    places = embed(pairing.setting, store.z[corners.ravel()], store.p[corners.ravel()])
+    sides = np.array([plan.on(piece) for plan, piece, _ in pieces])
+    triangles, possible = triangulate(places.reshape(*corners.shape, -1), sides)
+    rows = np.arange(len(corners))[:, None, None]
+    for (plan, _, index), own, good in zip(
+        pieces, corners[rows, triangles].tolist(), possible.tolist(), strict=True
+    ):
+        if not good:
+            found.undecided.add(plan.polygon.triangle)
+            continue
+        found.corners.extend(own)
+        found.index.extend([index] * len(own))
+        found.owner.extend([plan.polygon.triangle] * len(own))
+        found.sheet.extend([plan.sheet] * len(own))

@@ -1,0 +1,124 @@
+"""Sheet lifting, part two: lift edges from all known points until nothing new appears.
+
+From each known equilibrium over an edge's end, the edge is lifted: the curve ends over the other
+end, or turns at folds and comes back as another equilibrium over the same end, or leaves through a
+constraint. New ends are new equilibria.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.errors import InputError
+from equimorph.manifold.geometry.points import GRID, Points
+from equimorph.manifold.lifting.pairing import HARD, LONG, UNTRACED, Pairing, Rays
+from equimorph.manifold.lifting.single_steps import lift_directly
+from equimorph.manifold.lifting.traced_edges import trace
+from equimorph.model import Progress, step_of
+
+STEPS = 4
+"""Into so many equal steps long edges are cut before they count as hard."""
+CHUNK = 4096
+ENDLESS = 250
+"""More equilibria than this over one point, and the set is refused: it may wind for ever."""
+
+Lifted = tuple[Bool[np.ndarray, " rays"], Float[np.ndarray, "n size"]]
+"""Which rays could be lifted, and where those end."""
+
+
+def flood(pairing: Pairing, progress: Progress) -> None:
+    """Lift edges from all known points until every ray is traced or given up.
+
+    All rays that one step can lift go first, then those that a few equal steps can; the others wait
+    and are traced many at a time.
+    """
+    while True:
+        flood_directly(pairing, progress)
+        long = pairing.marked(LONG)
+        if len(long.points):
+            _lift(pairing, long, STEPS)
+            continue
+        hard = _one_of_each_pair(pairing, pairing.marked(HARD))
+        if len(hard.points) == 0:
+            return
+        for at in range(0, len(hard.points), CHUNK):
+            trace(pairing, hard.take(slice(at, at + CHUNK)))
+
+
+def flood_directly(pairing: Pairing, progress: Progress) -> None:
+    """Lift edges from all known points as far as single steps lead."""
+    pairing.fit()
+    while len((rays := pairing.marked(UNTRACED)).points):
+        _lift(pairing, rays, 1)
+        _refuse_endless(pairing)
+        live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == GRID)
+        progress.report("lifting edges", int(live), None)
+
+
+def _refuse_endless(pairing: Pairing) -> None:
+    """Raise InputError if a set grows without end, like one that winds around a circle for ever."""
+    store, setting = pairing.points, pairing.setting
+    vertex = store.vertex[: store.count]
+    sheets = np.bincount(vertex[vertex >= 0], minlength=1)
+    if sheets.max() > ENDLESS:
+        p = setting.parameters(pairing.mesh.vertices[sheets.argmax()][None])[0, setting.free]
+        names = [setting.structure.parameters[place].name for place in setting.free]
+        point = ", ".join(f"{name} = {value:g}" for name, value in zip(names, p, strict=True))
+        raise InputError(
+            f"`within` must leave at most {ENDLESS} equilibria over a point; got more over "
+            f"{point}. Bound a descriptor: one that grows as it winds if the set winds for ever, "
+            "displacements if the structure has so many states."
+        )
+
+
+def _one_of_each_pair(pairing: Pairing, rays: Rays) -> Rays:
+    """Rays of even index on edges that have such: one that turns at a fold comes back odd."""
+    even = pairing.points.index[rays.points] % 2 == 0
+    has_even = np.zeros(len(pairing.mesh.edges), bool)
+    has_even[rays.edges[even]] = True
+    return rays.take(even | ~has_even[rays.edges])
+
+
+def _lift(pairing: Pairing, rays: Rays, steps: int) -> None:
+    """Enter the curves of rays that so many steps lift; mark the others for more effort."""
+    pairing.mark(rays, LONG if steps == 1 else HARD)
+    difficult = pairing.effort[rays.edges] > 0
+    pairing.mark(rays.take(difficult), HARD)
+    rays = rays.take(~difficult)
+    for at in range(0, len(rays.points), CHUNK):
+        _lift_some(pairing, rays.take(slice(at, at + CHUNK)), steps)
+
+
+def _lift_some(pairing: Pairing, rays: Rays, steps: int) -> None:
+    store, setting, mesh, journal = pairing.points, pairing.setting, pairing.mesh, pairing.journal
+    step = step_of(f"lift {steps}", rays.points, rays.edges)
+    known = journal.recall(step)
+    good, z = _lifted(pairing, rays, steps) if known is None else _recalled(store, *known)
+    done = rays.take(good)
+    vertices = mesh.edges[done.edges, 1 - done.sides]
+    p = setting.parameters(mesh.vertices[vertices])
+    # where it is lifted in one sweep, the index stays what it was
+    ids, new = store.over_vertices(vertices, z, p, store.index[done.points])
+    if known is None:
+        journal.keep(step, (good, ids, z[new]))
+    pairing.fit()
+    pairing.enter_many(done, ids)
+
+
+def _lifted(pairing: Pairing, rays: Rays, steps: int) -> Lifted:
+    """Lift rays in so many steps: which can be, and their ends."""
+    store = pairing.points
+    start = store.z[rays.points], store.index[rays.points]
+    direct = lift_directly(pairing.line(rays), *start, pairing.setting.constraints, steps)
+    return direct.good, direct.z[direct.good]
+
+
+def _recalled(
+    store: Points,
+    good: Bool[np.ndarray, " rays"],
+    ids: Int[np.ndarray, " n"],
+    fresh: Float[np.ndarray, "new size"],
+) -> Lifted:
+    """Which rays were lifted, and their ends: points that are known by now, and fresh ones."""
+    z, new = np.empty((len(ids), fresh.shape[1])), ids >= store.count
+    z[~new], z[new] = store.z[ids[~new]], fresh[ids[new] - store.count]
+    return good, z

@@ -1,0 +1,250 @@
+"""Sheet lifting, part one: the pairs of equilibria over the ends of grid edges."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria import ParameterLine
+from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.geometry.points import CROSSING, SAME, Points
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.model import Forgetful, Journal
+
+UNTRACED, ABANDONED, LONG, HARD = -1, -2, -3, -4
+"""Marks of rays without a curve: long are those that one step cannot lift, hard if few neither."""
+
+
+@dataclass
+class Curves:
+    """Lifted edges: edge, start point, end point (−1: left through a constraint), inner points."""
+
+    edge: list[int] = field(default_factory=list)
+    start: list[int] = field(default_factory=list)
+    end: list[int] = field(default_factory=list)
+    inner: dict[int, list[int]] = field(default_factory=dict)
+
+    def add(self, edge: int, start: int, end: int, inner: list[int]) -> int:
+        """Add a curve; return its number."""
+        self.edge.append(edge)
+        self.start.append(start)
+        self.end.append(end)
+        if inner:
+            self.inner[len(self.edge) - 1] = inner
+        return len(self.edge) - 1
+
+    def extend(
+        self,
+        edges: Int[np.ndarray, " n"],
+        starts: Int[np.ndarray, " n"],
+        ends: Int[np.ndarray, " n"],
+    ) -> Int[np.ndarray, " n"]:
+        """Add curves without inner points; return their numbers."""
+        numbers = len(self.edge) + np.arange(len(edges))
+        self.edge.extend(edges.tolist())
+        self.start.extend(starts.tolist())
+        self.end.extend(ends.tolist())
+        return numbers
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Edges seen from points over one of their ends: the first or the second."""
+
+    points: Int[np.ndarray, " n"]
+    edges: Int[np.ndarray, " n"]
+    sides: Int[np.ndarray, " n"]
+
+    def take(self, some: Int[np.ndarray, " m"] | Bool[np.ndarray, " n"] | slice) -> "Rays":
+        """Return some of the rays."""
+        return Rays(self.points[some], self.edges[some], self.sides[some])
+
+
+@dataclass
+class Pairing:
+    """Everything known while the set is being lifted."""
+
+    setting: Setting
+    mesh: BaseMesh
+    points: Points
+    curves: Curves
+    rays: Int[np.ndarray, "capacity slots"]
+    """Curve that starts or ends at a point over one of its vertex's edges; `UNTRACED` if none."""
+    slots: Int[np.ndarray, "E 2"]
+    """Place of an edge among those of its two vertices."""
+    incident: Int[np.ndarray, "V slots"]
+    """Edges of each vertex, in the order of their slots; −1 beyond."""
+    effort: Int[np.ndarray, " E"]
+    conflicts: int = 0
+    crossings: dict[int, list[int]] = field(default_factory=dict)
+    """Points of each edge at which two curves cross."""
+    hubs: dict[tuple[int, int], int] = field(default_factory=dict)
+    """Points between two of these at which a fold of one of the sheets crosses, too."""
+    journal: Journal = field(default_factory=Forgetful)
+
+    def ray(self, point: int, edge: int) -> int:
+        """Curve at a point along an edge."""
+        side = int(self.mesh.edges[edge, 1] == self.points.vertex[point])
+        return int(self.rays[point, self.slots[edge, side]])
+
+    def set_ray(self, point: int, edge: int, curve: int) -> None:
+        """Enter the curve at a point along an edge."""
+        side = int(self.mesh.edges[edge, 1] == self.points.vertex[point])
+        self.rays[point, self.slots[edge, side]] = curve
+
+    def mark(self, rays: Rays, mark: int) -> None:
+        """Mark rays that have no curve."""
+        self.rays[rays.points, self.slots[rays.edges, rays.sides]] = mark
+
+    def line(self, rays: Rays) -> ParameterLine:
+        """Edges in parameter space, from the ends from which rays see them."""
+        setting, mesh = self.setting, self.mesh
+        start = setting.parameters(mesh.vertices[mesh.edges[rays.edges, rays.sides]])
+        end = setting.parameters(mesh.vertices[mesh.edges[rays.edges, 1 - rays.sides]])
+        return ParameterLine(setting.structure, start, end - start)
+
+    def crossing(
+        self, z: Float[np.ndarray, " size"], p: Float[np.ndarray, " P"], index: int, edge: int
+    ) -> int:
+        """Number of a polished crossing point on an edge, known or added."""
+        known, n = self.crossings.setdefault(edge, []), self.setting.structure.unknowns
+        for point in known:
+            gap = self.points.z[point, :n] - z[:n]
+            if gap**2 @ self.setting.structure.mass < SAME**2:
+                return point
+        known.append(self.points.add(z, p, index, CROSSING, edge))
+        return known[-1]
+
+    def alive(self, curve: int) -> bool:
+        """Whether a curve has not been taken back."""
+        return self.ray(self.curves.start[curve], self.curves.edge[curve]) == curve
+
+    def marked(self, mark: int) -> Rays:
+        """Rays with a certain mark: of each edge from one end, lest curves be traced twice."""
+        count = self.points.count
+        vertex = self.points.vertex[:count]
+        chosen = (self.rays[:count] == mark) & (vertex >= 0)[:, None]
+        points, slots = np.nonzero(chosen)
+        edges = self.incident[vertex[points], slots]
+        points, edges = points[edges >= 0], edges[edges >= 0]
+        sides = (self.mesh.edges[edges, 1] == vertex[points]).astype(int)
+        from_first = np.zeros(len(self.mesh.edges), bool)
+        from_first[edges[sides == 0]] = True
+        return Rays(points, edges, sides).take((sides == 0) | ~from_first[edges])
+
+    def enter(self, point: int, edge: int, end: int, inner: list[int]) -> None:
+        """Register a curve; contradictions take back what they contradict and raise the effort."""
+        known = self.ray(point, edge)
+        if known >= 0 and self.other_end(known, point) == end:
+            return
+        taken = end >= 0 and self.ray(end, edge) >= 0
+        if known >= 0 or taken or end == point:
+            self.conflicts += 1
+            self.effort[edge] += 1
+            for curve in {known, self.ray(end, edge) if end >= 0 else -1}:
+                if curve >= 0:
+                    self.forget(curve)
+            return
+        curve = self.curves.add(edge, point, end, inner)
+        self.set_ray(point, edge, curve)
+        if end >= 0:
+            self.set_ray(end, edge, curve)
+
+    def enter_many(self, rays: Rays, ends: Int[np.ndarray, " n"]) -> None:
+        """Register curves that cross their edges: at once where nothing is known, else singly."""
+        near, far = (self.slots[rays.edges, side] for side in (rays.sides, 1 - rays.sides))
+        _, first, shared = np.unique(
+            ends * self.rays.shape[1] + far, return_index=True, return_counts=True
+        )
+        new = np.zeros(len(ends), bool)
+        new[first] = shared == 1
+        new &= (self.rays[rays.points, near] < 0) & (self.rays[ends, far] < 0)
+        numbers = self.curves.extend(rays.edges[new], rays.points[new], ends[new])
+        self.rays[rays.points[new], near[new]] = numbers
+        self.rays[ends[new], far[new]] = numbers
+        rest = rays.take(~new)
+        for point, edge, end in zip(
+            rest.points.tolist(), rest.edges.tolist(), ends[~new].tolist(), strict=True
+        ):
+            self.enter(point, edge, end, [])
+
+    def other_end(self, curve: int, point: int) -> int:
+        """Point at the other end of a curve."""
+        start, end = self.curves.start[curve], self.curves.end[curve]
+        return end if start == point else start
+
+    def fit(self) -> None:
+        """Make room for rays of new points and edges."""
+        shape = (len(self.points.z), self.incident.shape[1])
+        if shape != self.rays.shape:
+            rays = np.full(shape, UNTRACED)
+            rays[: self.rays.shape[0], : self.rays.shape[1]] = self.rays
+            self.rays = rays
+
+    def use_mesh(self, mesh: BaseMesh) -> None:
+        """Take over a mesh with more vertices and edges; curves on removed edges are forgotten."""
+        gone = self.mesh.edges_in_use & ~mesh.edges_in_use[: len(self.mesh.edges)]
+        for curve in np.flatnonzero(gone[self.curves.edge]).tolist():
+            self.forget(curve, ABANDONED)
+        for edge in np.flatnonzero(gone):  # untraced rays of removed edges need no tracing any more
+            for side in range(2):
+                for point in self.points.over(int(self.mesh.edges[edge, side])):
+                    self.rays[point, self.slots[edge, side]] = ABANDONED
+        self.points.grow_vertices(len(mesh.vertices))
+        self.incident, self.slots = _incidence(mesh)
+        more = len(mesh.edges) - len(self.effort)
+        self.effort = np.concatenate([self.effort, np.zeros(more, int)])
+        self.mesh = mesh
+        self.fit()
+
+    def forget(self, curve: int, mark: int = UNTRACED) -> None:
+        """Take a curve back from its ends."""
+        edge = self.curves.edge[curve]
+        for point in (self.curves.start[curve], self.curves.end[curve]):
+            if point >= 0 and self.ray(point, edge) == curve:
+                self.set_ray(point, edge, mark)
+
+
+def _incidence(mesh: BaseMesh) -> tuple[Int[np.ndarray, "V slots"], Int[np.ndarray, "E 2"]]:
+    """Edges of each vertex in the order of their numbers, and the place of each edge there.
+
+    Removed edges keep their places, so that known rays stay where they are.
+    """
+    ends = mesh.edges.ravel()
+    order = np.argsort(ends, kind="stable")
+    degree = np.bincount(ends, minlength=len(mesh.vertices))
+    first = np.concatenate([[0], np.cumsum(degree)[:-1]])
+    place = np.empty(len(ends), int)
+    place[order] = np.arange(len(ends)) - first[ends[order]]
+    incident = np.full((len(mesh.vertices), int(degree.max())), -1)
+    incident[ends, place] = np.arange(len(ends)) // 2
+    return incident, place.reshape(-1, 2)
+
+
+def start_pairing(setting: Setting, mesh: BaseMesh, journal: Journal) -> Pairing:
+    """Empty pairing on a mesh."""
+    incident, slots = _incidence(mesh)
+    pairing = Pairing(
+        setting,
+        mesh,
+        Points.empty(setting.structure, len(mesh.vertices)),
+        Curves(),
+        np.full((0, incident.shape[1]), UNTRACED),
+        slots,
+        incident,
+        np.zeros(len(mesh.edges), int),
+        journal=journal,
+    )
+    pairing.fit()
+    return pairing
+
+
+def abandoned(pairing: Pairing) -> list[tuple[int, int]]:
+    """Rays that could not be traced: (point, edge) on edges that are in use."""
+    pairing.fit()
+    used = np.append(pairing.mesh.edges_in_use, False)
+    count = pairing.points.count
+    vertex = pairing.points.vertex[:count]
+    points, slots = np.nonzero((pairing.rays[:count] < 0) & (vertex >= 0)[:, None])
+    edges = pairing.incident[vertex[points], slots]
+    return [(int(a), int(b)) for a, b in zip(points, edges, strict=True) if used[b]]

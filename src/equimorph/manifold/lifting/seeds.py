@@ -1,0 +1,124 @@
+"""First equilibria over a few grid vertices, from which the set is flooded."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria import ParameterLine, TraceOptions, search_points
+from equimorph.equilibria.outcome import follow
+from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.lifting.single_steps import lift_directly
+from equimorph.model import position
+
+COARSE = 5
+"""Natural states are lifted at about so many vertices along each parameter."""
+SEARCHED = 3
+"""Vertices, beside the middle one, at which a random search looks for equilibria that no natural
+path reaches."""
+MORE = 12
+"""The same in diagrams over one parameter and in slices that are their own mirror images: there
+fewer of the pieces hang together."""
+STARTS = 100
+"""Random guesses over each of them."""
+
+Seeds = tuple[
+    Int[np.ndarray, " n"],
+    Float[np.ndarray, "n size"],
+    Float[np.ndarray, "n P"],
+    Int[np.ndarray, " n"],
+]
+
+
+def seeds(
+    setting: Setting, mesh: BaseMesh, searchable: Int[np.ndarray, " some"], seed: int
+) -> Seeds:
+    """Vertices, unknowns, parameters and index of first equilibria; deterministic for a `seed`.
+
+    Random search looks over some of the `searchable` vertices only.
+    """
+    vertices, z = _from_natural_states(setting, _spread(mesh))
+    searched_v, searched_z = _from_search(setting, mesh, searchable, seed)
+    vertices, z = np.concatenate([vertices, searched_v]), np.concatenate([z, searched_z])
+    return polished(setting, mesh, vertices, z)[0]
+
+
+def polished(
+    setting: Setting,
+    mesh: BaseMesh,
+    vertices: Int[np.ndarray, " some"],
+    z: Float[np.ndarray, "some size"],
+) -> tuple[Seeds, Bool[np.ndarray, " some"]]:
+    """Those of the states over vertices that are resolved equilibria, polished; and which."""
+    p = setting.parameters(mesh.vertices[vertices])
+    # a line of no length polishes the points and counts their index
+    still = ParameterLine(setting.structure, p, np.zeros_like(p))
+    index = setting.structure.index(z, p)
+    direct = lift_directly(still, z, index, setting.constraints)
+    good = direct.good & setting.structure.resolved(z, p)
+    return (vertices[good], direct.z[good], p[good], index[good]), good
+
+
+def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n d"]]:
+    """About `COARSE` vertices along each parameter, off the lines of symmetry of the box."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    share = (np.arange(COARSE) + 0.5) / COARSE
+    lines = np.meshgrid(*[share] * mesh.dimension, indexing="ij")
+    grid = np.stack(lines, axis=-1).reshape(-1, mesh.dimension)
+    wanted = low + grid * (high - low)
+    nearest = [(((mesh.vertices - w) / (high - low)) ** 2).sum(axis=1).argmin() for w in wanted]
+    chosen = np.unique(nearest)
+    return chosen, mesh.vertices[chosen]
+
+
+def _from_natural_states(
+    setting: Setting, chosen: tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n d"]]
+) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
+    vertices, points = chosen
+    structure = setting.structure
+    p = setting.parameters(points)
+    unloaded = p.copy()
+    for name, value in structure.unloaded().items():
+        unloaded[:, position(structure.parameters, name)] = value
+    z, found = structure.natural(unloaded)
+    z, p, unloaded, vertices = z[found], p[found], unloaded[found], vertices[found]
+    moving = np.abs(p - unloaded).max(axis=1) > 0
+    line = ParameterLine(structure, unloaded[moving], (p - unloaded)[moving])
+    options = TraceOptions(
+        through_folds=True, through_branch_points=True, record=False, locate_passed=False
+    )
+    outcome = follow(line, z[moving], setting.constraints, options)
+    arrived = outcome.code == ARRIVAL
+    return (
+        np.concatenate([vertices[~moving], vertices[moving][arrived]]),
+        np.concatenate([z[~moving], outcome.z[arrived]]),
+    )
+
+
+def _from_search(
+    setting: Setting, mesh: BaseMesh, searchable: Int[np.ndarray, " some"], seed: int
+) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
+    generator = np.random.default_rng(seed)
+    away = (mesh.vertices[searchable] - mesh.vertices[searchable].mean(axis=0)) / setting.scales
+    middle = searchable[(away**2).sum(axis=1).argmin()]
+    many = len(setting.free) == 1 or is_symmetric(setting)
+    chosen = np.unique([middle, *generator.choice(searchable, MORE if many else SEARCHED)])
+    found = search_points(
+        setting.structure,
+        setting.parameters(mesh.vertices[chosen]),
+        within=setting.constraints,
+        starts=STARTS,
+        seed=seed,
+    )
+    vertices = np.repeat(chosen, [len(states) for states in found])
+    return vertices, np.concatenate([states.z for states in found])
+
+
+def is_symmetric(setting: Setting) -> bool:
+    """Whether a symmetry of the structure leaves all parameters in the box where they are."""
+    inside = setting.base.copy()
+    inside[setting.free] = np.sqrt(np.arange(2.0, 2.0 + len(setting.free)))  # no number twice
+    return any(
+        np.array_equal(symmetry.image(inside), inside)
+        for symmetry in setting.structure.symmetries()
+    )

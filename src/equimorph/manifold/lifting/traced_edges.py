@@ -1,0 +1,235 @@
+"""Hard edges: traced by pseudo-arclength, in ever finer steps.
+
+Through folds and points where two curves cross, to the other end or to constraints.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.arrays import Flags
+from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria.outcome import Outcome, follow
+from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
+from equimorph.manifold.geometry.crossing_points import corrected_crossings
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
+from equimorph.manifold.geometry.points import BETWEEN, CAP, CROSSING
+from equimorph.manifold.geometry.points import FOLD as ON_FOLD
+from equimorph.manifold.lifting.pairing import ABANDONED, Pairing, Rays
+from equimorph.model import recalled, step_of
+
+EFFORTS = 4
+NOISE = 1e-6
+"""Distance in the metric below which two crossings are one, and by which folds may be misplaced."""
+
+Inner = tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"], int, int]
+"""Unknowns, parameters, index and kind of a point inside an edge."""
+
+
+@dataclass(frozen=True)
+class Traced:
+    """What became of rays that were followed.
+
+    good: whether their curves are known; vertices: over which they end, −1 if they left through a
+    constraint; z, index: there, of those good ones that end over vertices; lanes, inner_z, ...: the
+    points inside their edges, in order along each lane.
+    """
+
+    good: Bool[np.ndarray, " rays"]
+    vertices: Int[np.ndarray, " rays"]
+    z: Float[np.ndarray, "n size"]
+    index: Int[np.ndarray, " n"]
+    lanes: Int[np.ndarray, " m"]
+    inner_z: Float[np.ndarray, "m size"]
+    inner_p: Float[np.ndarray, "m P"]
+    inner_index: Int[np.ndarray, " m"]
+    kinds: Int[np.ndarray, " m"]
+
+    @property
+    def inner(self) -> dict[int, list[Inner]]:
+        """Points inside the edge of each lane that has such."""
+        out: dict[int, list[Inner]] = {}
+        lanes, index, kinds = (each.tolist() for each in (self.lanes, self.inner_index, self.kinds))
+        for k, lane in enumerate(lanes):
+            point = (self.inner_z[k], self.inner_p[k], index[k], kinds[k])
+            out.setdefault(lane, []).append(point)
+        return out
+
+
+def trace(pairing: Pairing, rays: Rays) -> None:
+    """Lift rays by pseudo-arclength; what fails is to be traced again with finer steps."""
+    line = pairing.line(rays)
+    efforts = pairing.effort[rays.edges]
+    for effort in range(EFFORTS):
+        lanes = np.flatnonzero(efforts == effort)
+        if len(lanes):
+            _trace(pairing, rays.take(lanes), line.take(lanes), effort)
+    pairing.mark(rays.take(efforts >= EFFORTS), ABANDONED)
+
+
+def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> None:
+    """Trace rays with a certain effort, and enter their curves."""
+    finer = 0.35**effort
+    options = TraceOptions(
+        through_folds=True,
+        through_branch_points=True,
+        first_step=0.05 * finer,
+        largest_step=0.5 * finer,
+        turning=0.25 * finer,
+        look_inside=False,
+    )
+    step = step_of(f"trace {effort}", rays.points, rays.edges)
+    found = recalled(
+        pairing.journal, step, lambda: tuple(vars(_traced(pairing, rays, line, options)).values())
+    )
+    traced = Traced(*found)
+    np.add.at(pairing.effort, rays.edges[~traced.good], 1)
+    ends = _ends(pairing, traced)
+    inner = traced.inner
+    points, edges = rays.points.tolist(), rays.edges.tolist()
+    for lane in np.flatnonzero(traced.good).tolist():
+        point, edge, end = points[lane], edges[lane], int(ends[lane])
+        known = pairing.ray(point, edge)
+        if known >= 0 and (end < 0 or pairing.other_end(known, point) == end):
+            continue  # the same curve, traced from its other end in the same batch
+        numbers = [_number(pairing, each, edge) for each in inner.get(lane, [])]
+        pairing.enter(point, edge, end, numbers)
+    pairing.fit()
+
+
+def _number(pairing: Pairing, point: Inner, edge: int) -> int:
+    """Number of a point inside an edge; one where curves cross belongs to both."""
+    if point[3] == CROSSING:
+        return pairing.crossing(*point[:3], edge)
+    return pairing.points.add(*point, edge)
+
+
+def _traced(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOptions) -> Traced:
+    """Follow rays to their ends."""
+    mesh, setting = pairing.mesh, pairing.setting
+    outcome = follow(line, pairing.points.z[rays.points], setting.constraints, options)
+    good = np.isin(outcome.code, (ARRIVAL, RETURN, CONSTRAINT))
+    inner = _inner(pairing, rays, outcome, line, good)
+    for lane, cap in _caps(pairing, outcome, line, good).items():
+        inner.setdefault(lane, []).append(cap)
+    side = np.where(outcome.code == RETURN, rays.sides, 1 - rays.sides)
+    vertices = mesh.edges[rays.edges, side]
+    vertices[outcome.code == CONSTRAINT] = -1
+    there = np.flatnonzero(good & (vertices >= 0))
+    rows = [(lane, *each) for lane, own in inner.items() for each in own]
+    lanes, z, p, index, kind = zip(*rows, strict=True) if rows else 5 * ((),)
+    return Traced(
+        good, vertices, outcome.z[there], outcome.index[there], np.array(lanes, int),
+        np.array(z).reshape(-1, setting.structure.size), np.array(p).reshape(-1, len(setting.base)),
+        np.array(index, int), np.array(kind, int),
+    )  # fmt: skip
+
+
+def _ends(pairing: Pairing, traced: Traced) -> Int[np.ndarray, " lanes"]:
+    """Points over the vertices at which lanes arrived or to which they returned; −1 for others."""
+    lanes = np.flatnonzero(traced.good & (traced.vertices >= 0))
+    vertices = traced.vertices[lanes]
+    p = pairing.setting.parameters(pairing.mesh.vertices[vertices])
+    ends = np.full(len(traced.good), -1)
+    ends[lanes], _ = pairing.points.over_vertices(vertices, traced.z, p, traced.index)
+    pairing.fit()
+    return ends
+
+
+def _caps(pairing: Pairing, outcome: Outcome, line: ParameterLine, good: Flags) -> dict[int, Inner]:
+    """Points at which lanes left through a constraint."""
+    lanes = np.flatnonzero(good & (outcome.code == CONSTRAINT))
+    z, p = outcome.z[lanes], line.take(lanes).parameters(outcome.t[lanes])
+    # counted anew: a fold may lie between the last step and the constraint
+    index = pairing.setting.structure.index(z, p).tolist()
+    return {int(lane): (z[k], p[k], index[k], CAP) for k, lane in enumerate(lanes)}
+
+
+def _inner(
+    pairing: Pairing,
+    rays: Rays,
+    outcome: Outcome,
+    line: ParameterLine,
+    good: Flags,
+) -> dict[int, list[Inner]]:
+    """Folds and crossings of each lane in order, with one regular point between neighbours.
+
+    Lanes on which a crossing cannot be polished are not `good` any more.
+    """
+    passed = outcome.passed
+    at = np.flatnonzero(np.isin(passed.code, (FOLD, BRANCH)))
+    z, index = passed.z[at].copy(), passed.index[at].min(axis=1)
+    p = line.start[passed.lanes[at]] + passed.t[at][:, None] * line.velocity[passed.lanes[at]]
+    kind = np.where(passed.code[at] == FOLD, ON_FOLD, CROSSING)
+    keep = np.ones(len(at), bool)
+    own = np.flatnonzero(kind == CROSSING)
+    if len(own):
+        pinned = _pinned(pairing, rays.take(passed.lanes[at[own]]), (z[own], p[own]), CROSSING)
+        z[own], p[own] = pinned.z, pinned.p
+        index[own] = lower_index(pairing.setting, pinned.z, pinned.p)
+        good[passed.lanes[at[own[~pinned.found]]]] = False
+        crossed = passed.lanes[at[own]]
+        keep[own] = _first_ones(pairing, crossed, pinned)
+        doubtful = np.flatnonzero((kind == ON_FOLD) & np.isin(passed.lanes[at], crossed))
+        there = (z[doubtful], p[doubtful])
+        keep[doubtful] = _pinned(pairing, rays.take(passed.lanes[at[doubtful]]), there, FOLD).found
+    rows: dict[int, list[Inner]] = {}
+    places: dict[int, float] = {}
+    for k in np.flatnonzero(keep):
+        lane, travelled = int(passed.lanes[at[k]]), float(passed.travelled[at[k]])
+        own_rows = rows.setdefault(lane, [])
+        if lane in places:
+            own_rows.append(_between(outcome, line, lane, (places[lane], travelled)))
+        own_rows.append((z[k], p[k], int(index[k]), int(kind[k])))
+        places[lane] = travelled
+    return rows
+
+
+def _first_ones(
+    pairing: Pairing, lanes: Int[np.ndarray, " n"], pinned: Pinned
+) -> Bool[np.ndarray, " n"]:
+    """Which crossings are not those that their lanes met just before."""
+    place = embed(pairing.setting, pinned.z, pinned.p)
+    gap = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    again = (np.diff(lanes) == 0) & (gap < NOISE)
+    return np.concatenate([[True], ~again])
+
+
+def _pinned(
+    pairing: Pairing,
+    rays: Rays,
+    states: tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]],
+    kind: int,
+) -> Pinned:
+    """Crossings or folds on edges, polished, and which of them are where they were thought to be.
+
+    A side branch of a pitchfork turns back there, and an eigenvalue touches zero: its sign is
+    round-off for a while, which looks like folds.
+    """
+    setting, mesh = pairing.setting, pairing.mesh
+    ends = mesh.vertices[mesh.edges[rays.edges]] / setting.scales
+    span = ends[:, 1] - ends[:, 0]
+    span /= np.linalg.norm(span, axis=1, keepdims=True)
+    place, fold = embed(setting, *states), kind == FOLD
+    aim = Aim(setting, fold, False, span[:, None], place, place[:, None][:, :0])
+    pinned = (corrected if fold else corrected_crossings)(aim, *states, np.zeros(len(place)))
+    if fold:
+        moved = np.linalg.norm(embed(setting, pinned.z, pinned.p) - place, axis=1)
+        pinned = replace(pinned, found=pinned.found & (moved < NOISE))
+    return pinned
+
+
+def _between(outcome: Outcome, line: ParameterLine, lane: int, span: tuple[float, float]) -> Inner:
+    """Recorded point of a lane nearest to the middle of an interval of its length."""
+    points = outcome.points
+    own = slice(*np.searchsorted(points.lanes, [lane, lane + 1]))
+    inside = (points.travelled[own] >= span[0]) & (points.travelled[own] <= span[1])
+    assert inside.any(), "two events in one step are refused by the tracer"
+    off = np.abs(points.travelled[own] - 0.5 * (span[0] + span[1]))
+    at = own.start + int(np.argmin(np.where(inside, off, np.inf)))
+    p = line.start[lane] + points.t[at] * line.velocity[lane]
+    # counted anew: near crossings the tracer may have met round-off
+    index = int(line.structure.index(points.z[at : at + 1], p[None])[0])
+    return points.z[at], p, index, BETWEEN

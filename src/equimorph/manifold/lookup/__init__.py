@@ -1,0 +1,1 @@
+"""Exact states of a set over points of the parameters."""

@@ -1,0 +1,164 @@
+"""Which cells lie over points: uniform bins over the space of the free parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.lookup.kernels import cells_near
+
+MOST_BINS = 4
+"""Bins per cell, at most."""
+NUDGE = 1e-9
+"""Shift, in ranges of the parameters, that puts points between cells into one of them."""
+FLAT = 1e-15
+"""Volume, in the unit cube, below which a cell has no barycentric coordinates."""
+TRIANGLE = 3
+"""Number of corners."""
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Pairs of a point and a cell near it, sorted by point.
+
+    weights: barycentric coordinates of the point in the cell; inside: whether the cell contains the
+    point, where points between cells belong to one of them on each sheet.
+    """
+
+    point: Int[np.ndarray, " hits"]
+    cell: Int[np.ndarray, " hits"]
+    weights: Float[np.ndarray, "hits corners"]
+    inside: Bool[np.ndarray, " hits"]
+
+    def take(self, some: Bool[np.ndarray, " hits"] | Int[np.ndarray, " some"]) -> "Hits":
+        """Some of the pairs."""
+        return Hits(*(column[some] for column in vars(self).values()))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Hits"]) -> "Hits":
+        """All pairs of some parts, at least one."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
+
+    def with_others(self, others: "Hits") -> "Hits":
+        """All pairs of both, each point's own first; `others` are sorted, too."""
+        place = np.searchsorted(self.point, others.point, side="right")
+        columns = zip(vars(self).values(), vars(others).values(), strict=True)
+        return Hits(*(np.insert(mine, place, more, axis=0) for mine, more in columns))
+
+    def __len__(self) -> int:
+        """Return the number of pairs."""
+        return len(self.point)
+
+
+@dataclass(frozen=True)
+class CellIndex:
+    """Bins over a box that list the cells above them, and the barycentric maps of the cells.
+
+    Points are scaled to the unit cube. Cells of bin b are ``cells[starts[b] : starts[b + 1]]``;
+    barycentric coordinates of x in cell c are ``maps[c] @ (x, 1)``, nan if it has no volume.
+    """
+
+    lower: Float[np.ndarray, " d"]
+    width: Float[np.ndarray, " d"]
+    counts: Int[np.ndarray, " d"]
+    starts: Int[np.ndarray, " bins_and_one"]
+    cells: Int[np.ndarray, " entries"]
+    maps: Float[np.ndarray, "C corners corners"]
+    overhang: Float[np.ndarray, "C corners"]
+
+    @classmethod
+    def of(
+        cls, corners: Float[np.ndarray, "C corners d"], overhang: Float[np.ndarray, "*some"]
+    ) -> "CellIndex":
+        """Index of cells.
+
+        Parameters
+        ----------
+        corners
+            Corners of the cells.
+        overhang
+            How far beyond each cell, or across the facet opposite to each corner, a point may lie
+            to be found near it, in barycentric coordinates.
+        """
+        d = corners.shape[2]
+        flat = corners.reshape(-1, d)
+        lower = flat.min(axis=0) if len(flat) else np.zeros(d)
+        width = flat.max(axis=0) - lower if len(flat) else np.ones(d)
+        width = np.where(width > 0.0, width, 1.0)
+        unit = (corners - lower) / width
+        low, high = unit.min(axis=1), unit.max(axis=1)
+        extent = high - low
+        counts = _bins(extent)
+        overhang = np.ascontiguousarray(np.broadcast_to(overhang.T, (d + 1, len(corners))).T)
+        # a corner moves by what the facets across from the others do
+        room = np.sort(overhang, axis=1)[:, 1:].sum(axis=1, keepdims=True) * extent
+        first, last = (
+            np.clip((side * counts).astype(int), 0, counts - 1)
+            for side in (low - room, high + room)
+        )
+        starts, cells = _listed(first, last, counts)
+        return cls(lower, width, counts, starts, cells, _maps(unit), overhang)
+
+    def near(self, points: Float[np.ndarray, "n d"]) -> Hits:
+        """Cells that contain points or that these miss by at most their overhang."""
+        bins = self.lower, self.width, self.counts, self.starts, self.cells
+        points = np.ascontiguousarray(points, dtype=float)
+        return Hits(*cells_near(points, bins, self.maps, self.overhang, NUDGE))
+
+    def weights(
+        self, points: Float[np.ndarray, "n d"], cell: Int[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n corners"]:
+        """Barycentric coordinates of points, each in a cell of its own."""
+        unit, maps = (points - self.lower) / self.width, self.maps[cell]
+        return np.asarray(np.einsum("nij,nj->ni", maps[:, :, :-1], unit) + maps[:, :, -1])
+
+
+def _bins(extent: Float[np.ndarray, "C d"]) -> Int[np.ndarray, " d"]:
+    """Number of bins along each parameter: half the size of a typical cell, but not too many."""
+    typical = np.median(extent, axis=0) if len(extent) else np.ones(extent.shape[1])
+    counts = np.clip(np.round(2.0 / np.maximum(typical, 1e-6)), 1, None)
+    share = MOST_BINS * max(len(extent), 1) / counts.prod()
+    fitting = np.maximum(counts * min(1.0, share ** (1.0 / len(counts))), 1)
+    return np.asarray(fitting.astype(int))
+
+
+def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "C corners corners"]:
+    """Inverse of the matrix of each cell's corners over ones."""
+    ones = np.ones((*unit.shape[:2], 1))
+    homogeneous = np.concatenate([unit, ones], axis=2)
+    flat = np.abs(volumes(unit)) < FLAT
+    homogeneous[flat] = np.eye(homogeneous.shape[1])
+    if unit.shape[1] == TRIANGLE:  # the products of two corners are all minors
+        first, second, third = np.swapaxes(homogeneous, 0, 1)
+        pairs = (second, third), (third, first), (first, second)
+        maps = np.stack([np.cross(*pair) for pair in pairs], axis=1)
+        maps /= np.einsum("ci,ci->c", first, maps[:, 0])[:, None, None]
+    else:
+        maps = np.linalg.inv(np.swapaxes(homogeneous, 1, 2))
+    maps[flat] = np.nan
+    return np.asarray(maps)
+
+
+def _listed(
+    first: Int[np.ndarray, "C d"], last: Int[np.ndarray, "C d"], counts: Int[np.ndarray, " d"]
+) -> tuple[Int[np.ndarray, " bins_and_one"], Int[np.ndarray, " entries"]]:
+    """Cells by bin, from the ranges of bins that they reach."""
+    spread = last - first + 1
+    number = spread.prod(axis=1)
+    cells_of = np.repeat(np.arange(len(first)), number)
+    step, bins_of = _ranges(np.zeros_like(number), number), np.zeros(len(cells_of), int)
+    for k in reversed(range(len(counts))):
+        step, along = np.divmod(step, spread[cells_of, k])
+        bins_of += (first[cells_of, k] + along) * int(counts[k + 1 :].prod())
+    order = np.argsort(bins_of, kind="stable")
+    filled = np.bincount(bins_of, minlength=int(counts.prod()))
+    return np.concatenate([[0], np.cumsum(filled)]), cells_of[order]
+
+
+def _ranges(start: Int[np.ndarray, " n"], number: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+    """Numbers from each start on, one range after the other."""
+    before = np.cumsum(number) - number
+    return np.asarray(np.arange(int(number.sum())) + np.repeat(start - before, number))

@@ -1,0 +1,48 @@
+"""Newton at fixed parameters until states are exact to round-off."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Flags, Lanes
+from equimorph.linalg.simd import LANES
+from equimorph.manifold.lookup.kernels import settle
+from equimorph.structures import Structure
+
+ITERATIONS = 40
+ROUND_OFF = 1e-14
+"""Bound of the next Newton correction, in the metric, below which a state is exact."""
+SETTLED = 2
+"""Corrections after which a lane whose index is not the wanted one is given up."""
+
+Points = Float[np.ndarray, "points P"]
+
+
+def exact_states(
+    structure: Structure, z: Lanes, p: Points, wanted: Int[np.ndarray, " lanes"] | None = None
+) -> tuple[Lanes, Flags, Int[np.ndarray, " lanes"]]:
+    """Newton at fixed parameters until the next correction would be round-off; and the index.
+
+    Corrections shrink quadratically: the one after sizes a and b is about b (b/a)². Where there is
+    no state beyond a fold, Newton leaps over the fold again and again: lanes that do not get nearer
+    and do not have the `wanted` index, if one is given, are given up.
+    """
+    count, mass = len(z), structure.mass
+    out, good, index = z.copy(), np.zeros(count, bool), np.full(count, -1)
+    # structures compute whole blocks of lanes: the rest of one goes with the first lane
+    rows = max(count, LANES) if count else 0
+    lane = np.arange(rows)
+    z, p = z[lane % count], p[lane % count]
+    before, goal = np.zeros(rows), index if wanted is None else wanted
+    still, fixed = np.zeros((rows, structure.size)), np.zeros((rows, p.shape[1]))
+    none, one = np.zeros(rows), np.ones(rows)
+    left = count
+    for number in range(ITERATIONS):
+        if left == 0:
+            break
+        m = max(left, LANES)
+        step = structure.advance(z[:m], p[:m], fixed[:m], still[:m], one[:m], none[:m])
+        rule = left, wanted is not None and number >= SETTLED, ROUND_OFF
+        left = settle(
+            (step.dz, step.index), (lane, z, p, before), (out, good, index), goal, mass, rule
+        )
+    return out, good, index

@@ -1,0 +1,294 @@
+"""States over points close to where two sheets cross: roots of one scalar equation.
+
+There Newton's matrix is nearly singular, and states lie close together: Newton's method at fixed
+parameters leads from every guess to any of them, and its corrections do not shrink to round-off.
+With a border b the equations ``F = r b``, ``b·(z − z₀) = s`` stay regular, and all states near the
+crossing point z₀ are the roots of r(s) [Govaerts2000]_.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy.polynomial import chebyshev
+
+from equimorph.arrays import Cells, Flags, Lanes, Values
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.manifold.geometry.crossing_points import corrected_crossings
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, lower_index
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.topology import adjacency, keys_of, rows_of
+from equimorph.manifold.lookup.cell_index import Hits
+from equimorph.structures import States
+
+Parameters = Float[np.ndarray, "_ P"]
+Facets = Int[np.ndarray, "n d"]
+
+NEAR = 1e-4
+"""Distance of points from a crossing, in scaled parameters, below which they are treated here."""
+WIDE = 0.03
+"""Amplitude, in the metric, up to which states belong to a crossing point."""
+MERGED = 1e-5
+"""Distance in the metric below which states of sheets that cross are one: there a residual at
+round-off does not tell how many there are."""
+DEGREE = 10
+"""Of the polynomial through r: its truncation is at round-off for the amplitudes here."""
+STEPS = 8
+IMAGINARY = 1e-3
+"""Imaginary part, relative to `WIDE`, up to which roots are tried as real ones."""
+RESIDUAL = 1e-12
+
+
+@dataclass(frozen=True)
+class Branches:
+    """States near crossing points: their points, and the index of each."""
+
+    z: Lanes
+    point: Int[np.ndarray, " lanes"]
+    index: Int[np.ndarray, " lanes"]
+
+
+@dataclass(frozen=True)
+class Centres:
+    """Crossing points close to points: z₀, p there, border, amplitude's length, index below."""
+
+    z: Lanes
+    p: Parameters
+    b: Lanes
+    size: Values
+    """Length in the metric of a unit of s."""
+    low: Int[np.ndarray, " lanes"]
+    point: Int[np.ndarray, " lanes"]
+
+    def take(self, some: Int[np.ndarray, " n"] | Flags) -> "Centres":
+        """Some of the crossing points."""
+        return Centres(*(column[some] for column in vars(self).values()))
+
+
+@dataclass(frozen=True, eq=False)
+class NearCrossings:
+    """Facets of a set along which sheets cross.
+
+    facets: vertices of each; of_cells: number of the facet opposite to each corner of each cell, −1
+    if no other sheet crosses there.
+    """
+
+    setting: Setting
+    points: States
+    facets: Int[np.ndarray, "n d"]
+    cells: Int[np.ndarray, "C corners"]
+    of_cells: Int[np.ndarray, "C corners"]
+
+    @cached_property
+    def _normal(self) -> Float[np.ndarray, "n d"]:
+        """Unit normals of the facets in the scaled parameters."""
+        place = self._places(self.points.p)[self.facets]
+        sides = place[:, 1:] - place[:, :1]
+        whole = np.concatenate([sides, np.zeros((len(place), 1, place.shape[2]))], axis=1)
+        return np.asarray(np.linalg.svd(whole)[2][:, -1])
+
+    @cached_property
+    def _bulge(self) -> Float[np.ndarray, " n"]:
+        """How far crossings lie from the middles of their facets, in the scaled parameters."""
+        number = np.arange(len(self.facets))
+        p = self.points.p[self.facets].mean(axis=1)
+        pinned = self._pinned(p, number)
+        away = np.linalg.norm(self._places(pinned.p - p), axis=1)
+        size = np.ptp(self._places(self.points.p)[self.facets], axis=1).max(axis=1, initial=0.0)
+        return np.asarray(np.where(pinned.found, away, 0.1 * size))
+
+    def _places(self, p: Float[np.ndarray, "... P"]) -> Float[np.ndarray, "... d"]:
+        return np.asarray(p[..., self.setting.free] / self.setting.scales)
+
+    def close(self, near: Hits, p: Parameters) -> Int[np.ndarray, "m 2"]:
+        """Pairs of a point and a facet that it may be close to."""
+        number = self.of_cells[near.cell]
+        row, corner = np.nonzero(number >= 0)
+        if len(row) == 0:
+            return np.zeros((0, 2), int)
+        facet, point = number[row, corner], near.point[row]
+        # nothing is lost if a point is a little beyond the ends: the next facet is met there
+        tip = self.cells[near.cell[row], corner]
+        first = self.facets[facet, 0]
+        height = np.einsum(
+            "nd,nd->n",
+            self._places(self.points.p[tip] - self.points.p[first]),
+            self._normal[facet],
+        )
+        away = np.abs(near.weights[row, corner] * height)
+        kept = away <= NEAR + 2.0 * self._bulge[facet]
+        return np.unique(np.stack([point[kept], facet[kept]], axis=1), axis=0)
+
+    def _pinned(self, p: Parameters, facet: Int[np.ndarray, " lanes"]) -> Pinned:
+        """Crossing points on lines through points, normal to facets."""
+        own = self.facets[facet]
+        place = self._places(self.points.p[own])
+        weights = _nearest_weights(place, self._places(p))
+        z = np.einsum("lk,lkn->ln", weights, self.points.z[own])
+        start = np.einsum("lk,lkn->ln", weights, self.points.p[own])
+        span = self._normal[facet][:, None]
+        # onto the line: off it by what the point has beyond the facet
+        off = self._places(p - start)
+        along = np.einsum("ld,lkd->lk", off, span)
+        start[:, self.setting.free] += (
+            off - np.einsum("lk,lkd->ld", along, span)
+        ) * self.setting.scales
+        middle = embed(self.setting, z, start)
+        aim = Aim(self.setting, False, False, span, middle, middle[:, None][:, :0])
+        around = np.ptp(embed_many(self.setting, self.points, own), axis=1).max(axis=1, initial=0.0)
+        return corrected_crossings(aim, z, start, around)
+
+    def centres(self, close: Int[np.ndarray, "m 2"], p: Parameters) -> Centres:
+        """Crossing points closer than `NEAR` to points, each once."""
+        point, facet = close.T
+        pinned = self._pinned(p[point], facet)
+        away = np.linalg.norm(self._places(pinned.p - p[point]), axis=1)
+        kept = np.flatnonzero(pinned.found & (away <= NEAR))
+        z, own, at = pinned.z[kept], pinned.p[kept], point[kept]
+        # neighbouring facets lead to the same point, up to the turn of their normals
+        place = embed(self.setting, z, own)
+        new = np.ones(len(kept), bool)
+        for k in range(1, len(kept)):
+            same = (at[:k] == at[k]) & new[:k]
+            new[k] = not (np.linalg.norm(place[:k][same] - place[k], axis=1) < 10 * NEAR).any()
+        z, own, at = z[new], own[new], at[new]
+        structure = self.setting.structure
+        b = null_border(structure, z, own)
+        v = Critical(structure, z, own, b).v
+        size = np.sqrt(v[:, : structure.unknowns] ** 2 @ structure.mass)
+        return Centres(z, own, b, size, lower_index(self.setting, z, own), at)
+
+    def branches(self, centres: Centres, p: Parameters) -> tuple[Branches, Centres]:
+        """All states over points whose amplitude from their crossing points is at most `WIDE`.
+
+        And the crossing points for which that is so: near others a second eigenvalue vanishes.
+        """
+        nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+        count, many = len(nodes), np.repeat(np.arange(len(centres.z)), len(nodes))
+        widest = WIDE / centres.size
+        s = (widest[:, None] * nodes).ravel()
+        _, r, _, good = self._along(centres.take(many), p, s)
+        whole = good.reshape(-1, count).all(axis=1)
+        owner, start = [], []
+        for lane in np.flatnonzero(whole).tolist():
+            fit = chebyshev.chebfit(nodes, r.reshape(-1, count)[lane], DEGREE)
+            roots = chebyshev.chebroots(fit)
+            real = roots[np.abs(roots.imag) <= IMAGINARY].real
+            real = real[np.abs(real) <= 1.0 + IMAGINARY]
+            owner.extend(len(real) * [lane])
+            start.extend((real * widest[lane]).tolist())
+        found = self._roots(centres, p, np.array(owner, int), np.array(start, float))
+        return _distinct(*found), centres.take(np.flatnonzero(whole))
+
+    def _roots(
+        self,
+        centres: Centres,
+        p: Parameters,
+        owner: Int[np.ndarray, " lanes"],
+        s: Values,
+    ) -> tuple[Branches, Values]:
+        """States at roots near given ones, with their amplitudes in the metric."""
+        own, first = centres.take(owner), s.copy()
+        for _ in range(STEPS):
+            _, r, slope, _ = self._along(own, p, s)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = np.nan_to_num(r / slope, nan=0.0, posinf=0.0, neginf=0.0)
+            most = IMAGINARY * WIDE / own.size
+            s = np.clip(s - step, first - most, first + most)
+        z, r, slope, good = self._along(own, p, s)
+        scale = WIDE / own.size
+        good &= (np.abs(r) <= RESIDUAL) & (np.abs(s) <= scale)
+        # the slope has the sign of the eigenvalue that nearly vanishes
+        index = own.low + (slope < 0.0)
+        return Branches(z[good], own.point[good], index[good]), (s * own.size)[good]
+
+    def on_branches(
+        self,
+        centres: Centres,
+        p: Parameters,
+        states: tuple[Lanes, Int[np.ndarray, " lanes"]],
+    ) -> Flags:
+        """Which states, given with their points, are such that `branches` finds."""
+        z, point = states
+        structure = self.setting.structure
+        out = np.zeros(len(z), bool)
+        for k in range(len(centres.z)):
+            own = np.flatnonzero(point == centres.point[k])
+            same = centres.take(np.full(len(own), k))
+            s = np.einsum("ln,ln->l", z[own] - same.z, same.b)
+            inner = np.abs(s) <= WIDE / same.size
+            own, same, s = own[inner], same.take(inner), s[inner]
+            there, _, _, good = self._along(same, p, s)
+            gap = np.sqrt((there - z[own])[:, : structure.unknowns] ** 2 @ structure.mass)
+            out[own[good & (gap <= MERGED)]] = True
+        return out
+
+    def _along(
+        self, centres: Centres, p: Parameters, s: Values
+    ) -> tuple[Lanes, Values, Values, Flags]:
+        """Points with amplitudes s over p, r and its slope there, and which could be found."""
+        structure, at = self.setting.structure, p[centres.point]
+        v = Critical(structure, centres.z, centres.p, centres.b).v
+        z = centres.z + s[:, None] * v
+        change = np.full(len(z), np.inf)
+        for _ in range(STEPS):
+            if not (change > 1e-13).any():
+                break
+            rhs = np.empty((len(z), 1, structure.size + 1))
+            rhs[:, 0, :-1] = -structure.residual(z, at)
+            rhs[:, 0, -1] = s - np.einsum("ln,ln->l", z - centres.z, centres.b)
+            x = Critical(structure, z, at, centres.b).solve(rhs)[:, 0]
+            z = z + x[:, :-1]
+            change = np.abs(x[:, :-1]).max(axis=1, initial=0.0)
+        r = np.einsum("ln,ln->l", structure.residual(z, at), centres.b)
+        slope = -Critical(structure, z, at, centres.b).g
+        return z, r, slope, np.asarray(change < 1e-9)
+
+
+def of_set(setting: Setting, points: States, cells: Cells, crossings: Facets) -> NearCrossings:
+    """Facets on crossings, given by their vertices, with the cells beside them."""
+    whole = adjacency(cells)
+    base = len(points)
+    keys, own = keys_of(whole.facets, base), np.unique(keys_of(crossings, base))
+    at = np.minimum(np.searchsorted(own, keys), len(own) - 1)
+    number = np.where(own[at] == keys, at, -1)
+    facets = rows_of(own, base, crossings.shape[1])
+    return NearCrossings(setting, points, facets, cells, number[whole.cell_facets])
+
+
+def _distinct(found: Branches, s: Values) -> Branches:
+    """One of those that are closer together than `MERGED`: the middle one.
+
+    Where two are, a third one at a similar distance goes with them: side branches come in pairs.
+    """
+    order = np.lexsort((s, found.point))
+    point, gap = found.point[order], np.diff(s[order], prepend=-np.inf)
+    new = np.diff(point, prepend=-1) != 0
+    merging = np.isin(point, point[~new & (gap <= MERGED)])
+    starts = np.flatnonzero(new | (gap > np.where(merging, 2.0 * MERGED, MERGED)))
+    sizes = np.diff(np.append(starts, len(order)))
+    chosen = order[starts + sizes // 2]
+    return Branches(found.z[chosen], found.point[chosen], found.index[chosen])
+
+
+def embed_many(
+    setting: Setting, points: States, rows: Int[np.ndarray, "lanes k"]
+) -> Float[np.ndarray, "lanes k coordinates"]:
+    """Places of several vertices for each lane."""
+    columns = [embed(setting, points.z[column], points.p[column]) for column in rows.T]
+    return np.stack(columns, axis=1)
+
+
+def _nearest_weights(
+    place: Float[np.ndarray, "lanes k d"], at: Float[np.ndarray, "lanes d"]
+) -> Float[np.ndarray, "lanes k"]:
+    """Barycentric coordinates, in facets, of the points of their planes next to others."""
+    sides = place[:, 1:] - place[:, :1]
+    gram = sides @ np.swapaxes(sides, 1, 2)
+    along = np.einsum("lkd,ld->lk", sides, at - place[:, 0])
+    share = np.einsum("lij,lj->li", np.linalg.pinv(gram), along)
+    weights = np.concatenate([1.0 - share.sum(axis=1, keepdims=True), share], axis=1)
+    weights = np.clip(weights, 0.0, 1.0)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))

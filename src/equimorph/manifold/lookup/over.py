@@ -1,0 +1,360 @@
+"""The states of an equilibrium set over points: the cells above them, polished by Newton."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.spatial.distance import cdist
+
+from equimorph.arrays import Lanes
+from equimorph.linalg.lanes import in_background, threads
+from equimorph.manifold.geometry.topology import adjacency, senses
+from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits
+from equimorph.manifold.lookup.exact_states import Points, exact_states
+from equimorph.manifold.lookup.kernels import (
+    balanced,
+    guesses,
+    one_of_each,
+    root_shares,
+    worth_trying,
+)
+from equimorph.manifold.lookup.near_crossings import NearCrossings
+from equimorph.manifold.lookup.rims import Rims, cells_beside
+from equimorph.manifold.lookup.straight_lifts import lift_to, turned_back
+from equimorph.model import Constraint
+from equimorph.structures import States, Structure
+
+OVERHANG = 0.3
+"""How far beyond a cell, in barycentric coordinates, a point may lie to be tried from it."""
+SAME = 1e-6
+"""Distance in the metric below which two states over one point are the same."""
+CLOSEST = 1e-3
+"""Least share of a cell between its fold and a guess: at the fold Newton's matrix is singular."""
+PARTNERS = 3
+"""Rounds in which states are looked for across folds, over points where some are missing."""
+CHUNK = 512
+"""Points that are served together: their work arrays stay small."""
+
+Found = tuple[Float[np.ndarray, "n size"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]]
+"""States, the points that they lie over, and their cells."""
+Guesses = Float[np.ndarray, "hits size"]
+
+
+@dataclass(frozen=True, eq=False)
+class Sheets:
+    """Cells of a set with their states, as the queries for states over points need them.
+
+    Parameters
+    ----------
+    points
+        States of the vertices.
+    free
+        Places of the free parameters.
+    cells, cell_index, component
+        Vertices of the cells, their index, and the pieces that they belong to.
+    folded, capped
+        Whether vertices lie on folds, and on constraints.
+    constraints
+        Those that cut the set off.
+    crossings
+        Where sheets cross, if they do.
+    """
+
+    points: States
+    free: Int[np.ndarray, " d"]
+    cells: Int[np.ndarray, "C corners"]
+    cell_index: Int[np.ndarray, " C"]
+    component: Int[np.ndarray, " C"]
+    folded: Bool[np.ndarray, " V"]
+    capped: Bool[np.ndarray, " V"]
+    constraints: tuple[Constraint, ...]
+    crossings: NearCrossings | None = None
+
+    @property
+    def structure(self) -> Structure:
+        """To which the states belong."""
+        return self.points.structure
+
+    @cached_property
+    def above(self) -> CellIndex:
+        """Index of the cells."""
+        overhang = np.where(self._at_an_edge, OVERHANG, 0.0)
+        return CellIndex.of(self.points.p[:, self.free][self.cells], overhang)
+
+    @cached_property
+    def _brims(self) -> Bool[np.ndarray, "C corners"]:
+        """Facets of cells, by the corner across, with all corners on folds or constraints."""
+        on = (self.folded | self.capped)[self.cells]
+        return np.asarray(on.sum(axis=1, keepdims=True) - on == on.shape[1] - 1)
+
+    @cached_property
+    def _at_an_edge(self) -> Bool[np.ndarray, " C"]:
+        """Cells on folds or constraints, where straight cells miss the curved edge."""
+        return np.asarray((self.folded | self.capped)[self.cells].any(axis=1))
+
+    @cached_property
+    def _of_cells(self) -> tuple[np.ndarray, ...]:
+        """Sign by index, and whether cells are overturned, at an edge, at a constraint."""
+        capped = np.asarray(self.capped[self.cells].any(axis=1))
+        return 1 - 2 * (self.cell_index % 2), self._overturned, self._at_an_edge, capped
+
+    @cached_property
+    def _overturned(self) -> Bool[np.ndarray, " C"]:
+        """Cells that project against the orientation that their index demands."""
+        places = self.points.p[:, self.free]
+        whole = adjacency(self.cells)
+        return senses(self.cells, self.cell_index, places, whole).overturned
+
+    def over(self, p: Points) -> tuple[States, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """States over points (all parameters given), sorted by point; the points; the cells.
+
+        Cells that contain a point, and those on folds and constraints that it just misses, are
+        interpolated and corrected by Newton. Across folds states appear in pairs of opposite
+        parity: where the sum of (−1)^index is not that of the cells above, states beyond
+        constraints included, or a cell gives no state, all known equilibria nearby are lifted to
+        the point instead.
+        """
+        chunks = self._in_chunks(p)
+        parts = [found for found, _ in chunks]
+        doubtful = [near for _, near in chunks if near is not None]
+        if doubtful:
+            parts.extend(self._searched(p, Hits.joined(doubtful)))
+        z, point, cell = (
+            column[0] if len(parts) == 1 else np.concatenate(column)
+            for column in zip(*parts, strict=True)
+        )
+        if doubtful:
+            order = np.lexsort((cell, point))
+            z, point, cell = z[order], point[order], cell[order]
+        if self.crossings is not None:
+            z, point, cell = self._beside_crossings(self.crossings, p, (z, point, cell))
+        return States(self.structure, z, p[point]), point, cell
+
+    def _beside_crossings(self, crossings: NearCrossings, p: Points, found: Found) -> Found:
+        """States found over points, where these are close to crossings by the reduced equation."""
+        z, point, cell = found
+        near = self.above.near(p[:, self.free])
+        close = crossings.close(near, p)
+        if len(close) == 0:
+            return found
+        centres = crossings.centres(close, p)
+        branches, centres = crossings.branches(centres, p)
+        own = np.isin(branches.index, self.cell_index)
+        own &= self._allowed(branches.z, p[branches.point])
+        of_own = (branches.z[own], branches.point[own], branches.index[own])
+        kept = ~crossings.on_branches(centres, p, (z, point))
+        parts = [(z[kept], point[kept], cell[kept])]
+        for number in np.unique(of_own[1]):
+            here, index = (column[of_own[1] == number] for column in (of_own[0], of_own[2]))
+            mine = near.take(near.point == number)
+            there = self._nearest(here, index, self._guess(mine), mine)
+            parts.append((here, np.full(len(here), number), there))
+        z, point, cell = (np.concatenate(column) for column in zip(*parts, strict=True))
+        order = np.lexsort((cell, point))
+        return z[order], point[order], cell[order]
+
+    def _in_chunks(self, p: Points) -> list[tuple[Found, Hits | None]]:
+        """States and doubtful cells as `_some` finds them, chunk by chunk, on all threads."""
+        if len(p) <= CHUNK:
+            return [self._some(p, 0)]
+        starts = range(0, len(p), CHUNK)
+        out: dict[int, tuple[Found, Hits | None]] = {}
+
+        def serve(own: range) -> None:
+            for at in own:
+                out[at] = self._some(p[at : at + CHUNK], at)
+
+        number = min(threads(), len(starts))
+        if number < 2:
+            serve(starts)
+        else:
+            for task in in_background([partial(serve, starts[k::number]) for k in range(number)]):
+                task.result()
+        return [out[at] for at in starts]
+
+    def _some(self, p: Points, first: int) -> tuple[Found, Hits | None]:
+        """States over points that are sure, and the cells near the others; `first` is added."""
+        near = self._near(p[:, self.free])
+        of_hits = near.cell, near.weights
+        hits = near.take(worth_trying(of_hits, near.inside, self._brims, self.above.maps, NUDGE))
+        at = p[hits.point]
+        guess = self._guess(hits)
+        wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
+        z, good, index = exact_states(self.structure, guess, at, wanted)
+        good &= (index == wanted) & self.structure.resolved(z, at)
+        mass = self.structure.mass
+        found = one_of_each((hits.point, hits.inside), (z, good), guess, room, mass, SAME)
+        sure = balanced((hits.point, hits.cell, hits.inside), good, found, self._of_cells, len(p))
+        doubtful = None
+        if not sure.all():
+            found = found[sure[hits.point[found]]]
+            doubtful = near.take(~sure[near.point])
+            doubtful = replace(doubtful, point=first + doubtful.point)
+        kept = found[self._allowed(z[found], at[found])]
+        return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
+
+    def _near(self, x: Float[np.ndarray, "points d"]) -> Hits:
+        """Cells near points, those beside the bands around rims that points lie in among them."""
+        near = self.above.near(x)
+        point, cell = self._rims.near(x)
+        if len(point) == 0:
+            return near
+        count, asked = len(self.cells), np.zeros(len(x), bool)
+        asked[point] = True
+        old = asked[near.point]
+        new = np.setdiff1d(point * count + cell, near.point[old] * count + near.cell[old])
+        point, cell = np.divmod(new, count)
+        more = Hits(point, cell, self.above.weights(x[point], cell), np.zeros(len(new), bool))
+        return near.with_others(more)
+
+    @cached_property
+    def _rims(self) -> Rims:
+        """Bands along folds and constraints, which straight cells miss."""
+        whole = adjacency(self.cells)
+        on = (self.folded | self.capped)[whole.facets].all(axis=1)
+        beside = cells_beside(whole)
+        index = np.where(beside >= 0, self.cell_index[beside], self.cell_index[beside[:, :1]])
+        on &= (whole.counts != 2) | (index != index[:, :1]).any(axis=1)
+        return Rims.of(self.points.p[:, self.free], whole, np.flatnonzero(on))
+
+    def _guess(self, hits: Hits) -> Lanes:
+        """Interpolation between the corners, at the nearest point of the cell.
+
+        From a fold on, states move like the root of the way in the parameters.
+        """
+        of_hits = hits.cell, hits.weights
+        return np.asarray(guesses(of_hits, self.cells, self.folded, self.points.z, CLOSEST))
+
+    @cached_property
+    def _room(self) -> Float[np.ndarray, " C"]:
+        """How far states may be from their guess: twice the longest side from the first corner."""
+        u = self.points.z[:, : self.structure.unknowns]
+        first, longest = u[self.cells[:, 0]], np.zeros(len(self.cells))
+        for corner in self.cells.T[1:]:
+            np.maximum(longest, (u[corner] - first) ** 2 @ self.structure.mass, out=longest)
+        return 2.0 * np.sqrt(longest) + SAME
+
+    def _allowed(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
+        good = np.ones(len(z), bool)
+        for constraint in self.constraints:
+            good &= constraint.excess(z, p) <= 0.0
+        return good
+
+    def _searched(self, p: Points, near: Hits) -> Iterator[Found]:
+        """States over points by lifts and Newton from all regular vertices near each of them."""
+        guess = self._guess(near)
+        pairs = np.stack(
+            [np.repeat(near.point, self.cells.shape[1]), self.cells[near.cell].ravel()]
+        )
+        owner, corner = np.unique(pairs[:, ~self.folded[pairs[1]]], axis=1)
+        solved, of_solved = self._exact(
+            np.concatenate([guess, self.points.z[corner]]),
+            p,
+            np.concatenate([near.point, owner]),
+        )
+        lifted, which = lift_to(self.points[corner], p[owner], self.constraints)
+        z = np.concatenate([solved, lifted])
+        point = np.concatenate([of_solved, owner[which]])
+        numbers = np.unique(near.point)
+        z, point, index = self._distinct(z, point, p)
+        for _ in range(PARTNERS):
+            more, of_more = self._partners(z, point, index, p, near)
+            if len(more) == 0:
+                break
+            before = len(z)
+            z, point, index = self._distinct(
+                np.concatenate([z, more]), np.concatenate([point, of_more]), p
+            )
+            if len(z) == before:
+                break
+        for number in numbers:
+            own, mine = point == number, near.point == number
+            cell = self._nearest(z[own], index[own], guess[mine], near.take(mine))
+            yield z[own], point[own], cell
+
+    def _distinct(
+        self, z: Lanes, point: Int[np.ndarray, " lanes"], p: Points
+    ) -> tuple[Float[np.ndarray, "m size"], Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+        """Different states over each point, those points, sorted, and the index."""
+        lanes = [np.flatnonzero(point == number) for number in np.unique(point)]
+        kept = np.concatenate(
+            [own[_firsts(self.structure, z[own])] for own in lanes] or [np.zeros(0, int)]
+        )
+        index = self.structure.index(z[kept], p[point[kept]])
+        # lifts from parts of sets leave them across folds
+        own = np.isin(index, self.cell_index)
+        return z[kept[own]], point[kept[own]], index[own]
+
+    def _partners(
+        self,
+        z: Lanes,
+        point: Int[np.ndarray, " lanes"],
+        index: Int[np.ndarray, " lanes"],
+        p: Points,
+        near: Hits,
+    ) -> tuple[Float[np.ndarray, "m size"], Int[np.ndarray, " m"]]:
+        """States that meet known ones in folds nearby, where parity tells that some are missing.
+
+        Out across the rims near the point, through the fold, and back.
+        """
+        inside, cell = near.inside, near.cell
+        sign, overturned = self._of_cells[:2]
+        above = np.where(overturned[cell], -sign[cell], sign[cell]) * inside
+        surplus = np.bincount(point, 1.0 - 2.0 * (index % 2), len(p)) - np.bincount(
+            near.point, above, len(p)
+        )
+        # cells without volume have no maps, and nothing is across from their corners
+        missed = (surplus[near.point] != 0.0) & np.isfinite(self.above.maps[cell, 0, 0])
+        hit, corner = np.nonzero(self._brims[cell] & missed[:, None])
+        out = -self.above.maps[cell[hit], corner, :-1] / self.above.width
+        length = np.linalg.norm(out, axis=1, keepdims=True)
+        sides = self.points.p[:, self.free][self.cells[cell[hit]]]
+        reach = np.ptp(sides, axis=1).max(axis=1, keepdims=True)
+        way = out / np.maximum(length, 1e-300) * reach
+        first, last = (np.searchsorted(point, near.point[hit], side) for side in ("left", "right"))
+        number = np.repeat(np.arange(len(hit)), last - first)
+        state = np.concatenate([np.zeros(0, int), *map(np.arange, first, last)])
+        velocity = np.zeros((len(state), p.shape[1]))
+        velocity[:, self.free] = way[number]
+        found, which = turned_back(States(self.structure, z[state], p[point[state]]), velocity)
+        found, of_found = self._exact(found, p, point[state[which]])
+        return found, of_found
+
+    def _exact(
+        self, starts: Lanes, p: Points, owner: Int[np.ndarray, " lanes"]
+    ) -> tuple[Float[np.ndarray, "some size"], Int[np.ndarray, " some"]]:
+        """Admissible states to which Newton leads over the points of the starts; which points."""
+        z, good, _ = exact_states(self.structure, starts, p[owner])
+        z, owner = z[good], owner[good]
+        good = self.structure.resolved(z, p[owner]) & self._allowed(z, p[owner])
+        return z[good], owner[good]
+
+    def _nearest(
+        self, z: Lanes, index: Int[np.ndarray, " lanes"], guess: Guesses, mine: Hits
+    ) -> Int[np.ndarray, " n"]:
+        """Cell of the same index whose interpolation over the point is nearest to each state."""
+        n, mass = self.structure.unknowns, self.structure.mass
+        gap = ((z[:, None, :n] - guess[None, :, :n]) ** 2) @ mass
+        gap[index[:, None] != self.cell_index[mine.cell][None]] = np.inf
+        if len(guess) == 0:
+            return np.full(len(z), -1)
+        best = gap.argmin(axis=1)
+        near = np.isfinite(gap[np.arange(len(z)), best])
+        return np.where(near, mine.cell[best], -1)
+
+
+def rooted(
+    weights: Float[np.ndarray, "n corners"], folded: Bool[np.ndarray, "n corners"]
+) -> Float[np.ndarray, "n corners"]:
+    """Weights of corners with the root of the share of those off the fold as their share."""
+    weights = weights.copy()
+    root_shares(weights, folded, CLOSEST)
+    return weights
+
+
+def _firsts(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
+    """States that no earlier one is the same as."""
+    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    return np.flatnonzero(~np.tril(cdist(u, u) <= SAME, -1).any(axis=1))

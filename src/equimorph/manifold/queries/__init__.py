@@ -1,0 +1,1 @@
+"""Questions to a set: levels, locations, distances, components, snaps and cusps."""

@@ -1,0 +1,187 @@
+"""Cusps of fold curves over two parameters: where the image of a fold curve turns back."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.locus import Locus, settle
+from equimorph.errors import InputError
+from equimorph.manifold.complex.cuts import roots
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.marked_complex import HOLE, ON_FOLD, RIM, Fabric, fabric_of
+from equimorph.manifold.complex.vertices import Vertices
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import lower_index
+from equimorph.manifold.geometry.points import CROSSING
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.queries.levels import fabric_setting
+from equimorph.structures import States
+
+REACH = 1.5
+"""How far a cusp may lie from the ends of the edge beside which it is sought, in its lengths."""
+SAME = 1e-6
+CLOSE = 1e-3
+"""Shares of an edge next to its ends in which a cusp is that of the end."""
+
+
+@dataclass(frozen=True)
+class Cusps:
+    """Cusps as states, and the index on the lower side of each; 0 on the boundary of stability.
+
+    lost: edges of folds with a cusp which was not found; refine the set there.
+    """
+
+    states: States
+    index: Int[np.ndarray, " n"]
+    lost: int
+
+
+def cusps(eset: EquilibriumSet) -> Cusps:
+    """Cusps on the folds of a set over two parameters, polished.
+
+    There ``φᵀF_zz[φ, φ] = 0``, which changes its sign with a null vector φ that is continuous along
+    the fold. Where sheets cross, these are the points at which pitchforks change their criticality:
+    a fold passes the crossing there, and its image turns back.
+
+    Raises
+    ------
+    InputError
+        For a set over another number of parameters.
+    """
+    if len(eset.names) != 2:
+        raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
+    fabric = fabric_of(fabric_setting(eset), eset)
+    ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    hubs = _turning_hubs(fabric, ends)
+    ends = ends[(fabric.vertices.kinds[ends] != CROSSING).all(axis=1)]
+    turning = ends[_turning(fabric, ends)]
+    lowest = fabric.vertices.index[turning].min(axis=1)
+    states: list[tuple[np.ndarray, np.ndarray, int]] = []
+    for edge, low in zip(turning, lowest.tolist(), strict=True):
+        found = _between(fabric, edge, low)
+        # a cusp that two edges lead to leaves another one lost
+        if found and all(np.abs(found[0] - z).max() > SAME for z, _, _ in states):
+            states.append((*found, low))
+    lost = len(turning) - len(states)
+    store = fabric.vertices
+    states += [(store.z[at], store.p[at], int(store.index[at])) for at in hubs.tolist()]
+    z, p = (
+        np.array([each[k] for each in states]).reshape(len(states), column.shape[1])
+        for k, column in enumerate((store.z, store.p))
+    )
+    index = np.array([low for *_, low in states], int)
+    return Cusps(States(eset.structure, z, p), index, lost)
+
+
+def _turning_hubs(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " m"]:
+    """Vertices at which the image of a fold turns back as it passes a crossing."""
+    store = fabric.vertices
+    both = np.concatenate([ends, ends[:, ::-1]])
+    both = both[store.kinds[both[:, 0]] == CROSSING]
+    point = fabric.points[both[:, 0]]
+    order = np.argsort(point, kind="stable")
+    _, first, counts = np.unique(point[order], return_index=True, return_counts=True)
+    pair = both[order[first[counts == 2, None] + np.arange(2)]]
+    place = store.place[:, -2:]
+    ways = place[pair[:, :, 1]] - place[pair[:, :, 0]]
+    back = np.einsum("nk,nk->n", ways[:, 0], ways[:, 1]) > 0.0
+    return np.asarray(pair[back, 0, 0])
+
+
+def _turning(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " m"]:
+    """Edges of folds at whose ends φᵀF_zz[φ, φ] has different signs."""
+    folded, at = np.unique(ends, return_inverse=True)
+    at = at.reshape(ends.shape)
+    null, bend = null_vectors(fabric.setting, fabric.vertices.take(folded))
+    sense = np.einsum("ni,ni->n", null[at[:, 0]], null[at[:, 1]])
+    return np.flatnonzero(bend[at[:, 0]] * bend[at[:, 1]] * np.sign(sense) < 0.0)
+
+
+def _between(
+    fabric: Fabric, edge: Int[np.ndarray, " 2"], low: int
+) -> tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"]] | None:
+    """Cusp beside an edge of a fold, by Newton from its middle or its ends."""
+    store, setting = fabric.vertices, fabric.setting
+    tests = (lambda at: at.g, lambda at: at.quadratic)
+    locus = Locus(setting.structure, store.p[edge[0]], setting.free, tests)
+    x = np.stack([locus.joined(store.z[end], store.p[end]) for end in edge])
+    length = np.linalg.norm(store.place[edge[1]] - store.place[edge[0]])
+    for start in (x.mean(axis=0), *x):
+        spot = settle(locus, start)
+        if spot is None:
+            continue
+        z, p = locus.split(spot.x[None])
+        away = np.linalg.norm(embed(setting, z, p) - store.place[edge], axis=1)
+        if away.max() <= REACH * length and lower_index(setting, z, p)[0] == low:
+            return z[0], p[0]
+    return None
+
+
+def with_cusps_beside(fabric: Fabric, beside: Bool[np.ndarray, " C"]) -> Fabric:
+    """The same with vertices at the cusps beside some cells.
+
+    A cell that cuts a cusp off is overturned: the sheet around goes all the way round the cusp.
+    """
+    near = np.zeros(len(fabric.vertices), bool)
+    near[fabric.cells[beside]] = True
+    ends, found = cusps_on_edges(fabric, near)
+    place = fabric.vertices.place
+    gap = np.stack([np.linalg.norm(found.place - place[end], axis=1) for end in ends.T])
+    whole = np.linalg.norm(place[ends[:, 1]] - place[ends[:, 0]], axis=1)
+    whole_edges = (fabric.edge_marks(np.sort(ends, axis=1)) & (HOLE | RIM)) == 0
+    apart = np.flatnonzero((gap > CLOSE * whole).all(axis=0) & whole_edges)
+    return fabric.bisected(ends[apart], found.take(apart)) if len(apart) else fabric
+
+
+def cusps_on_edges(
+    fabric: Fabric, near: Bool[np.ndarray, " V"] | None = None
+) -> tuple[Int[np.ndarray, "n 2"], Vertices]:
+    """Fold edges with cusps, of those with an end near a place, and the cusps."""
+    ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    if near is not None:
+        ends = ends[near[ends].any(axis=1)]
+    store = fabric.vertices
+    if len(ends) == 0:
+        return ends, store.take(np.zeros(0, int))
+    side = sides_of_existence(store.take(ends[:, 0]))
+    other = sides_of_existence(store.take(ends[:, 1]))
+    known = np.stack(
+        [np.einsum("ni,ni->n", side, side), np.einsum("ni,ni->n", side, other)], axis=1
+    )
+    turning = np.flatnonzero(known[:, 1] < 0.0)
+    if len(turning) == 0:
+        return ends[:0], store.take(turning)
+    lowest = store.index[ends[turning]].min(axis=1)
+
+    def value(at: Vertices, lanes: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
+
+    done, found = roots(fabric, ends[turning], (ON_FOLD, lowest), known[turning], value)
+    return ends[turning[done]], found
+
+
+def null_vectors(
+    setting: Setting, at: Vertices
+) -> tuple[Float[np.ndarray, "n unknowns"], Float[np.ndarray, " n"]]:
+    """Null vectors on folds, as displacements of unit length in the metric, and φᵀF_zz[φ, φ]."""
+    structure = setting.structure
+    n, root = structure.unknowns, np.sqrt(structure.mass)
+    b = null_border(structure, at.z, at.p)
+    norm = np.linalg.norm(b[:, :n] * root, axis=1)
+    critical = Critical(structure, at.z, at.p, np.ascontiguousarray(b * norm[:, None]))
+    return critical.v[:, :n] * root, critical.quadratic
+
+
+def sides_of_existence(at: Vertices) -> Float[np.ndarray, "n 2"]:
+    """Vectors, in scaled parameters, across folds: ``∇g·adj P`` with P the projection to them.
+
+    On a fold ``adj P = φψᵀ`` with the null vectors of P, and g is the function that vanishes there:
+    the vector is a multiple of ψ, which is normal to the fold's image, and vanishes with ∇g·φ.
+    """
+    along = at.frame[:, :, -2:]
+    a, b = along[:, 0].T
+    c, d = along[:, 1].T
+    g = at.fold_slope
+    return np.stack([g[:, 0] * d - g[:, 1] * b, g[:, 1] * a - g[:, 0] * c], axis=1)

@@ -1,0 +1,232 @@
+"""Where snaps lead: from each piece of stability boundary to the stratum where it lands."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.equilibria import Landing, snap_landing
+from equimorph.errors import InputError
+from equimorph.manifold.complex.arguments import whole_number
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.geometry.topology import adjacency, flags_of, pieces
+from equimorph.model import Progress, Silent
+
+SAME = 1e-5
+"""Distance in the metric below which a landing is a state of the set."""
+NOWHERE = -1
+"""Instead of a stratum: the landing is not in the set, or there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Snap:
+    """A run of the stability boundary from which all snaps lead to one stratum.
+
+    Parameters
+    ----------
+    source, target
+        Numbers of strata; `target` is −1 where the snap lands nowhere in the set.
+    status
+        How the snaps end: see `Landing`; "held" where nothing moves, as at cusps.
+    vertices
+        Vertices of the boundary that were tried, in order along it.
+    landings
+        Where each of them lands.
+    along
+        All vertices of the boundary from the first that was tried to the last; over three
+        parameters, where they have no order, those that were tried.
+    """
+
+    source: int
+    target: int
+    status: str
+    vertices: Int[np.ndarray, " tried"]
+    landings: tuple[Landing, ...]
+    along: Int[np.ndarray, " n"]
+
+    @property
+    def released(self) -> tuple[float, float]:
+        """Least and greatest energy that is freed."""
+        values = [landing.released for landing in self.landings]
+        return min(values), max(values)
+
+
+@dataclass(frozen=True, eq=False)
+class SnapGraph:
+    """Stable strata as nodes, snaps between them as edges.
+
+    Parameters
+    ----------
+    eset
+        The set.
+    strata
+        Numbers of the stable strata.
+    snaps
+        Runs of the stability boundary with their landings.
+    """
+
+    eset: EquilibriumSet
+    strata: tuple[int, ...]
+    snaps: tuple[Snap, ...]
+
+    def leaving(self, stratum: int) -> tuple[Snap, ...]:
+        """Snaps that leave a stratum.
+
+        Raises
+        ------
+        InputError
+            If it is no stable stratum.
+        """
+        if stratum not in self.strata:
+            names = ", ".join(map(str, self.strata)) or "none"
+            raise InputError(f"`stratum` must be a stable one ({names}); got {stratum!r}.")
+        return tuple(snap for snap in self.snaps if snap.source == stratum)
+
+    def __repr__(self) -> str:
+        """One line per stratum and per snap."""
+        lines = [f"SnapGraph over {self.eset.box}: {len(self.strata)} stable strata"]
+        for stratum in self.strata:
+            lines.append(f"  stratum {stratum} ({self.eset.strata[stratum].cells} cells)")
+            lines.extend(f"    {_told(self.eset, snap)}" for snap in self.leaving(stratum))
+        return "\n".join(lines)
+
+
+def snap_graph(
+    eset: EquilibriumSet, *, samples: int = 9, progress: Progress | None = None
+) -> SnapGraph:
+    """Follow snaps from all pieces of the stability boundary.
+
+    The boundary of a stable stratum, where it meets a stratum of index one, is left at some of its
+    vertices (`snap_landing`). Along curves the places where the landing changes are bisected until
+    they lie between neighbours.
+
+    Parameters
+    ----------
+    samples
+        Vertices that are tried on each piece at first.
+    progress
+        Sink for progress reports.
+
+    Raises
+    ------
+    InputError
+        If `samples` is not a whole number of at least two.
+    """
+    samples = whole_number("samples", samples, 2)
+    progress = progress or Silent()
+    stable = tuple(k for k, stratum in enumerate(eset.strata) if stratum.index == 0)
+    edges = [(k, piece) for k in stable for piece in _pieces(eset, k)]
+    snaps = []
+    for number, (source, piece) in enumerate(edges):
+        progress.report("snaps", number, len(edges))
+        snaps.extend(_Edge(eset, source, piece).snaps(samples))
+    return SnapGraph(eset, stable, tuple(snaps))
+
+
+def stability_boundary(eset: EquilibriumSet, stratum: int) -> Int[np.ndarray, "n d"]:
+    """Facets of the folds around a stratum, one a row."""
+    whole = adjacency(eset.cells)
+    d = len(eset.names)
+    every = [_facets(piece, d) for piece in eset.folds]
+    folded = flags_of(whole.facets, np.concatenate([np.zeros((0, d), int), *every]))
+    a, b = whole.links.T
+    side_a, side_b = eset.stratum[a] == stratum, eset.stratum[b] == stratum
+    own = np.unique(whole.across[(side_a != side_b) & folded[whole.across]])
+    return np.asarray(whole.facets[own])
+
+
+def _pieces(eset: EquilibriumSet, stratum: int) -> Iterator[Int[np.ndarray, " n"]]:
+    """Vertices of the pieces of the folds around a stable stratum, in order along curves."""
+    for piece in pieces(stability_boundary(eset, stratum)):
+        yield piece if len(eset.names) < 3 else np.unique(piece)
+
+
+def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+    """Facets of a piece of a fold: a point, a polyline or triangles."""
+    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
+
+
+class _Edge:
+    """A piece of the stability boundary, and what is known of the snaps from its vertices."""
+
+    def __init__(self, eset: EquilibriumSet, source: int, vertices: Int[np.ndarray, " n"]) -> None:
+        self.eset, self.source, self.vertices = eset, source, vertices
+        self.known: dict[int, tuple[Landing, int]] = {}
+
+    def snaps(self, samples: int) -> list[Snap]:
+        """Runs of vertices with the same landing."""
+        count = len(self.vertices)
+        tried = sorted({round(k) for k in np.linspace(0, count - 1, min(samples, count))})
+        if len(self.eset.names) == 2:
+            for low, high in pairwise(tried):
+                self._bisect(low, high)
+        for place in tried:
+            self._outcome(place)
+        out: list[Snap] = []
+        run: list[int] = []
+        order = sorted(self.known)
+        if len(self.eset.names) == 3:  # vertices of a surface have no order along it
+            order.sort(key=self._outcome)
+        for place in order:
+            if run and self._outcome(place) != self._outcome(run[-1]):
+                out.append(self._snap(run))
+                run = []
+            run.append(place)
+        return [*out, self._snap(run)] if run else out
+
+    def _snap(self, run: list[int]) -> Snap:
+        landings = tuple(self.known[place][0] for place in run)
+        status, target = self._outcome(run[0])
+        ordered = len(self.eset.names) < 3
+        along = self.vertices[run[0] : run[-1] + 1] if ordered else self.vertices[run]
+        return Snap(self.source, target, status, self.vertices[run], landings, along)
+
+    def _bisect(self, low: int, high: int) -> None:
+        """Try places between two, as long as their outcomes differ."""
+        while high - low > 1 and self._outcome(low) != self._outcome(high):
+            middle = (low + high) // 2
+            if self._outcome(middle) == self._outcome(low):
+                low = middle
+            else:
+                self._bisect(middle, high)
+                high = middle
+
+    def _outcome(self, place: int) -> tuple[str, int]:
+        if place not in self.known:
+            landing = self._landing(int(self.vertices[place]))
+            self.known[place] = landing, self._stratum(landing)
+        landing, stratum = self.known[place]
+        return landing.status, stratum
+
+    def _landing(self, vertex: int) -> Landing:
+        """Landing of the snap from a vertex; at most one of the two directions leads away."""
+        landings = snap_landing(self.eset.points[vertex])
+        return next((each for each in landings if each.status != "held"), landings[0])
+
+    def _stratum(self, landing: Landing) -> int:
+        """Stratum on which a landing lies."""
+        eset, structure = self.eset, self.eset.structure
+        if not landing.landed:
+            return NOWHERE
+        at = {name: np.array([landing.state[name]]) for name in eset.names}
+        here = eset.over(**at)
+        gap = (here.states.z - landing.state.z)[:, : structure.unknowns] ** 2 @ structure.mass
+        near: Bool[np.ndarray, " n"] = np.sqrt(gap) < SAME
+        found = here.stratum[near]
+        return int(found[0]) if len(found) else NOWHERE
+
+
+def _told(eset: EquilibriumSet, snap: Snap) -> str:
+    """A snap in one line."""
+    points = eset.coordinates[snap.vertices]
+    low, high = points.min(axis=0), points.max(axis=0)
+    ranges = zip(eset.names, low, high, strict=True)
+    where = ", ".join(f"{name} {a:.3g} … {b:.3g}" for name, a, b in ranges)
+    if snap.status == "held":
+        return f"no snap at {where}: nothing moves"
+    if snap.target == NOWHERE:
+        return f"snaps out of the set ({snap.status}) from {where}"
+    least, most = snap.released
+    return f"snaps to stratum {snap.target}, frees {least:.3g} … {most:.3g}, from {where}"

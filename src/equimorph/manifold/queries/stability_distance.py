@@ -1,0 +1,308 @@
+"""How far a stable state is from the edge of stability: in the parameters, and along the set."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from equimorph.arrays import Lanes, Parameters
+from equimorph.equilibria import lift
+from equimorph.errors import InputError
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.tangents import placed_frames
+from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.queries.locate import pieces_of
+from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, setting_of, spots
+from equimorph.manifold.queries.snap_graph import stability_boundary
+from equimorph.structures import State, States
+
+CANDIDATES = 12
+"""Places of the boundary from which the nearest one is searched."""
+SHORT_OF = 1e-7
+"""Part of the way to the boundary that is left out when a straight move to it is lifted."""
+LONGER = 1.1
+"""Ways along edges of the complex are up to a tenth too long: so much longer ones are tried."""
+LINKS = (8, 16)
+"""Links of the chains along the set whose lengths are extrapolated."""
+SWEEPS, STILL = 60, 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityDistance:
+    """Distances of a stable state from the boundary of its stratum where stability is lost.
+
+    Parameters
+    ----------
+    in_parameters
+        Length of the shortest straight change of the free parameters, in their scales, that leads
+        to a loss of stability; ∞ if none is known in the box.
+    nearest
+        Fold that this change leads to.
+    along_the_set
+        Length of the shortest curve on the set to the boundary, in the metric: configuration and
+        scaled parameters; ∞ if the stratum has no such boundary in the box.
+    way
+        States along that curve, the last one a fold.
+    """
+
+    in_parameters: float
+    nearest: State | None
+    along_the_set: float
+    way: States
+
+    def __repr__(self) -> str:
+        """Both lengths."""
+        return (
+            f"StabilityDistance({self.in_parameters:.6g} in scaled parameters, "
+            f"{self.along_the_set:.6g} along the set)"
+        )
+
+
+def stability_distance(eset: EquilibriumSet, state: State) -> StabilityDistance:
+    """How far a stable state is from the edge of stability, within the box of a set.
+
+    In the parameters: the nearest points of the folds around the stratum, polished on the fold by
+    Newton, nearest first, until the straight move to one of them can be lifted. Along the set: the
+    shortest ways over the edges of the complex, straightened on the set, with their lengths
+    extrapolated from chains of 8 and 16 links (fourth order).
+
+    Raises
+    ------
+    InputError
+        If the state is unstable, or no state of the set.
+    """
+    stratum = _stratum_of(eset, state)
+    boundary = stability_boundary(eset, stratum)
+    if len(boundary) == 0:
+        return StabilityDistance(np.inf, None, np.inf, state.batch)
+    length, nearest = _in_parameters(eset, state, boundary)
+    along, way = _along_the_set(eset, state, stratum, boundary)
+    return StabilityDistance(length, nearest, along, way)
+
+
+def _stratum_of(eset: EquilibriumSet, state: State) -> int:
+    values = {name: state[name] for name in eset.names}
+    if not np.allclose(eset.parameters_at(values), state.p, rtol=0, atol=1e-9):
+        raise InputError(
+            f"`state` must have the fixed parameters of the set ({dict(eset.fixed)}); "
+            f"got {state.parameters}."
+        )
+    stratum, _ = pieces_of(eset, state)
+    if stratum < 0:
+        raise InputError(f"`state` must be a state of the set; got {state}, which is not.")
+    if eset.strata[stratum].index != 0:
+        raise InputError(f"`state` must be stable; got one of index {eset.strata[stratum].index}.")
+    return stratum
+
+
+def _in_parameters(
+    eset: EquilibriumSet, state: State, boundary: Int[np.ndarray, "n d"]
+) -> tuple[float, State | None]:
+    """Shortest straight change to the boundary that can be lifted, and where it ends."""
+    setting = setting_of(eset)
+    free, scales = setting.free, setting.scales
+
+    def change(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes d"]:
+        del z
+        return np.asarray((p - state.p)[:, free] / scales)
+
+    far = np.linalg.norm(change(eset.points.z, eset.points.p), axis=1)
+    starts = _nearest_of_each_part(boundary, far)
+    found, length, _ = Ground(setting, eset, fold=True).nearest(spots(eset, starts), change)
+    best, nearest = np.inf, None
+    for lane in np.argsort(length, kind="stable"):
+        if length[lane] >= best:
+            break
+        share = _reached(eset, state, found.p[lane])
+        if share is not None and share * length[lane] < best:
+            best = float(share * length[lane])
+            nearest = State(eset.structure, found.z[lane], found.p[lane])
+    return best, nearest
+
+
+def _nearest_of_each_part(
+    boundary: Int[np.ndarray, "n d"], far: Float[np.ndarray, " V"]
+) -> Int[np.ndarray, " some"]:
+    """Vertices of the boundary nearer than their neighbours on it, the nearest first."""
+    if boundary.shape[1] == 1:
+        minima = boundary[np.argsort(far[boundary[:, 0]], kind="stable"), 0]
+    else:
+        minima = local_minima(faces_of(boundary, 2), far)
+    return np.asarray(minima[:CANDIDATES])
+
+
+def _reached(eset: EquilibriumSet, state: State, p: Float[np.ndarray, " P"]) -> float | None:
+    """Share of a straight change after which stability is lost; None if it is not."""
+    goal = state.p + (1.0 - SHORT_OF) * (p - state.p)
+    to = {name: float(goal[k]) for name, k in zip(eset.names, setting_of(eset).free, strict=True)}
+    path = lift(state, to=to)
+    if path.end.kind in {"fold", "branch point"}:
+        return float(path.end.at)
+    # next to a fold the softest mode is about as stiff as the root of the way that is left
+    end = path.end.state
+    soft = end.margin < 1e-2 * max(1.0, abs(state.margin))
+    return 1.0 if path.end.kind == "arrived" and end.stable and soft else None
+
+
+def _along_the_set(
+    eset: EquilibriumSet, state: State, stratum: int, boundary: Int[np.ndarray, "n d"]
+) -> tuple[float, States]:
+    """Length of the shortest curve on the set to the boundary, and states along it."""
+    best: tuple[float, States] = (np.inf, state.batch)
+    for path in _ways(eset, state, stratum, boundary):
+        chain = _Chain(eset, path)
+        lengths = [chain.straightened(links) for links in LINKS]
+        # chords fall short of arcs by the square of their length
+        length = (4.0 * lengths[1] - lengths[0]) / 3.0
+        if length < best[0]:
+            best = (length, States(eset.structure, chain.spot.z, chain.spot.p))
+    return best
+
+
+def _ways(
+    eset: EquilibriumSet, state: State, stratum: int, boundary: Int[np.ndarray, "n d"]
+) -> list[Spot]:
+    """Shortest ways over the edges of a stratum from a state to different parts of its boundary."""
+    setting = setting_of(eset)
+    cells = eset.cells[eset.stratum == stratum]
+    pairs = faces_of(cells, 2) if len(eset.names) > 1 else cells
+    place = embed(setting, eset.points.z, eset.points.p)
+    own = embed(setting, state.z[None], state.p[None])
+    length = np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)
+    used = np.unique(cells)
+    # the vertices around the state are those of the cells over it that it lies on
+    around = _corners_around(eset, state, stratum, used, place, own)
+    count = len(eset.points)
+    ends = np.concatenate([pairs, np.stack([np.full(len(around), count), around], axis=1)])
+    to_them = np.linalg.norm(place[around] - own, axis=1)
+    graph = coo_array(
+        (np.concatenate([length, to_them]), ends.T), shape=(count + 1, count + 1)
+    ).tocsr()
+    far, before = dijkstra(graph, directed=False, indices=count, return_predecessors=True)
+    chosen = _nearest_of_each_part(boundary, far)
+    chosen = chosen[far[chosen] <= LONGER * far[chosen[0]]]
+    ways = []
+    for goal in chosen:
+        path = [int(goal)]
+        while before[path[-1]] != count:
+            path.append(int(before[path[-1]]))
+        ways.append(_from_state(eset, state, np.array(path[::-1])))
+    return ways
+
+
+def _corners_around(
+    eset: EquilibriumSet,
+    state: State,
+    stratum: int,
+    used: Int[np.ndarray, " n"],
+    place: Float[np.ndarray, "V coordinates"],
+    own: Float[np.ndarray, "1 coordinates"],
+) -> Int[np.ndarray, " corners"]:
+    """Vertices of the cell on which a state lies; the nearest one if there is no such cell."""
+    at = {name: np.array([state[name]]) for name in eset.names}
+    here = eset.over(**at)
+    gap = np.abs(here.states.z - state.z).max(axis=1)
+    cell = here.cell[gap.argmin()]
+    if cell >= 0 and eset.stratum[cell] == stratum:
+        return np.asarray(eset.cells[cell])
+    return np.asarray(used[[np.linalg.norm(place[used] - own, axis=1).argmin()]])
+
+
+def _from_state(eset: EquilibriumSet, state: State, path: Int[np.ndarray, " n"]) -> Spot:
+    """A state, and vertices after it."""
+    on = spots(eset, path)
+    z, p = np.concatenate([state.z[None], on.z]), np.concatenate([state.p[None], on.p])
+    return Spot(z, p, np.concatenate([on.rows[:1], on.rows]))
+
+
+class _Chain:
+    """Points on the set from a state to a fold, pulled straight: a discrete geodesic.
+
+    The sum of squared links is least where every point lies amid its neighbours as seen along its
+    tangent space, and the last link is orthogonal to the fold.
+    """
+
+    def __init__(self, eset: EquilibriumSet, path: Spot) -> None:
+        self.setting, self.spot = setting_of(eset), path
+        self.on_set, self.on_fold = Ground(self.setting, eset), Ground(self.setting, eset, True)
+
+    def straightened(self, links: int) -> float:
+        """Length of the chain with so many links, after it has been straightened."""
+        self._divide(links)
+        for _ in range(SWEEPS):
+            size = self._sweep()
+            if size < STILL:
+                break
+        return float(self._links(self.spot).sum())
+
+    def _links(self, spot: Spot) -> Float[np.ndarray, " links"]:
+        return np.asarray(np.linalg.norm(np.diff(self._places(spot), axis=0), axis=1))
+
+    def _places(self, spot: Spot) -> Float[np.ndarray, "points coordinates"]:
+        return embed(self.setting, spot.z, spot.p)
+
+    def _divide(self, links: int) -> None:
+        """Put equidistant points on the set along the chain."""
+        spot = self.spot
+        length = np.concatenate([[0.0], np.cumsum(self._links(spot))])
+        at = np.linspace(0.0, length[-1], links + 1)
+        before = np.clip(np.searchsorted(length, at, side="right") - 1, 0, len(length) - 2)
+        gap = np.maximum(length[before + 1] - length[before], 1e-300)
+        share = np.clip((at - length[before]) / gap, 0.0, 1.0)[:, None]
+        z, p = (
+            (1.0 - share) * column[before] + share * column[before + 1]
+            for column in (spot.z, spot.p)
+        )
+        near = Spot(z, p, spot.rows[np.where(share[:, 0] < 0.5, before, before + 1)])
+        moved, good = self.on_set.corrected(near)
+        # the ends are what they were
+        inner = np.flatnonzero(good)[1:-1] if good[[0, -1]].all() else np.flatnonzero(good)
+        inner = inner[(inner > 0) & (inner < links)]
+        near = near.replaced(inner, moved.take(inner))
+        self.spot = near.take(np.concatenate([[0], inner, [links]]))
+
+    def _sweep(self) -> float:
+        """One step of all points towards the straight chain; its length, zero where it is done."""
+        inner = self.spot.take(np.arange(1, len(self.spot.z) - 1))
+        last = self.spot.take(np.array([-1]))
+        frames, rows = self.on_set.frames(inner)
+        edge, edge_rows = self.on_fold.frames(last)
+        inner, last = Spot(inner.z, inner.p, rows), Spot(last.z, last.p, edge_rows)
+        step, end = self._step(frames, edge)
+        energy = (self._links(self.spot) ** 2).sum()
+        for share in 0.5 ** np.arange(8):
+            middle, good = self.on_set.moved(inner, frames, share * step)
+            goal, there = last, np.ones(1, bool)
+            if edge.shape[1]:
+                goal, there = self.on_fold.moved(last, edge, share * end)
+            parts = (vars(each).values() for each in (self.spot.take(np.array([0])), middle, goal))
+            new = Spot(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+            if good.all() and there.all() and (self._links(new) ** 2).sum() < energy:
+                self.spot = new
+                return float(max(np.abs(step).max(initial=0.0), np.abs(end).max(initial=0.0)))
+        return 0.0
+
+    def _step(
+        self, frames: Float[np.ndarray, "inner d full"], edge: Float[np.ndarray, "1 k full"]
+    ) -> tuple[Float[np.ndarray, "inner d"], Float[np.ndarray, "1 k"]]:
+        """Step of Gauss–Newton for the sum of squared links."""
+        place = self._places(self.spot)
+        inner, d = frames.shape[:2]
+        k = edge.shape[1]
+        # directions of all points one below the other, and whose they are
+        rows = placed_frames(self.setting, frames).reshape(inner * d, place.shape[1])
+        rows = np.concatenate([rows, placed_frames(self.setting, edge)[0]])
+        owner = np.concatenate([np.repeat(np.arange(inner), d), np.full(k, inner)])
+        pull = np.empty_like(place[1:])
+        pull[:-1] = 2.0 * place[1:-1] - place[:-2] - place[2:]
+        pull[-1] = place[-1] - place[-2]
+        apart = np.abs(owner[:, None] - owner)
+        weight = np.where(apart == 1, -1.0, np.where(apart == 0, 2.0, 0.0))
+        weight[owner == inner] *= np.where(owner == inner, 0.5, 1.0)
+        matrix = weight * (rows @ rows.T)
+        gradient = np.einsum("rc,rc->r", rows, pull[owner])
+        step = -np.linalg.solve(matrix, gradient)
+        return step[: inner * d].reshape(inner, d), step[inner * d :].reshape(1, k)

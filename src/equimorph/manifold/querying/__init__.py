@@ -1,1 +1,0 @@
-"""Compiled kernels of queries for the states of a set over points."""

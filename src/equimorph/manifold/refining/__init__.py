@@ -1,0 +1,1 @@
+"""Make a set finer and its cells well shaped."""

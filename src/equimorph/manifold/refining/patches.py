@@ -1,0 +1,89 @@
+"""Parts of a complex that are worked on alone: what is beyond stays, and so does the rim between.
+
+Vertices keep their numbers, and new ones are appended, so that a part goes back as it is.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.manifold.complex.marked_complex import ON_CROSSING, RIM, Fabric
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Some cells of a fabric with all facets between their vertices, and the rest of it.
+
+    inside: vertices of the patch. Edges of the rest between its vertices are marked as its `RIM`:
+    they are not bisected, no vertex of them goes, and flips do not make them a second time.
+    """
+
+    fabric: Fabric
+    rest: Fabric
+    inside: Bool[np.ndarray, " V"]
+
+    def replaced(self, by: Fabric) -> Fabric:
+        """Return the whole fabric, with another one in place of the patch."""
+        kept, rest = (by.marks & RIM) == 0, self.rest
+        return replace(
+            by,
+            cells=np.concatenate([rest.cells, by.cells]),
+            cell_index=np.concatenate([rest.cell_index, by.cell_index]),
+            squared=np.concatenate([rest.squared, by.squared]),
+            sense=np.concatenate([rest.sense, by.sense]),
+            facets=np.concatenate([rest.facets, by.facets[kept]]),
+            marks=np.concatenate([rest.marks, by.marks[kept]]),
+        )
+
+
+def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Patch:
+    """Triangles around some vertices, and so many rings more; where sheets cross, of all of them.
+
+    Edges on crossings that other sheets hold beyond the patch belong to its rim.
+    """
+    for _ in range(rings + 1):
+        near = _in_all_sheets(fabric, near)
+        own = near[fabric.cells].any(axis=1)
+        near = np.zeros_like(near)
+        near[fabric.cells[own]] = True
+    rest = fabric.only(~own)
+    beyond = np.zeros_like(near)
+    beyond[rest.cells] = True
+    within = near[fabric.facets].all(axis=1)
+    # the rim of a patch that this one is a part of stays that of the larger one, too
+    outer = (fabric.marks & RIM) > 0
+    rims = [_pairs_between(rest.cells, near & beyond), fabric.facets[within & outer]]
+    rim = np.unique(np.sort(np.concatenate(rims), axis=1), axis=0)
+    shared = within & ~outer
+    facets, marks = fabric.facets[shared], fabric.marks[shared]
+    outside = _in_all_sheets(fabric, beyond & (near | (fabric.vertices.shared >= 0)))
+    held = ((marks & ON_CROSSING) > 0) & outside[facets].any(axis=1)
+    rim = np.concatenate([rim, facets[held]])
+    patch = replace(
+        fabric.only(own),
+        facets=np.concatenate([facets, rim]),
+        marks=np.concatenate([marks, np.full(len(rim), RIM)]),
+    )
+    rest = replace(rest, facets=fabric.facets[~shared], marks=fabric.marks[~shared])
+    return Patch(patch, rest, near)
+
+
+def _in_all_sheets(fabric: Fabric, near: Bool[np.ndarray, " V"]) -> Bool[np.ndarray, " V"]:
+    """Some vertices, and those that are the same points of other sheets."""
+    shared = fabric.vertices.shared
+    met = np.zeros(int(shared.max(initial=-1)) + 2, bool)
+    met[shared[near]] = True
+    met[-1] = False
+    return np.asarray(near | met[shared])
+
+
+def _pairs_between(
+    cells: Int[np.ndarray, "n corners"], chosen: Bool[np.ndarray, " V"]
+) -> Int[np.ndarray, "m 2"]:
+    """Edges of cells, sorted, both of whose ends are chosen."""
+    cells = cells[np.count_nonzero(chosen[cells], axis=1) > 1]
+    pairs = [cells[:, list(pair)] for pair in combinations(range(cells.shape[1]), 2)]
+    edges = np.concatenate(pairs)
+    return np.unique(np.sort(edges[chosen[edges].all(axis=1)], axis=1), axis=0)

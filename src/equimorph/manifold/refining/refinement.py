@@ -1,0 +1,145 @@
+"""Refinement: edges are bisected until straight cells are within a tolerance of the set.
+
+The longest edge of a cell goes first, so that angles do not shrink from one bisection to the next
+[Rivara1984]_. New vertices are predicted by the cubic that touches the tangent spaces at both ends
+of the edge, and corrected orthogonally to the mean of both spaces; on folds, constraints and sides
+of the box along these.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from equimorph.manifold.complex.arguments import check_accuracy
+from equimorph.manifold.complex.audit import Audit
+from equimorph.manifold.complex.description import Frame, Lifting, described
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
+from equimorph.manifold.complex.questions import question_of_refinement
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.refining.bettering import sharp
+from equimorph.manifold.refining.corners import smallest_free_angle
+from equimorph.manifold.refining.deviations import Memory, known
+from equimorph.manifold.refining.righting import righted
+from equimorph.manifold.refining.settling import settled, tidied, told_apart
+from equimorph.manifold.refining.surgery import smallest_angle
+from equimorph.manifold.refining.tetrahedra import smallest_dihedral
+from equimorph.model import Forgetful, Journal, Progress, Silent
+
+TRIALS = 4
+"""How often slivers of tetrahedra are taken away and edges are cut in turn."""
+SHARE = {1: 1.0, 2: 0.75, 3: 2.0 / 3.0}
+"""Part of the tolerance that edges may use up: inside a cell their deviations add up to 2d/(d + 1)
+of the largest."""
+
+
+def refine(
+    eset: EquilibriumSet,
+    accuracy: float,
+    progress: Progress | None = None,
+    journal: Journal | None = None,
+) -> EquilibriumSet:
+    """Return the set with cells so small that they are within a tolerance of it.
+
+    Parameters
+    ----------
+    eset
+        A set as it was lifted.
+    accuracy
+        Largest distance, in the metric of the embedding (configuration and scaled parameters),
+        between the straight cells and the set.
+    progress
+        Sink for progress reports; one that raises an exception cancels.
+    journal
+        Keeps new vertices as soon as they are found, to go on from; see `equilibrium_set`.
+
+    Returns
+    -------
+    The refined set; its audit tells the largest deviation that remains, how many edges could not be
+    bisected, and the smallest angle.
+
+    Raises
+    ------
+    InputError
+        If `accuracy` is not positive, or the journal is of something else.
+    """
+    check_accuracy(accuracy)
+    if journal is not None:
+        journal.begin(question_of_refinement(eset, accuracy))
+    return refined(eset, accuracy, progress or Silent(), journal or Forgetful())
+
+
+def refined(
+    eset: EquilibriumSet, accuracy: float, progress: Progress, journal: Journal
+) -> EquilibriumSet:
+    """Return a refined set; a journal that has begun goes on."""
+    free = np.array([[q.name for q in eset.structure.parameters].index(n) for n in eset.names])
+    base = eset.points.p[0].copy() if len(eset.points) else np.zeros(0)
+    setting = Setting(eset.structure, base, free, eset.constraints)
+    if len(eset.cells) == 0:
+        return eset
+    memory = Memory(journal)
+    fabric = tidied(fabric_of(setting, eset), memory)
+    fabric = _settled_and_righted(fabric, SHARE[len(free)] * accuracy, memory, progress)
+    fabric = told_apart(fabric, memory)
+    edges = known(fabric, memory)
+    audit = eset.audit
+    lifting = Lifting(
+        audit.unpaired, audit.conflicts, audit.retraced,
+        audit.parity_violations, audit.undecided, audit.bisected,
+    )  # fmt: skip
+    frame = Frame(setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
+    out = described(frame, fabric.complex(), lifting)
+    quality = replace(
+        out.audit,
+        checked=audit.checked,
+        missing=audit.missing,
+        recovered=audit.recovered,
+        accuracy=accuracy,
+        deviation=float(edges.error.max(initial=0.0) / SHARE[len(free)]),
+        unrefined=int((edges.error > SHARE[len(free)] * accuracy).sum()),
+        smallest_angle=smallest_angle(fabric),
+        smallest_dihedral=smallest_dihedral(fabric),
+        changed=_changed(audit, out.audit),
+        smallest_free_angle=smallest_free_angle(fabric),
+    )
+    return replace(out, audit=quality)
+
+
+def _changed(before: Audit, after: Audit) -> int:
+    """By how much the topology changed, which it must not."""
+    counts = np.array(
+        [
+            (audit.components, audit.euler_characteristic, sum(n for _, n in audit.loops))
+            for audit in (before, after)
+        ]
+    )
+    return int(np.abs(counts[0] - counts[1]).sum())
+
+
+def _settled_and_righted(
+    fabric: Fabric, tolerance: float, memory: Memory, progress: Progress
+) -> Fabric:
+    """Bisect and flip until nothing is left to do; then take slivers away, and begin again."""
+    fabric = settled(fabric, tolerance, memory, progress)
+    fabric = settled(tidied(fabric, memory, fine=True), tolerance, memory, progress)
+    if fabric.dimension == 1:
+        return fabric
+    return (_tamed if fabric.dimension == 3 else righted)(fabric, tolerance, memory)
+
+
+def _tamed(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
+    """Slivers taken away where no edge gets to deviate; else others cut, and so on."""
+    best, fewest = fabric, None
+    for _ in range(TRIALS):
+        fabric = tidied(fabric, memory, fine=True, limit=tolerance)
+        # edges that come to lie on a fold may deviate from it
+        fabric = settled(fabric, tolerance, memory)
+        faults = (int((known(fabric, memory).error > tolerance).sum()), sharp(fabric))
+        if fewest is not None and faults >= fewest:
+            return best
+        best, fewest = fabric, faults
+        if not any(faults):
+            return best
+        fabric = settled(tidied(fabric, memory, fine=True), tolerance, memory)
+    return best

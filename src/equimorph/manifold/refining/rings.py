@@ -1,0 +1,260 @@
+"""Rings of tetrahedra around edges, and how else the polygons around these can be filled.
+
+An edge inside has one polygon around it. An edge on a surface of marked facets has one on each
+side, both closed by the chord that takes the edge's place on the surface; on the boundary one side
+is missing.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold.complex.marked_complex import CURVES, ON_CROSSING, SIDES, Fabric
+from equimorph.manifold.geometry.topology import among, keys_of
+from equimorph.manifold.refining.tetrahedra import Judge, determinants, dihedrals
+
+MOST = 7
+"""Cells around edges that are looked at."""
+EDGES = (((0, 1), (2, 3)), ((0, 2), (3, 1)), ((0, 3), (1, 2)),
+         ((1, 2), (0, 3)), ((1, 3), (2, 0)), ((2, 3), (0, 1)))  # fmt: skip
+"""Edges of a tetrahedron, each with the others' ends: even permutations of the corners."""
+
+Ends = Int[np.ndarray, "n 2"]
+
+
+@dataclass(frozen=True)
+class Rings:
+    """Edges with what is around them.
+
+    cells: around each edge, −1 where there are fewer; first, second: polygons around it that turn
+    to the right about it, of so many corners, −1 beyond; second is empty but for edges on surfaces
+    inside. mark: of the edges; index: of the cells at first and second.
+    """
+
+    ends: Ends
+    mark: Int[np.ndarray, " n"]
+    cells: Int[np.ndarray, "n ring"]
+    first: Int[np.ndarray, "n corners"]
+    second: Int[np.ndarray, "n corners"]
+    index: Int[np.ndarray, "n 2"]
+
+    def take(self, some: Int[np.ndarray, " k"] | Bool[np.ndarray, " n"]) -> "Rings":
+        """Return some of the rings."""
+        return Rings(*(column[some] for column in vars(self).values()))
+
+    @property
+    def chord(self) -> Ends:
+        """What takes the place of edges on surfaces."""
+        last = (self.first >= 0).sum(axis=1) - 1
+        return np.stack([self.first[:, 0], self.first[np.arange(len(last)), last]], axis=1)
+
+
+def rings_around(fabric: Fabric, ends: Ends) -> Rings:
+    """Rings around edges, sorted ends each, that can be taken out; those of others are left out."""
+    base, mark = len(fabric.vertices), fabric.edge_marks(ends)
+    ends, mark = ends[_single(mark)], mark[_single(mark)]
+    keys = keys_of(ends, base)
+    order = np.argsort(keys)
+    ends, mark, keys = ends[order], mark[order], keys[order]
+    edge, cell, arc = _arcs(fabric, keys)
+    count = np.bincount(edge, minlength=len(ends))
+    few = (count <= MOST)[edge]
+    edge, cell, arc = edge[few], cell[few], arc[few]
+    order = np.argsort(edge, kind="stable")
+    edge, cell, arc = edge[order], cell[order], arc[order]
+    starts = np.searchsorted(edge, np.arange(len(ends)))
+    place = np.arange(len(edge)) - starts[edge]
+    table = np.full((len(ends), MOST, 3), -1)
+    table[edge, place] = np.concatenate([cell[:, None], arc], axis=1)
+    kept = (count > 0) & (count <= MOST)
+    return _ordered(fabric, (ends[kept], mark[kept], count[kept]), table[kept])
+
+
+def _single(mark: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Which edges lie inside, or on one surface whose facets may be exchanged."""
+    allowed = (CURVES & ~ON_CROSSING) | (63 * SIDES)
+    return np.asarray((mark & (mark - 1) == 0) & (mark & ~allowed == 0))
+
+
+def _arcs(
+    fabric: Fabric, keys: Int[np.ndarray, " n"]
+) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " a"], Ends]:
+    """Cells around edges: the edge, the cell, and its other side, turning to the right."""
+    base = len(fabric.vertices)
+    edges, owners, arcs = [], [], []
+    for (i, j), rest in EDGES:
+        pair = fabric.cells[:, [i, j]]
+        own = keys_of(pair, base)
+        at = np.minimum(np.searchsorted(keys, own), max(len(keys) - 1, 0))
+        found = np.flatnonzero(keys[at] == own) if len(keys) else np.zeros(0, int)
+        arc = fabric.cells[found][:, list(rest)]
+        turned = pair[found, 0] > pair[found, 1]
+        arcs.append(np.where(turned[:, None], arc[:, ::-1], arc))
+        edges.append(at[found])
+        owners.append(found)
+    return np.concatenate(edges), np.concatenate(owners), np.concatenate(arcs)
+
+
+def _ordered(
+    fabric: Fabric,
+    about: tuple[Ends, Int[np.ndarray, " n"], Int[np.ndarray, " n"]],
+    table: Int[np.ndarray, "n ring 3"],
+) -> Rings:
+    """Rings with their cells one after the other, parted where facets are marked."""
+    ends, mark, count = about
+    base, rows = len(fabric.vertices), np.arange(len(ends))
+    known = np.sort(keys_of(fabric.facets, base))
+    marked = np.zeros((len(ends), MOST), bool)
+    for k in range(MOST):
+        facet = np.concatenate([ends, table[:, k, 1:2]], axis=1)
+        marked[:, k] = among(keys_of(facet, base), known) & (k < count)
+    at = marked.argmax(axis=1)
+    cells, corners = np.full((len(ends), MOST), -1), np.full((len(ends), MOST + 1), -1)
+    parted, good = np.zeros((len(ends), MOST), bool), np.ones(len(ends), bool)
+    seen = np.zeros((len(ends), MOST), bool)
+    for k in range(MOST):
+        live = k < count
+        good &= ~(live & seen[rows, at])
+        seen[rows, at] |= live
+        cells[live, k], corners[live, k] = table[rows, at, 0][live], table[rows, at, 1][live]
+        parted[live, k] = marked[rows, at][live]
+        after = table[rows, at, 2]
+        corners[live, k + 1] = after[live]
+        match = table[:, :, 1] == after[:, None]
+        good &= ~live | match.any(axis=1) | (k == count - 1)
+        at = match.argmax(axis=1)
+    last = corners[rows, count]
+    closed = last == corners[:, 0]
+    corners[rows[closed], count[closed]] = -1
+    walls = parted.sum(axis=1)
+    inside = closed & (walls == 0) & (mark == 0)
+    surface = closed & (walls == 2) & (mark > 0) & parted[:, 0]
+    boundary = ~closed & (walls == 1) & (mark > 0) & parted[:, 0]
+    second = np.where(surface, np.where(parted, np.arange(MOST), -1).max(axis=1), 0)
+    first, other = _polygons(corners, count, second)
+    index = fabric.cell_index[cells[rows[:, None], np.stack([rows * 0, second], axis=1)]]
+    at_second = (np.arange(MOST) >= second[:, None]) & surface[:, None]
+    same = fabric.cell_index[cells] == index[rows[:, None], at_second.astype(int)]
+    good &= (same | (cells < 0)).all(axis=1) & (inside | surface | boundary)
+    return Rings(ends, mark, cells, first, other, index).take(good)
+
+
+def _polygons(
+    corners: Int[np.ndarray, "n ring"], count: Int[np.ndarray, " n"], second: Int[np.ndarray, " n"]
+) -> tuple[Int[np.ndarray, "n ring"], Int[np.ndarray, "n ring"]]:
+    """Polygons up to a place and from it on, back to the beginning; one alone if it is zero."""
+    two, number = (second > 0)[:, None], np.arange(corners.shape[1])
+    first = np.where(two & (number > second[:, None]), -1, corners)
+    at = number + second[:, None]
+    other = np.take_along_axis(corners, np.minimum(at, MOST), axis=1)
+    other = np.where(at == count[:, None], corners[:, :1], other)
+    return first, np.where(two & (at <= count[:, None]), other, -1)
+
+
+@dataclass(frozen=True)
+class Filling:
+    """Best tetrahedra between polygons and the ends of the edges that they turn about.
+
+    quality: smallest angle, minus infinity where there is no filling; cells: −1 beyond; chords: of
+    the polygons, −1 beyond.
+    """
+
+    quality: Float[np.ndarray, " n"]
+    cells: Int[np.ndarray, "n come 4"]
+    chords: Int[np.ndarray, "n chords 2"]
+
+
+def fill(
+    judge: Judge, ends: Ends, polygons: Int[np.ndarray, "n ring"], barred: Int[np.ndarray, " m"]
+) -> Filling:
+    """Fill polygons with the triangles that give the largest smallest angle.
+
+    `barred` are the keys, in order, of edges that may not be chords. Tetrahedra must look the right
+    way in the tangent spaces at both ends.
+    """
+    size = (polygons >= 0).sum(axis=1)
+    quality = np.where(size == 2, np.inf, -np.inf)
+    quality[size == 0] = np.inf
+    cells = np.full((len(ends), 2 * (MOST - 2), 4), -1)
+    chords = np.full((len(ends), MOST - 3, 2), -1)
+    for m in range(3, MOST + 1):
+        own = np.flatnonzero(size == m)
+        if len(own) == 0:
+            continue
+        ring = polygons[own, :m]
+        values = _triangles(judge, ends[own], ring, barred)
+        of, within = _triangulations(m)
+        each = values[:, of].min(axis=2)
+        best = each.argmax(axis=1)
+        quality[own] = each[np.arange(len(own)), best]
+        corners = ring[:, _corners(m)][np.arange(len(own))[:, None], of[best]]
+        for side, order in ((0, (0, 1, 2)), (1, (0, 2, 1))):
+            end = np.repeat(ends[own, side, None, None], m - 2, axis=1)
+            both = np.concatenate([end, corners[:, :, list(order)]], axis=2)
+            cells[own, side * (m - 2) : (side + 1) * (m - 2)] = both
+        if m > 3:
+            chords[own, : m - 3] = ring[np.arange(len(own))[:, None, None], within[best]]
+    return Filling(quality, cells, chords)
+
+
+def _triangles(
+    judge: Judge, ends: Ends, ring: Int[np.ndarray, "n m"], barred: Int[np.ndarray, " b"]
+) -> Float[np.ndarray, "n triangles"]:
+    """Smallest angle of the two tetrahedra over each triangle of polygons."""
+    m, base = ring.shape[1], len(judge.place)
+    chosen = _corners(m)
+    corners = ring[:, chosen].reshape(-1, 3)
+    out = np.full(len(corners), np.inf)
+    for side, order in ((0, [0, 1, 2]), (1, [0, 2, 1])):
+        end = np.repeat(ends[:, side], len(chosen))
+        cells = np.concatenate([end[:, None], corners[:, order]], axis=1)
+        # most are never wanted: the tangent space at the end will do
+        flat = judge.flat(ends[:, side], ring)[:, chosen[:, order]]
+        upright = determinants(flat.reshape(-1, 3, 3)) > 0.0
+        out[~upright] = -np.inf
+        looked = np.flatnonzero(out > -np.inf)
+        out[looked] = np.minimum(out[looked], dihedrals(judge.place, cells[looked]))
+    each = out.reshape(len(ring), -1)
+    for i, j in combinations(range(m), 2):
+        if j - i in {1, m - 1}:
+            continue
+        bad = among(keys_of(ring[:, [i, j]], base), barred)
+        held = (chosen == i).any(axis=1) & (chosen == j).any(axis=1)
+        each[bad[:, None] & held] = -np.inf
+    return each
+
+
+@cache
+def _corners(m: int) -> Int[np.ndarray, "triangles 3"]:
+    """Corners of all triangles of a polygon."""
+    return np.array(list(combinations(range(m), 3)))
+
+
+@cache
+def _triangulations(
+    m: int,
+) -> tuple[Int[np.ndarray, "ways triangles"], Int[np.ndarray, "ways chords 2"]]:
+    """All ways to cut a polygon into triangles: numbers of these, and the chords."""
+    number = {tuple(each): k for k, each in enumerate(_corners(m).tolist())}
+    ways = _ways(0, m - 1)
+    chords = []
+    for way in ways:
+        sides = {pair for each in way for pair in combinations(each, 2)}
+        chords.append(sorted(pair for pair in sides if 1 < pair[1] - pair[0] < m - 1))
+    of = np.array([[number[each] for each in way] for way in ways])
+    return of, np.array(chords, int).reshape(len(ways), m - 3, 2)
+
+
+def _ways(i: int, j: int) -> list[tuple[tuple[int, int, int], ...]]:
+    """All ways to cut the part of a polygon from corner i to corner j."""
+    if j - i < 2:
+        return [()]
+    return [
+        ((i, k, j), *left, *right)
+        for k in range(i + 1, j)
+        for left in _ways(i, k)
+        for right in _ways(k, j)
+    ]

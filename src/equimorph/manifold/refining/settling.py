@@ -1,0 +1,172 @@
+"""Bisection of edges until none deviates, flips and collapses in between."""
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.manifold.complex.edge_points import Places, chunks, recalled_on_edges, unmet
+from equimorph.manifold.complex.marked_complex import CURVES, Fabric
+from equimorph.manifold.complex.shared_edges import copies, doubled, first_copies, with_copies
+from equimorph.manifold.complex.vertices import Vertices, gathered
+from equimorph.manifold.geometry.topology import keys_of
+from equimorph.manifold.refining.bettering import bettered
+from equimorph.manifold.refining.deviations import Edges, Memory, chosen, known
+from equimorph.manifold.refining.leading import led_between, on_plain_curves
+from equimorph.manifold.refining.patches import patch_around
+from equimorph.manifold.refining.smoothing import SHARP, smooth
+from equimorph.manifold.refining.surgery import SHORT, angles, collapse, flip
+from equimorph.model import Journal, Progress, Silent
+
+ROUNDS = 200
+GROWN = 1.6
+"""How much more tetrahedra there are when slivers are taken away anew."""
+PLACES = (0.5, 0.3, 0.7)
+"""Where along an edge a vertex is tried, one place after the other."""
+HOPELESS = 60
+"""Failed bisections, and a fiftieth of all edges, beyond which refinement ends."""
+MOST = 4_000_000
+"""Cells beyond which refinement ends."""
+LOCAL = 40
+"""Where one in so many edges deviates at most, what is around these is worked on alone."""
+RINGS = 4
+"""Rings of cells around edges that deviate, which longer ones to be cut first may lie in."""
+
+
+def settled(
+    fabric: Fabric,
+    tolerance: float,
+    memory: Memory,
+    progress: Progress | None = None,
+    most: int = MOST,
+) -> Fabric:
+    """Bisect and flip until no edge deviates that can be bisected, or there are too many cells.
+
+    Without a sink for progress all at once, even if little is to be done.
+    """
+    cells = len(fabric.cells)
+    for _ in range(ROUNDS):
+        edges = known(fabric, memory)
+        hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
+        todo = ((edges.error > tolerance) | edges.pressing | edges.uneven) & ~edges.stuck
+        if hopeless or len(fabric.cells) > most or not todo.any():
+            break
+        if progress is not None and _few(fabric, todo):
+            fabric = _settled_around(fabric, edges.ends[todo], tolerance, memory)
+            continue
+        (progress or Silent()).report(
+            "refining", int((edges.error <= tolerance).sum()), len(edges.error)
+        )
+        before = len(fabric.vertices)
+        fabric = bisected(fabric, edges, chosen(edges, tolerance), memory)
+        if fabric.dimension == 2:
+            fabric = flip(fabric, memory.cut, since=before)
+        elif fabric.dimension == 3 and len(fabric.cells) > GROWN * cells:
+            fabric = tidied(fabric, memory)
+            cells = len(fabric.cells)
+    return fabric
+
+
+def _few(fabric: Fabric, todo: Bool[np.ndarray, " E"]) -> bool:
+    """Whether so few edges deviate that it is worth while to work around them alone."""
+    return fabric.dimension == 2 and int(np.count_nonzero(todo)) * LOCAL < len(todo)
+
+
+def _settled_around(
+    fabric: Fabric, ends: Int[np.ndarray, "n 2"], tolerance: float, memory: Memory
+) -> Fabric:
+    """Bisect and flip around some edges until none deviates there."""
+    near = np.zeros(len(fabric.vertices), bool)
+    near[ends] = True
+    patch = patch_around(fabric, near, RINGS)
+    inner = memory.among(patch.inside)
+    out = patch.replaced(settled(patch.fabric, tolerance, inner))
+    memory.learn(inner, patch.inside)
+    return out
+
+
+def told_apart(fabric: Fabric, memory: Memory) -> Fabric:
+    """Vertices on edges of several sheets that join the same two points of their crossing."""
+    ends = doubled(fabric)
+    if len(ends) == 0:
+        return fabric
+    edges, base = known(fabric, memory), len(fabric.vertices)
+    those = np.flatnonzero(np.isin(keys_of(edges.ends, base), keys_of(ends, base)))
+    return bisected(fabric, edges, those, memory)
+
+
+def tidied(fabric: Fabric, memory: Memory, fine: bool = False, limit: float = np.inf) -> Fabric:
+    """Take slivers away; of triangles that are `fine` already also by moving vertices.
+
+    Where cells are coarse, short edges may be all that keeps two folds apart.
+    """
+    if fabric.dimension == 3:
+        return bettered(fabric, memory, limit, fine)
+    if fabric.dimension == 1:
+        return fabric
+    short = SHORT if fine else 0.0
+    fabric = flip(collapse(flip(fabric, memory.cut), passes=4, short=short), memory.cut)
+    if not fine:
+        return fabric
+    return flip(smooth(fabric, angles(fabric) < SHARP), memory.cut)
+
+
+def bisected(
+    fabric: Fabric, edges: Edges, at_once: Int[np.ndarray, " n"], memory: Memory
+) -> Fabric:
+    """Put exact vertices on edges; remember where that failed."""
+    ends = edges.ends
+    at_once = at_once[first_copies(fabric, ends[at_once], edges.marks[at_once])]
+    lowest = np.full(len(ends), np.iinfo(int).max)
+    for side in edges.of_cells.T:
+        np.minimum.at(lowest, side, fabric.cell_index)
+
+    done, parts, left = _found(fabric, edges, at_once, lowest, memory.journal)
+    for edge in left[on_plain_curves(fabric, ends[left], edges.marks[left])].tolist():
+        led = led_between(fabric, ends[edge], int(edges.marks[edge]), int(lowest[edge]))
+        if led is None:
+            memory.lost.add((int(ends[edge, 0]), int(ends[edge, 1])))
+            continue
+        done.append(np.array([edge]))
+        parts.append(led)
+        left = left[left != edge]
+    _, others = copies(fabric, ends[left])
+    memory.stuck.update(map(tuple, np.concatenate([ends[left], others]).tolist()))
+    memory.failures += len(left)
+    if not done:
+        return fabric
+    at, rank = np.concatenate(done), np.empty(len(ends), int)
+    rank[at_once] = np.arange(len(at_once))
+    order = np.argsort(rank[at])
+    place = np.empty(len(at), int)
+    place[order] = np.arange(len(at))
+    at, more = at[order], gathered(parts, place)
+    if ((edges.marks[at] & CURVES) > 0).any():
+        memory.stuck.clear()  # beside a fold that is better known they may succeed
+    whole, more = with_copies(fabric, ends[at], more)
+    memory.cut = np.concatenate([memory.cut, whole])
+    memory.put = np.concatenate([memory.put, len(fabric.vertices) + np.arange(len(whole))])
+    return fabric.bisected(whole, more) if len(at) else fabric
+
+
+def _found(
+    fabric: Fabric,
+    edges: Edges,
+    wanted: Int[np.ndarray, " n"],
+    lowest: Int[np.ndarray, " E"],
+    journal: Journal,
+) -> tuple[list[Int[np.ndarray, " _"]], list[Vertices], Int[np.ndarray, " m"]]:
+    """Edges with vertices on them, part by part, and those on which none was found."""
+    done: list[Int[np.ndarray, " _"]] = []
+    parts: list[Vertices] = []
+    left = wanted
+    for t in PLACES:
+        own = chunks(left, edges.marks)
+        places = [
+            Places(edges.ends[some], int(edges.marks[some[0]]), lowest[some], np.full(len(some), t))
+            for some in own
+        ]
+        tried = unmet(fabric, recalled_on_edges(journal, fabric, places))
+        done.extend(some[found] for some, (found, _) in zip(own, tried, strict=True))
+        parts.extend(vertices for _, vertices in tried)
+        failed = [some[~found] for some, (found, _) in zip(own, tried, strict=True)]
+        left = np.concatenate([left[:0], *failed])
+    return done, parts, left
