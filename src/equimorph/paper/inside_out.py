@@ -24,6 +24,7 @@ def main(folder: Path, intervals: tuple[int, int] = INTERVALS) -> dict[str, floa
     panels = em.plotting.route_panels(eset, route, crown, limit=kappa <= 6)
     em.plotting.save(panels, folder, "inside-out")
     stable = eset.at(Theta=1.3, Delta=1.3).stable
+    assert route.path is not None
     return {
         "equilibria at (1, 0)": float(len(here)),
         "stable equilibria at (1, 0)": float(len(here.stable)),

@@ -27,7 +27,12 @@ def main(folder: Path) -> dict[str, float]:
     failing, heights = em.Projection(around), em.DescriptorChart(around, [third, "Delta"])
     reduced = em.reduce(around, prefer=em.highest(crown))
     atlas = em.dissect(around)
-    panels = [projection, (failing, heights), reduced, atlas]
+    panels: list[em.Chart | em.Atlas | list[em.Chart]] = [
+        projection,
+        [failing, heights],
+        reduced,
+        atlas,
+    ]
     em.plotting.save(em.plotting.parameterisation(panels, crown), folder, "parameterisations")
 
     (barrier,) = reduced.barriers

@@ -40,6 +40,7 @@ def main(folder: Path) -> dict[str, float]:
         eset, (length, angle), load, (*LEVELS, start["F"]), route=free_load, marks=marks
     )
     plots.save(levels, folder, "spring-levels")
+    assert free_load.path is not None
     return {
         "load of C_s": start["F"],
         "x_l of delta = 0.40 at the load of C_s": first.stable[0]["x_l"],

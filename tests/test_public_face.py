@@ -1,0 +1,29 @@
+"""The public face: what `import equimorph` offers, and what type checkers see of it."""
+
+import ast
+from importlib import import_module
+from pathlib import Path
+
+import equimorph as em
+
+STUB = ast.parse(Path(em.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+HOMES = {
+    alias.name: node.module
+    for node in STUB.body
+    if isinstance(node, ast.ImportFrom) and node.module
+    for alias in node.names
+}
+
+
+def test_every_name_of_the_stub_is_the_object_that_its_layer_exports():
+    """Type checkers read the stub, users get the object: both must be the same."""
+    for name, home in HOMES.items():
+        layer = import_module(f"equimorph.{home}")
+        assert name in layer.__dict__.get("__all__", dir(layer)), (name, home)
+        assert getattr(em, name) is getattr(layer, name), (name, home)
+
+
+def test_all_public_names_complete():
+    """`dir` is what completion offers."""
+    assert set(HOMES) <= set(dir(em))
+    assert set(HOMES) <= set(em.__all__)
