@@ -1,0 +1,294 @@
+"""One Newton step onto the equilibrium set and along it to the conditions of points."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.point_conditions import Condition, Directions, Move, Some
+from equimorph.linalg import BorderedSolution
+from equimorph.structures import Structure
+
+DOUBTFUL = 1e-4
+"""Pivot ratio below which the index is counted anew."""
+SINGULAR, RANK = 1e-14, 1e-12
+"""Determinant of the slopes of conditions and their smallest singular value, relative to their
+size, that count as zero."""
+
+Numbers = Int[np.ndarray, " lanes"]
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """Coordinates along the set: its tangent spaces, found on the way. Regular at folds, too.
+
+    Parameters
+    ----------
+    unfolded
+        Solve F + βb = 0 with one more unknown β, b near the null vector: regular at branch points
+        and where sheets cross, too. There β is zero.
+    border
+        b, if it is given: then it is kept.
+    """
+
+    unfolded: bool = False
+    border: Lanes | None = None
+
+    def take(self, some: Some) -> "Tangents":
+        """Return those of some of the lanes."""
+        return self if self.border is None else Tangents(self.unfolded, self.border[some])
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Coordinates along the set: projections to given planes that are near its tangent spaces.
+
+    Parameters
+    ----------
+    by_z, by_p
+        k rows for each lane, whose products with (dz, dp) are the coordinates.
+    """
+
+    by_z: Float[np.ndarray, "lanes k size"]
+    by_p: Float[np.ndarray, "lanes k parameters"]
+
+    def take(self, some: Some) -> "Planes":
+        """Return the planes of some of the lanes."""
+        return Planes(self.by_z[some], self.by_p[some])
+
+
+@dataclass(frozen=True)
+class Held:
+    """Coordinates along the set: the parameters along the directions. Singular at folds."""
+
+    def take(self, some: Some) -> "Held":
+        """Return the same."""
+        return self
+
+
+Frame = Tangents | Planes | Held
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is solved for: directions, conditions, coordinates along the set."""
+
+    structure: Structure
+    directions: Directions
+    conditions: tuple[Condition, ...]
+    frame: Frame
+
+    @property
+    def unfolded(self) -> bool:
+        """Whether β is one more unknown."""
+        return isinstance(self.frame, Tangents) and self.frame.unfolded
+
+    @property
+    def width(self) -> int:
+        """Unknowns besides z: steps along the directions, and β."""
+        return int(self.directions.shape[1]) + self.unfolded
+
+    @property
+    def critical(self) -> bool:
+        """Whether a border of F_z is needed."""
+        return self.unfolded or any(each.critical for each in self.conditions)
+
+    @property
+    def renews_border(self) -> bool:
+        """Whether the border follows the null vector."""
+        return self.critical and not (
+            isinstance(self.frame, Tangents) and self.frame.border is not None
+        )
+
+    def take(self, some: Some) -> "Problem":
+        """Return the problem of some of the lanes."""
+        if self.width == 0:
+            return self
+        conditions = tuple(each.take(some) for each in self.conditions)
+        frame = self.frame.take(some)
+        return Problem(self.structure, self.directions[some], conditions, frame)
+
+    def change(
+        self, a: Float[np.ndarray, "lanes steps k"]
+    ) -> Float[np.ndarray, "lanes steps parameters"]:
+        """Changes of the parameters by steps along the directions."""
+        return np.asarray(a[:, :, : self.directions.shape[1]] @ self.directions)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A Newton step: changes of z and of the other unknowns, and what the factorisation told."""
+
+    dz: Lanes
+    da: Float[np.ndarray, "lanes k"]
+    index: Numbers
+    sure: Flags
+    along: Float[np.ndarray, "lanes k bordered"]
+    null: Lanes
+
+
+@dataclass(frozen=True)
+class Points:
+    """Where the lanes are: points, β, the border b of F_z, rows that see the tangent space."""
+
+    problem: Problem
+    z: Lanes
+    p: Parameters
+    beta: Values
+    b: Lanes
+    rows: Float[np.ndarray, "lanes k bordered"]
+
+    def take(self, some: Some) -> "Points":
+        """Return some of the lanes."""
+        columns = (self.z, self.p, self.beta, self.b, self.rows)
+        return Points(self.problem.take(some), *(column[some] for column in columns))
+
+    def moved(self, step: Step, share: Values) -> "Points":
+        """Points after shares of a step, with the border and the rows renewed."""
+        problem, still = self.problem, share == 0.0
+        dz, da = share[:, None] * step.dz, share[:, None] * step.da
+        dz[still], da[still] = 0.0, 0.0
+        z, beta = self.z + dz, self.beta
+        if problem.width == 0:
+            return replace(self, z=z)
+        if problem.unfolded:
+            beta = beta + da[:, -1]
+        b, rows = step.null, self.rows
+        if isinstance(problem.frame, Tangents):
+            rows = _dual(problem.structure, step.along)
+        return Points(problem, z, self.p + problem.change(da[:, None])[:, 0], beta, b, rows)
+
+    def step(self) -> Step:
+        """Newton step onto the set and along it to the conditions."""
+        problem = self.problem
+        if problem.width == 0:
+            return self._fixed_step()
+        onto, along, solution = self.directions()
+        size = problem.structure.size
+        at = Critical(problem.structure, self.z, self.p, self.b)
+        onto_z, along_z = (np.ascontiguousarray(each[..., :size]) for each in (onto, along))
+        onto_p = problem.change(onto[:, None, size:])[:, 0]
+        move = Move(onto_z, onto_p, along_z, problem.change(along[:, :, size:]))
+        found = [condition.linear(at, move) for condition in problem.conditions]
+        amount = _amount(
+            np.concatenate([each.slopes for each in found], axis=1),
+            np.concatenate([each.value for each in found], axis=1),
+        )
+        step = onto + np.einsum("lk,lki->li", amount, along)
+        null = _unit(at.v) if problem.renews_border else self.b
+        sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
+        index = solution.negative - problem.structure.constraints
+        return Step(step[:, :size].copy(), step[:, size:], index, sure, along, null)
+
+    def _fixed_step(self) -> Step:
+        """The same at fixed parameters: the structure's fused step."""
+        lanes, size = self.z.shape
+        still, one, none = np.zeros((lanes, size)), np.ones(lanes), np.zeros(lanes)
+        move = self.problem.structure.advance(
+            self.z, self.p, np.zeros_like(self.p), still, one, none
+        )
+        sure = np.ones(lanes, bool)
+        return Step(move.dz, np.zeros((lanes, 0)), move.index, sure, self.rows, self.b)
+
+    def directions(
+        self,
+    ) -> tuple[
+        Float[np.ndarray, "lanes bordered"], Float[np.ndarray, "lanes k bordered"], BorderedSolution
+    ]:
+        """Newton step onto the set where the rows vanish, and directions along the set."""
+        problem, structure = self.problem, self.problem.structure
+        (lanes, size), k = self.z.shape, self.problem.width
+        columns = np.empty((lanes, k, size))
+        residual = structure.residual(self.z, self.p)
+        if problem.unfolded:
+            columns[:, -1], residual = self.b, residual + self.beta[:, None] * self.b
+        for i in range(k - problem.unfolded):
+            dp = np.ascontiguousarray(problem.directions[:, i])
+            columns[:, i] = structure.parameter_derivative(self.z, self.p, dp)
+        if isinstance(problem.frame, Held):
+            rhs = -np.concatenate([residual[:, None], columns], axis=1)
+            solution = structure.solve(self.z, self.p, rhs)
+            x = np.zeros((lanes, k + 1, size + k))
+            x[:, :, :size], x[:, 1:, size:] = solution.x, np.eye(k)
+            return x[:, 0], x[:, 1:], solution
+        rhs = np.zeros((lanes, k + 1, size + k))
+        rhs[:, 0, :size], rhs[:, 1:, size:] = -residual, np.eye(k)
+        inner, corner = (np.ascontiguousarray(each) for each in np.split(self.rows, [size], axis=2))
+        solution = structure.solve(self.z, self.p, rhs, (columns, inner, corner))
+        return solution.x[:, 0], solution.x[:, 1:], solution
+
+
+def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
+    """Guesses, with a border and rows if these are needed."""
+    structure, (lanes, size), k = problem.structure, z.shape, problem.width
+    beta, b, rows = np.zeros(lanes), np.zeros_like(z), np.zeros((lanes, k, size + k))
+    here = Points(problem, z, p, beta, b, rows)
+    if k == 0:
+        return here
+    frame = problem.frame
+    if isinstance(frame, Tangents) and frame.border is not None:
+        here = replace(here, b=frame.border)
+    elif problem.critical:
+        here = replace(here, b=null_border(structure, z, p))
+    if isinstance(frame, Planes):
+        by_a = np.einsum("lmp,lkp->lmk", frame.by_p, problem.directions)
+        return replace(here, rows=np.concatenate([frame.by_z, by_a], axis=2))
+    if isinstance(frame, Tangents):  # any rows that see the tangent space will do, then its own
+        waves = np.cos(np.outer(np.arange(1, k + 1), 1.7 * np.arange(size + k)) + 0.4)
+        along = replace(here, rows=np.tile(waves, (lanes, 1, 1))).directions()[1]
+        return replace(here, rows=_dual(structure, along))
+    return here
+
+
+def _dual(
+    structure: Structure, along: Float[np.ndarray, "lanes k bordered"]
+) -> Float[np.ndarray, "lanes k bordered"]:
+    """Rows whose products with steps are coordinates in orthonormal directions of the same space.
+
+    Not a number where the directions are dependent.
+    """
+    (_, k, width), n = along.shape, structure.unknowns
+    weight = np.ones(width)
+    weight[:n], weight[n : structure.size] = structure.mass, 0.0
+    gram = (along * weight) @ np.swapaxes(along, 1, 2)
+    whole = np.isfinite(gram).all(axis=(1, 2))
+    whole[whole] = np.linalg.det(gram[whole]) > 0.0
+    gram[~whole] = np.eye(k)
+    rows = np.linalg.solve(np.linalg.cholesky(gram), along) * weight
+    rows[~whole] = np.nan
+    return np.ascontiguousarray(rows)
+
+
+def length(structure: Structure, step: Step, multipliers: float) -> Values:
+    """Length of steps in the metric and in the scaled parameters."""
+    n = structure.unknowns
+    squared = step.dz[:, :n] ** 2 @ structure.mass
+    if step.da.shape[1]:
+        squared += (step.da**2).sum(axis=1)
+    if multipliers:
+        squared += multipliers * (step.dz[:, n:] ** 2).sum(axis=1)
+    return np.asarray(np.sqrt(squared))
+
+
+def _amount(
+    slopes: Float[np.ndarray, "lanes m k"], value: Float[np.ndarray, "lanes m"]
+) -> Float[np.ndarray, "lanes k"]:
+    """Steps along the set that take scalars to zero: the shortest, or those of least squares."""
+    count, m, k = slopes.shape
+    amount, whole = np.full((count, k), np.nan), np.isfinite(slopes).all(axis=(1, 2))
+    whole &= np.isfinite(value).all(axis=1)
+    plain = np.zeros(count, bool)
+    if m == k:
+        size = np.abs(slopes[whole]).max(axis=(1, 2), initial=0.0)
+        plain[whole] = np.abs(np.linalg.det(slopes[whole])) > SINGULAR * size**k
+        amount[plain] = -np.linalg.solve(slopes[plain], value[plain, :, None])[:, :, 0]
+    rest = whole & ~plain
+    inverse = np.linalg.pinv(slopes[rest], rcond=RANK)
+    amount[rest] = -np.einsum("lkm,lm->lk", inverse, value[rest])
+    return amount
+
+
+def _unit(v: Lanes) -> Lanes:
+    return np.ascontiguousarray(v / np.linalg.norm(v, axis=1, keepdims=True))

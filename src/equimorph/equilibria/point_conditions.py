@@ -1,0 +1,276 @@
+"""Conditions on equilibria: what a point must satisfy besides F(z; p) = 0.
+
+Newton's method only needs a condition and its slopes along the equilibrium set, so that a condition
+is asked for its value after a step onto the set and for its derivatives along directions of the
+set. There even a largest value over the structure is smooth, whose derivative with respect to a
+single unknown has kinks.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Lanes, Parameters, Scalars
+from equimorph.equilibria.critical import Critical
+from equimorph.model.descriptor import Evaluate
+
+Directions = Float[np.ndarray, "lanes k parameters"]
+Tests = Callable[[Critical], Scalars]
+"""Several scalars of nearly singular states, one column each."""
+Some = Int[np.ndarray, " some"]
+
+VALUE_DIFFERENCE, TEST_DIFFERENCE = 1e-5, 1e-5
+"""Steps of differences, in the metric: they set the rate of convergence, not the error."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """A step onto the equilibrium set and directions along it, as changes of z and p."""
+
+    onto_z: Lanes
+    onto_p: Parameters
+    along_z: Float[np.ndarray, "lanes k size"]
+    along_p: Float[np.ndarray, "lanes k parameters"]
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Values of m scalars after the step onto the set, and their slopes along its directions."""
+
+    value: Float[np.ndarray, "lanes m"]
+    slopes: Float[np.ndarray, "lanes m k"]
+
+
+@runtime_checkable
+class Condition(Protocol):
+    """Scalars that vanish at the wanted points, linear at a point of each lane."""
+
+    @property
+    def critical(self) -> bool:
+        """Whether the scalars need the border of a nearly singular F_z."""
+
+    def linear(self, at: Critical, move: Move) -> Linear:
+        """Values after a step onto the set, and slopes along it."""
+
+    def take(self, some: Some) -> "Condition":
+        """Return the condition for some of the lanes."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """det F_z = 0: the test function g of the bordered system vanishes."""
+
+    critical = True
+
+    def linear(self, at: Critical, move: Move) -> Linear:
+        """By the exact second derivatives."""
+        value = at.g - at.second(move.onto_z, move.onto_p)
+        return Linear(value[:, None], -_seconds(at, (at.v, np.zeros_like(at.p)), move)[:, None])
+
+    def take(self, some: Some) -> "Fold":
+        """Return the same: nothing differs between lanes."""
+        return self
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Gradient of the reduced equation r = 0 is zero: branch points, and crossings of sheets.
+
+    Lyapunov–Schmidt reduction with a border b [Govaerts2000]_: where the residual is r b, the set
+    is ``r(ξ, π) = 0`` in the amplitude ξ of the null vector and steps π along `directions`. The
+    point must be sought with the border as one more unknown (`unfolded`). There is one scalar more
+    than directions; all vanish together, so that least squares converge quadratically.
+
+    Parameters
+    ----------
+    directions
+        Changes of the parameters along which the set branches.
+    """
+
+    directions: Directions
+    critical = True
+
+    def linear(self, at: Critical, move: Move) -> Linear:
+        """By the exact second derivatives, which are the Hessian of r."""
+        structure, (lanes, k) = at.structure, self.directions.shape[:2]
+        moves = [np.ascontiguousarray(self.directions[:, i]) for i in range(k)]
+        rhs = np.zeros((lanes, k, structure.size + 1))
+        for i, dp in enumerate(moves):
+            rhs[:, i, :-1] = -structure.parameter_derivative(at.z, at.p, dp)
+        answers = at.solve(rhs)
+        tangents = [(at.v, np.zeros_like(at.p))]
+        tangents += [(np.ascontiguousarray(answers[:, i, :-1]), dp) for i, dp in enumerate(moves)]
+        gradient = -np.column_stack([at.g, answers[:, :, -1]])
+        slopes = np.stack([_seconds(at, tangent, move) for tangent in tangents], axis=1)
+        onto = (move.onto_z, move.onto_p)
+        for i, tangent in enumerate(tangents):
+            twice = structure.second_derivative(at.z, at.p, tangent, onto)
+            gradient[:, i] += np.einsum("li,li->l", at.v, twice)
+        scale = np.maximum(np.abs(slopes).max(axis=(1, 2)), 1e-300)
+        return Linear(gradient / scale[:, None], slopes / scale[:, None, None])
+
+    def take(self, some: Some) -> "Crossing":
+        """Return the condition for some of the lanes."""
+        return Crossing(self.directions[some])
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Points in planes through given points: parameters held, arclength, normal spaces of groups.
+
+    Parameters
+    ----------
+    z, p
+        A point of the plane of each lane.
+    by_z, by_p
+        Normals: ``by_z·(z' − z) + by_p·(p' − p) = 0`` for each of m rows.
+    """
+
+    z: Lanes
+    p: Parameters
+    by_z: Float[np.ndarray, "lanes m size"]
+    by_p: Float[np.ndarray, "lanes m parameters"]
+    critical = False
+
+    def linear(self, at: Critical, move: Move) -> Linear:
+        """Exact."""
+        value = np.einsum("lmi,li->lm", self.by_z, at.z + move.onto_z - self.z)
+        value += np.einsum("lmi,li->lm", self.by_p, at.p + move.onto_p - self.p)
+        slopes = self.by_z @ np.swapaxes(move.along_z, 1, 2)
+        slopes += self.by_p @ np.swapaxes(move.along_p, 1, 2)
+        return Linear(value, slopes)
+
+    def take(self, some: Some) -> "Plane":
+        """Return the planes of some of the lanes."""
+        return Plane(self.z[some], self.p[some], self.by_z[some], self.by_p[some])
+
+
+@dataclass(frozen=True)
+class Values:
+    """Scalars of states take given values: descriptors, targets, active constraints.
+
+    Parameters
+    ----------
+    functions
+        The m scalars.
+    targets
+        Their values for each lane.
+    difference
+        Step of differences, in the metric.
+    one_sided
+        Whether differences are taken towards one side only: cheaper, and less exact.
+    reach
+        Steps onto the set longer than this, in the metric, are not looked ahead: far from the set
+        the scalars may have no meaning.
+    """
+
+    functions: tuple[Evaluate, ...]
+    targets: Float[np.ndarray, "lanes m"]
+    difference: float = VALUE_DIFFERENCE
+    one_sided: bool = False
+    reach: float = np.inf
+    critical = False
+
+    def linear(self, at: Critical, move: Move) -> Linear:
+        """By differences along the directions."""
+        if self.reach < np.inf:
+            structure = at.structure
+            squared = move.onto_z[:, : structure.unknowns] ** 2 @ structure.mass
+            squared += ((move.onto_p / structure.scales) ** 2).sum(axis=1)
+            near = (squared < self.reach**2)[:, None]
+            onto = np.where(near, move.onto_z, 0.0), np.where(near, move.onto_p, 0.0)
+            move = Move(*onto, move.along_z, move.along_p)
+
+        def excess(z: Lanes, p: Parameters) -> Scalars:
+            found = np.stack([function(z, p) for function in self.functions], axis=1)
+            return np.asarray(found - np.tile(self.targets, (len(z) // len(self.targets), 1)))
+
+        return _differences(excess, at, move, self.difference, one_sided=self.one_sided)
+
+    def take(self, some: Some) -> "Values":
+        """Return the condition for some of the lanes."""
+        targets = self.targets[some]
+        return Values(self.functions, targets, self.difference, self.one_sided, self.reach)
+
+
+@dataclass(frozen=True)
+class Vanishing:
+    """Tests of nearly singular states vanish: cusps, swallowtails, grazing of bounds.
+
+    Parameters
+    ----------
+    tests
+        Scalars of some of the lanes, by their numbers: they may differ from lane to lane. The
+        states they are asked for are whole rounds of these lanes.
+    lanes
+        Numbers of the lanes.
+    difference, one_sided
+        As for `Values`.
+    """
+
+    tests: Callable[[Some], Tests]
+    lanes: Some
+    difference: float = TEST_DIFFERENCE
+    one_sided: bool = False
+    critical = True
+
+    def linear(self, at: Critical, move: Move) -> Linear:
+        """By differences along the directions, the border kept."""
+        own = self.tests(self.lanes)
+
+        def scalars(z: Lanes, p: Parameters) -> Scalars:
+            b = np.tile(at.b, (len(z) // len(at.b), 1))
+            return own(Critical(at.structure, z, p, b))
+
+        return _differences(scalars, at, move, self.difference, one_sided=self.one_sided)
+
+    def take(self, some: Some) -> "Vanishing":
+        """Return the tests of some of the lanes."""
+        return Vanishing(self.tests, self.lanes[some], self.difference, self.one_sided)
+
+
+def _seconds(
+    at: Critical, tangent: tuple[Lanes, Parameters], move: Move
+) -> Float[np.ndarray, "lanes k"]:
+    """vᵀD²F[tangent, direction] for each of the directions along the set."""
+    lanes, k = move.along_z.shape[:2]
+    out = np.empty((lanes, k))
+    for i in range(k):
+        dz, dp = (np.ascontiguousarray(each[:, i]) for each in (move.along_z, move.along_p))
+        twice = at.structure.second_derivative(at.z, at.p, tangent, (dz, dp))
+        out[:, i] = np.einsum("li,li->l", at.v, twice)
+    return out
+
+
+def _differences(
+    scalars: Callable[[Lanes, Parameters], Scalars],
+    at: Critical,
+    move: Move,
+    step: float,
+    *,
+    one_sided: bool,
+) -> Linear:
+    """Values after the step onto the set and differences around it, all in one call."""
+    lanes, k = move.along_z.shape[:2]
+    sides = (0.0, 1.0) if one_sided else (0.0, 1.0, -1.0)
+    shares = [sides[0], *(sign for sign in sides[1:] for _ in range(k))]
+    numbers = [0, *(i for _ in sides[1:] for i in range(k))]
+    z, p = (
+        np.concatenate(
+            [base + share * step * along[:, i] for share, i in zip(shares, numbers, strict=True)]
+            if k
+            else [base]
+        )
+        for base, along in (
+            (at.z + move.onto_z, move.along_z),
+            (at.p + move.onto_p, move.along_p),
+        )
+    )
+    flat = scalars(z, p)
+    found = flat.reshape(-1, lanes, flat.shape[1])
+    ahead = found[1 : 1 + k]
+    change = ahead - found[0] if one_sided else 0.5 * (ahead - found[1 + k :])
+    return Linear(found[0], np.moveaxis(change, 0, 2) / step)
