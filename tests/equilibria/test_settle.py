@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria.conditions import cubic, gap, quadratic
-from equimorph.equilibria.point_conditions import Crossing, Fold, Plane, Vanishing, Values
+from equimorph.equilibria.point_conditions import Crossing, Fold, Plane, Values, Vanishing
 from equimorph.equilibria.settle import (
     Guards,
     Held,
