@@ -6,7 +6,7 @@ import pytest
 
 import equimorph as em
 from equimorph import charts, plotting
-from equimorph.charts.uncrossed import uncrossed
+from equimorph.charts.preparation import cut_along_crossings
 from equimorph.manifold import EquilibriumSet, equilibrium_set, part, refine
 from equimorph.model import Box, Descriptor
 from oracles.surfaces import pitchforks, transcriticals, tricritical
@@ -158,7 +158,7 @@ def test_descriptors_tell_sheets_apart_off_the_plane(pitchfork):
 
 
 def test_cut_sets_keep_their_cells_and_states(pitchfork):
-    apart = uncrossed(pitchfork)
+    apart = cut_along_crossings(pitchfork)
     assert len(apart.cells) == len(pitchfork.cells)
     assert np.array_equal(apart.points.z[apart.cells], pitchfork.points.z[pitchfork.cells])
     assert apart.crossings == ()

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import equimorph as em
+from equimorph.charts.domain import single_valued
 from equimorph.charts.regions import count_regions
-from equimorph.charts.sheets import single_valued
 from equimorph.errors import InputError
 from equimorph.manifold import part
 from oracles.charted import lifted, spring_fold

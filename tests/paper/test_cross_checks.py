@@ -8,7 +8,7 @@ import pytest
 import equimorph as em
 from equimorph.equilibria import newton
 from equimorph.paper import curvatures, limit_loads
-from equimorph.tasks.maps.passages import Passages
+from equimorph.tasks.maps.curvature import FirstStablePaths
 from typecheck import unchecked
 
 LOADS = ("uniform", "left-half")
@@ -128,7 +128,7 @@ def passages_of(amap):
     """Values of a curvature map at any settings."""
     options = em.TraceOptions(record=False, through_folds=True, through_branch_points=True)
     place = [each.name for each in amap.structure.parameters].index(amap.load)
-    paths = Passages(
+    paths = FirstStablePaths(
         amap.sheet, place, amap.at, amap.bound, amap.descriptor, amap.within, options
     )  # fmt: skip
     return lambda settings: paths(settings).value

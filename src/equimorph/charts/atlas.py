@@ -11,8 +11,8 @@ from equimorph.arrays import Points
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells, Found
-from equimorph.charts.travel import AtlasPath, travel
-from equimorph.charts.uncrossed import at_crossings, first_copies
+from equimorph.charts.paths import AtlasPath, path_over_cells
+from equimorph.charts.preparation import crossing_facets, first_copies
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.embedding import embed
@@ -204,7 +204,7 @@ class Atlas:
 
     def _crossings(self) -> list[Transition]:
         """Curves along which charts of sheets that cross meet, pair by pair."""
-        flags = at_crossings(self.eset, self.whole)
+        flags = crossing_facets(self.eset, self.whole)
         if not flags.any():
             return []
         cell, corner = np.nonzero(flags[self.whole.cell_facets])
@@ -264,7 +264,7 @@ class Atlas:
         for name, state, cell in zip(("start", "goal"), (start, goal), cells, strict=True):
             if cell < 0:
                 raise InputError(f"`{name}` must be a state of the atlas; got {state}.")
-        found = travel(self.eset, self.chart, (start, cells[0]), (goal, cells[1]))
+        found = path_over_cells(self.eset, self.chart, (start, cells[0]), (goal, cells[1]))
         if found is None:
             raise InputError(
                 "`goal` must be joined to `start` on the set; got states that are not."

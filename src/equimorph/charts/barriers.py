@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Points
-from equimorph.charts.domain import Domain, Edge, kinds_along, wide
+from equimorph.charts.domain import Domain, Edge, kinds_along, without_slivers
 from equimorph.charts.location import Cells, facet_kinds
 from equimorph.charts.preference import Preference
 from equimorph.charts.regions import regions_within
@@ -220,7 +220,7 @@ def gaps_of(domain: Domain, box: Box, cell: Float[np.ndarray, " d"]) -> Domain:
         [np.full(len(loop) - 1, 1 if k == 0 else -1) for k, loop in enumerate(loops)]
     )
     regions = regions_within(np.concatenate(loops), edges, jump)
-    kept = wide(regions.loops(lambda n: n > 0), cell)
+    kept = without_slivers(regions.loops(lambda n: n > 0), cell)
     ends = np.concatenate([np.stack([loop[:-1], loop[1:]], axis=1) for loop in loops])
     kinds = np.concatenate([np.full(4, "box", dtype=object), *domain.loop_kinds])
     return Domain(names, kept, tuple(kinds_along(loop, ends, kinds) for loop in kept))

@@ -1,27 +1,37 @@
-"""What all charts can do: coordinates to exact states and back."""
+"""Charts: coordinates to exact states and back; by free parameters, or by descriptors."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Points
-from equimorph.charts.coordinates import Coordinates
-from equimorph.charts.domain import Domain
+from equimorph.charts.coordinates import Coordinates, coordinates_of, frames_anywhere
+from equimorph.charts.domain import (
+    Domain,
+    Overlap,
+    overlaps,
+    sheet_labels,
+    single_domain,
+    single_valued,
+)
 from equimorph.charts.location import SAME, Cells, Found
-from equimorph.charts.sheets import Overlap, alone, overlaps, single_valued
-from equimorph.charts.solving import frames_anywhere
-from equimorph.charts.uncrossed import uncrossed
+from equimorph.charts.preparation import cut_along_crossings, flip_overturned
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
+from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.geometry.embedding import embed
+from equimorph.model import Descriptor
 from equimorph.structures import State, States
 
 STATUSES = ("inside", "gap", "barrier", "beyond the box", "not single-valued")
 """Where points lie; only those inside have a state."""
 INSIDE, GAP, BARRIER, BEYOND, MANIFOLD = range(len(STATUSES))
+
+DEPENDENT = 1e-7
+"""Largest Jacobian, in ranges of the coordinates, of those that depend on each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +103,14 @@ class Chart(ABC):
     @cached_property
     def cells(self) -> Cells:
         """Cells of the set that the chart covers."""
-        return Cells(uncrossed(self.eset), self.coordinates, np.arange(len(self.eset.cells)))
+        return Cells(
+            cut_along_crossings(self.eset), self.coordinates, np.arange(len(self.eset.cells))
+        )
 
     @cached_property
     def domain(self) -> Domain:
         """Coordinates that exactly one state has."""
-        return alone(self.cells)
+        return single_domain(self.cells)
 
     @cached_property
     def overlaps(self) -> tuple[Overlap, ...]:
@@ -211,3 +223,111 @@ class Chart(ABC):
             found.cell,
         )
         return Charted(States(structure, z, p), code, cell)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Projection(Chart):
+    """The free parameters as coordinates.
+
+    They fail where more than one sheet lies over a point: along folds, and where a stratum lies
+    over itself. Of the stable part of a set: ``Projection(part(eset, eset.cell_index == 0))``.
+
+    Parameters
+    ----------
+    eset
+        The set, or a part of one.
+
+    Raises
+    ------
+    InputError
+        For an empty set.
+    """
+
+    def __post_init__(self) -> None:
+        """Refuse an empty set."""
+        check_cells(self.eset)
+
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """The free parameters."""
+        return coordinates_of(self.eset, self.eset.names)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DescriptorChart(Chart):
+    """Descriptors, or some of them and some free parameters, as coordinates.
+
+    Regular at folds of the set. They fail where the coordinates themselves fold (their Jacobian
+    along the set vanishes) and where different sheets have the same coordinates.
+
+    Parameters
+    ----------
+    eset
+        The set, or a part of one.
+    chosen
+        Descriptors, or names of free parameters or descriptors; one for each free parameter.
+
+    Raises
+    ------
+    InputError
+        For an empty set, or coordinates that are unknown, too few or many, or depend on each other.
+    """
+
+    chosen: Sequence[Descriptor | str]
+
+    def __post_init__(self) -> None:
+        """Refuse what gives no coordinates."""
+        check_cells(self.eset)
+        sizes = self._jacobians()
+        if not (sizes > DEPENDENT).any():
+            raise InputError(
+                f"`coordinates` must be independent; got {', '.join(self.names)}, whose Jacobian "
+                f"along the set is at most {sizes.max():.2g} of their ranges."
+            )
+
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """What was chosen."""
+        return coordinates_of(self.eset, self.chosen)
+
+    @cached_property
+    def cells(self) -> Cells:
+        """Cells of the set; those that chords of folds have turned over are flipped."""
+        eset, numbers = cut_along_crossings(self.eset), np.arange(len(self.eset.cells))
+        plain = Cells(eset, self.coordinates, numbers)
+        if len(self.names) != 2:
+            return plain
+        folds = [np.stack([fold[:-1], fold[1:]], axis=1) for fold in eset.folds]
+        fixed = np.concatenate([np.zeros((0, 2), int), *folds])
+        flipped, sheet = eset.cells.copy(), sheet_labels(plain)
+        for label in range(sheet.max() + 1):
+            own = sheet == label
+            flipped[own] = flip_overturned(flipped[own], plain.values, fixed)
+        return Cells(replace(eset, cells=flipped), self.coordinates, numbers)
+
+    @cached_property
+    def singular(self) -> Level:
+        """Exact states at which the coordinates fold: their Jacobian along the set vanishes."""
+        return singular_set(self.eset, self.coordinates.scalars)
+
+    @cached_property
+    def single_valued(self) -> bool:
+        """Whether all states have different coordinates: these fold nowhere, and nothing overlaps.
+
+        Folds are found exactly, where the overlap beside them may be narrower than a cell.
+        """
+        return len(self.singular.states) == 0 and single_valued(self.cells)
+
+    def _jacobians(self) -> np.ndarray:
+        """|det J| at some vertices, with coordinates measured in their ranges."""
+        some = np.unique(np.linspace(0, len(self.eset.cells) - 1, 60).astype(int))
+        cells = self.cells
+        spread = np.maximum(np.ptp(cells.values, axis=0), 1e-300)
+        sizes = np.abs(cells.turn[some]) / np.prod(spread)
+        return np.asarray(sizes * len(cells.numbers))
+
+
+def check_cells(eset: EquilibriumSet) -> None:
+    """Refuse a set without cells."""
+    if len(eset.cells) == 0:
+        raise InputError("`eset` must have cells; got an empty set.")

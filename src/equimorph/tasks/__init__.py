@@ -18,6 +18,7 @@ from equimorph.tasks.maps import (
     natural_states_over,
     unloaded_base,
 )
+from equimorph.tasks.motion.tracking import Tracking, track
 from equimorph.tasks.optimising import (
     Barriers,
     Certificate,
@@ -58,8 +59,7 @@ from equimorph.tasks.robustness import (
     stable_room,
 )
 from equimorph.tasks.route import Route
-from equimorph.tasks.shapes import Shapes, solve_shape, solve_shapes
-from equimorph.tasks.tracking import Tracking, track
+from equimorph.tasks.shapes.solutions import Shapes, solve_shape, solve_shapes
 from equimorph.tasks.verification import Proof, Verification, verify
 
 __all__ = [

@@ -58,17 +58,17 @@ class Route:
         return self.path.states if self.path else None
 
 
-def refused(why: str, way_points: Corners | None = None, path: Path | None = None) -> Route:
+def refusal(why: str, way_points: Corners | None = None, path: Path | None = None) -> Route:
     """Route that does not exist, and why."""
     return Route("refused", why, way_points or [], path)
 
 
-def place(state: State, names: Sequence[str]) -> str:
+def describe_place(state: State, names: Sequence[str]) -> str:
     """Parameters of a state in words: ``Theta = 1, Delta = 0.418136``."""
     return ", ".join(f"{name} = {state[name]:.6g}" for name in names)
 
 
-def verified(
+def verify_route(
     start: State,
     goal: State,
     way_points: Corners,
@@ -87,9 +87,9 @@ def verified(
     names = _moved(way_points)
     end = path.end
     if end.kind != "arrived":
-        return refused(_reason(path, names, len(way_points)), way_points, path)
+        return refusal(_reason(path, names, len(way_points)), way_points, path)
     if distance(end.state, goal) > 1e-6:
-        return refused(
+        return refusal(
             f"the way-points lead to another equilibrium over the goal's parameters, "
             f"{distance(end.state, goal):.3g} away in the metric",
             way_points,
@@ -98,8 +98,8 @@ def verified(
     margins = path.states.margin
     if not (margins > 0.0).all():
         k = int(np.argmin(margins))
-        return refused(f"unstable at {place(path.states[k], names)}", way_points, path)
-    schedule = scheduled(path, margins, (*(c.descriptor for c in within), *monitor))
+        return refusal(f"unstable at {describe_place(path.states[k], names)}", way_points, path)
+    schedule = schedule_of(path, margins, (*(c.descriptor for c in within), *monitor))
     length = float(path.length[-1])
     return Route("arrived", "", way_points, path, float(margins.min()), length, schedule)
 
@@ -110,10 +110,10 @@ def _moved(way_points: Corners) -> list[str]:
 
 def _reason(path: Path, names: Sequence[str], segments: int) -> str:
     segment = min(int(path.end.at) + 1, segments)
-    return f"segment {segment} of {segments} meets {obstacle(path.end, names)}"
+    return f"segment {segment} of {segments} meets {describe_obstacle(path.end, names)}"
 
 
-def obstacle(end: Event, names: Sequence[str]) -> str:
+def describe_obstacle(end: Event, names: Sequence[str]) -> str:
     """What ended a lift, and where, in words."""
     what = {
         "fold": "a fold: stability is lost and the structure would snap",
@@ -121,7 +121,7 @@ def obstacle(end: Event, names: Sequence[str]) -> str:
         "multiple point": f"a multiple point ({end.detail})",
         "constraint": f"the constraint {end.detail}",
     }.get(end.kind, f"a numerical failure ({end.detail})")
-    return f"{what}, at {place(end.state, names)}"
+    return f"{what}, at {describe_place(end.state, names)}"
 
 
 def distance(a: State, b: State) -> float:
@@ -138,7 +138,7 @@ def _identity(structure: Structure) -> dict[str, Any] | None:
         return None
 
 
-def scheduled(
+def schedule_of(
     path: Path, margins: Float[np.ndarray, " steps"], descriptors: Sequence[Descriptor]
 ) -> Schedule:
     """Schedule of a path, with its margins and values of descriptors at every step."""

@@ -7,14 +7,15 @@ import equimorph as em
 from equimorph.equilibria.first_stable import none_passed
 from equimorph.tasks.maps.brackets import (
     Brackets,
+    Samples,
     cells_beside,
     edges_ahead,
     grid_edges,
-    narrowed,
-    suspicious,
+    narrow,
+    sample_distance,
+    suspicious_edges,
 )
-from equimorph.tasks.maps.chains import chains
-from equimorph.tasks.maps.samples import Samples, difference
+from equimorph.tasks.maps.curves import polylines
 
 SPRING = em.Spring()
 
@@ -43,9 +44,9 @@ def sharp(function, count=12, divisions=4):
     settings = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
     vertices, edges = sampler(function)(settings), grid_edges((count + 1, count + 1))
     a, b = (vertices.take(edges[:, k]) for k in (0, 1))
-    at = np.flatnonzero(suspicious(difference(SPRING, a, b), (count + 1, count + 1)))
+    at = np.flatnonzero(suspicious_edges(sample_distance(SPRING, a, b), (count + 1, count + 1)))
     pairs = Brackets(a.take(at), b.take(at), at)
-    return narrowed(SPRING, sampler(function), pairs, divisions)
+    return narrow(SPRING, sampler(function), pairs, divisions)
 
 
 def test_a_jump_across_a_circle_is_found_to_the_width_of_the_brackets():
@@ -53,7 +54,7 @@ def test_a_jump_across_a_circle_is_found_to_the_width_of_the_brackets():
     pairs = sharp(lambda x, y: np.where(x**2 + y**2 < 0.5, 2.0 + x, 0.1 * y))
     middle = 0.5 * (pairs.a.setting + pairs.b.setting)
     np.testing.assert_allclose(np.hypot(*middle.T), np.sqrt(0.5), atol=4.1e-5)
-    line = max(chains(middle, pairs.edge, (13, 13)), key=len)
+    line = max(polylines(middle, pairs.edge, (13, 13)), key=len)
     assert len(line) == len(pairs) + 1
     assert line[0] == line[-1]
 
@@ -93,5 +94,5 @@ def test_open_lines_run_from_one_loose_end_to_the_other():
     edges = grid_edges((2, 4))
     across = [int(np.flatnonzero((edges == [k, k + 4]).all(axis=1))[0]) for k in (2, 0, 3, 1)]
     points = np.array([[0.5, 2.0], [0.5, 0.0], [0.5, 3.0], [0.5, 1.0]])
-    (line,) = chains(points, np.array(across), (2, 4))
+    (line,) = polylines(points, np.array(across), (2, 4))
     assert points[line, 1].tolist() in ([0, 1, 2, 3], [3, 2, 1, 0])

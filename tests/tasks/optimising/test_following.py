@@ -11,7 +11,7 @@ import equimorph as em
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import State
-from equimorph.tasks.optimising.following import follow_optimum
+from equimorph.tasks.optimising.moving_optimum import follow_optimum
 from typecheck import unchecked
 
 SLIDER = em.EnergyStructure(

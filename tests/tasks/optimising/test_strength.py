@@ -6,8 +6,7 @@ import pytest
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.model import Box
-from equimorph.tasks.optimising.climbing import climb
-from equimorph.tasks.optimising.minimax import raised
+from equimorph.tasks.optimising.two_parameter_search import climb, maximise_least
 from typecheck import unchecked
 
 
@@ -105,7 +104,7 @@ def test_the_least_of_several_functions_is_raised_to_its_kink():
         return np.stack([s[:, 0], s[:, 1], 1.0 - s.sum(axis=1)], axis=1)
 
     box = Box(x=(-1, 1), y=(-1, 1))
-    setting, value = raised(pieces, np.array([-0.4, 0.9]), np.array([0.2, 0.2]), box)
+    setting, value = maximise_least(pieces, np.array([-0.4, 0.9]), np.array([0.2, 0.2]), box)
     assert setting == pytest.approx((1 / 3, 1 / 3), abs=1e-6)
     assert value == pytest.approx(1 / 3, abs=1e-6)
 

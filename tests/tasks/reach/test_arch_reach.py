@@ -11,7 +11,7 @@ from equimorph.model import Box
 from equimorph.structures import Rod
 from equimorph.tasks import track
 from equimorph.tasks.reach import reachable
-from equimorph.tasks.reach.towards import jacobian_of
+from equimorph.tasks.reach.query import jacobian_of
 from typecheck import unchecked
 
 

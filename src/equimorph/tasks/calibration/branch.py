@@ -12,7 +12,7 @@ from equimorph.equilibria.outcome import KINDS
 from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.errors import InputError
 from equimorph.structures import States, Structure
-from equimorph.tasks.calibration.measured import Columns, Measurement, by_data, derivative
+from equimorph.tasks.calibration.measurements import Columns, Measurement, by_data, derivative
 from equimorph.tasks.calibration.unknowns import Unknowns, Vector
 
 Residuals = Float[np.ndarray, " numbers"]

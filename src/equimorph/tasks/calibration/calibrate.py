@@ -12,7 +12,7 @@ from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.structures import States
 from equimorph.tasks.calibration.branch import Branch, BranchEnds, Jacobian, Residuals
-from equimorph.tasks.calibration.measured import Columns, Measurement
+from equimorph.tasks.calibration.measurements import Columns, Measurement
 from equimorph.tasks.calibration.unknowns import Family, Unknowns, Vector, Wanted, unknowns
 
 CONVERGED = 1e-13

@@ -1,13 +1,13 @@
-"""Grid edges on which a map jumps or bends, narrowed down by division."""
+"""Samples of a map, and pairs of them between which it jumps or bends, narrowed by division."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Shaped
 
-from equimorph.arrays import Edges
+from equimorph.arrays import Edges, Lanes, Parameters, Settings, Values
 from equimorph.structures import Structure
-from equimorph.tasks.maps.samples import Sampler, Samples, difference, joined
 
 RATIO = 2.0
 """Difference over an edge relative to the smaller of its neighbours' in line that is suspicious."""
@@ -19,6 +19,65 @@ NEGLIGIBLE = 1e-3
 """Smaller differences are nothing to look for: where an extremum lies is known less well."""
 ASIDE = (0.0, 0.4, -0.37)
 """Where to look around a dividing point that gives no answer, in lengths of the parts."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Values of a map at settings, with the states that they were read from.
+
+    Attributes
+    ----------
+    setting
+        Where.
+    value
+        What the map shows; not a number where it is not defined.
+    kind
+        Number of the status.
+    place
+        Which constraint, and where on the structure it is met; zero where it says nothing.
+    z, p
+        State and all parameters; not numbers where there is no state.
+    passed
+        Critical states on the way, a tuple of `Passed` for each lane; none in maps that do not ask.
+    """
+
+    setting: Settings
+    value: Values
+    kind: Int[np.ndarray, " lanes"]
+    place: Values
+    z: Lanes
+    p: Parameters
+    passed: Shaped[np.ndarray, " lanes"]
+
+    def take(self, lanes: Int[np.ndarray, " some"]) -> "Samples":
+        """Return some of the lanes."""
+        return Samples(*(column[lanes] for column in vars(self).values()))
+
+    def where(self, left: np.ndarray, other: "Samples") -> "Samples":
+        """Return these lanes where `left` and those of `other` elsewhere."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Samples(*(np.where(left[:, None] if a.ndim > 1 else left, a, b) for a, b in pairs))
+
+
+Sampler = Callable[[Settings], Samples]
+
+
+def join_samples(parts: Sequence[Samples]) -> Samples:
+    """All lanes one after the other."""
+    columns = zip(*(vars(part).values() for part in parts), strict=True)
+    return Samples(*(np.concatenate(column) for column in columns))
+
+
+def sample_distance(structure: Structure, a: Samples, b: Samples) -> Values:
+    """Distance of states, values and places of two settings per lane; ∞ where kinds differ.
+
+    Zero where kinds are the same and the map shows nothing on both sides.
+    """
+    n, columns = structure.unknowns, structure.scales
+    gap = np.sqrt((a.z - b.z)[:, :n] ** 2 @ structure.mass) + np.abs(a.place - b.place)
+    gap = gap + np.linalg.norm((a.p - b.p) / columns, axis=1)
+    shown = np.isfinite(gap) & (np.isfinite(a.value) | np.isfinite(b.value))
+    return np.where(a.kind != b.kind, np.inf, np.where(shown, gap, 0.0))
 
 
 @dataclass(frozen=True)
@@ -48,7 +107,7 @@ class Brackets:
     def with_more(self, more: "Brackets") -> "Brackets":
         """Return these and others."""
         edge = np.concatenate([self.edge, more.edge])
-        return Brackets(joined([self.a, more.a]), joined([self.b, more.b]), edge)
+        return Brackets(join_samples([self.a, more.a]), join_samples([self.b, more.b]), edge)
 
 
 def grid_edges(shape: tuple[int, int]) -> Edges:
@@ -59,7 +118,7 @@ def grid_edges(shape: tuple[int, int]) -> Edges:
     return np.concatenate([down, right])
 
 
-def suspicious(
+def suspicious_edges(
     differences: Float[np.ndarray, " edges"], shape: tuple[int, int]
 ) -> Bool[np.ndarray, " edges"]:
     """Edges whose ends differ in kind, or much more than those of the edges before and behind."""
@@ -79,25 +138,25 @@ def _stands_out(
     return np.moveaxis(np.isinf(line) | (line > RATIO * usual), 0, axis)
 
 
-def divided(structure: Structure, sampler: Sampler, pairs: Brackets) -> Brackets:
+def divide(structure: Structure, sampler: Sampler, pairs: Brackets) -> Brackets:
     """Parts of pairs that stay sharp: their ends differ in kind, or by more than a smooth map's."""
     count = len(pairs)
-    before = difference(structure, pairs.a, pairs.b)
+    before = sample_distance(structure, pairs.a, pairs.b)
     # one after the other: all first ends, all first dividing points, ..., all second ends
-    cuts = joined([pairs.a, _between(sampler, pairs), pairs.b])
+    cuts = join_samples([pairs.a, _between(sampler, pairs), pairs.b])
     a, b = (cuts.take(np.arange(PARTS * count) + shift) for shift in (0, count))
-    now = difference(structure, a, b)
+    now = sample_distance(structure, a, b)
     least = np.where(np.isfinite(before), PARTS**-SHRINKING * before, np.inf)
     least = np.maximum(least, NEGLIGIBLE)
     sharp = np.isinf(now) | (now > np.tile(least, PARTS))
     return Brackets(a, b, np.tile(pairs.edge, PARTS)).take(np.flatnonzero(sharp))
 
 
-def narrowed(structure: Structure, sampler: Sampler, pairs: Brackets, times: int) -> Brackets:
+def narrow(structure: Structure, sampler: Sampler, pairs: Brackets, times: int) -> Brackets:
     """Pairs that stay sharp when they are divided some times."""
     for _ in range(times):
         if len(pairs):
-            pairs = divided(structure, sampler, pairs)
+            pairs = divide(structure, sampler, pairs)
     return pairs
 
 
@@ -112,7 +171,7 @@ def _between(sampler: Sampler, pairs: Brackets) -> Samples:
     for aside in ASIDE:
         here = (share[open_] + aside / PARTS)[:, None]
         order[open_] = len(found.kind) + np.arange(len(open_))
-        found = joined([found, sampler(start[open_] + here * length[open_])])
+        found = join_samples([found, sampler(start[open_] + here * length[open_])])
         lost = ~np.isfinite(found.z[order[open_]]).all(axis=1) & defined[open_]
         open_ = open_[lost]
         if not len(open_):

@@ -1,17 +1,41 @@
 """Reasons why a map is not smooth between two settings: states at which two tests vanish."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.arrays import Edges, Flags, Settings
+from equimorph.arrays import Edges, Flags, Settings, Values
+from equimorph.equilibria.critical import Critical
+from equimorph.equilibria.first_stable import none_passed
 from equimorph.equilibria.locus import Test
 from equimorph.equilibria.natural_sheet import NaturalSheet
-from equimorph.tasks.maps.brackets import Brackets
-from equimorph.tasks.maps.polish import TestsOf
-from equimorph.tasks.maps.samples import Samples
+from equimorph.model import Constraint, Descriptor
+from equimorph.tasks.maps.brackets import Brackets, Samples
+from equimorph.tasks.maps.singular_states import TestsOf
+
+START_KINDS = ("undefined unloaded", "no natural state", "lost")
+"""Why there is no path at a setting, or that it was lost; the first statuses of every map."""
+UNDEFINED, MISSING, LOST = range(len(START_KINDS))
+
+ELSEWHERE = 0.02
+"""Distance along a structure of two extrema that are not one that moves."""
+
+
+def unloaded_samples(
+    sheet: NaturalSheet, within: Sequence[Constraint], settings: Settings
+) -> Samples:
+    """Natural states: `UNDEFINED` or `MISSING` where no path can start, `LOST` elsewhere."""
+    z, found = sheet.states(settings)
+    p = sheet.parameters(settings)
+    kind = np.where(found, LOST, MISSING)
+    at = np.flatnonzero(found)
+    for constraint in within:
+        kind[at[constraint.excess(z[at], p[at]) > 0.0]] = UNDEFINED
+    none = np.full(len(settings), np.nan)
+    return Samples(settings, none, kind, np.zeros(len(p)), z, p, none_passed(len(p)))
 
 
 @dataclass(frozen=True)
@@ -66,3 +90,32 @@ class Paths(Protocol):
 
     def unexplained(self, pairs: Brackets) -> np.ndarray:
         """Kinds of places without a cause, by what the ends show; empty for none."""
+
+
+def equal_extrema(
+    descriptor: Descriptor, pairs: Brackets, where: Bool[np.ndarray, " pairs"], second: Test
+) -> list[Cause]:
+    """Causes that the local extrema at the places of both ends are equal, and another test."""
+    branches = descriptor.branches
+    if branches is None:
+        return []
+    # the part after a whole number is the arclength
+    places = np.stack([pairs.a.place, pairs.b.place], axis=1) % 2.0
+    moved = where & (np.abs(places[:, 0] - places[:, 1]) > ELSEWHERE)
+
+    def difference(lanes: Int[np.ndarray, " some"]) -> Test:
+        def test(at: Critical) -> Values:
+            values, found = branches(at.z, at.p)
+            near = np.tile(here[lanes], (len(at.z) // len(lanes), 1))
+            away = np.abs(found[:, None] - near[:, :, None])
+            away = np.where(np.isfinite(values)[:, None], away, np.inf)
+            one, other = np.take_along_axis(values, away.argmin(axis=2), 1).T
+            return np.asarray((one - other) / np.maximum(np.abs(one) + np.abs(other), 1.0))
+
+        return test
+
+    here = places[moved]
+    return [
+        Cause.of("place", lambda lanes: (difference(lanes), second), moved, side)
+        for side in (pairs.a, pairs.b)
+    ]

@@ -7,15 +7,25 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Bool
 
+from equimorph.arrays import Edges, Flags, Settings, Values
 from equimorph.equilibria import TraceOptions
-from equimorph.equilibria.natural_sheet import natural_sheet
+from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
+from equimorph.equilibria.critical import Critical
+from equimorph.equilibria.first_stable import WAYS, FirstStable
+from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Grid, Progress, Silent, position
 from equimorph.structures import States, Structure
 from equimorph.tasks.maps.actuator_map import ActuatorMap, settings_of, unloaded_base
-from equimorph.tasks.maps.curves import curves_through, places_on
-from equimorph.tasks.maps.edge import edge_of_definition
-from equimorph.tasks.maps.passages import KINDS, Passages
+from equimorph.tasks.maps.brackets import Brackets, Samples
+from equimorph.tasks.maps.causes import LOST, START_KINDS, Cause, equal_extrema, unloaded_samples
+from equimorph.tasks.maps.curves import curves_through, edge_of_definition, places_on
+
+KINDS = (*START_KINDS, *WAYS[1:])
+"""What a real loading does, or why there is no value, in the order of their numbers."""
+STABLE, SNAPS, OFF, BOUND, NONE = range(len(START_KINDS), len(KINDS))
+JUMP = 1e-2
+"""Relative difference of values on both sides of a curve that counts as a jump."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,7 +132,7 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     options = replace(
         options or TraceOptions(), record=False, through_folds=True, through_branch_points=True
     )
-    paths = Passages(sheet, place, float(at), float(bound), shown, constraints, options)
+    paths = FirstStablePaths(sheet, place, float(at), float(bound), shown, constraints, options)
     sink.report("paths", 0, 2)
     vertices = paths(settings)
     sink.report("paths", 1, 2)
@@ -136,3 +146,122 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
         States(structure, vertices.z, vertices.p), curves, sheet,
         float(bound), float(at), shown,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FirstStablePaths:
+    """The first stable state with load `at` on the path that starts at each natural state.
+
+    Attributes
+    ----------
+    sheet, load
+        Natural states, and the place of the parameter along which paths run.
+    at, bound
+        The given load; the largest load, of either sign, up to which paths are followed.
+    descriptor
+        What the map shows.
+    within
+        Constraints that end paths.
+    options
+        Step control.
+    """
+
+    sheet: NaturalSheet
+    load: int
+    at: float
+    bound: float
+    descriptor: Descriptor
+    within: tuple[Constraint, ...]
+    options: TraceOptions
+
+    def __call__(self, settings: Settings) -> Samples:
+        """Values at settings, with their states and what happens on the way."""
+        start = unloaded_samples(self.sheet, self.within, settings)
+        z, p, kind = start.z, start.p, start.kind
+        value, place = start.value, start.place
+        ready = np.flatnonzero(kind == LOST)
+        passed = start.passed[ready]
+        walked = FirstStable(
+            self.sheet.structure, self.load, float(self.sheet.base[self.load]), self.bound,
+            self.within, self.options,
+        )(z[ready], p[ready], np.full(len(ready), self.at), passed)  # fmt: skip
+        z[ready], p[ready], kind[ready] = walked[0], walked[1], LOST + walked[2]
+        start.passed[ready] = passed
+        z[kind <= LOST] = np.nan
+        met = np.flatnonzero(kind == BOUND)
+        if len(met):
+            place[met] = np.array([c.excess(z[met], p[met]) for c in self.within]).argmax(axis=0)
+        some = np.flatnonzero((kind >= STABLE) & (kind <= OFF))
+        value[some] = self.descriptor.function(z[some], p[some])
+        if self.descriptor.place is not None and len(some):
+            place[some] = self.descriptor.place(z[some], p[some])
+        return Samples(settings, value, kind, place, z, p, start.passed)
+
+    def causes(self, pairs: Brackets) -> list[Cause]:
+        """What changes where a state at the given load, or a path that leads to it, ends.
+
+        The state is a fold, or its extremum moves elsewhere; on the way two folds merge, the path
+        branches, or it touches a bound, or reaches it with the load.
+        """
+        structure, sides = self.sheet.structure, (pairs.a, pairs.b)
+        branches = branching(structure, structure.parameters[self.load].name)
+        found = [Cause.of("fold", (gap, self._level), _reached(side), side) for side in sides]
+        both, differs = _reached(pairs.a) & _reached(pairs.b), pairs.a.kind != pairs.b.kind
+        found += equal_extrema(self.descriptor, pairs, both, self._level)
+        for side, there in (*_forks(pairs, 0), *_forks(pairs, 1)):
+            for kind, test, may in (("snap", quadratic, differs), ("jump", branches, both)):
+                found.append(Cause.of(kind, (gap, test), there & both & may, side))
+                found.append(Cause.of("gap", (gap, test), there & ~both, side))
+        for k, constraint in enumerate(self.within):
+            limit = bound(constraint)
+            touches = grazing(structure, constraint, structure.parameters[self.load].name)
+            for side in sides:
+                met = differs & (side.kind == BOUND) & (side.place == k)
+                for test in (touches, self._level):
+                    found.append(Cause.of("gap", (limit, test), met, side))
+        return found
+
+    def _level(self, critical: Critical) -> Values:
+        """Load less the given one, in its scale."""
+        scale = self.sheet.structure.scales[self.load]
+        return np.asarray((critical.p[:, self.load] - self.at) / scale)
+
+    def suspects(self, vertices: Samples, edges: Edges) -> Bool[np.ndarray, " edges"]:
+        """No others than those over which the map changes much."""
+        del vertices
+        return np.zeros(len(edges), bool)
+
+    def known(self, side: Samples) -> Flags:
+        """Whether paths could start and were not lost."""
+        return np.asarray(side.kind > LOST)
+
+    def unexplained(self, pairs: Brackets) -> np.ndarray:
+        """Where states end, values jump, snapping begins, or the extremum moves elsewhere."""
+        a, b = pairs.a, pairs.b
+        jump = np.abs(a.value - b.value) > JUMP * np.maximum(np.abs(a.value), np.abs(b.value))
+        known = self.known(a) & self.known(b) & (_reached(a) | _reached(b))
+        both = _reached(a) & _reached(b)
+        cases = [~known, ~both, jump, a.kind != b.kind]
+        return np.select(cases, ["", "gap", "jump", "snap"], "place").astype(object)
+
+
+def _forks(pairs: Brackets, back: int) -> list[tuple[Samples, Bool[np.ndarray, " pairs"]]]:
+    """Critical states of each side behind which its path may be another than that of the other.
+
+    The first one that differs in its indices, or so many before. Where a side has none, its flag is
+    not set.
+    """
+    found = []
+    for one, other in ((pairs.a, pairs.b), (pairs.b, pairs.a)):
+        z, p, there = one.z.copy(), one.p.copy(), np.zeros(len(pairs), bool)
+        for i, (mine, others) in enumerate(zip(one.passed, other.passed, strict=True)):
+            alike = [a.index == b.index for a, b in zip(mine, others, strict=False)]
+            first = (alike.index(False) if False in alike else len(alike)) - back
+            if 0 <= first < len(mine):
+                z[i], p[i], there[i] = mine[first].z, mine[first].p, True
+        found.append((replace(one, z=z, p=p), there))
+    return found
+
+
+def _reached(side: Samples) -> Flags:
+    return np.asarray((side.kind >= STABLE) & (side.kind <= OFF))

@@ -1,4 +1,4 @@
-"""Curves on which a map is not smooth: what kind they are, and exactly where."""
+"""Curves on which a map is not smooth: of which kind they are, and exactly where."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,20 +6,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Settings
 from equimorph.equilibria.natural_sheet import NaturalSheet
+from equimorph.model import Constraint
 from equimorph.structures import States
 from equimorph.tasks.maps.brackets import (
     Brackets,
-    divided,
+    Samples,
+    cells_beside,
+    divide,
     edges_ahead,
     grid_edges,
-    narrowed,
-    suspicious,
+    narrow,
+    sample_distance,
+    suspicious_edges,
 )
-from equimorph.tasks.maps.candidates import BESIDE, SAME, candidates, sharp
-from equimorph.tasks.maps.causes import Paths
-from equimorph.tasks.maps.chains import chains
-from equimorph.tasks.maps.samples import Samples, difference
+from equimorph.tasks.maps.causes import LOST, Paths, unloaded_samples
+from equimorph.tasks.maps.exact_places import BESIDE, SAME, candidates, is_sharp
 
 ROUNDS = 3
 """How often causes are looked for, in parts of parts of a pair."""
@@ -28,6 +31,11 @@ DIVISIONS = 1
 EXACT = 1e-10
 """Error of places that have a cause, in units of the parameters' scales: Newton's method ends with
 a correction of 1e-9, and is linear with a rate of 1e-6."""
+
+EDGE_DIVISIONS = 14
+"""Down to round-off."""
+
+Points = Float[np.ndarray, "points 2"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,7 +96,7 @@ class Places:
         return self.kind, self.error, self.setting, self.z, self.p
 
 
-def explained(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
+def explain(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
     """Find the cause in each pair, and its exact place on the grid edge.
 
     A cause counts if Newton's method finds its state inside the pair, and the map differs on both
@@ -110,7 +118,7 @@ def explained(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets
 def _confirmed(
     paths: Paths, pairs: Brackets, places: Places, found: Bool[np.ndarray, " pairs"]
 ) -> tuple[Places, Brackets, Brackets]:
-    """Look at the map close to places on both sides; see `explained`."""
+    """Look at the map close to places on both sides; see `explain`."""
     structure = paths.sheet.structure
     at = np.flatnonzero(found)
     here, wide = places.take(at), pairs.take(at)
@@ -121,10 +129,10 @@ def _confirmed(
     low = np.abs(here.setting - wide.a.setting).sum(axis=1) < np.abs(room).sum(axis=1)
     high = np.abs(here.setting - wide.b.setting).sum(axis=1) < np.abs(room).sum(axis=1)
     left, right = wide.a.where(low, left), wide.b.where(high, right)
-    sure = sharp(paths, (left, right), wide, BESIDE)
+    sure = is_sharp(paths, (left, right), wide, BESIDE)
     sure &= paths.known(left) & paths.known(right)
     rest = Brackets(wide.a, left, wide.edge).with_more(Brackets(right, wide.b, wide.edge))
-    again = np.isinf(difference(structure, rest.a, rest.b)) & np.tile(sure, 2)
+    again = np.isinf(sample_distance(structure, rest.a, rest.b)) & np.tile(sure, 2)
     narrow = Brackets(left, right, wide.edge)
     confirmed = replace(here, brackets=narrow).take(np.flatnonzero(sure))
     open_ = np.setdiff1d(np.arange(len(pairs)), at[sure])
@@ -141,8 +149,8 @@ def places_on(paths: Paths, vertices: Samples, shape: tuple[int, int]) -> tuple[
     ends = (vertices.take(edges[:, k]) for k in (0, 1))
     # beyond the edge of definition, and where paths were lost, there is nothing to compare
     known = paths.known(vertices)[edges].all(axis=1)
-    differences = np.where(known, difference(structure, *ends), 0.0)
-    fresh = np.flatnonzero(suspicious(differences, shape) | paths.suspects(vertices, edges))
+    differences = np.where(known, sample_distance(structure, *ends), 0.0)
+    fresh = np.flatnonzero(suspicious_edges(differences, shape) | paths.suspects(vertices, edges))
     tried, seen = np.zeros(len(edges), bool), np.zeros(0, int)
     found: list[Places] = []
     left: list[Places] = []
@@ -151,12 +159,12 @@ def places_on(paths: Paths, vertices: Samples, shape: tuple[int, int]) -> tuple[
         pairs = (vertices.take(edges[fresh, 0]), vertices.take(edges[fresh, 1]), fresh)
         sure, open_ = _resolved(paths, Brackets(*pairs))
         found += sure
-        left.append(unexplained(paths, open_))
+        left.append(unexplained_places(paths, open_))
         seen = np.concatenate([seen, *(each.brackets.edge for each in (*sure, left[-1]))])
         ahead = edges_ahead(seen, shape)
         fresh = ahead[~tried[ahead] & (differences[ahead] > 0.0)]
     none = np.zeros(0, int)
-    nothing = unexplained(paths, Brackets(vertices.take(none), vertices.take(none), none))
+    nothing = unexplained_places(paths, Brackets(vertices.take(none), vertices.take(none), none))
     return _together([nothing, *found]), _together([nothing, *left])
 
 
@@ -167,10 +175,10 @@ def _resolved(paths: Paths, pairs: Brackets) -> tuple[list[Places], Brackets]:
     for _ in range(ROUNDS):
         if not len(pairs):
             return found, pairs
-        places, rest, more = explained(paths, pairs)
+        places, rest, more = explain(paths, pairs)
         found.append(places)
-        pairs = divided(structure, paths, rest).with_more(more) if len(rest) else more
-    return found, narrowed(structure, paths, pairs, DIVISIONS)
+        pairs = divide(structure, paths, rest).with_more(more) if len(rest) else more
+    return found, narrow(structure, paths, pairs, DIVISIONS)
 
 
 def _together(parts: list[Places]) -> Places:
@@ -180,7 +188,7 @@ def _together(parts: list[Places]) -> Places:
     return whole
 
 
-def unexplained(paths: Paths, pairs: Brackets) -> Places:
+def unexplained_places(paths: Paths, pairs: Brackets) -> Places:
     """Places in the middle of pairs, with kinds by what their ends show."""
     kind = paths.unexplained(pairs)
     some = np.flatnonzero(kind != "")
@@ -209,8 +217,92 @@ def curves_through(
             rounded = np.round(some.setting / (SAME * scales))
             some = some.take(np.sort(np.unique(rounded, axis=0, return_index=True)[1]))
             ends = np.stack([some.brackets.a.value, some.brackets.b.value], axis=1)
-            for line in chains(some.setting / scales, some.brackets.edge, shape):
+            for line in polylines(some.setting / scales, some.brackets.edge, shape):
                 states = States(structure, some.z[line], some.p[line])
                 values, errors = np.sort(ends[line]), some.error[line]
                 curves.append(MapCurve(kind, states, some.setting[line], values, errors))
     return tuple(curves)
+
+
+def edge_of_definition(
+    sheet: NaturalSheet,
+    within: Sequence[Constraint],
+    settings: Settings,
+    shape: tuple[int, int],
+) -> Places:
+    """Places on grid edges with a natural state that obeys the constraints at one end only."""
+
+    def sampler(where: Settings) -> Samples:
+        return unloaded_samples(sheet, within, where)
+
+    start, edges = sampler(settings), grid_edges(shape)
+    out = start.kind[edges] != LOST
+    at = np.flatnonzero(out[:, 0] != out[:, 1])
+    pairs = Brackets(start.take(edges[at, 0]), start.take(edges[at, 1]), at)
+    found = narrow(sheet.structure, sampler, pairs, EDGE_DIVISIONS)
+    middle = 0.5 * (found.a.setting + found.b.setting)
+    inside = found.a.where(found.a.kind == LOST, found.b)
+    kind = np.full(len(found), "edge", dtype=object)
+    return Places(found, kind, half_length(found), middle, inside.z, inside.p)
+
+
+def polylines(
+    points: Points, edge: Int[np.ndarray, " points"], shape: tuple[int, int]
+) -> list[Int[np.ndarray, " _"]]:
+    """Connect points on edges of a grid of ``shape`` vertices across its cells.
+
+    Within a cell the closest points on different edges are connected first, each to one other;
+    what is left over ends there.
+
+    Returns
+    -------
+    Numbers of the points along each polyline; a closed one repeats its first.
+    """
+    inside: dict[int, list[int]] = {}
+    for k, cells in enumerate(cells_beside(edge, shape).tolist()):
+        for cell in cells:
+            if cell >= 0:
+                inside.setdefault(cell, []).append(k)
+    links: dict[int, list[int]] = {k: [] for k in range(len(points))}
+    for members in inside.values():
+        for one, other in _pairs(points, edge, members):
+            links[one].append(other)
+            links[other].append(one)
+    return _walks(links)
+
+
+def _pairs(
+    points: Points, edge: Int[np.ndarray, " points"], members: list[int]
+) -> list[tuple[int, int]]:
+    """Closest pairs of points on different edges of one cell, each point once."""
+    choices = [
+        (a, b) for n, a in enumerate(members) for b in members[n + 1 :] if edge[a] != edge[b]
+    ]
+    choices.sort(key=lambda pair: float(np.hypot(*(points[pair[0]] - points[pair[1]]))))
+    used: set[int] = set()
+    found = []
+    for a, b in choices:
+        if a not in used and b not in used:
+            found.append((a, b))
+            used |= {a, b}
+    return found
+
+
+def _walks(links: dict[int, list[int]]) -> list[Int[np.ndarray, " _"]]:
+    """Follow links from loose ends, then around what is closed."""
+    left = set(links)
+    order = sorted(links, key=lambda k: len(links[k]))  # loose ends first
+    found = []
+    for start in order:
+        if start not in left:
+            continue
+        walk, here = [start], start
+        left.discard(start)
+        while ahead := [k for k in links[here] if k in left]:
+            here = ahead[0]
+            walk.append(here)
+            left.discard(here)
+        if len(walk) > 2 and start in links[here]:
+            walk.append(start)
+        found.append(np.array(walk))
+    return found

@@ -14,9 +14,14 @@ from jaxtyping import Float, Int
 from equimorph.equilibria import Event
 from equimorph.model import Constraint
 from equimorph.structures import State, States
+from equimorph.tasks.motion.blocks import Stretch
 from equimorph.tasks.motion.course import Course
-from equimorph.tasks.motion.dense import Stretch
-from equimorph.tasks.motion.local import at_targets, distances, local, shortest
+from equimorph.tasks.motion.local_coordinates import (
+    correct_onto_targets,
+    linearise,
+    shortest_change,
+    step_distances,
+)
 
 TOLERANCE = 1e-8
 """Error of a step, in the metric and scaled parameters."""
@@ -64,7 +69,9 @@ class _Here:
     held: frozenset[int]
 
 
-def steer(course: Course, start: State, within: tuple[Constraint, ...], limits: Limits) -> Motion:
+def follow_redundant(
+    course: Course, start: State, within: tuple[Constraint, ...], limits: Limits
+) -> Motion:
     """Follow a course with more actuators than targets."""
     here = _Here(start.z[None], start.p[None], 0.0, frozenset())
     here = replace(here, held=_held(course, here, limits))
@@ -104,10 +111,12 @@ def _velocity(
     rate = course.rate(time)
     own = np.array([k for k in course.free if k not in held], int)
     loads = np.setdiff1d(np.flatnonzero(rate[:count] != 0.0), course.free)
-    tangents = local(structure, *place, np.concatenate([own, loads]), course.descriptors)
+    tangents = linearise(structure, *place, np.concatenate([own, loads]), course.descriptors)
     given = rate[loads] / structure.scales[loads]
     wanted = rate[count:] - tangents.slope[0, :, len(own) :] @ given
-    moves = np.concatenate([shortest(tangents.slope[:, :, : len(own)], wanted[None])[0], given])
+    moves = np.concatenate(
+        [shortest_change(tangents.slope[:, :, : len(own)], wanted[None])[0], given]
+    )
     return (moves @ tangents.dz[0])[None], (moves @ tangents.dp[0])[None]
 
 
@@ -131,9 +140,9 @@ def _stepped(course: Course, here: _Here, step: float, time: float) -> tuple[_He
     given, targets = course.split(course.at(np.array([time])))
     given[:, course.free] = p[:, course.free]
     own = np.array([k for k in course.free if k not in here.held], int)
-    found = at_targets(course.structure, (z, given), own, course.descriptors, targets)
+    found = correct_onto_targets(course.structure, (z, given), own, course.descriptors, targets)
     whole = np.concatenate([off_z, np.zeros_like(off_z)]), np.concatenate([off_p, 0.0 * off_p])
-    error = float(distances(course.structure, *whole)[0])
+    error = float(step_distances(course.structure, *whole)[0])
     good = bool(found.good[0]) and np.isfinite(error)
     return _Here(found.z, found.p, time, here.held), error if good else np.inf
 
@@ -151,7 +160,7 @@ def _fault(
         return "error"
     structure = course.structure
     pair = np.concatenate([here.z, there.z]), np.concatenate([here.p, there.p])
-    if distances(structure, *pair)[0] > LARGEST:
+    if step_distances(structure, *pair)[0] > LARGEST:
         return "long"
     if structure.index(there.z, there.p)[0] != 0:
         return "unstable"
@@ -224,5 +233,5 @@ def _pair(*some: _Here) -> tuple[np.ndarray, np.ndarray]:
 def _singular(course: Course, here: _Here) -> float:
     """Least singular value of the Jacobian by the actuators that are not held."""
     own: Int[np.ndarray, " k"] = np.array([k for k in course.free if k not in here.held], int)
-    slope = local(course.structure, here.z, here.p, own, course.descriptors).slope
+    slope = linearise(course.structure, here.z, here.p, own, course.descriptors).slope
     return float(np.linalg.svd(slope[0], compute_uv=False)[-1])

@@ -1,10 +1,10 @@
 """Optimisation over equilibrium sets and maps."""
 
 from equimorph.tasks.optimising.certificates import Certificate
-from equimorph.tasks.optimising.followed_optimum import FollowedOptimum, Jump
-from equimorph.tasks.optimising.following import follow_optimum
 from equimorph.tasks.optimising.landscapes import Barriers, Landscape, landscape
+from equimorph.tasks.optimising.moving_optimum import follow_optimum
 from equimorph.tasks.optimising.optimum import Optima, Optimum, optimise
+from equimorph.tasks.optimising.optimum_path import FollowedOptimum, Jump
 from equimorph.tasks.optimising.robust import RobustOptimum, robust_optimum
 from equimorph.tasks.optimising.strength import Strongest, StrongestSettings, strongest
 

@@ -7,9 +7,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.tasks.optimising.descent import Settled
-from equimorph.tasks.optimising.programme import Programme
-from equimorph.tasks.optimising.stability import is_stability
+from equimorph.tasks.optimising.programme import Programme, is_stability
+from equimorph.tasks.optimising.sqp import LocalMinimum
 
 ACTIVE = 1e-7
 """Relative distance from a bound at which it is active."""
@@ -58,7 +57,7 @@ class Certificate:
         return f"Certificate({self.kind}{': ' + held if held else ''}; KKT {self.residual:.1e})"
 
 
-def certificate(programme: Programme, found: Settled) -> Certificate:
+def certificate(programme: Programme, found: LocalMinimum) -> Certificate:
     """Conditions at a point where a descent ended."""
     e, answer = found.expansion, found.answer
     f, g = e.f[0], e.g[0]
@@ -107,7 +106,7 @@ def _ridge(slopes: Float[np.ndarray, "tied d"]) -> tuple[float, float] | None:
     return float(rates.max()), float(-rates.min())
 
 
-def _places(programme: Programme, found: Settled, tied: list[int]) -> dict[float, float]:
+def _places(programme: Programme, found: LocalMinimum, tied: list[int]) -> dict[float, float]:
     if not programme.objective.kinked:
         return {}
     _, places = programme.objective.branches(found.spot.z, found.spot.p)

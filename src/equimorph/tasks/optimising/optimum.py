@@ -14,29 +14,31 @@ from equimorph.manifold.queries.nearest import local_minima
 from equimorph.model import Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate, certificate
-from equimorph.tasks.optimising.descent import Settled, descend
-from equimorph.tasks.optimising.feasible import Thin, between_vertices, least_violation
-from equimorph.tasks.optimising.objectives import Objective
-from equimorph.tasks.optimising.plane import (
-    Spots,
-    plane_of,
-    rows_at,
-    settled,
-    spots_of,
-    stepped,
-    together,
+from equimorph.tasks.optimising.feasible_starts import (
+    FeasibleStarts,
+    feasible_points_in_cells,
+    least_violation,
 )
-from equimorph.tasks.optimising.programme import Programme
-from equimorph.tasks.optimising.stability import is_stability, stability
-from equimorph.tasks.pieces import stable_piece
+from equimorph.tasks.optimising.programme import Objective, Programme, is_stability, stability
+from equimorph.tasks.optimising.sqp import LocalMinimum, descend
+from equimorph.tasks.optimising.tangent_steps import (
+    SetPoints,
+    join_points,
+    points_at_vertices,
+    project_onto_set,
+    step_along,
+    tangent_plane_at,
+    unconstrained_setting,
+)
 from equimorph.tasks.planning import plan
-from equimorph.tasks.prepared import (
+from equimorph.tasks.route import Route
+from equimorph.tasks.stable_part import (
     feasible_vertices,
     stable_edges,
+    stable_piece,
     stable_vertices,
     vertex_values,
 )
-from equimorph.tasks.route import Route
 
 CANDIDATES = 8
 """Local minima over the vertices from which optima are searched."""
@@ -241,7 +243,7 @@ def _check(eset: EquilibriumSet, sense: str, margin: float, start: State | None)
         )
 
 
-def _nothing(within: Sequence[Constraint], least: Thin | None) -> str:
+def _nothing(within: Sequence[Constraint], least: FeasibleStarts | None) -> str:
     asked = f" within {', '.join(map(str, within))}" if within else ""
     why = f"no stable optimum{asked} was found"
     if least is None or not np.isfinite(least.least):
@@ -269,7 +271,7 @@ def _watched(
 
 def _starts(
     eset: EquilibriumSet, programme: Programme, constraints: tuple[Constraint, ...]
-) -> tuple[Spots, Thin | None]:
+) -> tuple[SetPoints, FeasibleStarts | None]:
     """Allowed states that no allowed neighbour beats, vertices and others between them.
 
     Where there are none, what the search for the least violation found.
@@ -279,25 +281,25 @@ def _starts(
     constraints = tuple(each for each in constraints if each not in eset.constraints)
     if constraints:
         cells = eset.cells[eset.cell_index == 0]
-        thin = between_vertices(eset, programme, constraints, cells)
+        thin = feasible_points_in_cells(eset, programme, constraints, cells)
         some = programme.objective.values(thin.z, thin.p).argsort(kind="stable")[:CANDIDATES]
-        parts = together([parts, thin.take(some)])
+        parts = join_points([parts, thin.take(some)])
         if not len(parts):
             least = least_violation(eset, programme, constraints, cells)
             return least.spots, least
     return parts, None
 
 
-def _starts_around(ground: EquilibriumSet | None, programme: Programme, start: State) -> Spots:
+def _starts_around(ground: EquilibriumSet | None, programme: Programme, start: State) -> SetPoints:
     """Vertices of the feasible piece around the start that no neighbour beats; else the start."""
     if ground is None or not len(ground.cells):
-        return Spots(start.z[None], start.p[None], rows_at(programme.setting, start))
+        return SetPoints(start.z[None], start.p[None], tangent_plane_at(programme.setting, start))
     return _best_vertices(ground, programme, stable_vertices(ground))
 
 
 def _best_vertices(
     eset: EquilibriumSet, programme: Programme, allowed: Bool[np.ndarray, " V"]
-) -> Spots:
+) -> SetPoints:
     """Allowed vertices that no allowed neighbour beats, the best first."""
     goal = programme.objective
     value = goal.sign * vertex_values(eset, goal.descriptor)
@@ -305,10 +307,10 @@ def _best_vertices(
     edges = edges[allowed[edges].all(axis=1)]
     alone = np.setdiff1d(np.flatnonzero(allowed), edges)
     both = np.concatenate([local_minima(edges, value), alone])
-    return spots_of(eset, both[np.argsort(value[both], kind="stable")][:CANDIDATES])
+    return points_at_vertices(eset, both[np.argsort(value[both], kind="stable")][:CANDIDATES])
 
 
-def _optima(programme: Programme, ends: list[Settled]) -> list[Settled]:
+def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum]:
     """Different feasible ends, the best first."""
     setting, kept = programme.setting, []
     places: list[Float[np.ndarray, " coordinates"]] = []
@@ -328,7 +330,7 @@ def _optima(programme: Programme, ends: list[Settled]) -> list[Settled]:
     return kept
 
 
-def _optimum(programme: Programme, end: Settled) -> Optimum:
+def _optimum(programme: Programme, end: LocalMinimum) -> Optimum:
     state = State(programme.setting.structure, end.spot.z[0], end.spot.p[0])
     value = programme.objective.descriptor(state)
     return Optimum(state, value, certificate(programme, end))
@@ -339,7 +341,7 @@ def _reached(
     programme: Programme,
     start: State,
     demands: tuple[Sequence[Constraint], float],
-    found: list[tuple[Settled, Optimum]],
+    found: list[tuple[LocalMinimum, Optimum]],
 ) -> list[Optimum]:
     """Optima from the first on to which a route leads."""
     (eset, ground), (within, margin) = grounds, demands
@@ -355,7 +357,7 @@ def _reached(
     return []
 
 
-def _before_the_edge(programme: Programme, end: Settled) -> State | None:
+def _before_the_edge(programme: Programme, end: LocalMinimum) -> State | None:
     """State a little inside the stability boundary, if the point is on it.
 
     Inside all bounds that are active there, so that none is violated on the way back.
@@ -366,15 +368,15 @@ def _before_the_edge(programme: Programme, end: Settled) -> State | None:
     slopes = end.expansion.g_slope[0, active]
     slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-300)
     step, *_ = np.linalg.lstsq(slopes, np.full(len(active), -STEP_BACK), rcond=1e-6)
-    spot = Spots(end.spot.z, end.spot.p, end.spot.rows)
-    guess = stepped(programme.setting, spot, end.frames, step[None])
-    there, good = settled(programme.setting, *guess, spot.rows)
+    spot = SetPoints(end.spot.z, end.spot.p, end.spot.rows)
+    guess = step_along(programme.setting, spot, end.frames, step[None])
+    there, good = project_onto_set(programme.setting, *guess, spot.rows)
     return State(programme.setting.structure, there.z[0], there.p[0]) if good[0] else None
 
 
 def _in_the_box(eset: EquilibriumSet, state: State) -> State:
     """State whose parameters do not exceed the box by rounding."""
-    box, free = eset.box, plane_of(eset).free
+    box, free = eset.box, unconstrained_setting(eset).free
     p = state.p.copy()
     p[free] = np.clip(p[free], box.lower, box.upper)
     z, good = newton(state.structure, state.z[None], p[None])

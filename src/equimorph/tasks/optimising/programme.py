@@ -1,4 +1,4 @@
-"""An optimisation problem on an equilibrium set, and its derivatives along the set."""
+"""An optimisation problem on an equilibrium set: what is minimised, under which constraints."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,18 +7,100 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Flags, Frames, Lanes, Parameters
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Values
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.model import Constraint
-from equimorph.structures import value_of
-from equimorph.tasks.optimising.objectives import Objective, matched
-from equimorph.tasks.optimising.plane import Spots, plane_of, settled, stepped
+from equimorph.model import Constraint, Descriptor
+from equimorph.structures import Structure, margin_of, value_of
+from equimorph.tasks.optimising.tangent_steps import (
+    SetPoints,
+    project_onto_set,
+    step_along,
+    unconstrained_setting,
+)
+
+Branches = tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]]
+
+SWEEPS = 5
+SHIFT = -1e-7
+"""Of the inverse iteration: at folds the matrix is regular with it."""
+STABLE = "stable"
 
 DIFFERENCE = 1e-5
 """Step of first derivatives along the tangent space, in the metric."""
 CURVING = 1e-3
 """Step of second derivatives along the set."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What is made small: a descriptor, or its negative.
+
+    A maximum of smooth functions, like max |κ|, that is made small counts by its `branches`.
+    """
+
+    descriptor: Descriptor
+    sign: float
+
+    @property
+    def kinked(self) -> bool:
+        """Whether it may have kinks at its minima."""
+        return self.sign > 0.0 and self.descriptor.branches is not None
+
+    def values(self, z: Lanes, p: Parameters) -> Values:
+        """Values to be made small."""
+        return np.asarray(self.sign * self.descriptor.function(z, p))
+
+    def branches(self, z: Lanes, p: Parameters) -> Branches:
+        """Smooth functions whose largest it is, −∞ where there are fewer, and their places."""
+        if self.kinked and self.descriptor.branches is not None:
+            return self.descriptor.branches(z, p)
+        value = self.values(z, p)[:, None]
+        return value, np.zeros_like(value)
+
+
+def match_branches(base: Branches, other: Branches) -> Float[np.ndarray, "lanes m"]:
+    """Values of the other branches in the order of the first ones, by nearest places."""
+    values, places = other
+    there = np.where(np.isfinite(values), places, np.inf)
+    gap = np.abs(np.where(np.isfinite(base[0]), base[1], 0.0)[:, :, None] - there[:, None])
+    nearest = gap.argmin(axis=2)
+    found = np.take_along_axis(values, nearest, axis=1)
+    return np.where(np.isfinite(base[0]), found, -np.inf)
+
+
+def stability(structure: Structure, margin: float) -> Constraint:
+    """Constraint that the stability margin stays above `margin`."""
+    if margin > 0.0:
+        return margin_of(structure) >= margin
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return nearest_eigenvalue(structure, z, p)
+
+    return Descriptor(STABLE, "1", value, STABLE, structure.signature) >= 0.0
+
+
+def is_stability(constraint: Constraint) -> bool:
+    """Whether a constraint is one of stability."""
+    return constraint.descriptor.name in (STABLE, "stability_margin")
+
+
+def nearest_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:
+    """Eigenvalue of the constrained Hessian nearest to zero, in the metric, by inverse iteration.
+
+    Near the stability boundary it is the margin to round-off; far from it, about as large.
+    """
+    n, mass = structure.unknowns, structure.mass
+    v = np.tile(np.cos(1.7 * np.arange(n)) + 1.3, (len(z), 1))
+    shift, value = np.full(len(z), SHIFT), np.zeros(len(z))
+    for _ in range(SWEEPS):
+        rhs = np.zeros((len(z), 1, structure.size))
+        rhs[:, 0, :n] = mass * v
+        x = structure.solve(z, p, rhs, shift=shift).x[:, 0, :n]
+        size = x**2 @ mass
+        value = SHIFT + np.einsum("li,i,li->l", x, mass, v) / size
+        v = x / np.sqrt(size)[:, None]
+    return value
 
 
 @dataclass(frozen=True)
@@ -68,7 +150,7 @@ class Programme:
         for name, low, high in sides:
             itself = value_of(eset.structure, name)
             bounds += [itself >= low, itself <= high]
-        return cls(plane_of(eset), tuple(bounds), objective, constraints)
+        return cls(unconstrained_setting(eset), tuple(bounds), objective, constraints)
 
     @cached_property
     def all(self) -> tuple[Constraint, ...]:
@@ -80,7 +162,7 @@ class Programme:
         each = [c.excess(z, p) / max(1.0, abs(c.bound)) for c in self.all]
         return np.stack(each, axis=1)
 
-    def expanded(self, at: Spots, frames: Frames) -> Expansion:
+    def expanded(self, at: SetPoints, frames: Frames) -> Expansion:
         """Values, first and second derivatives along orthonormal tangents.
 
         Slopes are central differences along the tangent space: what lies off the set cancels. Bends
@@ -89,7 +171,7 @@ class Programme:
         lanes, d = len(at), frames.shape[1]
         near, far = np.concatenate([np.eye(d), -np.eye(d)]), _directions(d)
         flat = self._moved(at, frames, DIFFERENCE * near)
-        curved, found = settled(
+        curved, found = project_onto_set(
             self.setting, *self._moved(at, frames, CURVING * far), np.repeat(at.rows, len(far), 0)
         )
         z = np.concatenate([at.z, flat[0], curved.z])
@@ -101,7 +183,7 @@ class Programme:
         f = [base[0]]
         for part, count in zip(parts[1:], (len(near), len(far)), strict=True):
             own = (np.repeat(each, count, axis=0) for each in base)
-            other = matched((next(own), next(own)), (values[part], places[part]))
+            other = match_branches((next(own), next(own)), (values[part], places[part]))
             f.append(other.reshape(lanes, count, -1))
         g = [excess[parts[0]]]
         g += [
@@ -115,7 +197,7 @@ class Programme:
         )  # fmt: skip
 
     def linearised(
-        self, at: Spots, frames: Frames
+        self, at: SetPoints, frames: Frames
     ) -> tuple[Float[np.ndarray, "lanes k"], Float[np.ndarray, "lanes k d"]]:
         """Excess over all bounds, and its slopes along orthonormal tangents."""
         d = frames.shape[1]
@@ -125,12 +207,12 @@ class Programme:
         return excess[: len(at)], _slopes(around)
 
     def _moved(
-        self, at: Spots, frames: Frames, steps: Float[np.ndarray, "n d"]
+        self, at: SetPoints, frames: Frames, steps: Float[np.ndarray, "n d"]
     ) -> tuple[Float[np.ndarray, "many size"], Float[np.ndarray, "many parameters"]]:
         """Points of the tangent spaces, lane by lane."""
         many = at.take(np.repeat(np.arange(len(at)), len(steps)))
         own = np.repeat(frames, len(steps), axis=0)
-        return stepped(self.setting, many, own, np.tile(steps, (len(at), 1)))
+        return step_along(self.setting, many, own, np.tile(steps, (len(at), 1)))
 
 
 def _directions(d: int) -> Float[np.ndarray, "n d"]:

@@ -61,7 +61,7 @@ class Ridge:
     sides: Float[np.ndarray, "2 distances"] | None = None
 
 
-def highest(lmap: LimitLoadMap, curve: MapCurve) -> Ridge | None:
+def highest_point(lmap: LimitLoadMap, curve: MapCurve) -> Ridge | None:
     """Highest point of a curve whose states are known by the tests that vanish; else None."""
     best = np.maximum(np.nan_to_num(curve.values[:, 1]), curve.states[lmap.load])
     number = int(best.argmax())
@@ -171,13 +171,13 @@ def _cliff_at(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> Ridg
         return None
     along = [each.x[-3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
     near = setting + side * CLOSE * np.array([[1.0], [2.0]]) * across
-    values = lmap.rays(np.concatenate([near, along, settings_beside(setting, across)]))
+    values = lmap.rays(np.concatenate([near, along, settings_across(setting, across)]))
     one, two, left, right = values[:4].tolist()
     slope = abs(right - left) / (2.0 * NARROW)
     return Ridge(setting, 2.0 * one - two, slope, across, True, values[4:].reshape(2, -1))
 
 
-def settings_beside(setting: Pair, across: Pair) -> Float[np.ndarray, "settings 2"]:
+def settings_across(setting: Pair, across: Pair) -> Float[np.ndarray, "settings 2"]:
     """Settings on one side and on the other, at distances `BESIDE`."""
     steps = BESIDE[:, None] * across
     return np.concatenate([setting - steps, setting + steps])

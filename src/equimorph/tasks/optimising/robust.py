@@ -13,12 +13,10 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate, certificate
-from equimorph.tasks.optimising.descent import Settled, descend
-from equimorph.tasks.optimising.objectives import Objective
 from equimorph.tasks.optimising.optimum import Optimum, Sense, optimise
-from equimorph.tasks.optimising.plane import Spots, rows_at
-from equimorph.tasks.optimising.programme import Programme
-from equimorph.tasks.optimising.stability import stability
+from equimorph.tasks.optimising.programme import Objective, Programme, stability
+from equimorph.tasks.optimising.sqp import LocalMinimum, descend
+from equimorph.tasks.optimising.tangent_steps import SetPoints, tangent_plane_at
 
 Branches = Float[np.ndarray, "lanes m"]
 
@@ -203,7 +201,7 @@ def _on_edges(question: _Question, near: Optimum, room: float) -> list[_End]:
             continue
         programme = _edge_programme(question, number)
         state = near.state
-        start = Spots(state.z[None], state.p[None], rows_at(programme.setting, state))
+        start = SetPoints(state.z[None], state.p[None], tangent_plane_at(programme.setting, state))
         ends += [
             _edge(programme, corner, end)
             for end in descend(programme, start)
@@ -238,7 +236,7 @@ def _edge_programme(question: _Question, number: int) -> Programme:
     return Programme.over(eset, Objective(goal, 1.0), own)
 
 
-def _edge(programme: Programme, corner: Corner, end: Settled) -> _End:
+def _edge(programme: Programme, corner: Corner, end: LocalMinimum) -> _End:
     state = State(programme.setting.structure, end.spot.z[0], end.spot.p[0])
     found = certificate(programme, end)
     return _End(state, float(end.expansion.f.max()), corner.offsets, found, False)

@@ -12,9 +12,8 @@ from equimorph.arrays import Flags, Settings, Values
 from equimorph.equilibria import LimitLoad
 from equimorph.errors import InputError
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
-from equimorph.tasks.optimising.climbing import climb
-from equimorph.tasks.optimising.minimax import raised
-from equimorph.tasks.optimising.ridges import BESIDE, highest, settings_beside
+from equimorph.tasks.optimising.ridges import BESIDE, highest_point, settings_across
+from equimorph.tasks.optimising.two_parameter_search import climb, maximise_least
 
 CANDIDATES = 4
 ROBUST = 2
@@ -185,7 +184,7 @@ def _sure(lmap: LimitLoadMap) -> list[Strongest]:
     for curve in sorted(lmap.curves, key=lambda each: -_level(each)):
         if found and _level(curve) < HOPELESS * found[0].value:
             continue
-        ridge = highest(lmap, curve)
+        ridge = highest_point(lmap, curve)
         if ridge is None or not lmap.grid.box.contains(ridge.setting, slack=1e-9):
             continue
         if ridge.slope > LEVEL:  # the end of a curve
@@ -264,7 +263,7 @@ def _sides(
     lmap: LimitLoadMap, setting: Float[np.ndarray, " 2"], across: Float[np.ndarray, " 2"]
 ) -> Float[np.ndarray, "2 distances"]:
     """Limit loads on both sides of a setting."""
-    return lmap.rays(settings_beside(setting, across)).reshape(2, -1)
+    return lmap.rays(settings_across(setting, across)).reshape(2, -1)
 
 
 def _strongest(
@@ -322,10 +321,10 @@ def _raised(
     radius, box = _steps(lmap), lmap.grid.box
     ends = []
     for vertex in _vertices(lmap, value)[:ROBUST]:
-        raised_to, _ = raised(pieces, vertex, radius, box)
+        raised_to, _ = maximise_least(pieces, vertex, radius, box)
         # across a jump the search goes on in all directions
         top = climb(worst, raised_to, 0.1 * radius, box)
-        ends.append(raised(pieces, top.setting, 0.1 * radius, box))
+        ends.append(maximise_least(pieces, top.setting, 0.1 * radius, box))
     return max(ends, key=lambda end: end[1])
 
 

@@ -1,23 +1,142 @@
-"""The stable cells of an equilibrium set as a network of lifts, prepared once for all routes."""
+"""The stable cells of a set as a network of straight lifts, computed once for all routes."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, dijkstra
 
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria.outcome import Outcome, follow
+from equimorph.equilibria.tracing import ARRIVAL
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint
 from equimorph.structures import State, States
-from equimorph.tasks.planning.links import Demands, links, shortest
 from equimorph.tasks.planning.objectives import ROUGH, Objective
-from equimorph.tasks.prepared import kept
+from equimorph.tasks.route import FINE
+from equimorph.tasks.stable_part import cached
+
+CLOSE = 0.05
+"""Largest step in the metric where the stability margin is watched along a lift."""
+BROAD = 0.1
+"""The same where the cost is summed up from step to step."""
+MATCH = 1e-5
 
 CRITICAL = (1, 4, 7)
 """Kinds of vertices at which stability ends: on folds, and where sheets cross."""
 Ends = tuple[State, State]
 Pairs = Int[np.ndarray, "links 2"]
+
+
+@dataclass(frozen=True)
+class Demands:
+    """What a route has to obey, and what it should have least of.
+
+    `closely`: whether every lift is as fine as the final one; else it may step over the corner of a
+    keep-out region.
+    """
+
+    objective: Objective
+    constraints: tuple[Constraint, ...] = ()
+    margin: float = 0.0
+    closely: bool = False
+
+    @property
+    def options(self) -> TraceOptions:
+        """Step control of the lifts."""
+        if self.closely:
+            return FINE
+        if self.margin > 0.0:
+            return TraceOptions(largest_step=CLOSE)
+        step = 0.5 if self.objective.is_length else BROAD
+        return TraceOptions(first_step=0.1, largest_step=step)
+
+    def admissible(self, states: States) -> Flags:
+        """Whether states keep the margin (by one count of inertia) and the constraints."""
+        structure = states.structure
+        nothing = np.zeros((len(states), 0, structure.size))
+        shift = np.full(len(states), self.margin)
+        count = structure.solve(states.z, states.p, nothing, shift=shift).negative
+        good = np.asarray(count == structure.constraints)
+        for constraint in self.constraints:
+            good[good] = constraint.excess(states.z[good], states.p[good]) <= 0.0
+        return good
+
+
+def connect(source: States, target: States, demands: Demands) -> tuple[Flags, Values]:
+    """Whether straight lifts lead from states to states, admissible all the way; their costs."""
+    z, linked, cost = lift_straight(source, target.p, demands)
+    linked &= distances(source.structure.mass, z - target.z) < MATCH
+    return linked, cost
+
+
+def lift_straight(source: States, p: Parameters, demands: Demands) -> tuple[Lanes, Flags, Values]:
+    """Where straight lifts to parameters end; whether they got there admissibly; their costs."""
+    structure, z = source.structure, source.z.copy()
+    velocity = p - source.p
+    there, cost = np.ones(len(source), bool), np.zeros(len(source))
+    moving = np.flatnonzero(np.abs(velocity).max(axis=1, initial=0.0) > 0.0)
+    if len(moving):
+        line = ParameterLine(structure, source.p[moving].copy(), velocity[moving])
+        outcome = follow(line, z[moving], demands.constraints, demands.options)
+        arrived = outcome.code == ARRIVAL
+        if demands.margin > 0.0:
+            arrived &= _keeps_margin(line, outcome, demands)
+        z[moving], there[moving] = outcome.z, arrived
+        cost[moving] = _costs(source[moving], line, outcome, demands.objective)
+    return z, there, cost
+
+
+def distances(mass: Float[np.ndarray, " n"], dz: Lanes) -> Values:
+    """Length of changes of the unknowns in the metric."""
+    return np.asarray(np.sqrt(dz[:, : len(mass)] ** 2 @ mass))
+
+
+def _keeps_margin(line: ParameterLine, outcome: Outcome, demands: Demands) -> Flags:
+    """Whether every recorded point of the lifts has at least the margin."""
+    keeps = np.ones(len(outcome.code), bool)
+    points = outcome.points
+    p = line.take(points.lanes).parameters(points.t)
+    margin_alone = Demands(demands.objective, (), demands.margin)
+    good = margin_alone.admissible(States(line.structure, points.z, p))
+    keeps[points.lanes[~good]] = False
+    return keeps
+
+
+def _costs(source: States, line: ParameterLine, outcome: Outcome, objective: Objective) -> Values:
+    """Cost of each lift, summed up over its recorded points."""
+    if objective.is_length:
+        return np.asarray(outcome.travelled * sum(weight for weight, _ in objective.terms))
+    points, lanes = outcome.points, np.arange(len(source))
+    lane = np.concatenate([lanes, points.lanes, lanes])
+    t = np.concatenate([np.zeros(len(lanes)), points.t, outcome.t])
+    order = np.lexsort((t, lane))
+    z = np.concatenate([source.z, points.z, outcome.z])[order]
+    lane, t = lane[order], t[order]
+    states = States(line.structure, z, line.take(lane).parameters(t))
+    pairs = np.flatnonzero(lane[1:] == lane[:-1])
+    costs = objective.costs(states, pairs, pairs + 1)
+    return np.bincount(lane[pairs], costs, len(lanes))
+
+
+def shortest_path(
+    count: int, pairs: Int[np.ndarray, "links 2"], costs: Values, ends: tuple[int, int]
+) -> Int[np.ndarray, " n"] | None:
+    """Cheapest path from one node to another by Dijkstra; None if there is none."""
+    # a cost of zero would be no link in a sparse matrix
+    weights = np.maximum(costs, 1e-300)
+    graph = coo_array((weights, pairs.T), shape=(count, count)).tocsr()
+    start, goal = ends
+    _, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
+    if before[goal] < 0:
+        return None
+    path = [goal]
+    while path[-1] != start:
+        path.append(int(before[path[-1]]))
+    return np.array(path[::-1])
 
 
 class Network:
@@ -74,7 +193,7 @@ class Network:
 
 def network_of(eset: EquilibriumSet) -> Network:
     """The network of a set, made on first use and kept as long as the set."""
-    network: Network = kept(eset, "network", lambda: Network(eset))
+    network: Network = cached(eset, "network", lambda: Network(eset))
     return network
 
 
@@ -87,13 +206,13 @@ def cheapest_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States 
     allowed = network.allowed(eset, demands)
     broken, lifted = network.verdicts(demands)
     costs = network.costs(eset, demands.objective)
-    states = with_ends(eset, ends)
+    states = nodes_with_ends(eset, ends)
     count, inner = len(states), np.flatnonzero(allowed[network.pairs].all(axis=1) & ~broken)
-    own, own_costs = own_links(eset, ends, demands)
+    own, own_costs = end_links(eset, ends, demands)
     while True:
         pairs = np.concatenate([network.pairs[inner], own])
         weights = np.concatenate([costs[inner], own_costs])
-        path = shortest(count, pairs, weights, (count - 2, count - 1))
+        path = shortest_path(count, pairs, weights, (count - 2, count - 1))
         if path is None:
             return None
         used = inner[_on_path(network.pairs[inner], path, count)]
@@ -101,7 +220,7 @@ def cheapest_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States 
         if len(fresh) == 0:
             return states[path]
         first, second = network.pairs[fresh].T
-        good, _ = links(states[first], states[second], demands)
+        good, _ = connect(states[first], states[second], demands)
         lifted[fresh[good]], broken[fresh[~good]] = True, True
         inner = inner[~broken[inner]]
 
@@ -113,7 +232,7 @@ def _on_path(pairs: Pairs, path: Int[np.ndarray, " n"], count: int) -> Flags:
     return np.isin(np.sort(pairs, axis=1) @ code, steps @ code)
 
 
-def with_ends(eset: EquilibriumSet, ends: Ends) -> States:
+def nodes_with_ends(eset: EquilibriumSet, ends: Ends) -> States:
     """Vertices of the set, start and goal."""
     return States(
         eset.structure,
@@ -122,7 +241,7 @@ def with_ends(eset: EquilibriumSet, ends: Ends) -> States:
     )
 
 
-def own_links(eset: EquilibriumSet, ends: Ends, demands: Demands) -> tuple[Pairs, Values]:
+def end_links(eset: EquilibriumSet, ends: Ends, demands: Demands) -> tuple[Pairs, Values]:
     """Links of start and goal to the vertices around them, and to each other."""
     count = len(eset.points)
     allowed = network_of(eset).allowed(eset, demands)
@@ -131,7 +250,7 @@ def own_links(eset: EquilibriumSet, ends: Ends, demands: Demands) -> tuple[Pairs
         near, cost = neighbours(eset, allowed, end, demands)
         pairs.append(np.stack([np.full(len(near), count + number), near], axis=1))
         costs.append(cost)
-    direct, cost = links(ends[0].batch, ends[1].batch, demands)
+    direct, cost = connect(ends[0].batch, ends[1].batch, demands)
     if direct[0]:
         pairs.append(np.array([[count, count + 1]]))
         costs.append(cost)
@@ -147,15 +266,15 @@ def neighbours(
     around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
     near = np.flatnonzero(allowed & np.isin(eset.grid_vertex, around))
     source = States(eset.structure, np.tile(end.z, (len(near), 1)), np.tile(end.p, (len(near), 1)))
-    linked, cost = links(source, eset.points[near], demands)
+    linked, cost = connect(source, eset.points[near], demands)
     return near[linked], cost[linked]
 
 
-def no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:
+def explain_no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:
     """Tell whether instability alone or the other demands part start and goal."""
     network, free = network_of(eset), Demands(demands.objective)
     allowed = network.allowed(eset, free)
-    own, _ = own_links(eset, ends, free)
+    own, _ = end_links(eset, ends, free)
     pairs = np.concatenate([network.pairs[allowed[network.pairs].all(axis=1)], own])
     count = len(eset.points) + 2
     graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))

@@ -10,19 +10,18 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, eased
 from equimorph.structures import State
-from equimorph.tasks.known import Start, known_state
-from equimorph.tasks.planning.admission import (
+from equimorph.tasks.planning.network import Demands, Ends, cheapest_path, explain_no_route
+from equimorph.tasks.planning.objectives import Wish, objective_of
+from equimorph.tasks.planning.snap_routes import route_with_snaps
+from equimorph.tasks.planning.straightening import (
     check_ends,
-    checked_route,
-    corners_of,
-    route_along,
+    route_over_corners,
+    straight_corners,
+    verify_way_points,
     violation,
 )
-from equimorph.tasks.planning.links import Demands
-from equimorph.tasks.planning.network import Ends, cheapest_path, no_route
-from equimorph.tasks.planning.objectives import Wish, objective_of
-from equimorph.tasks.planning.snapping import with_snaps
-from equimorph.tasks.route import Corners, Route, refused
+from equimorph.tasks.route import Corners, Route, refusal
+from equimorph.tasks.start import Start, start_state
 
 EXACT, RESERVES = (1.0, 0.0), ((1.01, 1e-3), (1.05, 1e-2), (1.15, 1e-2))
 """Factors on the demanded margin, and shares of that of the ends that are added to it.
@@ -85,7 +84,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     """
     if not margin >= 0.0:
         raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
-    start = known_state(start)
+    start = start_state(start)
     demands = Demands(
         objective_of(objective, eset.structure),
         tuple(eased(each) for each in dict.fromkeys((*eset.constraints, *within))),
@@ -97,11 +96,11 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     _check_price(snap_price, via)
     why = violation(ends, demands)
     if why:
-        return refused(why, corners)
+        return refusal(why, corners)
     if corners is not None:
-        return checked_route(ends, corners, demands, monitor)
+        return verify_way_points(ends, corners, demands, monitor)
     if snap_price is not None:
-        return with_snaps(eset, ends, demands, snap_price, monitor)
+        return route_with_snaps(eset, ends, demands, snap_price, monitor)
     return _free(eset, ends, demands, monitor)
 
 
@@ -125,7 +124,7 @@ def _free(
     if route is not None and not route.arrived and demands.constraints:
         # coarse lifts step over corners of what is forbidden
         route = _with_reserves(eset, ends, replace(demands, closely=True), monitor) or route
-    return route or refused(no_route(eset, ends, demands))
+    return route or refusal(explain_no_route(eset, ends, demands))
 
 
 def _with_reserves(
@@ -138,7 +137,9 @@ def _with_reserves(
         tightened = replace(demands, margin=reserved)
         path = cheapest_path(eset, ends, tightened)
         if path is not None:
-            route = route_along(eset, corners_of(eset, path, tightened), demands, monitor)
+            route = route_over_corners(
+                eset, straight_corners(eset, path, tightened), demands, monitor
+            )
             if route.arrived:
                 return route
     return route

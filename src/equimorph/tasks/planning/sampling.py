@@ -11,12 +11,18 @@ from equimorph.equilibria import check_start, way_points
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, Descriptor, eased, position
 from equimorph.structures import State, States, Structure
-from equimorph.tasks.planning.links import Demands, links, straight_lifts
+from equimorph.tasks.planning.network import Demands, connect, lift_straight
 from equimorph.tasks.planning.objectives import Wish, objective_of
-from equimorph.tasks.planning.pushing import insides, pushed, slopes_of
-from equimorph.tasks.planning.straightening import relaxed, straightened
-from equimorph.tasks.planning.trees import Course, Tree, joined_path
-from equimorph.tasks.route import Corners, Route, refused, verified
+from equimorph.tasks.planning.random_trees import (
+    LoadCourse,
+    Tree,
+    constraint_slopes,
+    insets,
+    joined_path,
+    project_onto_constraints,
+)
+from equimorph.tasks.planning.straightening import relax_corners, straighten
+from equimorph.tasks.route import Corners, Route, refusal, verify_route
 
 RESERVES = (1.0, 1.1)
 CONNECTIONS = 4
@@ -104,15 +110,15 @@ def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyw
     ends = _checked_ends(start, goal, course)
     for name, state in ends.items():
         if not state.stable:
-            return refused(f"the {name} is unstable (index {state.index})")
+            return refusal(f"the {name} is unstable (index {state.index})")
         if not demands.admissible(state.batch)[0]:
-            return refused(f"the {name} violates the constraints or the margin")
-    route = refused("")
+            return refusal(f"the {name} violates the constraints or the margin")
+    route = refusal("")
     for reserve in RESERVES:
         tightened = replace(demands, margin=margin * reserve)
         path = _Search(course, start, goal, tightened, options).path()
         if path is None:
-            return refused(
+            return refusal(
                 f"no route was found with {options.lifts} lifts, which is no proof that none exists"
             )
         last = goal or path[0][-1]
@@ -123,7 +129,7 @@ def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyw
 
 
 def _drawn(
-    course: Course,
+    course: LoadCourse,
     path: tuple[States, Float[np.ndarray, " nodes"]],
     ends: tuple[State, State],
     demands: tuple[Demands, Demands],
@@ -131,10 +137,10 @@ def _drawn(
 ) -> Route:
     """Route along a straightened path, by fine lifts where coarse ones step over a corner."""
     own, tightened = demands
-    rules, route = own.constraints, refused("")
+    rules, route = own.constraints, refusal("")
     for closely in (False, True) if rules else (False,):
         corners = _corners(course, path, replace(tightened, closely=closely))
-        route = _kept(verified(*ends, corners, rules, monitor), own)
+        route = _kept(verify_route(*ends, corners, rules, monitor), own)
         if route.arrived:
             break
     return route
@@ -145,13 +151,13 @@ def _kept(route: Route, demands: Demands) -> Route:
         return route
     if route.margin < demands.margin:
         why = f"the stability margin falls to {route.margin:.4g}, below {demands.margin:g}"
-        return refused(why, route.way_points, route.path)
+        return refusal(why, route.way_points, route.path)
     assert route.path is not None
     cost = demands.objective.along(route.path.states)
     return replace(route, objective=str(demands.objective), cost=cost)
 
 
-def _course(start: State, actuators: Box, loads: Sequence[Mapping[str, float]]) -> Course:
+def _course(start: State, actuators: Box, loads: Sequence[Mapping[str, float]]) -> LoadCourse:
     structure = start.structure
     free = np.array([position(structure.parameters, name) for name in actuators.names])
     for leg in loads:
@@ -159,10 +165,10 @@ def _course(start: State, actuators: Box, loads: Sequence[Mapping[str, float]]) 
         if both:
             raise InputError(f"`loads` must not move actuators; got {both[0]!r}.")
     corners = way_points(structure, start.p, list(loads)) if loads else [start.p]
-    return Course(actuators, free, np.array(corners))
+    return LoadCourse(actuators, free, np.array(corners))
 
 
-def _checked_ends(start: State, goal: State | None, course: Course) -> dict[str, State]:
+def _checked_ends(start: State, goal: State | None, course: LoadCourse) -> dict[str, State]:
     """Both ends, by name."""
     if goal is None and course.legs == 0:
         raise InputError("`goal` must be given, unless loads move; got none.")
@@ -189,7 +195,7 @@ class _Search:
 
     def __init__(
         self,
-        course: Course,
+        course: LoadCourse,
         start: State,
         goal: State | None,
         demands: Demands,
@@ -231,7 +237,7 @@ class _Search:
         if self.demands.constraints:
             a = self._pushed(states, tree.s[near], a, s)
         p = course.parameters(a, s)
-        z, there, _ = straight_lifts(states, p, self.demands)
+        z, there, _ = lift_straight(states, p, self.demands)
         there &= np.abs(p - states.p).max(axis=1, initial=0.0) > 0.0
         self.lifts += len(near)
         return tree.add(z[there], p[there], s[there], near[there])
@@ -250,11 +256,13 @@ class _Search:
         directions = np.zeros((len(states), len(half) + 1, states.p.shape[1]))
         directions[:, np.arange(len(half)), course.free] = half
         directions[:, -1] = course.parameters(here, s) - course.parameters(here, now)
-        excess, slopes = slopes_of(states, directions, within)
+        excess, slopes = constraint_slopes(states, directions, within)
         # loads move by the whole of the last direction, actuators by shares of the others
         excess = excess + slopes[:, :, -1]
         room = ((course.box.lower - here) / half, (course.box.upper - here) / half)
-        change = pushed((a - here) / half, excess, slopes[:, :, :-1], room, insides(within))
+        change = project_onto_constraints(
+            (a - here) / half, excess, slopes[:, :, :-1], room, insets(within)
+        )
         return np.asarray(here + change * half)
 
     def _join(
@@ -267,7 +275,7 @@ class _Search:
             return None
         first = States(self.structure, own.z[mine], own.p[mine])
         second = States(self.structure, other.z[theirs], other.p[theirs])
-        linked, _ = links(first, second, self.demands)
+        linked, _ = connect(first, second, self.demands)
         self.lifts += len(mine)
         good: Bool[np.ndarray, " n"] = np.flatnonzero(linked)
         if len(good) == 0:
@@ -278,7 +286,7 @@ class _Search:
 
 
 def _corners(
-    course: Course, path: tuple[States, Float[np.ndarray, " nodes"]], demands: Demands
+    course: LoadCourse, path: tuple[States, Float[np.ndarray, " nodes"]], demands: Demands
 ) -> Corners:
     """Way-points of a path, straightened leg by leg of the loads."""
     states, s = path
@@ -288,9 +296,11 @@ def _corners(
         inside = np.flatnonzero((s >= leg) & (s <= leg + 1)) if course.legs else np.arange(len(s))
         section = states[inside]
         if course.legs == 0:
-            section = relaxed(straightened(section, demands), demands, (course.box, course.free))
+            section = relax_corners(
+                straighten(section, demands), demands, (course.box, course.free)
+            )
         else:
-            section = straightened(section, demands)
+            section = straighten(section, demands)
         moving = np.ptp(np.concatenate([states.p, course.corners]), axis=0) > 0.0
         corners += [
             {name: corner[name] for name, moves in zip(names, moving, strict=True) if moves}

@@ -11,7 +11,7 @@ from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Spline, names_of
 from equimorph.structures import State
-from equimorph.tasks.route import FINE, Route, distance, refused, scheduled
+from equimorph.tasks.route import FINE, Route, distance, refusal, schedule_of
 
 Places = Float[np.ndarray, "_ parameters"]
 
@@ -68,7 +68,7 @@ def smoothed(
         if found.arrived:
             return found
         why, tolerance = found.why, 0.5 * tolerance
-    return refused(f"no rounding of the corners can be lifted: {why}", route.way_points)
+    return refusal(f"no rounding of the corners can be lifted: {why}", route.way_points)
 
 
 def _corners(route: Route) -> list[int]:
@@ -131,15 +131,15 @@ def _verified(
     samples = {name: curve[:, k] for k, name in enumerate(names) if moving[k]}
     path = lift(start, Spline(**samples), within=within, options=FINE)
     if not path.arrived:
-        return refused(f"it meets a {path.end.kind}", route.way_points, path)
+        return refusal(f"it meets a {path.end.kind}", route.way_points, path)
     assert route.path is not None
     if distance(path.end.state, route.path.end.state) > SAME:
-        return refused("it leads to another equilibrium", route.way_points, path)
+        return refusal("it leads to another equilibrium", route.way_points, path)
     margins = path.states.margin
     if margins.min() < margin or not (margins > 0.0).all():
-        return refused(f"the margin falls to {margins.min():.4g}", route.way_points, path)
+        return refusal(f"the margin falls to {margins.min():.4g}", route.way_points, path)
     told = dict.fromkeys((*(c.descriptor for c in within), *monitor))
-    schedule = scheduled(path, margins, tuple(told))
+    schedule = schedule_of(path, margins, tuple(told))
     length = float(path.length[-1])
     return replace(
         route, path=path, margin=float(margins.min()), length=length, schedule=schedule,

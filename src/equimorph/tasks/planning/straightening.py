@@ -1,15 +1,22 @@
-"""Paths over a mesh made straight, and drawn to where they cost least."""
+"""Paths over a mesh made straight, moved to where they cost least, and verified as routes."""
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters
-from equimorph.equilibria import ParameterLine, TraceOptions, newton
+from equimorph.equilibria import ParameterLine, TraceOptions, check_start, newton
 from equimorph.equilibria.outcome import follow
 from equimorph.equilibria.tracing import ARRIVAL
-from equimorph.structures import States
-from equimorph.tasks.planning.drawing import Room, chords, drawn, drawn_by_lifts
-from equimorph.tasks.planning.links import Demands, links, shortest
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Descriptor, position
+from equimorph.structures import State, States
+from equimorph.tasks.planning.corner_moves import Room, chords, move_by_chords, move_by_lifts
+from equimorph.tasks.planning.network import Demands, Ends, connect, shortest_path
+from equimorph.tasks.route import Corners, Route, refusal, verify_route
 
 MOST_SHORTCUTS = 8000
 """Number of straight lifts that are tried to shorten a path within its class."""
@@ -28,7 +35,7 @@ UNSURE = 0.05
 """Share of its cost by which a chord may mislead about a leg."""
 
 
-def straightened(states: States, demands: Demands, same_class: bool = False) -> States:
+def straighten(states: States, demands: Demands, same_class: bool = False) -> States:
     """Corners of the cheapest chain of straight lifts between any two states of a path.
 
     A path along edges of a mesh is some per cent too long; every pair of its states that a straight
@@ -37,12 +44,12 @@ def straightened(states: States, demands: Demands, same_class: bool = False) -> 
     """
     most = STATIONS_WITH_MARGINS if demands.objective.needs_margins else STATIONS
     first, second = _pairs(len(states), None if same_class else most)
-    linked, cost = links(states[first], states[second], demands)
+    linked, cost = connect(states[first], states[second], demands)
     if same_class:
         linked &= _swept(first, second, linked)
     pairs = np.stack([first[linked], second[linked]], axis=1)
     each = cost[linked] + CORNER * cost[second - first == 1].sum()
-    path = shortest(len(states), pairs, each, (0, len(states) - 1))
+    path = shortest_path(len(states), pairs, each, (0, len(states) - 1))
     return states if path is None else states[path]
 
 
@@ -74,7 +81,7 @@ def _swept(
     return np.asarray(second < first_miss[first])
 
 
-def relaxed(
+def relax_corners(
     corners: States,
     demands: Demands,
     room: Room,
@@ -88,11 +95,11 @@ def relaxed(
     """
     corners = _divided(corners, demands)
     if same_class:
-        corners = drawn_by_lifts(corners, demands, room, quick=False)
+        corners = move_by_lifts(corners, demands, room, quick=False)
     else:
-        corners, whole = _linked(corners, drawn(corners, demands, room), demands)
+        corners, whole = _linked(corners, move_by_chords(corners, demands, room), demands)
         if not whole:
-            corners = drawn_by_lifts(corners, demands, room, quick=True)
+            corners = move_by_lifts(corners, demands, room, quick=True)
     return _thinned(corners, demands, same_class)
 
 
@@ -102,7 +109,7 @@ def _linked(before: States, after: States, demands: Demands) -> tuple[States, bo
     while True:
         z = np.where(back[:, None], before.z, after.z)
         corners = States(before.structure, z, np.where(back[:, None], before.p, after.p))
-        good, _ = links(corners[:-1], corners[1:], demands)
+        good, _ = connect(corners[:-1], corners[1:], demands)
         bad = np.flatnonzero(~good)
         if len(bad) == 0 or back[bad].all() & back[bad + 1].all():
             return corners, not back.any()
@@ -144,13 +151,13 @@ def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
     if not same_class:
         some = _promising(corners, (first, second), demands)
         first, second = first[some], second[some]
-    linked, cost = links(corners[first], corners[second], demands)
+    linked, cost = connect(corners[first], corners[second], demands)
     if same_class:
         linked &= _swept(first, second, linked)
     consecutive = cost[second - first == 1].sum()
     pairs = np.stack([first[linked], second[linked]], axis=1)
     each = cost[linked] + GAIN * consecutive
-    path = shortest(len(corners), pairs, each, (0, len(corners) - 1))
+    path = shortest_path(len(corners), pairs, each, (0, len(corners) - 1))
     return corners if path is None else corners[path]
 
 
@@ -167,3 +174,87 @@ def _promising(
     apart = before[second] - before[first]
     allowed = (1.0 + UNSURE) * apart + GAIN * before[-1] * (second - first - 1)
     return np.flatnonzero(leg | (good & (cost <= allowed)))
+
+
+def check_ends(eset: EquilibriumSet, ends: Ends) -> None:
+    """Raise `InputError` unless start and goal are equilibria of the set's problem."""
+    for name, state in zip(("start", "goal"), ends, strict=True):
+        _check_belongs(eset, name, state)
+
+
+def violation(ends: Ends, demands: Demands) -> str | None:
+    """Why start or goal is no admissible end of a route, if one is not."""
+    faults = (_fault(name, end, demands) for name, end in zip(("start", "goal"), ends, strict=True))
+    return next((fault for fault in faults if fault), None)
+
+
+def verify_way_points(
+    ends: Ends, corners: Corners, demands: Demands, monitor: Sequence[Descriptor]
+) -> Route:
+    """Return the route over way-points, verified, with its cost."""
+    return check_margin(verify_route(*ends, corners, demands.constraints, monitor), demands)
+
+
+def route_over_corners(
+    eset: EquilibriumSet, corners: States, demands: Demands, monitor: Sequence[Descriptor]
+) -> Route:
+    """Return the route over corners from start to goal, verified, with its cost."""
+    ends, steps = (corners[0], corners[len(corners) - 1]), way_points_of(eset, corners)
+    found = verify_route(*ends, steps, demands.constraints, monitor, corners)
+    return check_margin(found, demands)
+
+
+def way_points_of(eset: EquilibriumSet, corners: States) -> Corners:
+    """Way-points from the first of some corners over all others."""
+    return [{name: corner[name] for name in eset.names} for corner in list(corners)[1:]]
+
+
+def straight_corners(
+    eset: EquilibriumSet, path: States, demands: Demands, same_class: bool = False
+) -> States:
+    """Corners of a straightened path, both ends among them."""
+    corners = straighten(path, demands, same_class)
+    free = np.array([position(eset.structure.parameters, name) for name in eset.names])
+    return relax_corners(corners, demands, (eset.box, free), same_class)
+
+
+def check_margin(route: Route, demands: Demands) -> Route:
+    """Return the route with its cost, refused if its margin falls below what is demanded."""
+    if not route.arrived:
+        return route
+    if route.margin >= demands.margin:
+        assert route.path is not None
+        cost = demands.objective.along(route.path.states)
+        return replace(route, objective=str(demands.objective), cost=cost)
+    return refusal(
+        f"the stability margin falls to {route.margin:.4g} on the way, below {demands.margin:g}",
+        route.way_points,
+        route.path,
+    )
+
+
+def _check_belongs(eset: EquilibriumSet, name: str, state: State) -> None:
+    try:
+        check_start(state)
+    except InputError as error:
+        raise InputError(str(error).replace("`state`", f"`{name}`")) from None
+    here = {free: state[free] for free in eset.names}
+    wanted = eset.parameters_at(here)
+    if not np.allclose(wanted, state.p, rtol=0, atol=1e-9):
+        raise InputError(
+            f"`{name}` must have the fixed parameters of the set ({dict(eset.fixed)}); "
+            f"got {state.parameters}."
+        )
+
+
+def _fault(name: str, state: State, demands: Demands) -> str | None:
+    """Why a state is no admissible end of a route, if it is not."""
+    for constraint in demands.constraints:
+        if not constraint.holds(state.batch)[0]:
+            value = constraint.descriptor(state)
+            return f"the {name} violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
+    if not state.stable:
+        return f"the {name} is unstable (index {state.index})"
+    if state.margin < demands.margin:
+        return f"the {name} has a stability margin of {state.margin:.4g}, below {demands.margin:g}"
+    return None

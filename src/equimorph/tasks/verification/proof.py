@@ -8,8 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import newton
 from equimorph.structures import States, Structure
-from equimorph.tasks.verification.newton_kantorovich import Bounds, segment_bounds
-from equimorph.tasks.verification.sampled import can_be_sampled
+from equimorph.tasks.verification.newton_kantorovich import Bounds, can_be_sampled, segment_bounds
 
 MOST_BISECTIONS = 12
 LARGEST_SAGITTA = 0.25

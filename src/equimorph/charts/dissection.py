@@ -1,0 +1,284 @@
+"""`dissect`: a set cut into few charts over the free parameters."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.charts.atlas import Atlas
+from equimorph.charts.chart import check_cells
+from equimorph.charts.conflicts import conflicts_of, least_cut
+from equimorph.charts.coordinates import Coordinates, coordinates_of
+from equimorph.charts.location import Cells
+from equimorph.charts.paths import Walker, Way, straightest_path
+from equimorph.charts.preparation import add_cusp_vertices, cut_along_crossings, flip_overturned
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.marked_complex import Fabric, fabric_of, squared_sides
+from equimorph.manifold.complex.vertices import Vertices, vertices_of
+from equimorph.manifold.geometry.points import REFINED
+from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labels
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.manifold.queries.levels import fabric_setting, part_of
+from equimorph.structures import States
+
+RINGS = 3
+"""Rings of cells around the end of a cut in which a cusp is its true end."""
+SAME = 1e-9
+"""Difference of shares of an edge up to which two crossings are one."""
+MOST = 40
+"""Cuts after which what still overlaps is left to the eye."""
+
+
+def dissect(eset: EquilibriumSet) -> Atlas:
+    """Cut a set, or a part of one, into few charts over the free parameters.
+
+    Folds part strata. A stratum that lies over itself is cut between the cells that do, along the
+    least cut of its dual graph with lengths in scaled parameters. Over two parameters a cut is then
+    pulled straight, from cusp to cusp where it ends at them, and the cells are cut exactly along
+    it.
+
+    Parameters
+    ----------
+    eset
+        The set; of its stable part ``part(eset, eset.cell_index == 0)``.
+
+    Returns
+    -------
+    Charts, each single-valued, with the transitions between them.
+
+    Raises
+    ------
+    InputError
+        For an empty set.
+    """
+    check_cells(eset)
+    eset = cut_along_crossings(eset)
+    work = _Work.of(eset)
+    if len(eset.names) > 1:
+        work = work.cusped()
+        open_ = list(range(len(eset.strata)))
+        for _ in range(MOST):
+            if not open_:
+                break
+            work, more = work.parted(open_.pop(0))
+            open_ += more
+    index = np.array([stratum.index for stratum in eset.strata])
+    fabric = replace(work.fabric, cell_index=index[work.origin[work.fabric.cell_index]])
+    whole = eset
+    if len(fabric.vertices) > len(eset.points):
+        nothing = np.zeros(len(fabric.vertices), bool)
+        whole = part_of(eset, fabric, np.ones(len(fabric.cells), bool), (nothing, 0))
+    _, label = np.unique(work.fabric.cell_index, return_inverse=True)
+    order = np.argsort(-np.bincount(label), kind="stable")
+    rank = np.empty(len(order), int)
+    rank[order] = np.arange(len(order))
+    family = work.origin[work.fabric.cell_index]
+    return Atlas(whole, rank[label], family)
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """A set that is being cut: a fabric whose cells are numbered by chart instead of index.
+
+    Parameters
+    ----------
+    eset
+        The set that was given.
+    fabric
+        Its cells, cut; ``fabric.cell_index`` is the number of their chart.
+    origin
+        Stratum of each chart.
+    cusps
+        Vertices at cusps.
+    """
+
+    eset: EquilibriumSet
+    fabric: Fabric
+    origin: Int[np.ndarray, " charts"]
+    cusps: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, eset: EquilibriumSet) -> "_Work":
+        """Nothing is cut: charts are strata."""
+        fabric = fabric_of(fabric_setting(eset), eset)
+        number = np.arange(len(eset.strata))
+        return cls(eset, replace(fabric, cell_index=eset.stratum.copy()), number)
+
+    def cells(self, chart: int) -> tuple[Cells, Int[np.ndarray, " own"]]:
+        """Cells of a chart in the plane of parameters, and their numbers."""
+        own = np.flatnonzero(self.fabric.cell_index == chart)
+        store = self.fabric.vertices
+        index = np.array([stratum.index for stratum in self.eset.strata])
+        drawn = replace(
+            self.eset,
+            points=States(self.eset.structure, store.z, store.p),
+            kinds=store.kinds,
+            index=store.index,
+            grid_vertex=store.grid_vertex,
+            cells=self.fabric.cells,
+            component=np.zeros_like(self.fabric.cell_index),
+            stratum=self.fabric.cell_index,
+            cell_index=index[self.origin[self.fabric.cell_index]],
+        )
+        return Cells(drawn, self._coordinates, own), own
+
+    @property
+    def _coordinates(self) -> Coordinates:
+        return coordinates_of(self.eset, self.eset.names)
+
+    def parted(self, chart: int) -> tuple["_Work", list[int]]:
+        """The same with a chart cut once, and the charts to look at again."""
+        cells, own = self.cells(chart)
+        colour = conflicts_of(cells).colour
+        if not (colour >= 0).any():
+            return self, []
+        side = least_cut(cells, colour == 0, colour > 0)
+        straight = self._straight(chart, cells, side, colour < 0)
+        if straight is not None:
+            return straight
+        number = len(self.origin)
+        label = self.fabric.cell_index.copy()
+        label[own[side]] = number
+        return self._labelled(label, chart), [chart, number]
+
+    def _labelled(self, label: Int[np.ndarray, " C"], chart: int) -> "_Work":
+        more = int(label.max()) + 1 - len(self.origin)
+        origin = np.concatenate([self.origin, np.full(max(more, 0), self.origin[chart])])
+        return replace(self, fabric=replace(self.fabric, cell_index=label), origin=origin)
+
+    def cusped(self) -> "_Work":
+        """The same with vertices at the cusps, where sheets part that a cut has to part."""
+        if self.fabric.dimension != 2:
+            return self
+        fabric, cusps = add_cusp_vertices(self.fabric)
+        if len(cusps) == 0:
+            return self
+        return replace(self, fabric=fabric, cusps=tuple(cusps.tolist()))._untangled()
+
+    def _untangled(self) -> "_Work":
+        """The same with fewer triangles that chords of curved folds have turned over."""
+        fabric = self.fabric
+        places = fabric.vertices.p[:, fabric.setting.free]
+        corners = fabric.cells.copy()
+        for chart in range(len(self.origin)):
+            own = np.flatnonzero(fabric.cell_index == chart)
+            corners[own] = flip_overturned(corners[own], places, fabric.facets)
+        squared = squared_sides(fabric.vertices.place, corners)
+        return replace(self, fabric=replace(fabric, cells=corners, squared=squared))
+
+    def _straight(
+        self,
+        chart: int,
+        cells: Cells,
+        side: Bool[np.ndarray, " own"],
+        alone: Bool[np.ndarray, " own"],
+    ) -> tuple["_Work", list[int]] | None:
+        """The chart cut along straight lines, if these part what the cut parted."""
+        if self.fabric.dimension != 2:
+            return None
+        places = cells.values / cells.coordinates.setting.scales
+        clear = Walker(cells.corners, places, alone)
+        free = Walker(cells.corners, places, np.ones_like(alone))
+        ways = []
+        for path in _paths(cells, side):
+            drawn = _snapped((clear, free), cells, path, self.cusps)
+            ways.append(straightest_path(clear, free, drawn))
+        cut = _crossed(self.fabric, ways)
+        if cut is None:
+            return None
+        fabric, facets = cut
+        work = replace(self, fabric=fabric)
+        drawn_cells, own = work.cells(chart)
+        whole = drawn_cells.whole
+        wall = flags_of(whole.facets, facets)
+        piece = labels(len(own), whole.links[~wall[whole.across]])
+        if piece.max() == 0:
+            return None
+        label = fabric.cell_index.copy()
+        numbers = np.concatenate([[chart], len(self.origin) + np.arange(piece.max())])
+        label[own] = numbers[piece]
+        return work._labelled(label, chart), numbers.tolist()
+
+
+def _paths(cells: Cells, side: Bool[np.ndarray, " own"]) -> list[list[int]]:
+    """Chains of edges between both sides of a cut."""
+    whole = cells.whole
+    a, b = whole.links.T
+    return [chain.tolist() for chain in chains(whole.facets[whole.across[side[a] != side[b]]])]
+
+
+def _snapped(
+    walkers: tuple[Walker, Walker], cells: Cells, path: list[int], cusps: tuple[int, ...]
+) -> list[int]:
+    """The path, with its ends moved to cusps beside them."""
+    out = list(path)
+    if path[0] == path[-1]:
+        return out
+    for _ in range(2):
+        out = _begun(walkers, cells, out, cusps)[::-1]
+    return out
+
+
+def _begun(
+    walkers: tuple[Walker, Walker], cells: Cells, path: list[int], cusps: tuple[int, ...]
+) -> list[int]:
+    """The path from the cusp next to its beginning on, if it sees one of its first vertices."""
+    around = np.array([path[0]])
+    for _ in range(RINGS):
+        around = np.unique(cells.corners[np.isin(cells.corners, around).any(axis=1)])
+    near = [cusp for cusp in cusps if cusp in around and cusp != path[0]]
+    if not near or path[0] in cusps:
+        return path
+    place = walkers[0].places
+    cusp = min(near, key=lambda c: float(np.linalg.norm(place[c] - place[path[0]])))
+    # next to a cusp all cells lie over others
+    for walker in walkers:
+        for k, vertex in enumerate(path[: len(path) // 2 + 1]):
+            if vertex != cusp and walker.way(cusp, vertex) is not None:
+                return [cusp, *path[k:]]
+    return path
+
+
+def _crossed(fabric: Fabric, ways: list[Way]) -> tuple[Fabric, Int[np.ndarray, "n 2"]] | None:
+    """The fabric with exact vertices where straight ways cross edges, and the edges along them."""
+    crossings: dict[tuple[int, int], float] = {}
+    for a, b, share in (step for way in ways for step in way if not isinstance(step, int)):
+        key, own = ((a, b), share) if a < b else ((b, a), 1.0 - share)
+        # two ways over one edge would need two vertices on it
+        if abs(crossings.setdefault(key, own) - own) > SAME:
+            return None
+    number = {key: len(fabric.vertices) + k for k, key in enumerate(crossings)}
+    if crossings:
+        ends = np.array(list(crossings))
+        new = _amid(fabric, ends, np.array(list(crossings.values())))
+        if new is None:
+            return None
+        fabric = fabric.bisected(ends, new)
+    wall = np.array([pair for way in ways for pair in pairwise(_numbers(way, number))], int)
+    base = len(fabric.vertices)
+    pairs = [fabric.cells[:, list(two)] for two in ((0, 1), (1, 2), (0, 2))]
+    known = np.concatenate([keys_of(pair, base) for pair in pairs])
+    wall = wall.reshape(-1, 2)
+    return (fabric, wall) if np.isin(keys_of(wall, base), known).all() else None
+
+
+def _numbers(way: Way, number: dict[tuple[int, int], int]) -> list[int]:
+    """Vertices of a way whose crossed edges have been given vertices."""
+    return [step if isinstance(step, int) else number[min(step[:2]), max(step[:2])] for step in way]
+
+
+def _amid(
+    fabric: Fabric, ends: Int[np.ndarray, "n 2"], share: Float[np.ndarray, " n"]
+) -> Vertices | None:
+    """Exact vertices over points between the ends of edges, if there are any."""
+    store, setting = fabric.vertices, fabric.setting
+    weights = np.stack([1.0 - share, share], axis=1)
+    z, p = (np.einsum("nk,nki->ni", weights, column[ends]) for column in (store.z, store.p))
+    z, good, index = exact_states(setting.structure, z, p)
+    lowest = store.index[ends].min(axis=1)
+    if not (good & (index == lowest)).all():
+        return None
+    kinds = np.full(len(ends), REFINED)
+    rows = np.ascontiguousarray(store.rows[ends[:, 0]])
+    return vertices_of(setting, (z, p), kinds, (index, np.full(len(ends), -1)), rows)

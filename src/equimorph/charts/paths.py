@@ -1,0 +1,364 @@
+"""Short paths over the cells of a set from chart to chart, straight where they can be."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from equimorph.charts.preparation import first_copies
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.manifold.lookup.over import rooted
+from equimorph.manifold.queries.nearest import setting_of
+from equimorph.structures import State, States
+
+AT_VERTEX = 1e-6
+"""Share of an edge within which a way that crosses it runs through its end."""
+LONGEST = 100_000
+
+Crossing = tuple[int, int, float]
+"""Ends of an edge, and the share of the way from the first to the second where it is crossed."""
+Way = list[int | Crossing]
+
+
+@dataclass(frozen=True, eq=False)
+class AtlasPath:
+    """A continuous way on a set, from chart to chart.
+
+    Parameters
+    ----------
+    states
+        Exact states along it: at its ends, and where it enters another cell.
+    coords
+        Their coordinates.
+    chart
+        Number of the chart of each step between them.
+    """
+
+    states: States
+    coords: Float[np.ndarray, "points d"]
+    chart: Int[np.ndarray, " steps"]
+
+    def __repr__(self) -> str:
+        """Charts in turn and number of states."""
+        charts = " → ".join(str(chart) for chart, _, _ in self.legs)
+        return f"AtlasPath({charts}: {len(self.states)} states)"
+
+    @property
+    def legs(self) -> tuple[tuple[int, Float[np.ndarray, "_ d"], States], ...]:
+        """Chart, coordinates and states of each leg; neighbours share the state between them."""
+        change = np.flatnonzero(np.diff(self.chart)) + 1
+        bounds = [0, *change.tolist(), len(self.chart)]
+        return tuple(
+            (int(self.chart[a]), self.coords[a : b + 1], self.states[a : b + 1])
+            for a, b in pairwise(bounds)
+        )
+
+
+def path_over_cells(
+    eset: EquilibriumSet,
+    chart: Int[np.ndarray, " C"],
+    start: tuple[State, int],
+    goal: tuple[State, int],
+) -> AtlasPath | None:
+    """Short way between states, each with its cell; None if the set does not join them.
+
+    Shortest over edges, in the metric; over two parameters then pulled straight between folds.
+    """
+    # ways may lead from sheet to sheet where these cross
+    eset = replace(eset, cells=first_copies(eset)[eset.cells])
+    if start[1] == goal[1]:
+        states = _stacked(eset, start[0], None, goal[0])
+        return AtlasPath(states, _coords(eset, states), chart[[start[1]]])
+    path = _over_edges(eset, start, goal)
+    if path is None:
+        return None
+    way = _pulled(eset, path)
+    states = _stacked(eset, start[0], _states_on(eset, way), goal[0])
+    charts = _charts_of(eset, chart, way)
+    whole = np.concatenate([chart[[start[1]]], charts, chart[[goal[1]]]])
+    return AtlasPath(states, _coords(eset, states), whole)
+
+
+def _coords(eset: EquilibriumSet, states: States) -> Float[np.ndarray, "points d"]:
+    return np.stack([states[name] for name in eset.names], axis=1)
+
+
+def _stacked(eset: EquilibriumSet, start: State, middle: States | None, goal: State) -> States:
+    parts = [start.batch, *([] if middle is None else [middle]), goal.batch]
+    z, p = (np.concatenate([getattr(part, name) for part in parts]) for name in ("z", "p"))
+    return States(eset.structure, z, p)
+
+
+def _over_edges(
+    eset: EquilibriumSet, start: tuple[State, int], goal: tuple[State, int]
+) -> list[int] | None:
+    """Vertices of the shortest way over edges from one cell to another."""
+    setting, count = setting_of(eset), len(eset.points)
+    place = embed(setting, eset.points.z, eset.points.p)
+    pairs = faces_of(eset.cells, 2) if eset.cells.shape[1] > 2 else eset.cells
+    pairs = pairs[~_at_end(eset)[pairs].any(axis=1)]
+    links, lengths = [pairs], [np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)]
+    for number, (state, cell) in enumerate((start, goal)):
+        corners = eset.cells[cell]
+        own = embed(setting, state.z[None], state.p[None])
+        links.append(np.stack([np.full(len(corners), count + number), corners], axis=1))
+        lengths.append(np.linalg.norm(place[corners] - own, axis=1))
+    joined = np.concatenate(links)
+    graph = coo_array(
+        (np.maximum(np.concatenate(lengths), 1e-12), joined.T), shape=(count + 2,) * 2
+    ).tocsr()
+    far, before = dijkstra(graph, directed=False, indices=count, return_predecessors=True)
+    if not np.isfinite(far[count + 1]):
+        return None
+    path = [int(before[count + 1])]
+    while before[path[-1]] != count:
+        path.append(int(before[path[-1]]))
+    return path[::-1]
+
+
+def _at_end(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
+    """Vertices on folds at which the set ends: no way should touch them."""
+    whole, at = adjacency(eset.cells), np.zeros(len(eset.points), bool)
+    at[whole.facets[whole.counts == 1]] = True
+    return at & np.isin(eset.kinds, (FOLD, CORNER))
+
+
+def _pulled(eset: EquilibriumSet, path: list[int]) -> Way:
+    """The way, straight in the parameters between its vertices on folds."""
+    if eset.cells.shape[1] != 3:
+        return list(path)
+    folded = np.isin(eset.kinds, (FOLD, CORNER, CROSSING))
+    stops = [0, *(k for k in range(1, len(path) - 1) if folded[path[k]]), len(path) - 1]
+    way: Way = [path[0]]
+    for a, b in pairwise(stops):
+        run = path[a : b + 1]
+        if len(run) < 2:
+            continue
+        around = eset.stratum[np.isin(eset.cells, run[:2]).sum(axis=1) == 2]
+        walker = Walker(eset.cells, eset.coordinates, np.isin(eset.stratum, around))
+        way += straightest_path(walker, walker, run)[1:]
+    return way
+
+
+def _states_on(eset: EquilibriumSet, way: Way) -> States:
+    """Exact states at the vertices and crossed edges of a way."""
+    ends = np.array([(s, s) if isinstance(s, int) else s[:2] for s in way])
+    share = np.array([0.0 if isinstance(s, int) else s[2] for s in way])
+    weights = np.stack([1.0 - share, share], axis=1)
+    p = np.einsum("nk,nkp->np", weights, eset.points.p[ends])
+    folded = np.isin(eset.kinds, (FOLD, CORNER, CROSSING))[ends]
+    some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
+    weights[some] = rooted(weights[some], folded[some])
+    z = np.einsum("nk,nki->ni", weights, eset.points.z[ends])
+    amid = np.flatnonzero(share > 0.0)
+    z[amid], good, _ = exact_states(eset.structure, z[amid], p[amid])
+    kept = np.ones(len(way), bool)
+    kept[amid] = good
+    return States(eset.structure, z[kept], p[kept])
+
+
+def _charts_of(
+    eset: EquilibriumSet, chart: Int[np.ndarray, " C"], way: Way
+) -> Int[np.ndarray, " steps"]:
+    """Chart of each step of a way: that of a cell which holds both of its ends."""
+    out: list[int] = []
+    for one, other in pairwise(way):
+        held = {*(one[:2] if not isinstance(one, int) else (one,))}
+        held |= {*(other[:2] if not isinstance(other, int) else (other,))}
+        around = np.flatnonzero(np.isin(eset.cells, list(held)).sum(axis=1) == len(held))
+        known = chart[around].tolist()
+        out.append(out[-1] if out and out[-1] in known else int(known[0]))
+    return np.array(out, int)
+
+
+@dataclass(frozen=True, eq=False)
+class Walker:
+    """Triangles over the plane on which one can go straight on.
+
+    Parameters
+    ----------
+    corners
+        Vertices of the triangles.
+    places
+        Places of all vertices in the plane.
+    allowed
+        Triangles that may be entered.
+    """
+
+    corners: Int[np.ndarray, "C 3"]
+    places: Float[np.ndarray, "V 2"]
+    allowed: Bool[np.ndarray, " C"]
+
+    @cached_property
+    def _whole(self) -> Adjacency:
+        return adjacency(self.corners)
+
+    @cached_property
+    def _beyond(self) -> list[list[int]]:
+        """Triangle beyond the side opposite to each corner; −1 where there is none."""
+        whole = self._whole
+        beyond = np.full(self.corners.shape, -1)
+        facet = whole.across[whole.manifold]
+        for cell, other in (whole.links[whole.manifold].T, whole.links[whole.manifold].T[::-1]):
+            corner = (whole.cell_facets[cell] == facet[:, None]).argmax(axis=1)
+            beyond[cell, corner] = other
+        beyond[(beyond >= 0) & ~self.allowed[beyond]] = -1
+        found: list[list[int]] = beyond.tolist()
+        return found
+
+    @cached_property
+    def _rows(self) -> list[int]:
+        """Vertices of the triangles one after the other: long lists of lists are slow to make."""
+        rows: list[int] = self.corners.ravel().tolist()
+        return rows
+
+    def _corners(self, cell: int) -> list[int]:
+        return self._rows[3 * cell : 3 * cell + 3]
+
+    @cached_property
+    def _columns(self) -> tuple[list[float], list[float]]:
+        x, y = self.places.T
+        return x.tolist(), y.tolist()
+
+    @cached_property
+    def _around(self) -> dict[int, list[int]]:
+        """Allowed triangles around each vertex."""
+        around: dict[int, list[int]] = {}
+        for cell in np.flatnonzero(self.allowed).tolist():
+            for vertex in self._corners(cell):
+                around.setdefault(vertex, []).append(cell)
+        return around
+
+    def way(self, start: int, goal: int) -> Way | None:
+        """Vertices and crossed edges of the straight way between two vertices, if there is one.
+
+        Both ends are part of it.
+        """
+        way: Way = [start]
+        target = self.places[goal]
+        for _ in range(LONGEST):
+            here = way[-1]
+            assert isinstance(here, int)
+            if here == goal:
+                return way
+            leg = self._leg(here, target)
+            if leg is None:
+                return None
+            way += leg
+        return None
+
+    def _leg(self, start: int, target: Float[np.ndarray, " 2"]) -> Way | None:
+        """From a vertex straight on to the next vertex that is met."""
+        origin = self.places[start]
+        ahead = target - origin
+        far = float(ahead @ ahead)
+        if far == 0.0:
+            return None
+        for cell in self._around.get(start, ()):
+            a, b = (v for v in self._corners(cell) if v != start)
+            entry = self._crossed(origin, ahead, a, b)
+            if entry is None:
+                continue
+            crossing, along = entry
+            if isinstance(crossing, int):
+                return [crossing] if along <= 1.0 + AT_VERTEX else None
+            if along > 1.0 + AT_VERTEX:
+                continue
+            return self._onward((origin, ahead), cell, start, crossing)
+        return None
+
+    def _onward(
+        self,
+        ray: tuple[Float[np.ndarray, " 2"], Float[np.ndarray, " 2"]],
+        cell: int,
+        corner: int,
+        crossing: Crossing,
+    ) -> Way | None:
+        """Through one triangle after the other until a vertex is met."""
+        way: Way = [crossing]
+        while len(way) < LONGEST:
+            a, b, _ = crossing
+            cell = self._beyond[cell][self._corners(cell).index(corner)]
+            if cell < 0:
+                return None
+            third = next(v for v in self._corners(cell) if v not in {a, b})
+            for side, rest in ((a, b), (b, a)):
+                entry = self._crossed(*ray, side, third)
+                if entry is None or entry[1] > 1.0 + AT_VERTEX:
+                    continue
+                if isinstance(entry[0], int):
+                    return [*way, entry[0]] if entry[0] == third else None
+                crossing, corner = entry[0], rest
+                way.append(crossing)
+                break
+            else:
+                return None
+        return None
+
+    def _crossed(
+        self, origin: Float[np.ndarray, " 2"], ahead: Float[np.ndarray, " 2"], a: int, b: int
+    ) -> tuple[int | Crossing, float] | None:
+        """Where a ray crosses an edge, or which of its ends it meets; and after which share."""
+        (px, py), (dx, dy) = origin.tolist(), ahead.tolist()
+        x, y = self._columns
+        ax, ay, bx, by = x[a], y[a], x[b], y[b]
+        side_a = dx * (ay - py) - dy * (ax - px)
+        side_b = dx * (by - py) - dy * (bx - px)
+        if side_a == side_b:
+            return None
+        share = side_a / (side_a - side_b)
+        if not -AT_VERTEX <= share <= 1.0 + AT_VERTEX:
+            return None
+        ahead_x, ahead_y = ax + share * (bx - ax) - px, ay + share * (by - ay) - py
+        along = (ahead_x * dx + ahead_y * dy) / (dx * dx + dy * dy)
+        if along <= 0.0:
+            return None
+        if share < AT_VERTEX:
+            return a, along
+        if share > 1.0 - AT_VERTEX:
+            return b, along
+        return (a, b, share), along
+
+
+def straightest_path(clear: Walker, free: Walker, path: list[int]) -> Way:
+    """The shortest chain of straight ways between vertices of a path.
+
+    Parameters
+    ----------
+    clear
+        Where ways between any two of the vertices may run.
+    free
+        Where ways between neighbours on the path may run, if they may not otherwise.
+    path
+        Vertices.
+    """
+    count = len(path)
+    length = np.full(count, np.inf)
+    length[0] = 0.0
+    before = np.zeros(count, int)
+    ways: dict[tuple[int, int], Way] = {}
+    places = clear.places[path]
+    for i in range(count):
+        for j in range(i + 1, count):
+            far = length[i] + float(np.linalg.norm(places[j] - places[i]))
+            if far >= length[j]:
+                continue
+            way = clear.way(path[i], path[j])
+            if way is None and j == i + 1:
+                way = free.way(path[i], path[j]) or [path[i], path[j]]
+            if way is not None:
+                length[j], before[j], ways[i, j] = far, i, way
+    at, out = count - 1, [path[-1]]
+    whole: Way = list(out)
+    while at > 0:
+        whole = ways[int(before[at]), at][:-1] + whole
+        at = int(before[at])
+    return whole

@@ -1,0 +1,160 @@
+"""`reduce`: at most one preferred state over each point, with barriers and gaps."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.arrays import Points
+from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
+from equimorph.charts.chart import BARRIER, BEYOND, GAP, INSIDE, Chart, Charted, check_cells
+from equimorph.charts.coordinates import Coordinates, coordinates_of
+from equimorph.charts.domain import Domain, typical_extent
+from equimorph.charts.location import Cells
+from equimorph.charts.preference import Preference, preferred_part
+from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
+from equimorph.charts.rules import Rule, Scores, rule_of
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Constraint, Descriptor
+from equimorph.structures import States
+
+ON_BARRIER = 1e-9
+"""Distance from a barrier, in ranges of the parameters, within which points lie on it."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Reduction(Chart):
+    """The free parameters as coordinates of preferred states.
+
+    Which state is preferred is decided anew, and exactly, for every point that is asked for.
+
+    Parameters
+    ----------
+    eset
+        The preferred part of the set, cut exactly along barriers and gaps; a set of its own. Tasks
+        take it together with `constraint`.
+    whole
+        The set that was reduced, with vertices at its cusps.
+    rule
+        What is preferred.
+    among
+        Which cells of the whole set had the choice.
+    cut
+        Vertices of the preferred part at which the preference changes.
+    barriers
+        Curves across which neighbouring points do not have neighbouring states.
+    lost
+        Edges of the set on which no end of the preferred part was found.
+    """
+
+    whole: EquilibriumSet
+    rule: Rule
+    among: Int[np.ndarray, " own"]
+    cut: Bool[np.ndarray, " V"]
+    barriers: tuple[Barrier, ...]
+    lost: int
+
+    def __repr__(self) -> str:
+        """Rule, barriers and gaps."""
+        return (
+            f"Reduction({self.rule}: {len(self.barriers)} barriers, {len(self.gaps.loops)} gaps "
+            f"on {self.whole})"
+        )
+
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """The free parameters."""
+        return coordinates_of(self.whole, self.whole.names)
+
+    @cached_property
+    def preference(self) -> Preference:
+        """The rule, ready for the set."""
+        cells = Cells(self.whole, self.coordinates, self.among)
+        return Preference(cells, self.rule.on(self.whole), self.rule.scores(self.whole))
+
+    @cached_property
+    def cells(self) -> Cells:
+        """The preferred cells."""
+        return Cells(self.eset, self.coordinates, np.arange(len(self.eset.cells)), self.cut)
+
+    @cached_property
+    def gaps(self) -> Domain:
+        """Points of the box without a state."""
+        return gaps_of(self.domain, self.eset.box, typical_extent(self.cells))
+
+    def state(self, coords: Points) -> Charted:
+        """Preferred states over points; see `Chart.state`."""
+        points = self._checked(coords)
+        found = self.preference.over(points)
+        code = np.full(len(points), GAP)
+        code[found.point] = INSIDE
+        beyond = ~self.eset.box.contains(points, slack=1e-12)
+        code[beyond] = BEYOND
+        code[self._on_barrier(points) & ~beyond] = BARRIER
+        return self._answers(found.take(code[found.point] == INSIDE), code)
+
+    @cached_property
+    def constraint(self) -> Constraint:
+        """The constraint that states are the preferred ones.
+
+        Tasks that lift, track, solve or optimise take it with their other constraints: over the
+        preferred part alone, Newton's method may end beyond a barrier.
+        """
+        return Descriptor("not preferred", "", self.preference.excess) <= 0.0
+
+    def _on_barrier(self, points: Points) -> Bool[np.ndarray, " points"]:
+        on = np.zeros(len(points), bool)
+        size = self.eset.box.upper - self.eset.box.lower
+        for barrier in self.barriers:
+            on |= barrier.distance(points, size) <= ON_BARRIER
+        return on
+
+
+def reduce(
+    eset: EquilibriumSet,
+    *,
+    prefer: Rule | Callable[[States], Scores],
+    stable: bool = True,
+) -> Reduction:
+    """Reduce a set to at most one preferred state over each point.
+
+    Vertices over which another state is preferred are left out, and edges between preferred and
+    other vertices are cut where the preference changes: by bisection of the exact choice, so that
+    ties of scores, ends of other sheets and ends of paths are all found alike.
+
+    Parameters
+    ----------
+    eset
+        The set.
+    prefer
+        `quasi_static`, `first_stable_on_path`, `lowest`, `highest`, `nearest`, or a function of
+        states whose least value is preferred.
+    stable
+        Whether only stable states have the choice.
+
+    Returns
+    -------
+    A single-valued chart with its barriers and gaps.
+
+    Raises
+    ------
+    InputError
+        For an empty set, one without stable states, a rule that does not fit the set, or one that
+        prefers no state at all.
+    """
+    check_cells(eset)
+    eset = with_cusp_vertices(cut_along_crossings(eset))
+    rule = rule_of(prefer)
+    among = np.flatnonzero((eset.cell_index == 0) | (not stable))
+    if len(among) == 0:
+        raise InputError("`eset` must have stable states; got none. Pass stable=False.")
+    coordinates = coordinates_of(eset, eset.names)
+    preference = Preference(Cells(eset, coordinates, among), rule.on(eset))
+    chosen, cut, lost = preferred_part(preference)
+    if len(chosen.cells) == 0:
+        raise InputError(f"`prefer` must prefer some states of the set; got {rule}.")
+    own = Cells(chosen, coordinates, np.arange(len(chosen.cells)), cut)
+    return Reduction(chosen, eset, rule, among, cut, barriers_of(own, preference), lost)

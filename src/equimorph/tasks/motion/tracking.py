@@ -1,0 +1,311 @@
+"""`track`: actuators that lead descriptors along given targets while loads move."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
+from equimorph.errors import InputError
+from equimorph.model import Constraint, Descriptor, Schedule, position
+from equimorph.structures import State, States, Structure, value_of
+from equimorph.tasks.motion.blocks import DENSE, path_by_blocks, same_descriptors, stable_path
+from equimorph.tasks.motion.course import Course
+from equimorph.tasks.motion.redundant import follow_redundant
+from equimorph.tasks.optimising.moving_optimum import MovingProblem, actuator_bounds, follow_minimum
+from equimorph.tasks.optimising.optimum_path import FollowedOptimum
+from equimorph.tasks.optimising.programme import Objective, stability
+from equimorph.tasks.route import FINE, describe_place, schedule_of
+from equimorph.tasks.start import Start, start_state
+
+Failure = Literal["", "snap-through", "singular Jacobian", "actuator limit", "constraint", "lost"]
+SAME = 1e-8
+"""Relative distance of targets that are the same."""
+CRITICAL = ("critical", "branch point", "index")
+"""Ends at which a stable state loses its stability."""
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """Answer to "can the structure follow this motion".
+
+    Parameters
+    ----------
+    status
+        "arrived", or "refused" with the reason in `why` and its class in `failure`.
+    failure
+        "snap-through": stability is lost. "singular Jacobian": the actuators cannot move the
+        descriptors on (det S_a = 0). "actuator limit", "constraint": a bound is met. "lost": a
+        numerical failure.
+    path
+        Exact states, as far as it went; `path.at` counts legs, so that 1.5 is half-way through the
+        second one.
+    margin
+        Smallest stability margin on the way.
+    schedule
+        Parameters along the whole motion; None if it was refused.
+    compromise
+        Beyond the failure, if asked for: the stable states with the least sum of squares of what
+        is left of the targets, half of which are its values.
+    """
+
+    status: Literal["arrived", "refused"]
+    failure: Failure
+    why: str
+    path: Path
+    targets: tuple[Descriptor, ...]
+    actuators: tuple[str, ...] = ()
+    schedule: Schedule | None = None
+    compromise: FollowedOptimum | None = None
+
+    def __repr__(self) -> str:
+        """Margin, or why and where it fails."""
+        if self.arrived:
+            return f"Tracking(arrived: margin {self.margin:.4g})"
+        return f"Tracking(refused at {self.last_good:.6g}: {self.why})"
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the whole motion can be followed on stable states."""
+        return self.status == "arrived"
+
+    @property
+    def last_good(self) -> float:
+        """Where the motion ends: the number of legs that were done."""
+        return float(self.path.at[-1])
+
+    @cached_property
+    def margin(self) -> float:
+        """Smallest stability margin on the way."""
+        return float(self.path.states.margin.min())
+
+    @property
+    def states(self) -> States:
+        """Exact states along the path."""
+        return self.path.states
+
+    @property
+    def values(self) -> Mapping[str, Float[np.ndarray, " steps"]]:
+        """Values of the targets along the path, by name."""
+        return {each.name: each(self.path.states) for each in self.targets}
+
+    @cached_property
+    def holonomy(self) -> Mapping[str, float] | None:
+        """Change of each actuator around the loop, if the motion comes back to earlier targets.
+
+        Zero where the actuators come back, too; None if the targets do not close.
+        """
+        at, states = self.path.at, self.path.states
+        corners = np.flatnonzero(np.isclose(at, np.round(at), rtol=0, atol=1e-12))
+        if not self.arrived or len(corners) < 2:
+            return None
+        parameters = self.path.states.structure.parameters
+        free = [position(parameters, name) for name in self.actuators]
+        columns = np.delete(states.p[corners], free, axis=1)
+        values = np.stack([each(states[corners]) for each in self.targets], axis=1)
+        columns = np.concatenate([columns, values], axis=1)
+        size = 1.0 + np.abs(columns).max(axis=0)
+        same = np.flatnonzero((np.abs(columns - columns[-1]) <= SAME * size).all(axis=1))
+        if len(same) < 2:
+            return None
+        change = states.p[corners[-1]] - states.p[corners[same[0]]]
+        return dict(zip(self.actuators, change[free].tolist(), strict=True))
+
+
+def track(  # the knobs of the public face, all by keyword
+    start: Start,
+    targets: Leg | Sequence[Leg],
+    *,
+    actuators: Sequence[str] | Mapping[str, tuple[float, float]],
+    within: Sequence[Constraint] = (),
+    monitor: Sequence[Descriptor] = (),
+    beyond: bool = False,
+) -> Tracking:
+    """Follow targets S*(t) with as many actuators or more, while loads may move.
+
+    ``S_a ȧ = Ṡ* − S_l l̇``, corrected onto the set at every step: an error-controlled continuation
+    in pseudo-arclength, once coarsely, and again finely before it is called good. Many close
+    targets are corrected side by side. With more actuators than targets the shortest motion of the
+    actuators is taken at every moment, in their scales; one that meets its limit is held there as
+    long as the others can go on.
+
+    Parameters
+    ----------
+    start
+        A stable equilibrium; what `locate` or `estimate_state` says of a measured one will do.
+    targets
+        One leg or several: ``{descriptor: value, "q": value}``, approached at a constant rate, or
+        functions of t from 0 to 1 that return such mappings and begin at the start's values.
+    actuators
+        Parameters to solve for, at least as many as descriptors; with limits:
+        ``{"Theta": (0.2, 2.5)}``.
+    within
+        Constraints to obey on the way.
+    monitor
+        Further descriptors for the schedule.
+    beyond
+        Whether to follow the best compromise where the targets are beyond reach; the same
+        descriptors on all legs.
+
+    Returns
+    -------
+    The motion with its schedule, or where and why it cannot be followed. Of a motion that comes
+    back to its first targets the actuators need not come back: see `Tracking.holonomy`.
+
+    Raises
+    ------
+    InputError
+        If `start` is no stable equilibrium, not known, or violates a bound, or for targets and
+        actuators without meaning.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> spring = em.Spring()
+    >>> start = em.lift(spring.natural_state(x_l=0.8), {"F": 0.02}).end.state
+    >>> turned = em.track(start, {spring.descriptor("angle"): 0.8}, actuators=["x_l"])
+    >>> turned.arrived, float(turned.schedule.values[-1, 0].round(6))
+    (True, 0.677282)
+    """
+    state = start_state(start)
+    structure, names = state.structure, tuple(actuators)
+    limits = dict(actuators) if isinstance(actuators, Mapping) else {}
+    bounds = [bound for name, ends in limits.items() for bound in _limits(structure, name, ends)]
+    if not state.stable:
+        raise InputError(f"`start` must be stable; got a state of index {state.index}.")
+    legs = _listed(targets)
+    asked = _descriptors([_checked(leg(0.0) if callable(leg) else leg, names) for leg in legs])
+    path = _path(state, legs, names, (tuple(within), tuple(bounds), limits))
+    failure = _failure(path.end, bounds)
+    if failure:
+        why = _why(path.end, failure, names)
+        rest = _compromise(path, legs, names, (tuple(within), limits)) if beyond else None
+        return Tracking("refused", failure, why, path, asked, names, None, rest)
+    monitored = tuple(dict.fromkeys((*asked, *(c.descriptor for c in within), *monitor)))
+    schedule = schedule_of(path, path.states.margin, monitored)
+    return Tracking("arrived", "", "", path, asked, names, schedule)
+
+
+def _path(
+    start: State,
+    legs: Sequence[Leg],
+    names: tuple[str, ...],
+    bounds: tuple[
+        tuple[Constraint, ...], tuple[Constraint, ...], Mapping[str, tuple[float, float]]
+    ],
+) -> Path:
+    """Path of a motion by the method that suits it."""
+    within, at_limits, limits = bounds
+    parameters = start.structure.parameters
+    first = legs[0](0.0) if callable(legs[0]) else legs[0]
+    if sum(isinstance(key, Descriptor) for key in first) < len(names):
+        course = Course.of(start, legs, names)
+        check_start(start, (*within, *at_limits))
+        places = {position(parameters, name): ends for name, ends in limits.items()}
+        motion = follow_redundant(course, start, within, places)
+        return stable_path(motion.stretch.states, motion.stretch.times, motion.end)
+    every = (*within, *at_limits)
+    if len(legs) >= DENSE and same_descriptors(legs):
+        check_start(start, every)
+        return path_by_blocks(Course.of(start, legs, names), start, every, FINE)
+    freed = [_freed(leg, names) for leg in legs]
+    path = lift(start, freed, within=every)
+    return lift(start, freed, within=every, options=FINE) if path.arrived else path
+
+
+def _compromise(
+    path: Path,
+    legs: Sequence[Leg],
+    names: tuple[str, ...],
+    bounds: tuple[tuple[Constraint, ...], Mapping[str, tuple[float, float]]],
+) -> FollowedOptimum:
+    """Least squares from the end of a path on."""
+    structure, (within, limits) = path.states.structure, bounds
+    course = Course.of(path.states[0], legs, names)
+
+    def goal(columns: Float[np.ndarray, " columns"]) -> Objective:
+        wanted = columns[len(structure.parameters) :]
+
+        def miss(z: Lanes, p: Parameters) -> Values:
+            values = np.stack([each.function(z, p) for each in course.descriptors], axis=1)
+            return np.asarray(0.5 * ((values - wanted) ** 2).sum(axis=1))
+
+        return Objective(Descriptor("miss", "", miss), 1.0)
+
+    rules = (*within, stability(structure, 0.0))
+    problem = MovingProblem(course, goal, rules, actuator_bounds(structure, limits), False)
+    # the end itself may lie on a fold, where the actuators are no coordinates
+    return follow_minimum(
+        problem, path.states[-2 if len(path.states) > 1 else -1], float(path.at[-1])
+    )
+
+
+def _listed(targets: Leg | Sequence[Leg]) -> list[Leg]:
+    return [targets] if isinstance(targets, Mapping) or callable(targets) else list(targets)
+
+
+def _freed(leg: Leg, actuators: tuple[str, ...]) -> Leg:
+    """Leg with the actuators left unknown."""
+    if callable(leg):
+        return lambda t: {**_checked(leg(t), actuators), **dict.fromkeys(actuators)}
+    return {**_checked(leg, actuators), **dict.fromkeys(actuators)}
+
+
+def _checked(values: Waypoint, actuators: tuple[str, ...]) -> Waypoint:
+    if not isinstance(values, Mapping):
+        raise InputError(f"`targets` must give {{descriptor: value}}; got {values!r}.")
+    asked = [key for key in values if isinstance(key, Descriptor)]
+    if not 0 < len(asked) <= len(actuators):
+        raise InputError(
+            f"`targets` must prescribe as many descriptors as there are actuators "
+            f"({len(actuators)}), or fewer; got {len(asked)}."
+        )
+    for name in actuators:
+        if name in values:
+            raise InputError(
+                f"`targets` must leave the actuator {name} free; got {values[name]!r}."
+            )
+    return values
+
+
+def _descriptors(first: Sequence[Waypoint]) -> tuple[Descriptor, ...]:
+    keys = (key for leg in first for key in leg)
+    return tuple(dict.fromkeys(key for key in keys if isinstance(key, Descriptor)))
+
+
+def _limits(structure: Structure, name: str, ends: tuple[float, float]) -> list[Constraint]:
+    """Both limits of an actuator, as constraints."""
+    low, high = ends
+    if not low < high:
+        raise InputError(f"`actuators` must give limits in order; got {name} = {ends}.")
+    itself = value_of(structure, name)
+    return [itself >= low, itself <= high]
+
+
+def _failure(end: Event, bounds: Sequence[Constraint]) -> Failure:
+    if end.kind == "arrived":
+        return ""
+    if end.kind in CRITICAL:
+        return "snap-through"
+    if end.kind == "fold":
+        return "singular Jacobian"
+    if end.kind == "limit":
+        return "actuator limit"
+    if end.kind == "constraint":
+        limits = {str(bound) for bound in bounds}
+        return "actuator limit" if end.detail in limits else "constraint"
+    return "lost"
+
+
+def _why(end: Event, failure: Failure, actuators: tuple[str, ...]) -> str:
+    what = {
+        "snap-through": "stability is lost: the structure would snap",
+        "singular Jacobian": "the actuators cannot move the targets on (singular Jacobian)",
+        "actuator limit": f"an actuator is at its limit ({end.detail})",
+        "constraint": f"the constraint {end.detail} is met",
+    }.get(failure, f"numerical failure: {end.detail}")
+    return f"{what}, at {describe_place(end.state, actuators)}"

@@ -1,0 +1,380 @@
+"""`follow_optimum`: a local optimum while loads and targets vary, and where it jumps."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.equilibria import Event, Leg
+from equimorph.errors import InputError
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.model import Constraint, Descriptor
+from equimorph.structures import State, States, Structure, value_of
+from equimorph.tasks.motion.blocks import stable_path
+from equimorph.tasks.motion.course import Course
+from equimorph.tasks.optimising.certificates import Certificate, certificate
+from equimorph.tasks.optimising.optimum_path import (
+    FollowedOptimum,
+    Jump,
+    expected_end,
+    extrapolation_factor,
+    next_trial,
+)
+from equimorph.tasks.optimising.programme import Objective, Programme, is_stability, stability
+from equimorph.tasks.optimising.sqp import ITERATIONS, LocalMinimum, descend
+from equimorph.tasks.optimising.tangent_steps import (
+    SetPoints,
+    project_onto_set,
+    step_along,
+    tangent_plane_at,
+)
+from equimorph.tasks.route import schedule_of
+from equimorph.tasks.start import Start, start_state
+
+FIRST, LARGEST = 0.02, 0.1
+"""Share of a leg of the first step, and of the longest."""
+CLOSEST = 1e-9
+"""Share of a leg to which a jump is located."""
+SURE = 0.5
+"""Way from its prediction, relative to that of the prediction, of an optimum that goes on."""
+NEAR = 4e-3
+"""Way, in the metric and scaled parameters, that no jump is as short as."""
+FAR = 0.15
+"""Longest way between successive optima."""
+SHORTER = 0.4
+"""Share of a step in vain that is tried next."""
+LATER = (0.0, 1e-4, 1e-3, 1e-2)
+"""Shares of a leg after which a first optimum is tried: it is flat where targets get lost."""
+SHORT = 10
+"""Steps of a descent from a prediction."""
+FLAT = -1e-6
+"""Least curvature of a minimum."""
+NUDGE = 1e-3
+FEASIBLE = 1e-7
+
+Where = Callable[[Float[np.ndarray, " columns"]], Objective]
+"""Objective at given parameters and targets."""
+
+
+def follow_optimum(
+    start: Start,
+    objective: Descriptor,
+    to: Leg | Sequence[Leg],
+    *,
+    actuators: Sequence[str] | Mapping[str, tuple[float, float]],
+    within: Sequence[Constraint] = (),
+    sense: Literal["min", "max"] = "min",
+    margin: float = 0.0,
+) -> FollowedOptimum:
+    """Follow the optimum of an objective while loads and targets of descriptors vary.
+
+    At every step a sequential quadratic programme on the set ends at the optimum near the last one,
+    with constraints that become active or idle on the way. Steps are shortened until the optimum
+    moves as predicted; where it does not, however short the step, it jumps: a descent from there
+    leads to the other side. With targets among `to` it is the choice of spare actuators.
+
+    Parameters
+    ----------
+    start
+        Stable state, in the basin of the optimum to follow.
+    objective
+        A descriptor of the structure.
+    to
+        Legs of loads, by name, and targets, by descriptor, as for `track`; none prescribes an
+        actuator.
+    actuators
+        Parameters to choose, more than targets; with limits if given as a mapping.
+    within
+        Constraints.
+    sense
+        "min" or "max".
+    margin
+        Smallest stability margin allowed.
+
+    Returns
+    -------
+    The optima along the way with their certificates, and all jumps with both sides.
+
+    Raises
+    ------
+    InputError
+        If `start` is not stable or not known, for an unknown sense, a negative margin, or legs and
+        actuators without meaning.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> spring = em.Spring()
+    >>> start = em.lift(spring.natural_state(x_l=0.8), {"F": 0.01}).end.state
+    >>> angle = spring.angle
+    >>> flattest = em.follow_optimum(
+    ...     start, angle, {"F": 0.02}, actuators=["x_l"], within=[angle >= 0.1]
+    ... )
+    >>> flattest.certificates[-1].kind, round(float(flattest.values[-1] ** 3), 3)
+    ('stability boundary', 0.021)
+    """
+    state, names = start_state(start), tuple(actuators)
+    if sense not in ("min", "max") or not margin >= 0.0:
+        raise InputError(
+            f"`sense` must be min or max and `margin` at least 0; got {sense!r}, {margin!r}."
+        )
+    if not state.stable:
+        raise InputError(f"`start` must be stable; got a state of index {state.index}.")
+    legs = [to] if isinstance(to, Mapping) or callable(to) else list(to)
+    course = Course.of(state, legs, names)
+    if len(course.descriptors) >= len(names):
+        raise InputError(
+            f"`to` must prescribe fewer descriptors than there are actuators ({len(names)}), so "
+            f"that there is a choice; got {len(course.descriptors)}."
+        )
+    limits = dict(actuators) if isinstance(actuators, Mapping) else {}
+    goal = Objective(objective, 1.0 if sense == "min" else -1.0)
+    rules = (*within, stability(state.structure, margin))
+    problem = MovingProblem(
+        course, lambda _: goal, rules, actuator_bounds(state.structure, limits), True
+    )
+    return follow_minimum(problem, state, 0.0)
+
+
+def actuator_bounds(
+    structure: Structure, limits: Mapping[str, tuple[float, float]]
+) -> tuple[Constraint, ...]:
+    """Limits of actuators as constraints."""
+    bounds: list[Constraint] = []
+    for name, (low, high) in limits.items():
+        if not low < high:
+            raise InputError(f"`actuators` must give limits in order; got {name} = {low, high}.")
+        itself = value_of(structure, name)
+        bounds += [itself >= float(low), itself <= float(high)]
+    return tuple(bounds)
+
+
+@dataclass(frozen=True)
+class MovingProblem:
+    """Optima along a course.
+
+    Parameters
+    ----------
+    course
+        Loads and targets.
+    goal
+        Objective at the columns of a time.
+    rules
+        Constraints, stability among them.
+    bounds
+        Limits of the actuators.
+    held
+        Whether the targets hold exactly; else the objective deals with them.
+    """
+
+    course: Course
+    goal: Where
+    rules: tuple[Constraint, ...]
+    bounds: tuple[Constraint, ...]
+    held: bool
+
+    def programme(self, time: float) -> Programme:
+        """Programme at a time."""
+        course = self.course
+        columns = course.at(np.array([time]))[0]
+        targets = course.split(columns[None])[1][0] if self.held else np.zeros(0)
+        equal: list[Constraint] = []
+        for each, value in zip(course.descriptors, targets.tolist(), strict=False):
+            equal += [each <= value, each >= value]
+        setting = Setting(course.structure, columns[: len(course.structure.parameters)],
+                          course.free, ())  # fmt: skip
+        return Programme(setting, self.bounds, self.goal(columns), (*self.rules, *equal))
+
+
+@dataclass(frozen=True)
+class _Found:
+    """An optimum at a time."""
+
+    time: float
+    programme: Programme
+    end: LocalMinimum
+    certificate: Certificate
+
+    @property
+    def place(self) -> Float[np.ndarray, " coordinates"]:
+        """Where it is, in the metric and scaled actuators."""
+        return np.asarray(embed(self.programme.setting, self.end.spot.z, self.end.spot.p)[0])
+
+
+def follow_minimum(problem: MovingProblem, start: State, time: float) -> FollowedOptimum:
+    """Follow the optimum near a state from a time on."""
+    legs = problem.course.legs
+    begin = SetPoints(
+        start.z[None], start.p[None], tangent_plane_at(problem.programme(time).setting, start)
+    )
+    first = None
+    for later in LATER:
+        first = first or _solved(problem, begin, min(time + later, legs))
+    if first is None:
+        why = "the descent from the start ends at no optimum"
+        return _result(problem, [], [], why, start)
+    track, jumps = [first], list[Jump]()
+    step, failure = FIRST, np.inf
+    while track[-1].time < legs:
+        here = track[-1]
+        if failure - here.time <= CLOSEST * (1.0 + here.time):
+            after = _beyond(problem, here, failure)
+            if after is None or np.linalg.norm(after.place - here.place) > NEAR:
+                jumps.append(_jump(here, after))
+            if after is None:
+                return _result(problem, track, jumps, "no optimum is left", start)
+            track.append(after)
+            step, failure = FIRST, np.inf
+            continue
+        corner = min(np.floor(here.time) + 1.0, legs)
+        there, ahead = _onward(problem, (track, jumps), (step, failure), corner)
+        if there is None:
+            failure, step = ahead, SHORTER * (ahead - here.time)
+        else:
+            step = min(1.5 * (ahead - here.time), LARGEST)
+            track.append(there)
+            failure = failure if there.time < failure else np.inf
+    return _result(problem, track, jumps, "", start)
+
+
+def _onward(
+    problem: MovingProblem,
+    past: tuple[list[_Found], list[Jump]],
+    reach: tuple[float, float],
+    corner: float,
+) -> tuple[_Found | None, float]:
+    """Next optimum, if the last one leads to it; and the time that was tried."""
+    (track, jumps), (step, failure) = past, reach
+    here = track[-1]
+    end = _end(track, jumps) if failure < np.inf else np.nan
+    known = here.time < end < failure
+    ahead = next_trial(here.time, end, failure) if known else here.time + step
+    ahead = min(ahead, corner)
+    guess = _predicted(problem, track, ahead, jumps, end)
+    there = None if guess is None else _solved(problem, guess, ahead, SHORT)
+    if there is None or guess is None or not _goes_on(here, there, guess):
+        return None, ahead
+    return there, ahead
+
+
+def _pair(track: list[_Found], jumps: list[Jump]) -> tuple[_Found, _Found] | None:
+    """Last two optima, if the way between them is smooth."""
+    if len(track) < 2 or (jumps and jumps[-1].at >= track[-2].time):
+        return None
+    first, second = track[-2:]
+    return (first, second) if first.time >= np.floor(second.time - 1e-12) else None
+
+
+def _end(track: list[_Found], jumps: list[Jump]) -> float:
+    """Time at which the optimum is expected to end, if it is."""
+    pair = _pair(track, jumps)
+    if pair is None:
+        return np.nan
+    bends = (pair[0].certificate.curvature, pair[1].certificate.curvature)
+    return expected_end((pair[0].time, pair[1].time), bends)
+
+
+def _predicted(
+    problem: MovingProblem, track: list[_Found], ahead: float, jumps: list[Jump], end: float
+) -> SetPoints | None:
+    """State of the set at a time ahead, where the last two optima lead to."""
+    here, course = track[-1], problem.course
+    z, p = here.end.spot.z.copy(), here.end.spot.p.copy()
+    pair = _pair(track, jumps)
+    if pair is not None:
+        share = extrapolation_factor((pair[0].time, pair[1].time), ahead, end)
+        z += share * (z - pair[0].end.spot.z)
+        p += share * (p - pair[0].end.spot.p)
+    given = course.split(course.at(np.array([ahead])))[0]
+    given[:, course.free] = p[:, course.free]
+    found, good = project_onto_set(problem.programme(ahead).setting, z, given, here.end.spot.rows)
+    return found if good[0] else None
+
+
+def _solved(
+    problem: MovingProblem, guess: SetPoints, time: float, rounds: int = ITERATIONS
+) -> _Found | None:
+    """Optimum near a guess; None where the descent does not end at one."""
+    programme = problem.programme(time)
+    ends = descend(programme, guess, rounds)
+    if not ends or not ends[0].converged or ends[0].expansion.g.max() > FEASIBLE:
+        return None
+    end = ends[0]
+    found = certificate(programme, end)
+    index = programme.setting.structure.index(end.spot.z, end.spot.p)[0]
+    if found.curvature < FLAT or (index != 0 and found.kind != "stability boundary"):
+        return None
+    return _Found(time, programme, end, found)
+
+
+def _goes_on(here: _Found, there: _Found, guess: SetPoints) -> bool:
+    """Whether an optimum is where the one before leads to."""
+    aim = embed(there.programme.setting, guess.z, guess.p)[0]
+    way = float(np.linalg.norm(there.place - here.place))
+    off = float(np.linalg.norm(there.place - aim))
+    return way <= NEAR or (way <= FAR and off <= SURE * float(np.linalg.norm(aim - here.place)))
+
+
+def _beyond(problem: MovingProblem, here: _Found, ahead: float) -> _Found | None:
+    """Optimum on the other side of a jump, by descents from beside the last one."""
+    frames, d = here.end.frames, len(problem.course.free)
+    setting = problem.programme(ahead).setting
+    given = problem.course.split(problem.course.at(np.array([ahead])))[0]
+    for step in NUDGE * np.concatenate([np.eye(d), -np.eye(d)]):
+        z, p = step_along(setting, here.end.spot, frames, step[None])
+        free = problem.course.free
+        at = given.copy()
+        at[:, free] = p[:, free]
+        guess, good = project_onto_set(setting, z, at, here.end.spot.rows)
+        found = _solved(problem, guess, ahead) if good[0] else None
+        if found is not None:
+            return found
+    return None
+
+
+def _jump(here: _Found, after: _Found | None) -> Jump:
+    structure = here.programme.setting.structure
+    sides = [
+        None if each is None else State(structure, each.end.spot.z[0], each.end.spot.p[0])
+        for each in (here, after)
+    ]
+    values = [
+        np.nan if side is None or each is None else each.programme.objective.descriptor(side)
+        for side, each in zip(sides, (here, after), strict=True)
+    ]
+    assert sides[0] is not None
+    return Jump(here.time, sides[0], sides[1], (float(values[0]), float(values[1])))
+
+
+def _result(
+    problem: MovingProblem, track: list[_Found], jumps: list[Jump], why: str, start: State
+) -> FollowedOptimum:
+    structure = problem.course.structure
+    none = np.zeros((0, len(start.z))), np.zeros((0, len(start.p)))
+    z = np.concatenate([none[0], *(each.end.spot.z for each in track)])
+    p = np.concatenate([none[1], *(each.end.spot.p for each in track)])
+    values = [
+        float(each.programme.objective.descriptor.function(each.end.spot.z, each.end.spot.p)[0])
+        for each in track
+    ]
+    states, times = States(structure, z, p), np.array([each.time for each in track])
+    found = FollowedOptimum(
+        "refused" if why else "arrived",
+        why,
+        states,
+        times,
+        np.array(values),
+        tuple(each.certificate for each in track),
+        tuple(jumps),
+    )
+    if why or jumps or len(track) < 2:
+        return found
+    path = stable_path(states, times, Event("arrived", states[-1], times[-1]))
+    if not path.length[-1] > 0.0:
+        return found
+    rules = [each.descriptor for each in problem.rules if not is_stability(each)]
+    goal = track[0].programme.objective.descriptor
+    return replace(found, schedule=schedule_of(path, found.margin, (goal, *rules)))

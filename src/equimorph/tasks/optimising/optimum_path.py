@@ -1,0 +1,116 @@
+"""Records of an optimum that moves with loads and targets, and predictions of where it ends."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.model import Schedule
+from equimorph.structures import State, States
+from equimorph.tasks.optimising.certificates import Certificate
+
+INSIDE, OUTSIDE = 0.95, 3.0
+"""Where the end is approached, in shares of the way to where it is expected."""
+CLOSE = 0.02
+"""Way to the expected end, relative to that to a known failure, at which its far side is tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """Where an optimum ceases to be one, and where the descent from there ends.
+
+    Parameters
+    ----------
+    at
+        Number of the leg + share of it.
+    before, after
+        States on both sides; `after` is None if there is no optimum beyond.
+    values
+        Objective on both sides; nan where there is none.
+    """
+
+    at: float
+    before: State
+    after: State | None
+    values: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedOptimum:
+    """Answer to "how does the best state move".
+
+    Parameters
+    ----------
+    status
+        "arrived", or "refused" with the reason in `why` where no optimum is left.
+    states
+        Optima along the way, the first for the start's parameters.
+    at
+        Number of the leg + share of it, of each; twice at jumps.
+    values
+        The objective.
+    certificates
+        Where each sits: interior, constraint, box or stability boundary; see `Certificate`.
+    jumps
+        Where the optimum moves at once.
+    schedule
+        Parameters at every optimum, with margins and values of the objective and the constraints,
+        straight in between: `verify` tells whether that may be executed. None if refused, and
+        where it jumps, as no schedule follows that.
+    """
+
+    status: Literal["arrived", "refused"]
+    why: str
+    states: States
+    at: Float[np.ndarray, " points"]
+    values: Float[np.ndarray, " points"]
+    certificates: tuple[Certificate, ...]
+    jumps: tuple[Jump, ...]
+    schedule: Schedule | None = None
+
+    def __repr__(self) -> str:
+        """Values at both ends, and how many jumps."""
+        if self.status == "refused":
+            return f"FollowedOptimum(refused at {self.at[-1]:.6g}: {self.why})"
+        ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}"
+        return f"FollowedOptimum({ends}; {len(self.jumps)} jumps)"
+
+    @property
+    def arrived(self) -> bool:
+        """Whether there is an optimum all the way."""
+        return self.status == "arrived"
+
+    @property
+    def margin(self) -> Float[np.ndarray, " points"]:
+        """Stability margin of each."""
+        return self.states.margin
+
+
+def expected_end(times: tuple[float, float], curvatures: tuple[float, float]) -> float:
+    """Time at which a minimum merges with a saddle, from its curvatures at two times before.
+
+    Its square falls to zero in proportion to the time that is left. Not a number where it does not
+    fall.
+    """
+    (t, later), (first, second) = times, curvatures
+    if not 0.0 < second < first < np.inf:
+        return np.nan
+    return float(later + (later - t) * second**2 / (first**2 - second**2))
+
+
+def next_trial(here: float, end: float, failure: float) -> float:
+    """Time between an optimum and a failure to look at next, near the expected end."""
+    gap = end - here
+    if gap > CLOSE * (failure - here):
+        return here + INSIDE * gap
+    return here + OUTSIDE * gap
+
+
+def extrapolation_factor(times: tuple[float, float], ahead: float, end: float) -> float:
+    """Step of what moves like the square root of the time left, in last steps; or evenly."""
+    first, second = times
+    if not (second < ahead < end):
+        return (ahead - second) / (second - first)
+    left = np.sqrt([end - first, end - second, end - ahead])
+    return float((left[1] - left[2]) / (left[0] - left[1]))

@@ -1,0 +1,249 @@
+"""Sequential quadratic programming on an equilibrium set, many starts at a time."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.arrays import Frames
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.tasks.optimising.programme import Expansion, Programme
+from equimorph.tasks.optimising.quadratic import Answer, Quadratic, solve
+from equimorph.tasks.optimising.tangent_steps import (
+    SetPoints,
+    join_points,
+    project_onto_set,
+    step_along,
+    tangents_at,
+)
+
+ITERATIONS, HALVINGS = 40, 10
+LONGEST = 0.3
+"""Longest step in the metric."""
+STILL = 1e-9
+"""Length of a step that is the last."""
+STALLED = 1e-6
+"""Length of a step below which a merit that no longer falls is round-off."""
+MERGED = 0.01
+"""Distance in the metric and scaled parameters below which two lanes are one."""
+FEASIBLE = 1e-7
+"""Relative excess over a bound that counts as none."""
+PENALTY = 2.0
+"""Of a violated constraint, relative to its multiplier."""
+FLAT = 1e-4
+"""Least curvature of the quadratic model, relative to its largest."""
+
+
+@dataclass(frozen=True)
+class LocalMinimum:
+    """A point at which no step makes the objective smaller.
+
+    Parameters
+    ----------
+    spot
+        The point, one lane.
+    frames
+        Orthonormal tangents there.
+    expansion
+        Values and derivatives there.
+    answer
+        Multipliers.
+    converged
+        Whether the last step was at round-off.
+    """
+
+    spot: SetPoints
+    frames: Frames
+    expansion: Expansion
+    answer: Answer
+    converged: bool
+
+
+@dataclass
+class _Lane:
+    """One start on its way."""
+
+    spot: SetPoints
+    reach: float = LONGEST
+    penalty: float = 1.0
+    answer: Answer | None = None
+    done: LocalMinimum | None = None
+    best: SetPoints | None = None
+    least: float = np.inf
+
+
+def descend(
+    programme: Programme, starts: SetPoints, rounds: int = ITERATIONS
+) -> list[LocalMinimum]:
+    """Local minima from starts; those that lead nowhere are left out.
+
+    Those that still move after all rounds end at their best feasible points, not converged.
+    """
+    lanes = [_Lane(starts.take(np.array([k]))) for k in range(len(starts))]
+    for _ in range(rounds):
+        todo = [lane for lane in lanes if lane.done is None and lane.reach > 0.0]
+        if not todo:
+            break
+        here = join_points([lane.spot for lane in todo])
+        alone = _first_of_each(programme, here)
+        for k in set(range(len(todo))) - set(alone):
+            todo[k].reach = 0.0
+        todo, here = [todo[k] for k in alone], here.take(np.array(alone))
+        frames, here = tangents_at(programme.setting, here)
+        expansion = programme.expanded(here, frames)
+        _remember(todo, here, expansion)
+        answers = [_answer(expansion, k, lane) for k, lane in enumerate(todo)]
+        _advance(programme, todo, here, (frames, expansion), answers)
+    _stop(programme, lanes)
+    return [lane.done for lane in lanes if lane.done is not None]
+
+
+def _remember(todo: list[_Lane], here: SetPoints, expansion: Expansion) -> None:
+    """Keep the best feasible point of each lane."""
+    for k, lane in enumerate(todo):
+        value = float(expansion.f[k].max())
+        if value < lane.least and expansion.g[k].max() <= FEASIBLE:
+            lane.best, lane.least = here.take(np.array([k])), value
+
+
+def _stop(programme: Programme, lanes: list[_Lane]) -> None:
+    """Leave lanes at their best feasible points: at kinks of constraints steps never end.
+
+    Lanes that were merged with others count only where no other has ended.
+    """
+    ended = any(lane.done is not None for lane in lanes)
+    left = [lane for lane in lanes if lane.done is None and (lane.reach > 0.0 or not ended)]
+    left = [lane for lane in left if lane.best is not None]
+    if not left:
+        return
+    best = [lane.best for lane in left if lane.best is not None]
+    frames, here = tangents_at(programme.setting, join_points(best))
+    expansion = programme.expanded(here, frames)
+    for k, lane in enumerate(left):
+        answer = _answer(expansion, k, lane)
+        if answer is not None:
+            lane.done = _settled(here, (frames, expansion), k, answer, False)
+
+
+def _first_of_each(programme: Programme, here: SetPoints) -> list[int]:
+    """Lanes that are not close to an earlier one, which would end where that one does."""
+    places = embed(programme.setting, here.z, here.p)
+    kept: list[int] = []
+    for lane, place in enumerate(places):
+        if not kept or np.linalg.norm(places[kept] - place, axis=1).min() > MERGED:
+            kept.append(lane)
+    return kept
+
+
+def _answer(expansion: Expansion, k: int, lane: _Lane) -> Answer | None:
+    """Step of the quadratic model; where constraints contradict each other, towards these."""
+    d = expansion.f_slope.shape[2]
+    f, g, known = expansion.f[k], expansion.g[k], lane.answer
+    model = Quadratic(f, expansion.f_slope[k], g, expansion.g_slope[k], np.eye(d))
+    if known is None or len(known.weights) != len(f):
+        # multipliers of the plain model weigh the second derivatives
+        known = solve(model, lane.reach)
+    if known is None:
+        return _restored(model, lane.reach)
+    bend = np.einsum("m,mij->ij", known.weights, expansion.f_bend[k])
+    bend += np.einsum("k,kij->ij", known.multipliers, expansion.g_bend[k])
+    if expansion.known[k]:
+        model = replace(model, hessian=_positive(bend))
+    return solve(model, lane.reach) or _restored(model, lane.reach)
+
+
+def _positive(bend: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
+    """Curvatures made positive: where they are not, long steps are tried."""
+    values, vectors = np.linalg.eigh(0.5 * (bend + bend.T))
+    size = np.maximum(values, FLAT * (1e-3 + np.abs(values).max()))
+    return np.asarray((vectors * size) @ vectors.T)
+
+
+def _restored(model: Quadratic, reach: float) -> Answer:
+    """Shortest step that meets the violated constraints, or a part of it."""
+    bad = model.g > 0.0
+    step = np.linalg.lstsq(model.b[bad], -model.g[bad], rcond=None)[0]
+    step = step * min(1.0, reach / max(float(np.linalg.norm(step)), 1e-300))
+    return Answer(step, np.full(len(model.f), 1.0 / len(model.f)), np.zeros(len(model.g)))
+
+
+def _advance(
+    programme: Programme,
+    todo: list[_Lane],
+    here: SetPoints,
+    derivatives: tuple[Frames, Expansion],
+    answers: list[Answer | None],
+) -> None:
+    """Move every lane by its step, shortened until its merit falls."""
+    frames, expansion = derivatives
+    waiting: list[tuple[int, float]] = []
+    for k, (lane, answer) in enumerate(zip(todo, answers, strict=True)):
+        lane.answer = answer
+        length = float(np.linalg.norm(answer.step)) if answer is not None else 0.0
+        if answer is None:
+            lane.reach = 0.0
+        elif length < STILL:
+            lane.done = _settled(here, derivatives, k, answer, True)
+        else:
+            own = PENALTY * max(float(answer.multipliers.sum()), _steepness(expansion, k))
+            lane.penalty = max(lane.penalty, own)
+            waiting.append((k, 1.0))
+    for _ in range(HALVINGS):
+        if not waiting:
+            return
+        waiting = _tried(programme, todo, (here, frames, expansion), answers, waiting)
+    for k, _ in waiting:
+        answer = answers[k]
+        assert answer is not None
+        small = float(np.linalg.norm(answer.step)) < STALLED
+        todo[k].done = _settled(here, derivatives, k, answer, small)
+
+
+def _steepness(expansion: Expansion, k: int) -> float:
+    """Slope of the objective relative to those of violated constraints: what restoring may cost."""
+    bad = expansion.g[k] > 0.0
+    if not bad.any():
+        return 0.0
+    slopes = np.linalg.norm(expansion.g_slope[k, bad], axis=1)
+    steepest = np.linalg.norm(expansion.f_slope[k], axis=1).max()
+    return float(steepest / np.maximum(slopes, 1e-6).min())
+
+
+def _tried(
+    programme: Programme,
+    todo: list[_Lane],
+    ground: tuple[SetPoints, Frames, Expansion],
+    answers: list[Answer | None],
+    waiting: list[tuple[int, float]],
+) -> list[tuple[int, float]]:
+    """Lanes whose merit does not fall after the share of their steps, with half of it."""
+    here, frames, expansion = ground
+    lanes = np.array([k for k, _ in waiting])
+    steps = np.stack([share * answers[k].step for k, share in waiting])  # type: ignore[union-attr]
+    at = here.take(lanes)
+    guess = step_along(programme.setting, at, frames[lanes], steps)
+    there, found = project_onto_set(programme.setting, *guess, at.rows)
+    value = programme.objective.values(there.z, there.p)
+    excess = np.maximum(programme.excess(there.z, there.p), 0.0).sum(axis=1)
+    left = []
+    for i, (k, share) in enumerate(waiting):
+        lane = todo[k]
+        before = expansion.f[k].max() + lane.penalty * np.maximum(expansion.g[k], 0.0).sum()
+        after = value[i] + lane.penalty * excess[i]
+        if found[i] and after < before:
+            lane.spot = there.take(np.array([i]))
+            lane.reach = min(LONGEST, 2.0 * lane.reach) if share == 1.0 else lane.reach
+        else:
+            left.append((k, 0.5 * share))
+    return left
+
+
+def _settled(
+    here: SetPoints, derivatives: tuple[Frames, Expansion], k: int, answer: Answer, converged: bool
+) -> LocalMinimum:
+    frames, e = derivatives
+    own = Expansion(
+        e.f[k : k + 1], e.f_slope[k : k + 1], e.f_bend[k : k + 1], e.g[k : k + 1],
+        e.g_slope[k : k + 1], e.g_bend[k : k + 1], e.known[k : k + 1],
+    )  # fmt: skip
+    return LocalMinimum(here.take(np.array([k])), frames[k : k + 1], own, answer, converged)

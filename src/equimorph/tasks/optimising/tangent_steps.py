@@ -1,0 +1,92 @@
+"""Moving on an equilibrium set in coordinates of its tangent spaces."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
+from equimorph.equilibria.steering import answers
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import Aim, corrected
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
+from equimorph.manifold.queries.nearest import setting_of, spots
+from equimorph.structures import State
+
+Steps = Float[np.ndarray, "lanes d"]
+
+ANYWHERE = 1e3
+"""Distance from its guess within which a corrected point will do."""
+
+
+@dataclass(frozen=True)
+class SetPoints:
+    """Points of a set with orthonormal bases of spaces near their tangent spaces."""
+
+    z: Lanes
+    p: Parameters
+    rows: Rows
+
+    def __len__(self) -> int:
+        """Number of points."""
+        return len(self.z)
+
+    def take(self, some: Int[np.ndarray, " n"] | Flags) -> "SetPoints":
+        """Some of the points."""
+        return SetPoints(self.z[some], self.p[some], self.rows[some])
+
+
+def join_points(parts: list[SetPoints]) -> SetPoints:
+    """All points of several batches."""
+    return SetPoints(
+        np.concatenate([each.z for each in parts]),
+        np.concatenate([each.p for each in parts]),
+        np.concatenate([each.rows for each in parts]),
+    )
+
+
+def points_at_vertices(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> SetPoints:
+    """Vertices of a set, with the planes of cells around them."""
+    found = spots(eset, vertices)
+    return SetPoints(found.z, found.p, found.rows)
+
+
+def tangent_plane_at(setting: Setting, state: State) -> Float[np.ndarray, "1 d coordinates"]:
+    """Plane near the tangent space of a stable state."""
+    structure, free = setting.structure, setting.free
+    dz, dp = answers(structure, state.z[None], state.p[None], free)
+    u = dz[0][:, : structure.unknowns] * np.sqrt(structure.mass)
+    both = np.concatenate([u, dp[0][:, free] / structure.scales[free]], axis=1)
+    return np.ascontiguousarray(np.linalg.qr(both.T)[0].T[None])
+
+
+def unconstrained_setting(eset: EquilibriumSet) -> Setting:
+    """Structure and free parameters of a set, without its constraints: steps may cross these."""
+    return replace(setting_of(eset), constraints=())
+
+
+def tangents_at(setting: Setting, at: SetPoints) -> tuple[Frames, SetPoints]:
+    """Orthonormal tangents at points, and the points with these as their planes."""
+    frames = tangent_frames(setting, at.z, at.p, at.rows)
+    return frames, SetPoints(at.z, at.p, placed_frames(setting, frames))
+
+
+def step_along(
+    setting: Setting, at: SetPoints, frames: Frames, steps: Steps
+) -> tuple[Lanes, Parameters]:
+    """Points of the tangent spaces, off the set by the square of the step."""
+    dz, dp = split_step(setting, np.einsum("ld,ldf->lf", steps, frames))
+    return at.z + dz, at.p + dp
+
+
+def project_onto_set(
+    setting: Setting, z: Lanes, p: Parameters, rows: Rows
+) -> tuple[SetPoints, Flags]:
+    """Points of the set orthogonally above points, in planes, and where there are any."""
+    d = len(setting.free)
+    span = np.tile(np.eye(d), (len(z), 1, 1))
+    aim = Aim(setting, False, False, span, embed(setting, z, p), rows)
+    pinned = corrected(aim, z, p, np.full(len(z), ANYWHERE))
+    return SetPoints(pinned.z, pinned.p, rows), pinned.found

@@ -1,0 +1,162 @@
+"""Maxima of functions of two parameters that are smooth in pieces, and of the least of several."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.arrays import Pair, Values
+from equimorph.model import Box
+from equimorph.tasks.optimising.quadratic import Quadratic, solve
+
+Function = Callable[[Float[np.ndarray, "lanes 2"]], Values]
+
+NINE = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), indexing="ij"), -1).reshape(-1, 2)
+DIRECTIONS = 12
+SMALLEST_RADIUS = 1e-5
+"""Radius of the search, in its first one, at which it ends."""
+ROUNDS = 40
+
+Pieces = Callable[[Float[np.ndarray, "lanes 2"]], Float[np.ndarray, "lanes m"]]
+
+ITERATIONS = 30
+DIFFERENCE = 1e-4
+"""Step of differences, in radii."""
+GENTLE = 1e-3
+"""Curvature that makes the model strictly convex, in slopes per radius."""
+SMALLEST_REACH = 1e-7
+"""Reach, in radii, at which the search ends."""
+SHORTER = 0.3 ** np.arange(4.0)
+"""Shares of the reach that are tried at once; the longest step that gains something is made."""
+
+
+@dataclass(frozen=True)
+class LocalMaximum:
+    """A local maximum: where, its value, what is left of the slope, whether it is smooth there."""
+
+    setting: Pair
+    value: float
+    slope: Pair
+    smooth: bool
+
+
+def climb(function: Function, start: Pair, radius: Pair, box: Box) -> LocalMaximum:
+    """Local maximum of a function in a box, from a start; not a number counts as lowest.
+
+    Settings on a circle, turned in every round, are tried; the radius is halved where none is
+    better. On smooth ground the top of a parabola through nine values finishes.
+    """
+    here, value, size = start, float(_values(function, start[None], box)[0]), 1.0
+    for number in range(ROUNDS):
+        if size < SMALLEST_RADIUS:
+            break
+        angle = 2.0 * np.pi * (np.arange(DIRECTIONS) + 0.382 * number) / DIRECTIONS
+        ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        tried = here + size * radius * np.concatenate([ring, 0.3 * ring])
+        values = _values(function, tried, box)
+        best = int(values.argmax())
+        if values[best] > value + 1e-13 * abs(value):
+            here, value = np.clip(tried[best], box.lower, box.upper), float(values[best])
+        else:
+            size *= 0.5
+            done = _parabola(function, (here, value), size * radius, box)
+            if done is not None:
+                return done
+    return LocalMaximum(here, value, np.full(2, np.nan), False)
+
+
+def _values(function: Function, settings: Float[np.ndarray, "lanes 2"], box: Box) -> Values:
+    inside = np.clip(settings, box.lower, box.upper)
+    return np.nan_to_num(function(inside), nan=-np.inf)
+
+
+def _parabola(
+    function: Function, here: tuple[Pair, float], radius: Pair, box: Box
+) -> LocalMaximum | None:
+    """Top by Newton's method on parabolas, if the ground is smooth and the top inside."""
+    place, value = here
+    share = 1.0
+    slope = np.full(2, np.nan)
+    for _ in range(6):
+        at = place + share * radius * NINE
+        if not box.contains(at).all():
+            return None
+        found = function(at)
+        terms = np.column_stack([np.ones(9), NINE, NINE[:, 0] ** 2, NINE.prod(1), NINE[:, 1] ** 2])
+        if not np.isfinite(found).all():
+            return None
+        fit, *_ = np.linalg.lstsq(terms, found, rcond=None)
+        if np.abs(terms @ fit - found).max() > 0.05 * np.ptp(found):
+            return None
+        bend = np.array([[2 * fit[3], fit[4]], [fit[4], 2 * fit[5]]])
+        if np.linalg.eigvalsh(bend).max() >= 0.0:
+            return None
+        step = -np.linalg.solve(bend, fit[1:3])
+        if np.abs(step).max() > 3.0:
+            return None
+        place = place + share * radius * step
+        slope = fit[1:3] / (share * radius)
+        if np.abs(step).max() < 1e-3 and share < 0.3:
+            break
+        share = max(0.3 * share, 0.02)
+    top = float(_values(function, place[None], box)[0])
+    return LocalMaximum(place, top, slope, True) if top >= value - 1e-9 * abs(value) else None
+
+
+def maximise_least(pieces: Pieces, start: Pair, radius: Pair, box: Box) -> tuple[Pair, float]:
+    """Setting near a start whose smallest value is largest, and that value.
+
+    Not a number counts as zero. Jumps are no obstacle for the steps, but no ridge to follow either.
+    """
+    here, reach = start, 0.5
+    around = _around(pieces, here[None], radius, box)[0]
+    for _ in range(ITERATIONS):
+        if reach < SMALLEST_REACH:
+            break
+        # the next points come with what is around them: a call costs more than its lanes
+        reaches = reach * SHORTER
+        steps = [_step(around, here, (radius, each), box) for each in reaches]
+        tried = [
+            (each, step) for each, step in zip(reaches, steps, strict=True) if step is not None
+        ]
+        if not tried:
+            reach *= SHORTER[-1]
+            continue
+        there = np.clip(here + np.array([step for _, step in tried]) * radius, box.lower, box.upper)
+        found = _around(pieces, there, radius, box)
+        after, value = found[:, 0].min(axis=1), around[0].min()
+        better = np.flatnonzero(after > value)
+        if len(better) == 0:
+            reach = 0.3 * reaches[-1]
+            continue
+        first = better[0]
+        gained, here, around = after[first] - value, there[first], found[first]
+        reach = min(1.0, 1.7 * tried[first][0])
+        if gained < 1e-12 * abs(after[first]):
+            break
+    return here, float(around[0].min())
+
+
+def _around(
+    pieces: Pieces, places: Float[np.ndarray, "lanes 2"], radius: Pair, box: Box
+) -> Float[np.ndarray, "lanes 5 m"]:
+    """Values at places and beside them, for differences; not a number counts as zero."""
+    ways = DIFFERENCE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+    many = np.clip(places[:, None] + ways * radius, box.lower, box.upper)
+    values = np.nan_to_num(pieces(many.reshape(-1, 2)), nan=0.0)
+    return np.asarray(values.reshape(len(places), len(ways), -1))
+
+
+def _step(
+    values: Float[np.ndarray, "5 m"], here: Pair, size: tuple[Pair, float], box: Box
+) -> Float[np.ndarray, " 2"] | None:
+    """Step, in radii, to the largest least value of the linear models."""
+    radius, reach = size
+    slopes = np.stack([values[1] - values[2], values[3] - values[4]], axis=1) / (2.0 * DIFFERENCE)
+    steepest = max(float(np.abs(slopes).max()), 1e-12)
+    sides = np.array([(box.lower - here) / radius, (here - box.upper) / radius]).ravel()
+    walls = np.concatenate([-np.eye(2), np.eye(2)])
+    model = Quadratic(-values[0], -slopes, sides, walls, GENTLE * steepest * np.eye(2))
+    answer = solve(model, reach)
+    return None if answer is None else answer.step

@@ -1,0 +1,204 @@
+"""Chains of corners drawn to where they cost least, one move of every other corner at a time."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.arrays import Values
+from equimorph.equilibria import newton
+from equimorph.model import Box
+from equimorph.structures import States
+from equimorph.tasks.planning.network import Demands, connect
+from equimorph.tasks.planning.objectives import Places
+
+Room = tuple[Box, Int[np.ndarray, " d"]]
+"""The box, and which parameters are free in it."""
+Some = Int[np.ndarray, " n"]
+
+SIZES = (0.12, 0.04, 0.013)
+"""Moves of corners, in scaled parameters, that are tried one after the other."""
+ROUNDS, POLISHING = 6, 2
+LEAST_GAIN = 2e-6
+"""Share of the cost that a move has to gain."""
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """Corners and the costs of their legs: along chords, and by lifts if these count."""
+
+    corners: Places
+    legs: Values
+    lifts: Values | None
+
+
+@dataclass(frozen=True)
+class _Moves:
+    """Corners elsewhere: which ones, where, and what both legs would cost there."""
+
+    tried: Some
+    new: Places
+    legs: Float[np.ndarray, "2 n"]
+    lifts: Float[np.ndarray, "2 n"] | None = None
+
+    def __getitem__(self, some: Some) -> "_Moves":
+        """Some of them."""
+        lifts = None if self.lifts is None else self.lifts[:, some]
+        return _Moves(self.tried[some], self.new[some], self.legs[:, some], lifts)
+
+
+def move_by_chords(corners: States, demands: Demands, room: Room) -> States:
+    """Corners moved as long as that makes their chords cheaper.
+
+    A chord runs through the exact state amid two corners; costs are summed up over its two halves,
+    and margins and constraints hold at all of these states. What comes out may be impossible to
+    lift: that is for `connect` to say.
+    """
+    return _drawn(corners, demands, room, (SIZES, ROUNDS, False))
+
+
+def move_by_lifts(corners: States, demands: Demands, room: Room, quick: bool) -> States:
+    """Corners moved as long as that makes the straight lifts between them cheaper.
+
+    `quick` where little is left to do.
+    """
+    return _drawn(
+        corners, demands, room, (SIZES[1:], POLISHING, True) if quick else (SIZES, ROUNDS, True)
+    )
+
+
+def chords(
+    corners: States, ways: tuple[Some, Some], demands: Demands
+) -> tuple[Bool[np.ndarray, " n"], Values]:
+    """Whether chords between some of the corners seem admissible, and what they cost."""
+    places = demands.objective.places(corners)
+    return _chords(places[ways[0]], places[ways[1]], demands)
+
+
+def _drawn(
+    corners: States, demands: Demands, room: Room, how: tuple[tuple[float, ...], int, bool]
+) -> States:
+    sizes, rounds, lifted = how
+    places = demands.objective.places(corners)
+    legs = _chords(places[:-1], places[1:], demands)[1]
+    lifts = connect(corners[:-1], corners[1:], demands)[1] if lifted else None
+    chain = _Chain(places, legs, lifts)
+    for size in sizes:
+        for _ in range(rounds):
+            before = chain
+            for odd in (1, 2):
+                chain = _moved(chain, (odd, size), demands, room)
+            if chain is before:
+                break
+    return chain.corners.states
+
+
+def _chords(
+    first: Places, second: Places, demands: Demands
+) -> tuple[Bool[np.ndarray, " n"], Values]:
+    """Whether the states amid two admissible ones are so, too, and the cost by way of them."""
+    a, b = first.states, second.states
+    p = 0.5 * (a.p + b.p)
+    z, good = newton(a.structure, 0.5 * (a.z + b.z), p, iterations=8)
+    some = np.flatnonzero(good)
+    amid = States(a.structure, z[some], p[some])
+    middle, between = demands.objective.places(amid), demands.objective.between
+    cost = np.full(len(p), np.nan)
+    cost[some] = between(first[some], middle) + between(middle, second[some])
+    none = np.flatnonzero(~good)
+    cost[none] = between(first[none], second[none])
+    good[some] = demands.admissible(amid)
+    return good, cost
+
+
+def _moved(chain: _Chain, move: tuple[int, float], demands: Demands, room: Room) -> _Chain:
+    """Chain with every other corner moved, if that makes its two legs cheaper."""
+    tried, new = _candidates(chain.corners.states, move, room)
+    some = np.flatnonzero(demands.admissible(new)) if len(tried) else tried
+    if len(some) == 0:
+        return chain
+    tried, places = tried[some], demands.objective.places(new[some])
+    before = _joined(chain.corners[tried - 1], places)
+    after = _joined(places, chain.corners[tried + 1])
+    good, cost = _chords(before, after, demands)
+    moves = _Moves(tried, places, cost.reshape(2, -1))
+    gain = _gain(chain.legs, tried, good, cost)
+    if chain.lifts is not None:  # lifts are for moves that look good: those that fail take longest
+        some = np.flatnonzero(gain > 0.0)
+        if len(some) == 0:
+            return chain
+        moves = moves[some]
+        both = np.concatenate([some, some + len(tried)])
+        good, cost = connect(before.states[both], after.states[both], demands)
+        moves = replace(moves, lifts=cost.reshape(2, -1))
+        gain = _gain(chain.lifts, moves.tried, good, cost)
+    least = LEAST_GAIN * (chain.legs if chain.lifts is None else chain.lifts).sum()
+    return _taken(chain, moves, np.where(gain > least, gain, 0.0))
+
+
+def _joined(first: Places, second: Places) -> Places:
+    return Places(
+        States(
+            first.states.structure,
+            np.concatenate([first.states.z, second.states.z]),
+            np.concatenate([first.states.p, second.states.p]),
+        ),
+        np.concatenate([first.efforts, second.efforts]),
+        np.concatenate([first.nearness, second.nearness]),
+    )
+
+
+def _candidates(corners: States, move: tuple[int, float], room: Room) -> tuple[Some, States]:
+    """Equilibria beside every other corner, and which corner each of them is for.
+
+    Whether these lie on the branch of the corner is what lifts from its neighbours show.
+    """
+    (odd, size), (box, free) = move, room
+    at = np.arange(odd, len(corners) - 1, 2)
+    structure = corners.structure
+    steps = size * structure.scales[free] * _directions(len(free))
+    tried, step = np.repeat(at, len(steps)), np.tile(steps, (len(at), 1))
+    p = corners.p[tried]
+    p[:, free] = np.clip(p[:, free] + step, box.lower, box.upper)
+    some = np.flatnonzero(np.abs(p - corners.p[tried]).max(axis=1, initial=0.0) > 0.0)
+    tried, p = tried[some], p[some]
+    z, there = newton(structure, corners.z[tried], p, iterations=8)
+    return tried[there], States(structure, z[there], p[there])
+
+
+def _directions(d: int) -> Float[np.ndarray, "directions d"]:
+    """Both ways along every parameter, and amid each two of them."""
+    units = np.eye(d)
+    first, second = np.triu_indices(d, 1)
+    amid = [units[first] + sign * units[second] for sign in (1.0, -1.0)]
+    half = np.concatenate([units, *(0.5**0.5 * each for each in amid)])
+    return np.concatenate([half, -half])
+
+
+def _gain(
+    old: Values, tried: Some, good: Bool[np.ndarray, " legs"], cost: Float[np.ndarray, " legs"]
+) -> Float[np.ndarray, " n"]:
+    """What each move saves; −∞ where a leg is broken."""
+    both, total = good.reshape(2, -1).all(axis=0), cost.reshape(2, -1).sum(axis=0)
+    return np.where(both, old[tried - 1] + old[tried] - total, -np.inf)
+
+
+def _taken(chain: _Chain, moves: _Moves, gain: Float[np.ndarray, " n"]) -> _Chain:
+    """Chain with the best of the moves that gain something, one for each corner."""
+    best = np.full(len(chain.corners.states), 0.0)
+    np.maximum.at(best, moves.tried, gain)
+    chosen = np.flatnonzero((gain > 0.0) & (gain == best[moves.tried]))
+    if len(chosen) == 0:
+        return chain
+    took = moves[chosen]
+    corners = chain.corners.replaced(took.tried, took.new)
+    legs, lifts = _changed(chain.legs, took.tried, took.legs), chain.lifts
+    if lifts is not None and took.lifts is not None:
+        lifts = _changed(lifts, took.tried, took.lifts)
+    return _Chain(corners, legs, lifts)
+
+
+def _changed(legs: Values, tried: Some, new: Float[np.ndarray, "2 n"]) -> Values:
+    out = legs.copy()
+    out[tried - 1], out[tried] = new
+    return out

@@ -1,0 +1,237 @@
+"""`alternatives`: the best routes that pass the holes of the stable set in different ways."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Edges
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Constraint, Descriptor, eased
+from equimorph.structures import State, States
+from equimorph.tasks.planning.homology import cocycles
+from equimorph.tasks.planning.network import (
+    Demands,
+    Ends,
+    connect,
+    end_links,
+    explain_no_route,
+    network_of,
+    nodes_with_ends,
+)
+from equimorph.tasks.planning.objectives import Wish, objective_of
+from equimorph.tasks.planning.planner import EXACT, RESERVES
+from equimorph.tasks.planning.straightening import (
+    check_ends,
+    route_over_corners,
+    straight_corners,
+    violation,
+)
+from equimorph.tasks.route import Route, refusal
+
+MOST_TURNS = 2
+"""How often a path may pass around one hole."""
+LABELS = 8
+"""Classes that are kept at a vertex, for each one that is asked for."""
+Class = tuple[int, ...]
+
+
+def alternatives(
+    eset: EquilibriumSet,
+    start: State,
+    goal: State,
+    count: int = 3,
+    *,
+    within: Sequence[Constraint] = (),
+    margin: float = 0.0,
+    objective: Wish = "length",
+    monitor: Sequence[Descriptor] = (),
+) -> tuple[Route, ...]:
+    """Plan several routes none of which can be drawn into another on the stable, feasible set.
+
+    The best path of each class over the mesh by Dijkstra's algorithm on pairs of a vertex and a
+    class [Bhattacharya2012]_, straightened within its class and verified.
+
+    Parameters
+    ----------
+    eset
+        A set over two parameters.
+    start, goal, within, margin, objective, monitor
+        As of `plan`.
+    count
+        Most routes.
+
+    Returns
+    -------
+    Routes of distinct classes, the best first; fewer if there are no more, or one refusal.
+
+    Raises
+    ------
+    InputError
+        As `plan`, or for sets over one or three parameters, or a count below one.
+    """
+    if len(eset.names) != 2:
+        raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
+    if count < 1:
+        raise InputError(f"`count` must be at least 1; got {count!r}.")
+    wish = objective_of(objective, eset.structure)
+    obeyed = tuple(eased(each) for each in dict.fromkeys((*eset.constraints, *within)))
+    demands = Demands(wish, obeyed, margin)
+    ends = (start, goal)
+    check_ends(eset, ends)
+    why = violation(ends, demands)
+    if why:
+        return (refusal(why),)
+    best, failed = list[Route](), list[Route]()
+    least = min(end.margin for end in ends)
+    for factor, share in (*RESERVES, EXACT) if margin > 0.0 else (EXACT, *RESERVES):
+        tightened = replace(demands, margin=min(margin * factor + least * share, least))
+        paths = _Classes(eset, ends, tightened).paths(count)
+        corners = [straight_corners(eset, path, tightened, same_class=True) for path in paths]
+        routes = [route_over_corners(eset, each, demands, monitor) for each in corners]
+        best = max(best, [route for route in routes if route.arrived], key=len)
+        failed += routes
+        if routes and len(best) == len(routes):
+            break
+    if not failed:
+        return (refusal(explain_no_route(eset, ends, demands)),)
+    return tuple(sorted(best, key=lambda route: route.cost)) or (failed[0],)
+
+
+@dataclass(frozen=True)
+class _Graph:
+    """Links with costs and the cocycles along them, from the first node to the second."""
+
+    pairs: Edges
+    costs: Float[np.ndarray, " links"]
+    values: Int[np.ndarray, "links holes"]
+
+
+class _Classes:
+    """Search for the best path of each class."""
+
+    def __init__(self, eset: EquilibriumSet, ends: Ends, demands: Demands) -> None:
+        self.eset, self.ends, self.demands = eset, ends, demands
+        self.states = nodes_with_ends(eset, ends)
+        network = network_of(eset)
+        allowed = network.allowed(eset, demands)
+        self.broken, self.lifted = network.verdicts(demands)
+        self.inner = np.flatnonzero(allowed[network.pairs].all(axis=1))
+        pairs = np.sort(network.pairs[self.inner], axis=1)
+        triangles = np.sort(network.cells[allowed[network.cells].all(axis=1)], axis=1)
+        values = cocycles(len(eset.points), pairs, triangles)
+        own, own_costs = end_links(eset, ends, demands)
+        own_values = _own_values(own, pairs, values, len(eset.points))
+        self.graph = _Graph(
+            np.concatenate([pairs, own]),
+            np.concatenate([network.costs(eset, demands.objective)[self.inner], own_costs]),
+            np.concatenate([values, own_values]),
+        )
+
+    def paths(self, count: int) -> list[States]:
+        """States along the best paths of so many classes, all of whose links can be lifted."""
+        while True:
+            found = self._search(count)
+            if not self._lift([path for _, path in found]):
+                return [self.states[path] for _, path in found]
+
+    def _lift(self, paths: list[Int[np.ndarray, " n"]]) -> bool:
+        """Lift links on paths that were not lifted before; whether some of them are broken."""
+        nodes = len(self.states)
+        code = np.array([nodes, 1])
+        steps = [np.sort(np.stack([p[:-1], p[1:]], axis=1), axis=1) @ code for p in paths]
+        if not steps:
+            return False
+        pairs = self.graph.pairs[: len(self.inner)]
+        used = np.flatnonzero(np.isin(pairs @ code, np.concatenate(steps)))
+        fresh = used[~self.lifted[self.inner[used]] & ~self.broken[self.inner[used]]]
+        if len(fresh) == 0:
+            return False
+        first, second = pairs[fresh].T
+        good, _ = connect(self.states[first], self.states[second], self.demands)
+        self.lifted[self.inner[fresh[good]]] = True
+        self.broken[self.inner[fresh[~good]]] = True
+        return bool((~good).any())
+
+    def _search(self, count: int) -> list[tuple[Class, Int[np.ndarray, " n"]]]:
+        """Dijkstra's algorithm on (vertex, class)."""
+        beside = self._beside()
+        nodes, holes = len(self.states), self.graph.values.shape[1]
+        start, goal = nodes - 2, nodes - 1
+        zero: Class = (0,) * holes
+        queue: list[tuple[float, int, Class, int]] = [(0.0, start, zero, -1)]
+        done: dict[tuple[int, Class], int] = {}
+        before: list[tuple[int, int]] = []
+        visits = np.zeros(nodes, int)
+        found: list[tuple[Class, Int[np.ndarray, " n"]]] = []
+        while queue and len(found) < count:
+            cost, node, own, parent = heappop(queue)
+            if (node, own) in done or visits[node] >= LABELS * count:
+                continue
+            visits[node] += 1
+            done[node, own] = len(before)
+            before.append((node, parent))
+            if node == goal:
+                found.append((own, _traced(before, len(before) - 1)))
+                continue
+            for other, step, change in beside[node]:
+                new = (
+                    own
+                    if change is None
+                    else tuple(a + b for a, b in zip(own, change, strict=True))
+                )
+                if (other, new) not in done and max(map(abs, new), default=0) <= MOST_TURNS:
+                    heappush(queue, (cost + step, other, new, len(before) - 1))
+        return found
+
+    def _beside(self) -> list[list[tuple[int, float, Class | None]]]:
+        """Neighbours of each node, with costs and changes of class."""
+        graph, beside = self.graph, [[] for _ in range(len(self.states))]  # type: ignore[var-annotated]
+        good = np.ones(len(graph.pairs), bool)
+        good[: len(self.inner)] = ~self.broken[self.inner]
+        for k in np.flatnonzero(good):
+            a, b = graph.pairs[k].tolist()
+            row = graph.values[k]
+            there = tuple(row.tolist()) if row.any() else None
+            back = tuple((-row).tolist()) if row.any() else None
+            beside[a].append((b, float(graph.costs[k]), there))
+            beside[b].append((a, float(graph.costs[k]), back))
+        return beside
+
+
+def _traced(before: list[tuple[int, int]], last: int) -> Int[np.ndarray, " n"]:
+    way = []
+    while last >= 0:
+        node, last = before[last]
+        way.append(node)
+    return np.array(way[::-1])
+
+
+def _own_values(
+    own: Int[np.ndarray, "own 2"],
+    pairs: Edges,
+    values: Int[np.ndarray, "edges holes"],
+    count: int,
+) -> Int[np.ndarray, "own holes"]:
+    """Cocycles on the links of start and goal: zero to one neighbour, elsewhere along the mesh."""
+    out = np.zeros((len(own), values.shape[1]), dtype=int)
+    for end in (count, count + 1):
+        mine = np.flatnonzero((own[:, 0] == end) & (own[:, 1] < count))
+        if len(mine) == 0:
+            continue
+        near = {int(own[k, 1]): int(k) for k in mine}
+        inside = np.flatnonzero(np.isin(pairs, list(near)).all(axis=1))
+        known, queue = {int(own[mine[0], 1])}, [int(own[mine[0], 1])]
+        while queue:
+            here = queue.pop()
+            for k in inside[(pairs[inside] == here).any(axis=1)]:
+                a, b = pairs[k].tolist()
+                other, sign = (b, 1) if a == here else (a, -1)
+                if other not in known:
+                    out[near[other]] = out[near[here]] + sign * values[k]
+                    known.add(other)
+                    queue.append(other)
+    return out

@@ -1,0 +1,145 @@
+"""Where on a set descriptors may take given values: linear interpolation over cells."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.topology import faces_of
+from equimorph.model import Descriptor
+from equimorph.tasks.optimising.tangent_steps import SetPoints, unconstrained_setting
+from equimorph.tasks.stable_part import cached, vertex_values
+
+CLOSE = 0.5
+"""Distance of two predictions, in sizes of their cell, below which one of them will do."""
+OVERHANG = 0.5
+"""How far beyond a cell, in barycentric coordinates, its linear prediction is still tried."""
+
+
+def predictor(eset: EquilibriumSet, descriptors: tuple[Descriptor, ...]) -> "Predictor":
+    """Predictor of a set for some descriptors, kept with the set."""
+    found = cached(eset, ("predictor", descriptors), lambda: Predictor(eset, descriptors))
+    assert isinstance(found, Predictor)
+    return found
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """A set with the values of some descriptors at its vertices."""
+
+    eset: EquilibriumSet
+    descriptors: tuple[Descriptor, ...]
+
+    @cached_property
+    def setting(self) -> Setting:
+        """Structure and free parameters of the set."""
+        return unconstrained_setting(self.eset)
+
+    @cached_property
+    def values(self) -> Float[np.ndarray, "V k"]:
+        """Values at the vertices."""
+        return np.stack([vertex_values(self.eset, each) for each in self.descriptors], axis=1)
+
+    @cached_property
+    def spread(self) -> Float[np.ndarray, " k"]:
+        """Ranges of the descriptors over the set: units of misfits."""
+        return np.asarray(np.maximum(np.ptp(self.values, axis=0), 1e-300))
+
+    @cached_property
+    def edges(self) -> Int[np.ndarray, "edges 2"]:
+        """Edges of all cells."""
+        return faces_of(self.eset.cells, 2)
+
+    @cached_property
+    def _ranges(self) -> tuple[Float[np.ndarray, "C k"], Float[np.ndarray, "C k"]]:
+        """Lower and upper ends of what may be found in or near each cell."""
+        corners = self.values[self.eset.cells]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        reach = corners.shape[2] * OVERHANG * (high - low)
+        return low - reach, high + reach
+
+    def cells(
+        self, wanted: Float[np.ndarray, " k"]
+    ) -> tuple[Float[np.ndarray, "some corners"], Int[np.ndarray, " some"]]:
+        """Barycentric coordinates at which cells take values, in or near them; which cells."""
+        low, high = self._ranges
+        near = np.ones(len(low), bool)
+        for k, value in enumerate(wanted):
+            near &= (low[:, k] <= value) & (value <= high[:, k])
+        cells = np.flatnonzero(near)
+        corners = self.values[self.eset.cells[cells]]
+        sides = corners[:, 1:] - corners[:, :1]
+        size = np.maximum(np.abs(sides).max(axis=(1, 2), initial=0.0), 1e-300)
+        regular = np.abs(np.linalg.det(sides)) > 1e-12 * size ** sides.shape[1]
+        cells, corners, sides = cells[regular], corners[regular], sides[regular]
+        gap = wanted - corners[:, 0]
+        inner = np.linalg.solve(np.swapaxes(sides, 1, 2), gap[:, :, None])[:, :, 0]
+        share = np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)
+        inside = np.flatnonzero(share.min(axis=1) >= -OVERHANG)
+        order = inside[np.argsort(-share[inside].min(axis=1), kind="stable")]
+        chosen = order[self._different(share[order], cells[order])]
+        return share[chosen], cells[chosen]
+
+    @cached_property
+    def _sides(self) -> tuple[Float[np.ndarray, " C"], Int[np.ndarray, " C"]]:
+        """Longest side of each cell from its first corner, and on which side of folds it lies.
+
+        Cells of one index on which the descriptors move with the parameters in the same sense.
+        """
+        eset = self.eset
+        places = embed(self.setting, eset.points.z, eset.points.p)
+        first, rest = eset.cells[:, 0], eset.cells[:, 1:]
+        size = np.max([np.linalg.norm(places[c] - places[first], axis=1) for c in rest.T], axis=0)
+        moves = (
+            np.sign(np.linalg.det(each[rest] - each[first][:, None]))
+            for each in (self.values, eset.coordinates)
+        )
+        return size, np.asarray(2 * eset.cell_index + (next(moves) * next(moves) > 0), int)
+
+    def _different(
+        self, share: Float[np.ndarray, "some corners"], cells: Int[np.ndarray, " some"]
+    ) -> Int[np.ndarray, " kept"]:
+        """Predictions that are not close to an earlier one from the same side of folds."""
+        size, side = self._sides
+        corners, structure = self.eset.cells[cells], self.setting.structure
+        n, free = structure.unknowns, self.setting.free
+        u = np.einsum("ck,cki->ci", share, self.eset.points.z[corners, :n])
+        p = np.einsum("ck,cki->ci", share, self.eset.points.p[corners][:, :, free])
+        place = np.concatenate([u * np.sqrt(structure.mass), p / self.setting.scales], axis=1)
+        gap = np.linalg.norm(place[:, None] - place[None], axis=2)
+        close = (gap < CLOSE * size[cells]) & (side[cells][:, None] == side[cells][None])
+        cached: list[int] = []
+        for k in range(len(cells)):
+            if not close[k, cached].any():
+                cached.append(k)
+        return np.array(cached, int)
+
+    def guesses(
+        self, share: Float[np.ndarray, "some corners"], cells: Int[np.ndarray, " some"]
+    ) -> SetPoints:
+        """Points of cells, with their planes, inside the box."""
+        eset = self.eset
+        corners = eset.cells[cells]
+        z = np.einsum("ck,cki->ci", share, eset.points.z[corners])
+        p = np.einsum("ck,cki->ci", share, eset.points.p[corners])
+        free = self.setting.free
+        p[:, free] = np.clip(p[:, free], eset.box.lower, eset.box.upper)
+        return SetPoints(z, p, self.planes(cells))
+
+    def planes(self, cells: Int[np.ndarray, " some"]) -> Float[np.ndarray, "some d coordinates"]:
+        """Orthonormal bases of the planes of cells."""
+        corners = self.eset.cells[cells]
+        used, place = np.unique(corners, return_inverse=True)
+        points = self.eset.points
+        at = embed(self.setting, points.z[used], points.p[used])[place.reshape(corners.shape)]
+        sides = at[:, 1:] - at[:, :1]
+        sides /= np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-300)
+        return np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(sides, 1, 2))[0], 1, 2))
+
+    def misfits(self, wanted: Float[np.ndarray, " k"]) -> Float[np.ndarray, " V"]:
+        """Root of the sum of squares of what vertices miss, in ranges over the set."""
+        return np.asarray(np.sqrt((((self.values - wanted) / self.spread) ** 2).sum(axis=1)))

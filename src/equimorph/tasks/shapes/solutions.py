@@ -1,0 +1,356 @@
+"""`solve_shape`: all equilibria of a set whose descriptors take given values."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Values
+from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet, Level
+from equimorph.manifold.queries.nearest import local_minima
+from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule
+from equimorph.structures import State, States
+from equimorph.tasks.optimising.programme import stability
+from equimorph.tasks.optimising.tangent_steps import SetPoints, points_at_vertices
+from equimorph.tasks.planning import plan
+from equimorph.tasks.route import Route
+from equimorph.tasks.shapes.correction import states_with_values
+from equimorph.tasks.shapes.fits_and_families import best_fits, solution_family
+from equimorph.tasks.shapes.prediction import Predictor, predictor
+from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
+
+SAME = 1e-6
+"""Distance, in the metric and scaled parameters, below which two solutions are the same."""
+AT_EDGE = 1e-9
+"""By how much a solution may exceed the box or a constraint."""
+EXACT = 1e-8
+"""Misfit, in ranges over the set, below which values are met."""
+STARTS = 12
+"""Vertices from which members of a family are searched."""
+
+Rank = Literal["route", "energy", "margin"]
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Answer to "at which settings does the structure take this shape".
+
+    Parameters
+    ----------
+    status
+        "solved"; "fitted": there are more descriptors than free parameters and no state meets them
+        all; or "refused" with the reason in `why`.
+    states
+        All solutions, best first: stable ones before unstable ones, then by rank. Of fits, the
+        local minima of the misfit, the least first. Of families (fewer descriptors than free
+        parameters), the members nearest to the vertices that come nearest; see `solution_family`.
+    index
+        Negative eigenvalues of each; 0 is stable.
+    misfit
+        What each leaves of the targets: root of the sum of squares, in ranges over the set.
+    routes
+        Way to each from the start, or why there is none; empty without a start.
+    closest, miss
+        Vertex of the set whose descriptors come nearest to the targets, and how far it is from
+        them; see `nearest` for the exact state.
+    """
+
+    status: Literal["solved", "fitted", "refused"]
+    why: str
+    states: States
+    index: Int[np.ndarray, " lanes"]
+    misfit: Values
+    routes: tuple[Route, ...]
+    closest: State
+    miss: Mapping[str, float]
+    wanted: Float[np.ndarray, " k"]
+    within: tuple[Constraint, ...]
+    known: Predictor | None = field(default=None, metadata=NOT_KEPT)
+
+    def __repr__(self) -> str:
+        """How many there are, or why there is none."""
+        if self.status == "refused":
+            return f"Shapes(refused: {self.why})"
+        return f"Shapes({len(self)} states, {int(np.sum(self.index == 0))} of them stable)"
+
+    def __len__(self) -> int:
+        """Number of solutions."""
+        return len(self.states)
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a solution."""
+        return self.status == "solved"
+
+    @property
+    def stable(self) -> States:
+        """The stable solutions, best first."""
+        mine: States = self.states[self.index == 0]
+        return mine
+
+    @cached_property
+    def margin(self) -> Values:
+        """Stability margin of each solution."""
+        return self.states.margin if len(self) else np.zeros(0)
+
+    @property
+    def schedule(self) -> Schedule | None:
+        """Way to the best solution that can be reached from the start, if there is a start."""
+        return next((route.schedule for route in self.routes if route.arrived), None)
+
+    @cached_property
+    def nearest(self) -> State | None:
+        """Stable state within the constraints that comes nearest to the targets."""
+        known = self._known
+        eset = known.eset
+        allowed = feasible_vertices(eset, self.within)
+        if not allowed.any():
+            allowed = stable_vertices(eset)
+        within = (*self.within, stability(eset.structure, 0.0))
+        found, _ = best_fits(known, self.wanted, within, allowed)
+        return found[0] if len(found) else None
+
+    @cached_property
+    def family(self) -> Level | None:
+        """All states that meet fewer targets than there are free parameters: curves or surfaces.
+
+        None for as many targets as free parameters, or more.
+        """
+        known = self._known
+        if len(self.wanted) >= len(known.eset.names):
+            return None
+        return solution_family(known, self.wanted)
+
+    @property
+    def _known(self) -> Predictor:
+        if self.known is None:
+            raise InputError(
+                "`Shapes` read from a file must be solved again for what its set knows; got one "
+                "without the set."
+            )
+        return self.known
+
+
+def solve_shape(
+    eset: EquilibriumSet,
+    targets: Mapping[Descriptor, float],
+    *,
+    within: Sequence[Constraint] = (),
+    start: State | None = None,
+    rank: Rank | None = None,
+) -> Shapes:
+    """Find all states of a set at which descriptors take given values.
+
+    Cells over which the linear interpolation of the descriptors comes near the targets predict
+    states, which Newton corrects along the set; folds are no obstacle. A solution that no cell
+    predicts would need two in one cell: refine the set there. With more descriptors than free
+    parameters the fits of least squares are found, with fewer the family of solutions.
+
+    Parameters
+    ----------
+    eset
+        The set over the actuators.
+    targets
+        Descriptors of the structure with their values.
+    within
+        Constraints that solutions have to obey, beside those of the set.
+    start
+        Stable state from which to plan a route to each stable solution.
+    rank
+        "route" (shortest first; the default with a start), "energy" (lowest first; the default
+        without) or "margin" (largest first).
+
+    Returns
+    -------
+    The solutions. None is an answer: refused, with what comes nearest.
+
+    Raises
+    ------
+    InputError
+        Without targets, for values that are not finite, an empty set, or a rank by routes without
+        a start.
+    """
+    columns = {each: np.array([value], dtype=float) for each, value in targets.items()}
+    return solve_shapes(eset, columns, within=within, start=start, rank=rank)[0]
+
+
+def solve_shapes(
+    eset: EquilibriumSet,
+    targets: Mapping[Descriptor, Float[np.ndarray, " many"]],
+    *,
+    within: Sequence[Constraint] = (),
+    start: State | None = None,
+    rank: Rank | None = None,
+) -> tuple[Shapes, ...]:
+    """Answer many questions of `solve_shape` at once: values of each descriptor, one per question.
+
+    What the set has to be asked is kept with it, so that later questions are answered faster.
+
+    Raises
+    ------
+    InputError
+        As for `solve_shape`, and for different numbers of values.
+    """
+    wanted = _numbers(eset, targets)
+    rank = rank or ("energy" if start is None else "route")
+    if rank not in ("route", "energy", "margin") or (rank == "route" and start is None):
+        raise InputError(
+            f"`rank` must be energy or margin, or route if there is a start; got {rank!r}."
+        )
+    known = predictor(eset, tuple(targets))
+    constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
+    if wanted.shape[1] > len(eset.names):
+        groups = [_fitted(known, each, constraints) for each in wanted]
+    else:
+        groups = _solved(known, wanted, constraints)
+    answers = []
+    for values, (states, misfit) in zip(wanted, groups, strict=True):
+        routes = [] if start is None else [plan(eset, start, s, within=within) for s in states]
+        question = (known, values, constraints)
+        answers.append(_answer(question, states, misfit, (rank, routes)))
+    return tuple(answers)
+
+
+def _numbers(
+    eset: EquilibriumSet, targets: Mapping[Descriptor, Float[np.ndarray, " many"]]
+) -> Float[np.ndarray, "many k"]:
+    if not targets:
+        raise InputError("`targets` must give at least one descriptor; got none.")
+    for descriptor, value in targets.items():
+        bad = np.asarray(value)[~np.isfinite(value)]
+        if len(bad):
+            raise InputError(
+                f"`targets` must be finite; got {descriptor.name} = {float(bad[0])!r}."
+            )
+    if len({np.shape(value) for value in targets.values()}) != 1:
+        raise InputError(
+            "`targets` must give equally many values of each descriptor; got "
+            f"{', '.join(f'{len(v)} of {d.name}' for d, v in targets.items())}."
+        )
+    if not len(eset.cells):
+        raise InputError("`eset` must have cells; got an empty set.")
+    return np.stack([np.asarray(value, dtype=float) for value in targets.values()], axis=1)
+
+
+def _answer(
+    question: tuple[Predictor, Float[np.ndarray, " k"], tuple[Constraint, ...]],
+    states: States,
+    misfit: Values,
+    order_by: tuple[Rank, list[Route]],
+) -> Shapes:
+    """Solutions in order."""
+    known, wanted, within = question
+    rank, routes = order_by
+    index = states.index if len(states) else np.zeros(0, int)
+    own = np.zeros(len(states))
+    if len(states) and rank == "route":
+        own = np.nan_to_num([each.length for each in routes], nan=np.inf)
+    elif len(states):
+        own = states.energy if rank == "energy" else -states.margin
+    fits = misfit > EXACT
+    order = np.lexsort((own, index, np.where(fits, misfit, 0.0)))
+    closest, miss = _closest(known, wanted)
+    status: Literal["solved", "fitted", "refused"] = "solved"
+    if len(order) == 0 or fits.all():
+        status = "fitted" if len(order) else "refused"
+    why = "" if status == "solved" else _why(known.descriptors, wanted, miss)
+    return Shapes(
+        status, why, states[order], index[order], misfit[order],
+        tuple(routes[k] for k in order) if routes else (), closest, miss, wanted, within, known,
+    )  # fmt: skip
+
+
+def _solved(
+    known: Predictor, wanted: Float[np.ndarray, "many k"], within: tuple[Constraint, ...]
+) -> list[tuple[States, Values]]:
+    """Exact solutions of each question in the box and within constraints, each once."""
+    structure, eset = known.eset.structure, known.eset
+    spots, owner = _guesses(known, wanted)
+    z, p, found = states_with_values(known.setting, spots, known.descriptors, wanted[owner])
+    found &= eset.box.contains(p[:, known.setting.free], slack=AT_EDGE)
+    found[found] &= structure.resolved(z[found], p[found])
+    for constraint in within:
+        room = AT_EDGE * max(1.0, abs(constraint.bound))
+        found[found] &= constraint.excess(z[found], p[found]) <= room
+    states = States(structure, z[found], p[found])
+    owner = owner[found]
+    bounds = np.searchsorted(owner, np.arange(len(wanted) + 1))
+    groups = []
+    for first, last in pairwise(bounds):
+        own = states[first:last]
+        own = own[_distinct(own)]
+        groups.append((own, np.zeros(len(own))))
+    if wanted.shape[1] < len(eset.names):
+        # the shortest way to a family may leave the box
+        groups = [
+            group if len(group[0]) else _members(known, values, within)
+            for group, values in zip(groups, wanted, strict=True)
+        ]
+    return groups
+
+
+def _members(
+    known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
+) -> tuple[States, Values]:
+    """Members of a family within the box and constraints."""
+    states, misfit = _fitted(known, wanted, within)
+    return states[misfit <= EXACT], misfit[misfit <= EXACT]
+
+
+def _guesses(
+    known: Predictor, wanted: Float[np.ndarray, "many k"]
+) -> tuple[SetPoints, Int[np.ndarray, " lanes"]]:
+    """Starts of Newton's method, and the questions that they belong to."""
+    if wanted.shape[1] < len(known.eset.names):
+        starts = [local_minima(known.edges, known.misfits(each))[:STARTS] for each in wanted]
+        vertices = np.concatenate(starts)
+        owner = np.repeat(np.arange(len(wanted)), [len(each) for each in starts])
+        used, place = np.unique(vertices, return_inverse=True)
+        return points_at_vertices(known.eset, used).take(place), owner
+    parts = [known.cells(each) for each in wanted]
+    owner = np.repeat(np.arange(len(wanted)), [len(cells) for _, cells in parts])
+    shares, cells = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return known.guesses(shares, cells), owner
+
+
+def _fitted(
+    known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
+) -> tuple[States, Values]:
+    """Different fits of least squares."""
+    states, misfit = best_fits(known, wanted, within)
+    kept = _distinct(states)
+    return states[kept], misfit[kept]
+
+
+def _distinct(states: States) -> Int[np.ndarray, " distinct"]:
+    """First of each group of states that are the same."""
+    structure = states.structure
+    u = states.z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    place = np.concatenate([u, states.p / structure.scales], axis=1)
+    kept: list[int] = []
+    for i, own in enumerate(place):
+        if not kept or np.linalg.norm(place[kept] - own, axis=1).min() > SAME:
+            kept.append(i)
+    return np.array(kept, dtype=int)
+
+
+def _closest(known: Predictor, wanted: Float[np.ndarray, " k"]) -> tuple[State, dict[str, float]]:
+    best = int(known.misfits(wanted).argmin())
+    gaps = (known.values[best] - wanted).tolist()
+    names = [each.name for each in known.descriptors]
+    return known.eset.points[best], dict(zip(names, gaps, strict=True))
+
+
+def _why(
+    descriptors: tuple[Descriptor, ...],
+    wanted: Float[np.ndarray, " k"],
+    miss: Mapping[str, float],
+) -> str:
+    asked = ", ".join(f"{d.name} = {v:g}" for d, v in zip(descriptors, wanted, strict=True))
+    gaps = ", ".join(f"{name} by {gap:.3g}" for name, gap in miss.items())
+    return f"no state of the set has {asked}; the nearest vertex misses {gaps}"

@@ -1,0 +1,101 @@
+"""The stable part of an equilibrium set: vertices, edges, pieces; computed once for each set."""
+
+from collections.abc import Callable
+from itertools import combinations_with_replacement
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.manifold import EquilibriumSet, part, restricted
+from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.queries.locate import cell_of, pieces_of
+from equimorph.manifold.queries.nearest import setting_of
+from equimorph.model import Constraint, Descriptor
+from equimorph.structures import State
+
+_KEPT: WeakKeyDictionary[EquilibriumSet, dict[Any, Any]] = WeakKeyDictionary()
+
+SLACK = 1e-9
+"""Relative excess over a bound that counts as none."""
+
+PARTS = 4
+"""Parts of a side of a cell between the places whose distances are compared."""
+
+
+def cached(eset: EquilibriumSet, key: Any, compute: Callable[[], Any]) -> Any:
+    """Return what was computed before for a set, or compute it; forgotten with the set."""
+    known = _KEPT.setdefault(eset, {})
+    if key not in known:
+        known[key] = compute()
+    return known[key]
+
+
+def vertex_values(eset: EquilibriumSet, descriptor: Descriptor) -> Float[np.ndarray, " V"]:
+    """Values of a descriptor at the vertices of a set."""
+    found = cached(
+        eset, ("values", descriptor), lambda: descriptor.function(eset.points.z, eset.points.p)
+    )
+    return np.asarray(found)
+
+
+def stable_vertices(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
+    """Vertices of stable cells, those on folds among them."""
+    stable = np.zeros(len(eset.points), bool)
+    stable[eset.cells[eset.cell_index == 0]] = True
+    return stable
+
+
+def stable_edges(eset: EquilibriumSet) -> Int[np.ndarray, "edges 2"]:
+    """Edges of stable cells."""
+    found = cached(eset, "edges", lambda: faces_of(eset.cells[eset.cell_index == 0], 2))
+    return np.asarray(found)
+
+
+def feasible_vertices(
+    eset: EquilibriumSet, within: tuple[Constraint, ...]
+) -> Bool[np.ndarray, " V"]:
+    """Stable vertices that obey constraints."""
+    good = stable_vertices(eset)
+    for constraint in within:
+        sign = 1.0 if constraint.sense == "<=" else -1.0
+        excess = sign * (vertex_values(eset, constraint.descriptor) - constraint.bound)
+        good &= excess <= SLACK * max(1.0, abs(constraint.bound))
+    return good
+
+
+def stable_piece(
+    eset: EquilibriumSet, state: State, within: tuple[Constraint, ...]
+) -> EquilibriumSet | None:
+    """Stable cells around a state that obey all constraints; None if it is no state of the set.
+
+    Regions that pass between vertices, however thin, are followed as far as their sides cross edges
+    of the cells; without cells if they cross none.
+    """
+    stratum, _ = pieces_of(eset, state)
+    if stratum < 0:
+        return None
+    piece = part(eset, eset.stratum == stratum)
+    for constraint in within:
+        if len(piece.cells):
+            piece = restricted(piece, constraint)
+    if not within or not len(piece.cells):
+        return piece
+    return part(piece, piece.component == piece.component[cell_near(piece, state)])
+
+
+def cell_near(eset: EquilibriumSet, state: State) -> int:
+    """Cell of a state; the nearest one where a curved boundary leaves it out."""
+    found = cell_of(eset, state)
+    if found >= 0:
+        return found
+    setting = setting_of(eset)
+    corners = embed(setting, eset.points.z, eset.points.p)[eset.cells]
+    here = embed(setting, state.z[None], state.p[None])[0]
+    count = eset.cells.shape[1]
+    picks = np.array(list(combinations_with_replacement(range(count), PARTS)))
+    shares = np.stack([(picks == k).sum(axis=1) for k in range(count)], axis=1) / PARTS
+    gaps = [np.linalg.norm(np.einsum("k,cks->cs", w, corners) - here, axis=1) for w in shares]
+    return int(np.argmin(np.min(gaps, axis=0)))

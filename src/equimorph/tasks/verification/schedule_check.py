@@ -1,0 +1,402 @@
+"""`verify`: margins along any schedule, or its first violation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Flags
+from equimorph.equilibria import (
+    Event,
+    Lifts,
+    Path,
+    TraceOptions,
+    check_start,
+    lift,
+    newton,
+    way_points,
+)
+from equimorph.errors import InputError
+from equimorph.model import Constraint, Descriptor, Schedule, names_of
+from equimorph.structures import State, States, Structure, from_identity
+from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
+from equimorph.tasks.verification.proof import Proof, prove
+
+NEAR = 0.05
+"""Distance in the metric up to which a start that was written with few digits is corrected."""
+
+Rows = Float[np.ndarray, "rows parameters"]
+
+SAME = 1e-6
+"""Distance in the metric within which a lifted state is the one that Newton found."""
+AT_GOAL = 1e-9
+"""Share of a leg that may be missing: steps that end at the goal but for round-off count."""
+
+
+@dataclass(frozen=True, eq=False)
+class LiftedPolyline:
+    """Exact states along a polyline, and how the way ended.
+
+    Parameters
+    ----------
+    states
+        All points in order: corners, and those where the lifts stopped between them.
+    at
+        Number of the leg + share of it, per state.
+    corners
+        Which states are the corners that were reached.
+    end
+        The last event: "arrived", or what ended the way.
+    """
+
+    states: States
+    at: Float[np.ndarray, " points"]
+    corners: Int[np.ndarray, " corners"]
+    end: Event
+
+
+def follow_polyline(
+    start: State, rows: Rows, within: tuple[Constraint, ...], options: TraceOptions
+) -> LiftedPolyline:
+    """Follow the straight legs from the parameters of `start` through those of each row.
+
+    Newton leads from corner to corner; that it stays on the curve is what the lifts of all legs,
+    side by side, then show. Where a lift comes to another state, the march goes on from that one.
+    """
+    legs: list[LiftedPolyline] = []
+    done, here = 0, start
+    while done < len(rows):
+        nodes = _by_newton(here, rows[done:])
+        lifts = _lifted(nodes[:-1], nodes.p[1:], within, options)
+        good = _true(lifts, nodes[1:])
+        legs.append(_part(nodes[0], lifts, good + 1, done))
+        done += min(good + 1, len(nodes) - 1)
+        here = legs[-1].end.state
+        if legs[-1].end.kind != "arrived":
+            break
+    return _joined(start, legs)
+
+
+def _by_newton(start: State, rows: Rows) -> States:
+    """States over rows by Newton from each to the next; at least one beyond the start."""
+    structure, z = start.structure, [start.z]
+    for row in rows:
+        new, found = newton(structure, z[-1][None], row[None])
+        if not found[0]:
+            break
+        z.append(new[0])
+    # a leg that Newton cannot take is given to the lift, whatever its end
+    if len(z) == 1:
+        z.append(start.z)
+    return States(structure, np.array(z), np.concatenate([start.p[None], rows[: len(z) - 1]]))
+
+
+def _lifted(
+    states: States, to: Rows, within: tuple[Constraint, ...], options: TraceOptions
+) -> Lifts:
+    names = names_of(states.structure.parameters)
+    columns = {name: to[:, k].copy() for k, name in enumerate(names)}
+    return lift(states, columns, within=within, options=options)
+
+
+def _true(lifts: Lifts, goals: States) -> int:
+    """Number of legs, from the first on, whose lifts arrive at the goal."""
+    gap = (lifts.states.z - goals.z)[:, : goals.structure.unknowns] ** 2 @ goals.structure.mass
+    bad = np.flatnonzero(~_there(lifts) | (np.sqrt(gap) > SAME))
+    return int(bad[0]) if len(bad) else len(goals)
+
+
+def _there(lifts: Lifts) -> Flags:
+    """Which lifts came to their goals."""
+    return np.asarray(lifts.arrived | ((lifts.kind == "lost") & (lifts.at > 1.0 - AT_GOAL)))
+
+
+def _part(start: State, lifts: Lifts, legs: int, before: int) -> LiftedPolyline:
+    """The first legs as one march."""
+    legs = min(legs, len(lifts))
+    points = lifts.points
+    assert points is not None
+    inside = (points.at > AT_GOAL) & (points.at < 1.0 - AT_GOAL)
+    ours = np.flatnonzero((points.lane < legs) & inside)
+    ends = np.arange(legs)
+    lane = np.concatenate([points.lane[ours], ends])
+    at = np.concatenate([points.at[ours], lifts.at[:legs]])
+    order = np.lexsort((at, lane))
+    z = np.concatenate([points.states.z[ours], lifts.states.z[:legs]])[order]
+    p = np.concatenate([points.states.p[ours], lifts.states.p[:legs]])[order]
+    corner = np.flatnonzero(order >= len(ours))
+    end = lifts[legs - 1]
+    kind = "arrived" if _there(lifts)[legs - 1] else end.kind
+    ended = Event(kind, end.state, before + legs - 1 + end.at, end.criticality, end.detail)
+    states = States(start.structure, z, p)
+    return LiftedPolyline(states, before + (lane + at)[order], corner, ended)
+
+
+def _joined(start: State, parts: list[LiftedPolyline]) -> LiftedPolyline:
+    z = np.concatenate([start.z[None], *(part.states.z for part in parts)])
+    p = np.concatenate([start.p[None], *(part.states.p for part in parts)])
+    at = np.concatenate([np.zeros(1), *(part.at for part in parts)])
+    corners, count = [np.zeros(1, int)], 1
+    for part in parts:
+        corners.append(part.corners + count)
+        count += len(part.states)
+    return LiftedPolyline(States(start.structure, z, p), at, np.concatenate(corners), parts[-1].end)
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """Whether a schedule can be executed without a snap.
+
+    Parameters
+    ----------
+    status
+        "verified", or "refused" with the first violation in `why`.
+    states
+        Equilibria along the schedule, as far as it can be followed.
+    at
+        Number of the step + share of it, per state.
+    margin
+        Smallest stability margin on the way.
+    schedule
+        The schedule with the margins and descriptors found; only if it was verified.
+    violation
+        What ended the way, and where.
+    proof
+        In proof mode: what is proved between the states, too.
+    """
+
+    status: Literal["verified", "refused"]
+    why: str
+    states: States
+    at: Float[np.ndarray, " points"]
+    margins: Float[np.ndarray, " points"]
+    schedule: Schedule | None = None
+    violation: Event | None = None
+    proof: Proof | None = None
+
+    def __repr__(self) -> str:
+        """Margin and proof, or the violation."""
+        if not self.verified:
+            return f"Verification(refused at {self.at[-1]:.6g}: {self.why})"
+        proof = "" if self.proof is None else f", {self.proof.status}"
+        return f"Verification(verified: {len(self.states)} states, margin {self.margin:.4g}{proof})"
+
+    @property
+    def verified(self) -> bool:
+        """Whether nothing stands in the way."""
+        return self.status == "verified"
+
+    @property
+    def margin(self) -> float:
+        """Smallest stability margin at the states."""
+        return float(self.margins.min())
+
+    @cached_property
+    def path(self) -> Path:
+        """States with their lengths, and how the way ended."""
+        states, at = self.states, float(self.at[-1])
+        lost = "arrived" if self.verified else "constraint"
+        end = self.violation or Event(lost, states[-1], at, detail=self.why)
+        return Path(states, self.at, _lengths(states), np.zeros(len(states), int), (end,))
+
+
+def verify(
+    schedule: Schedule | Sequence[Mapping[str, float]],
+    start: State | None = None,
+    *,
+    structure: Structure | None = None,
+    within: Sequence[Constraint] = (),
+    margin: float = 0.0,
+    monitor: Sequence[Descriptor] = (),
+    proof: bool = False,
+    options: TraceOptions | None = None,
+) -> Verification:
+    """Check a schedule, from wherever it comes: every step is lifted finely, margins are recorded.
+
+    Between its steps parameters change at constant rates. A way-point {name: value} keeps the
+    parameters that it does not name.
+
+    Parameters
+    ----------
+    schedule
+        A `Schedule`, of a route or read from files; or way-points, which need a `start`.
+    start
+        State in which the structure is. None: that of the schedule, corrected if it was written
+        with few digits.
+    structure
+        Needed only if neither a start nor the schedule carries one.
+    within
+        Constraints to obey on the way.
+    margin
+        Smallest stability margin allowed, in the structure's metric.
+    monitor
+        Further descriptors for the schedule of the result.
+    proof
+        Prove, too, that between the states the curve exists, is the only one nearby and keeps its
+        index; see `Proof`. A schedule that is safe, but cannot be proved so, stays verified.
+    options
+        Step control of the lifts; by default that of the final check of routes.
+
+    Returns
+    -------
+    The verified schedule, or the first violation.
+
+    Raises
+    ------
+    InputError
+        If there is no start or structure, names are not those of the structure, the start is no
+        equilibrium, nothing moves, or `margin` is negative.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> rest = em.Spring().natural_state(x_l=1.5)
+    >>> em.verify([{"F": 0.2}, {"x_l": 1.2}], rest, proof=True).proof.status
+    'proved'
+    """
+    if not margin >= 0.0:
+        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
+    begin, rows = _legs(schedule, start, structure)
+    constraints = tuple(within)
+    why = _wrong_start(begin, constraints, margin)
+    if why:
+        return Verification("refused", why, begin.batch, np.zeros(1), np.array([begin.margin]))
+    done = follow_polyline(begin, rows, constraints, options or FINE)
+    margins = done.states.margin
+    why, last = _violation(done, margins, margin, len(rows))
+    if why:
+        kept = slice(0, last + 1)
+        event = done.end if done.end.kind != "arrived" else None
+        return Verification(
+            "refused", why, done.states[kept], done.at[kept], margins[kept], None, event
+        )
+    proved = prove(done.states, margin) if proof else None
+    table = _table(done, margins, (*(c.descriptor for c in constraints), *monitor))
+    return Verification("verified", "", done.states, done.at, margins, table, None, proved)
+
+
+def _legs(
+    schedule: Schedule | Sequence[Mapping[str, float]],
+    start: State | None,
+    structure: Structure | None,
+) -> tuple[State, Float[np.ndarray, "rows parameters"]]:
+    """Start, and all parameters at the corners after it."""
+    if not isinstance(schedule, Schedule):
+        if start is None:
+            raise InputError("`start` must be given with way-points; got none.")
+        check_start(start)
+        return start, _moving(np.array(way_points(start.structure, start.p, schedule)))
+    begin = start or first_state(schedule, structure)
+    names = names_of(begin.structure.parameters)
+    if schedule.names != names:
+        raise InputError(
+            f"`schedule` must give the parameters {', '.join(names)}; "
+            f"got {', '.join(schedule.names)}."
+        )
+    if not np.isfinite(schedule.values).all():
+        raise InputError("`schedule` must have finite values; got some that are not.")
+    check_start(begin)
+    if not np.allclose(schedule.values[0], begin.p, rtol=0, atol=1e-9):
+        raise InputError(
+            f"`start` must have the first parameters of the schedule; got {begin.parameters}."
+        )
+    return begin, _moving(np.concatenate([begin.p[None], schedule.values[1:]]))
+
+
+def _moving(rows: Float[np.ndarray, "rows parameters"]) -> Float[np.ndarray, "moves parameters"]:
+    """Corners after the first, without pauses."""
+    moves = np.abs(np.diff(rows, axis=0)).max(axis=1, initial=0.0) > 0.0
+    if not moves.any():
+        raise InputError("`schedule` must change at least one parameter; got one that rests.")
+    return np.asarray(rows[1:][moves])
+
+
+def first_state(schedule: Schedule, structure: Structure | None) -> State:
+    """State in which a schedule begins, of its own structure unless another is given.
+
+    Raises
+    ------
+    InputError
+        If it carries no structure, or does not begin at an equilibrium.
+    """
+    owner, unknowns = structure, schedule.start.get("unknowns")
+    if owner is None:
+        if schedule.start.get("structure") is None:
+            raise InputError(
+                "`structure` must be given for a schedule that carries none; got none."
+            )
+        owner = from_identity(schedule.start["structure"])
+    z = np.asarray(unknowns, dtype=float)
+    if z.shape != (owner.size,):
+        raise InputError(
+            f"`schedule` must start with {owner.size} unknowns of its structure; "
+            f"got {z.size if unknowns is not None else 'none'}."
+        )
+    state = State(owner, z, schedule.values[0].copy())
+    if state.residual < 1e-10:
+        return state
+    near, found = newton(owner, z[None], state.p[None])
+    gap = float(np.sqrt((near[0] - z)[: owner.unknowns] ** 2 @ owner.mass))
+    if not (found[0] and gap <= NEAR):
+        raise InputError(
+            f"`schedule` must start at an equilibrium; got a residual of {state.residual:.2g}."
+        )
+    return State(owner, near[0], state.p)
+
+
+def _wrong_start(start: State, within: tuple[Constraint, ...], margin: float) -> str:
+    for constraint in within:
+        if not constraint.holds(start.batch)[0]:
+            value = constraint.descriptor(start)
+            return f"the start violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
+    if not start.stable:
+        return f"the start is unstable (index {start.index})"
+    if start.margin < margin:
+        return f"the start has a stability margin of {start.margin:.4g}, below {margin:g}"
+    return ""
+
+
+def _violation(
+    done: LiftedPolyline, margins: Float[np.ndarray, " points"], margin: float, legs: int
+) -> tuple[str, int]:
+    """First violation in words, and the number of the state; nothing for none."""
+    low = np.flatnonzero(margins < margin) if margin > 0.0 else np.flatnonzero(margins <= 0.0)
+    # the end at a fold has no margin, but the fold is what is to be told
+    low = low[low < len(margins) - (done.end.kind != "arrived")]
+    names = _moved(done.states)
+    if len(low):
+        k = int(low[0])
+        where = describe_place(done.states[k], names)
+        return f"the stability margin falls to {margins[k]:.4g}, below {margin:g}, at {where}", k
+    if done.end.kind == "arrived":
+        return "", len(margins) - 1
+    leg = min(int(done.end.at) + 1, legs)
+    return f"step {leg} of {legs} meets {describe_obstacle(done.end, names)}", len(margins) - 1
+
+
+def _moved(states: States) -> list[str]:
+    names = names_of(states.structure.parameters)
+    moves = np.ptp(states.p, axis=0) > 0.0
+    return [name for name, moving in zip(names, moves, strict=True) if moving]
+
+
+def _table(
+    done: LiftedPolyline, margins: Float[np.ndarray, " points"], descriptors: Sequence[Descriptor]
+) -> Schedule:
+    """Schedule of all states."""
+    at = done.at.copy()
+    at[done.corners] = np.arange(len(done.corners))
+    path = Path(done.states, at, _lengths(done.states), np.zeros(len(at), int), (done.end,))
+    return schedule_of(path, margins, tuple(dict.fromkeys(descriptors)))
+
+
+def _lengths(states: States) -> Float[np.ndarray, " points"]:
+    """Length of the way to each state, in the metric and scaled parameters."""
+    structure = states.structure
+    dz = np.diff(states.z[:, : structure.unknowns], axis=0)
+    dp = np.diff(states.p, axis=0) / structure.scales
+    steps = np.sqrt(dz**2 @ structure.mass + (dp**2).sum(axis=1))
+    return np.concatenate([[0.0], np.cumsum(steps)])
