@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria import ParameterLine, TraceOptions, follow
+from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.structures import Rod, States
 
 BOX = ((0.2, 2.5), (-2.0, 2.0))
@@ -69,9 +69,9 @@ def bench_equilibria_along_paths(benchmark, recorded):
         ParameterLine(states.structure, states.p, np.tile([0, 0, 20.0, 0], (10_000, 1))),
     )
     few = line.take(np.arange(1000))
-    points = len(follow(line, z).points.t) + len(z)
-    follow(few, z[:1000])
-    ended = benchmark.pedantic(follow, (line, z, (), TraceOptions(record=recorded)), rounds=3)
+    points = len(trace(line, z).points.t) + len(z)
+    trace(few, z[:1000])
+    ended = benchmark.pedantic(trace, (line, z, (), TraceOptions(record=recorded)), rounds=3)
     per_second = points / benchmark.stats["min"]
     record(benchmark, states, ended.code, equilibria=points, equilibria_per_second=per_second)
 

@@ -19,7 +19,7 @@ import equimorph as em
 from bench_lift import BOX, LARGEST, natural_states
 from bench_maps import over
 from bench_sets import lifted
-from equimorph.equilibria import ParameterLine, TraceOptions, follow
+from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.plotting.style import DOUBLE_COLUMN, INDEX_COLOURS, INK, house_style
 from equimorph.structures import Rod
 from equimorph.tasks import curvature_map, limit_load_map
@@ -94,9 +94,9 @@ def equilibria_along_paths() -> Timing:
     states = natural_states(10_000)
     velocity = np.tile([0.0, 0.0, 20.0, 0.0], (len(states), 1))
     line, z = ParameterLine(states.structure, states.p, velocity), states.z
-    count = len(follow(line, z).points.t) + len(z)
+    count = len(trace(line, z).points.t) + len(z)
     few = TraceOptions(record=False)
-    seconds = least(lambda: follow(line, z, (), few), len(z))
+    seconds = least(lambda: trace(line, z, (), few), len(z))
     return Timing("equilibria along paths", count, seconds)
 
 

@@ -24,7 +24,7 @@ class PlainCompiledModules(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        if fullname.startswith("equimorph.") and fullname.rpartition(".")[2] in COMPILED:
+        if fullname.startswith("equimorph.") and fullname.endswith(COMPILED):
             return PathFinder.find_spec(fullname, path, target)
         return None
 

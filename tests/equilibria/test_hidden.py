@@ -8,9 +8,9 @@ from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 import equimorph as em
-from equimorph.equilibria import ParameterLine, TraceOptions, follow
-from equimorph.equilibria.hidden import with_hidden_events
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, FOLD
+from equimorph.equilibria import ParameterLine, TraceOptions, trace
+from equimorph.equilibria.hidden_events import with_hidden_events
+from equimorph.equilibria.trace_options import EventCode
 from oracles.polynomial import Polynomial, slaved
 from typecheck import unchecked
 
@@ -49,13 +49,13 @@ def test_determinants_separate_pairs_of_branch_points_without_any_probe(power, c
     stop = np.linspace(centre + np.sqrt(depth) + 0.05, 1.0, 5)[:, None]
     curve = ParameterLine(Determined(energy, 1, ("a",)), np.full((5, 1), -1.0), stop + 1.0)
     through = TraceOptions(through_folds=True, through_branch_points=True, record=False)
-    passed = follow(curve, np.zeros((5, 1)), options=through).passed
+    passed = trace(curve, np.zeros((5, 1)), options=through).passed
     assert passed.lanes.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
     a = -1.0 + passed.t * curve.velocity[passed.lanes, 0]
     root = np.sqrt(depth)
     assert a.reshape(5, 2) == pytest.approx(np.tile([centre - root, centre + root], (5, 1)))
-    outcome = follow(curve, np.zeros((5, 1)), options=TraceOptions(record=False))
-    assert outcome.code.tolist() == [BRANCH] * 5
+    outcome = trace(curve, np.zeros((5, 1)), options=TraceOptions(record=False))
+    assert outcome.code.tolist() == [EventCode.BRANCH_POINT] * 5
 
 
 def dipping(depth, centre, c=1.0):
@@ -110,12 +110,12 @@ def test_eigenvalues_that_touch_zero_show_in_many_lanes(centre, c, k, m):
     form = slaved(dipping(0.0, centre, c), k, m)
     stop = np.linspace(0.8, 1.0, 3)
     curve = ParameterLine(form, np.full((3, 1), -1.0), stop[:, None] + 1.0)
-    outcome = follow(curve, np.zeros((3, 2)), options=TraceOptions(record=False))
-    assert outcome.code.tolist() == [BRANCH] * 3
+    outcome = trace(curve, np.zeros((3, 2)), options=TraceOptions(record=False))
+    assert outcome.code.tolist() == [EventCode.BRANCH_POINT] * 3
     assert -1.0 + outcome.t * (stop + 1.0) == pytest.approx(np.full(3, centre), abs=1e-8)
     through = TraceOptions(through_folds=True, through_branch_points=True, record=False)
-    outcome = follow(curve, np.zeros((3, 2)), options=through)
-    assert outcome.code.tolist() == [ARRIVAL] * 3
+    outcome = trace(curve, np.zeros((3, 2)), options=through)
+    assert outcome.code.tolist() == [EventCode.ARRIVED] * 3
     lanes = outcome.passed.lanes
     assert np.unique(lanes).tolist() == [0, 1, 2]
     places = -1.0 + outcome.passed.t * (stop + 1.0)[lanes]
@@ -129,8 +129,8 @@ def test_folds_in_which_paths_do_not_turn_show_in_many_lanes(start, stop):
     x = np.cbrt(start)
     z, p = np.tile([x, 0.5 * x**2], (2, 1)), np.full((2, 1), start)
     curve = ParameterLine(form, p, np.array([[stop], [stop + 0.1]]) - start)
-    outcome = follow(curve, z, options=TraceOptions(record=False))
-    assert outcome.code.tolist() == [FOLD] * 2
+    outcome = trace(curve, z, options=TraceOptions(record=False))
+    assert outcome.code.tolist() == [EventCode.FOLD] * 2
     assert start + outcome.t * curve.velocity[:, 0] == pytest.approx([0.0, 0.0], abs=1e-10)
 
 
@@ -170,9 +170,9 @@ def test_many_lanes_are_probed_together_each_as_if_alone(thorough):
     curve = ParameterLine(form, np.full((5, 1), -1.0), stop[:, None] + 1.0)
     z, options = np.zeros((5, 1)), TraceOptions(through_folds=True, through_branch_points=True)
     outcome = with_hidden_events(
-        curve, z, follow(curve, z, options=options), options, thorough=thorough
+        curve, z, trace(curve, z, options=options), options, thorough=thorough
     )
-    assert outcome.code.tolist() == [ARRIVAL] * 5
+    assert outcome.code.tolist() == [EventCode.ARRIVED] * 5
     root = np.sqrt(1e-3)
     places = curve.parameters(np.zeros(5))[outcome.passed.lanes, 0]
     places = places + outcome.passed.t * curve.velocity[outcome.passed.lanes, 0]
@@ -181,9 +181,15 @@ def test_many_lanes_are_probed_together_each_as_if_alone(thorough):
     assert outcome.index.tolist() == [0, 1, 0, 0, 0]
     options = TraceOptions()
     outcome = with_hidden_events(
-        curve, z, follow(curve, z, options=options), options, thorough=thorough
+        curve, z, trace(curve, z, options=options), options, thorough=thorough
     )
-    assert outcome.code.tolist() == [BRANCH, BRANCH, ARRIVAL, BRANCH, BRANCH]
+    assert outcome.code.tolist() == [
+        EventCode.BRANCH_POINT,
+        EventCode.BRANCH_POINT,
+        EventCode.ARRIVED,
+        EventCode.BRANCH_POINT,
+        EventCode.BRANCH_POINT,
+    ]
     assert outcome.why == {}
     assert -1.0 + outcome.t * (stop + 1.0) == pytest.approx([-root, -root, -0.5, -root, -root])
 

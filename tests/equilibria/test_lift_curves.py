@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria.lifting.pieces import approximated
+from equimorph.equilibria.prescribed_curves import approximated
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from oracles.polynomial import Polynomial, fold_form, pitchfork_form

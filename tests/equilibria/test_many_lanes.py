@@ -1,6 +1,7 @@
 """Lifts and limit loads of many states: equal to those of each alone, in bounded memory."""
 
 import tracemalloc
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -203,7 +204,7 @@ class StopAfter:
 
 def test_cancelled_lifts_keep_what_is_done(arch, monkeypatch):
     """The finished lanes equal those of an undisturbed run; the others are "cancelled"."""
-    monkeypatch.setattr("equimorph.equilibria.outcome.REPORT_EVERY", 0.0)
+    monkeypatch.setattr(import_module("equimorph.equilibria.trace"), "REPORT_EVERY", 0.0)
     seed = rest_states(arch, 250)
     states = States(arch, np.tile(seed.z, (40, 1)), np.tile(seed.p, (40, 1)))
     sink = StopAfter(500)
@@ -218,6 +219,6 @@ def test_cancelled_lifts_keep_what_is_done(arch, monkeypatch):
 
 
 def test_cancelled_lift_of_one_state_is_said_to_be_cancelled(arch, monkeypatch):
-    monkeypatch.setattr("equimorph.equilibria.outcome.REPORT_EVERY", 0.0)
+    monkeypatch.setattr(import_module("equimorph.equilibria.trace"), "REPORT_EVERY", 0.0)
     path = em.lift(rest_states(arch, 1)[0], {"q": 2.0}, progress=StopAfter(0))
     assert path.end.kind == "cancelled"

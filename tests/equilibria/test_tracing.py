@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria import ParameterLine, TraceOptions, follow
-from equimorph.equilibria.fronts import initial_front
-from equimorph.equilibria.outcome import Batching
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD
+from equimorph.equilibria import ParameterLine, TraceOptions, trace
+from equimorph.equilibria.steps import initial_front
+from equimorph.equilibria.trace import Batching
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.structures import States
 from oracles.polynomial import fold_form, pitchfork_form
 
@@ -37,10 +37,17 @@ def test_lanes_do_not_influence_each_other():
     start = np.array([state.p for state in rest] * 2)
     velocity = np.zeros_like(start)
     velocity[:3, 2], velocity[3:, 2] = 8.0, 1.0
-    whole = follow(ParameterLine(arch, start, velocity), z)
-    assert whole.code.tolist() == [BRANCH, FOLD, FOLD, ARRIVAL, ARRIVAL, ARRIVAL]
+    whole = trace(ParameterLine(arch, start, velocity), z)
+    assert whole.code.tolist() == [
+        EventCode.BRANCH_POINT,
+        EventCode.FOLD,
+        EventCode.FOLD,
+        EventCode.ARRIVED,
+        EventCode.ARRIVED,
+        EventCode.ARRIVED,
+    ]
     for i in range(6):
-        alone = follow(ParameterLine(arch, start[i : i + 1], velocity[i : i + 1]), z[i : i + 1])
+        alone = trace(ParameterLine(arch, start[i : i + 1], velocity[i : i + 1]), z[i : i + 1])
         assert alone.code[0] == whole.code[i]
         assert np.abs(alone.z[0] - whole.z[i]).max() < 1e-12
         assert alone.t[0] == pytest.approx(whole.t[i], rel=1e-13)
@@ -49,8 +56,8 @@ def test_lanes_do_not_influence_each_other():
 def test_one_lost_lane_does_not_sink_the_batch():
     """The second lane starts at a fold, where nothing leads on."""
     curve, z = lines(fold_form(), [[1.0], [0.0]], [[1.0], [0.0]], [[4.0], [1.0]])
-    outcome = follow(curve, z)
-    assert outcome.code.tolist() == [ARRIVAL, 0]
+    outcome = trace(curve, z)
+    assert outcome.code.tolist() == [EventCode.ARRIVED, 0]
     assert "singular" in outcome.why[1]
     assert outcome.z[0, 0] == pytest.approx(2.0, rel=1e-14)
 
@@ -60,16 +67,16 @@ def test_every_goal_is_arrived_at_wherever_the_last_step_ends():
     goals = np.linspace(1.2, 9.0, 2000)[:, None]
     ones = np.ones_like(goals)
     curve, z = lines(fold_form(), ones, ones, goals)
-    outcome = follow(curve, z, options=TraceOptions(record=False, retries=0))
-    assert (outcome.code == ARRIVAL).all()
+    outcome = trace(curve, z, options=TraceOptions(record=False, retries=0))
+    assert (outcome.code == EventCode.ARRIVED).all()
     assert outcome.why == {}
     assert outcome.z == pytest.approx(np.sqrt(goals), rel=1e-14)
 
 
 def test_recorded_points_keep_the_names_of_their_lanes():
     curve, z = lines(pitchfork_form(1.0), [[0.0], [1.0]], [[-1.0, 0], [1, 0]], [[1.0, 0], [4, 0]])
-    outcome = follow(curve, z)
-    assert outcome.code.tolist() == [BRANCH, ARRIVAL]
+    outcome = trace(curve, z)
+    assert outcome.code.tolist() == [EventCode.BRANCH_POINT, EventCode.ARRIVED]
     points = outcome.points
     assert points.z[points.lanes == 0] == pytest.approx(0.0, abs=1e-14)
     assert (points.z[points.lanes == 1] >= 1.0).all()
@@ -117,10 +124,15 @@ def test_results_are_the_same_bit_for_bit_in_any_order_on_any_number_of_threads(
     within = (arch.max_curvature <= 5.0,)
     order = np.random.default_rng(2).permutation(300)
     back = np.argsort(order)
-    columns, points = outcome_columns(follow(ParameterLine(arch, start, velocity), z, within))
-    assert set(columns[0].tolist()) == {ARRIVAL, FOLD, BRANCH, CONSTRAINT}
+    columns, points = outcome_columns(trace(ParameterLine(arch, start, velocity), z, within))
+    assert set(columns[0].tolist()) == {
+        EventCode.ARRIVED,
+        EventCode.FOLD,
+        EventCode.BRANCH_POINT,
+        EventCode.CONSTRAINT,
+    }
     line = ParameterLine(arch, start[order], velocity[order])
-    other, others = outcome_columns(follow(line, z[order], within, batching=batching))
+    other, others = outcome_columns(trace(line, z[order], within, batching=batching))
     for a, b in zip(columns, other, strict=True):
         assert np.array_equal(a, b[back])
     for lane in range(300):
@@ -144,7 +156,7 @@ def test_progress_is_reported_and_an_error_of_the_sink_cancels():
     velocity[:, 2] = 8.0
     sink = Impatient()
     with pytest.raises(TimeoutError):
-        follow(ParameterLine(arch, start, velocity), np.tile(rest.z, (20000, 1)), progress=sink)
+        trace(ParameterLine(arch, start, velocity), np.tile(rest.z, (20000, 1)), progress=sink)
     [(stage, done, total)] = sink.seen
     assert stage == "tracing lanes"
     assert 0 <= done < total == 20000

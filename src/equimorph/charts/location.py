@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Points
 from equimorph.charts.coordinates import Coordinates
 from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
@@ -267,8 +267,8 @@ class Cells:
         velocity = np.zeros_like(start.p)
         velocity[:, self.coordinates.places] = wanted - start.p[:, self.coordinates.places]
         line = ParameterLine(self.eset.structure, start.p.copy(), velocity)
-        ended = follow(line, start.z.copy(), (), TraceOptions(record=False))
-        arrived = ended.code == ARRIVAL
+        ended = trace(line, start.z.copy(), (), TraceOptions(record=False))
+        arrived = ended.code == EventCode.ARRIVED
         p = start.p + velocity
         index = np.where(arrived, ended.index, -1)
         return ended.z, p, self._allowed(ended.z, p, arrived, index, hits.cell)

@@ -14,8 +14,8 @@ from equimorph.charts.location import Found
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.first_stable import OFF, STABLE, FirstStable
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.embedding import embed
@@ -293,8 +293,8 @@ def _loaded(eset: EquilibriumSet, load: int, low: float) -> Ends:
 
     def ends(z: Lanes, begin: Parameters, goal: Parameters) -> Lanes:
         line = ParameterLine(eset.structure, begin, goal - begin)
-        ended = follow(line, z.copy(), eset.constraints, TraceOptions(record=False))
-        there = (ended.code == ARRIVAL) | (ended.t > 1.0 - AT_END)
+        ended = trace(line, z.copy(), eset.constraints, TraceOptions(record=False))
+        there = (ended.code == EventCode.ARRIVED) | (ended.t > 1.0 - AT_END)
         return np.where(there[:, None], ended.z, np.nan)
 
     return ends

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 from equimorph.equilibria import find_equilibria, limit_load
-from equimorph.equilibria.stepping.kernels import proceed
+from equimorph.equilibria.step_kernels import proceed
 from equimorph.linalg.compiled import is_kept
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box, Constraint

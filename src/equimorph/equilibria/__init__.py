@@ -1,8 +1,8 @@
 """Equilibria: solving, lifting, events, limit loads, searching."""
 
-from equimorph.equilibria.both_ways import CriticalCurve
 from equimorph.equilibria.completeness import Completeness
 from equimorph.equilibria.critical_curves import (
+    CriticalCurve,
     branch_curve,
     constraint_curve,
     cusp_curve,
@@ -12,18 +12,18 @@ from equimorph.equilibria.critical_curves import (
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
 from equimorph.equilibria.deflation import deflated_newton
 from equimorph.equilibria.imperfections import Corner, corners_of, worst_named, worst_over
+from equimorph.equilibria.legs import Leg, Waypoint
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
-from equimorph.equilibria.lifting.legs import Leg, Waypoint
-from equimorph.equilibria.lifting.paths import lift_legs
-from equimorph.equilibria.limit import LimitLoad, LimitLoads, limit_load
+from equimorph.equilibria.limit_load import LimitLoad, LimitLoads, limit_load
 from equimorph.equilibria.newton import newton
-from equimorph.equilibria.outcome import Outcome, follow
+from equimorph.equilibria.paths import lift_legs
 from equimorph.equilibria.pools import distinct
 from equimorph.equilibria.ranges import held_over
 from equimorph.equilibria.search import FoundStates, find_equilibria, search_points
 from equimorph.equilibria.snap import Landing, snap_landing
 from equimorph.equilibria.switching import Branch, branches
-from equimorph.equilibria.tracing import TraceOptions
+from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace_options import TraceOptions
 
 __all__ = [
     "Branch",
@@ -38,10 +38,10 @@ __all__ = [
     "LimitLoad",
     "LimitLoads",
     "NewtonHomotopy",
-    "Outcome",
     "ParameterLine",
     "Path",
     "TraceOptions",
+    "Traces",
     "Waypoint",
     "branch_curve",
     "branches",
@@ -53,7 +53,6 @@ __all__ = [
     "distinct",
     "find_equilibria",
     "fold_curve",
-    "follow",
     "grazing_curve",
     "held_over",
     "lift",
@@ -62,6 +61,7 @@ __all__ = [
     "newton",
     "search_points",
     "snap_landing",
+    "trace",
     "way_points",
     "worst_named",
     "worst_over",

@@ -7,9 +7,9 @@ from jaxtyping import Int
 
 from equimorph.arrays import Values
 from equimorph.equilibria.critical import Critical
-from equimorph.equilibria.following import Watch
 from equimorph.equilibria.lift import check_start
 from equimorph.equilibria.locus import Test
+from equimorph.equilibria.trace_locus import Watch
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position
 from equimorph.structures import State, Structure

@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import ParameterLine
-from equimorph.equilibria.normal_form import criticality
-from equimorph.equilibria.outcome import Outcome, follow
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, RETURN, TraceOptions
+from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Structure
 
@@ -116,19 +116,23 @@ class FirstStable:
         velocity = np.zeros_like(walk.p)
         velocity[:, self.load] = goal - walk.p[:, self.load]
         line = ParameterLine(self.structure, walk.p.copy(), velocity)
-        ended = follow(line, walk.z.copy(), self.within, self.options)
-        arrived, returned = ended.code == ARRIVAL, ended.code == RETURN
+        ended = trace(line, walk.z.copy(), self.within, self.options)
+        arrived, returned = ended.code == EventCode.ARRIVED, ended.code == EventCode.RETURNED
         outside = arrived & (walk.up == walk.high)
         inside = (arrived & ~outside) | returned
         high, up = walk.high ^ (arrived & ~outside), walk.up ^ returned
         p = line.parameters(ended.t)
         p[inside, self.load] = np.where(high, walk.at, self.low)[inside]
-        z = np.where((inside | outside | (ended.code == CONSTRAINT))[:, None], ended.z, np.nan)
+        z = np.where(
+            (inside | outside | (ended.code == EventCode.CONSTRAINT))[:, None], ended.z, np.nan
+        )
         way = np.where(walk.way == STABLE, _first_loss(line, ended), walk.way)
         if passed is not None:
             _note(passed, walk.lane, line, ended)
         met = inside & high & (ended.index == 0)
-        kind = np.select([met, outside, ended.code == CONSTRAINT], [way, NONE, BOUND], LOST)
+        kind = np.select(
+            [met, outside, ended.code == EventCode.CONSTRAINT], [way, NONE, BOUND], LOST
+        )
         return _Walk(walk.lane, z, p, walk.at, way, high, up), kind
 
 
@@ -136,7 +140,7 @@ def _note(
     passed: Shaped[np.ndarray, " all"],
     lanes: Int[np.ndarray, " lanes"],
     line: ParameterLine,
-    ended: Outcome,
+    ended: Traces,
 ) -> None:
     """Add the critical states that paths met to those known."""
     events = ended.passed
@@ -146,13 +150,13 @@ def _note(
         passed[lane] = (*passed[lane], Passed((before, behind), events.z[k], p[k]))
 
 
-def _first_loss(line: ParameterLine, ended: Outcome) -> Int[np.ndarray, " lanes"]:
+def _first_loss(line: ParameterLine, ended: Traces) -> Int[np.ndarray, " lanes"]:
     """What the first loss of stability on the way means for a real loading."""
     way = np.full(len(ended.code), STABLE)
     losses = ended.passed.take(ended.passed.index[:, 1] > 0)
     lanes, first = np.unique(losses.lanes, return_index=True)
     way[lanes] = SNAPS
-    branch = np.flatnonzero(losses.code[first] == BRANCH)
+    branch = np.flatnonzero(losses.code[first] == EventCode.BRANCH_POINT)
     if len(branch):
         at, which = lanes[branch], first[branch]
         kinds = criticality(line.take(at), losses.z[which], losses.t[which])

@@ -11,8 +11,8 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.newton import newton
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL, TraceOptions
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, position
 from equimorph.structures import Structure
@@ -135,7 +135,7 @@ class _Ray:
         if len(lanes):
             velocity = np.tile(TWICE * self.corner, (len(lanes), 1))
             line = ParameterLine(self.structure, p[lanes], velocity)
-            ended = follow(line, end[lanes], (), TraceOptions(record=False))
+            ended = trace(line, end[lanes], (), TraceOptions(record=False))
             share[lanes], end[lanes] = TWICE * ended.t, ended.z
             at[lanes] += ended.t[:, None] * velocity
         return share, end, at
@@ -196,8 +196,8 @@ class _Corners:
         many = np.repeat(lanes, len(self.corners) - 1)
         velocity = np.tile(self.corners[1:], (len(lanes), 1))
         line = ParameterLine(self.structure, p[many], velocity)
-        ended = follow(line, here[many], (), TraceOptions(record=False))
-        good = np.flatnonzero(ended.code == ARRIVAL)
+        ended = trace(line, here[many], (), TraceOptions(record=False))
+        good = np.flatnonzero(ended.code == EventCode.ARRIVED)
         values = np.full(len(many), np.inf)
         values[good] = self.descriptor.function(ended.z[good], p[many[good]] + velocity[good])
         out[lanes, 1:] = values.reshape(len(lanes), -1)

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import overload
 
-from equimorph.equilibria.lifting.legs import Leg, way_points
-from equimorph.equilibria.lifting.lifts import Lifts, lift_many
-from equimorph.equilibria.lifting.paths import Event, Path, lift_one
-from equimorph.equilibria.starts import check_start, check_starts
-from equimorph.equilibria.tracing import TraceOptions
+from equimorph.equilibria.legs import Leg, check_start, check_starts, way_points
+from equimorph.equilibria.lifts import Lifts, lift_many
+from equimorph.equilibria.paths import Event, Path, lift_one
+from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint, Progress
 from equimorph.structures import State, States
 

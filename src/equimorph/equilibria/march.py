@@ -7,10 +7,10 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Some, Values
 from equimorph.equilibria import kernels
-from equimorph.equilibria.cubics import least_inside
+from equimorph.equilibria import step_kernels as stepping
 from equimorph.equilibria.curves import Curve, squared_length
-from equimorph.equilibria.fronts import Bracket, Front, new_scalars
-from equimorph.equilibria.happenings import Happenings
+from equimorph.equilibria.events import Events
+from equimorph.equilibria.inside_steps import NARROW, inside_step
 from equimorph.equilibria.kernels import (
     ARRIVAL,
     BRANCH,
@@ -23,12 +23,17 @@ from equimorph.equilibria.kernels import (
     REFUSED,
     RETURN,
 )
-from equimorph.equilibria.location import locate_branch_point, polish
-from equimorph.equilibria.probing import NARROW, inside_step
-from equimorph.equilibria.records import EventFile, PointFile
-from equimorph.equilibria.starts import ON_BOUND
-from equimorph.equilibria.stepping import kernels as stepping
-from equimorph.equilibria.tracing import TraceOptions
+from equimorph.equilibria.legs import ON_BOUND
+from equimorph.equilibria.locate import locate_branch_point, polish
+from equimorph.equilibria.steps import (
+    Bracket,
+    EventFile,
+    Front,
+    PointFile,
+    least_inside,
+    new_scalars,
+)
+from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Advance
 
@@ -92,7 +97,7 @@ class Block:
         self.capacity, self.active = capacity, 0
         size = curve.metric.size
         self.events = EventFile(size, events + capacity)
-        self.hidden: list[Happenings] = []
+        self.hidden: list[Events] = []
         self._last: dict[int, float] = {}
         self.points = PointFile(size, capacity if options.record else 0)
         shapes = (2 * [(capacity, stepping.MEMORY, size)]) + (2 * [(capacity, size)])
@@ -235,7 +240,7 @@ class Block:
         counts = self._scalars[1]
         stage, what = counts[kernels.STAGE, : self.active], counts[kernels.WHAT, : self.active]
         for i in np.flatnonzero((stage == CONVERGED) & (what & (HIDDEN | EARLY) != 0)):
-            at, found = np.array([i]), list[Happenings]()
+            at, found = np.array([i]), list[Events]()
             for ends, lengths in self._doubtful(at, move) if self.options.look_inside else ():
                 found += inside_step(self._here.take(at), ends, lengths, self.options)
             events = self._new(int(counts[kernels.LANE, i]), found)
@@ -256,9 +261,9 @@ class Block:
             spans.append(self._around(at, move))
         return spans
 
-    def _new(self, lane: int, found: list[Happenings]) -> list[Happenings]:
+    def _new(self, lane: int, found: list[Events]) -> list[Events]:
         """Events of a lane but for those that were found in the step before, too."""
-        events = Happenings.joined(found, self.curve.metric.size)
+        events = Events.joined(found, self.curve.metric.size)
         known = self._last.get(lane, -np.inf)
         events = events.take(np.abs(events.travelled - known) > NARROW)
         if len(events.t):
@@ -337,7 +342,7 @@ class Block:
         if there:
             index = np.stack([front.index, front.index], 1)
             way = numbers[kernels.TRAVELLED, [i]] + np.sqrt(gap)
-            self.hidden.append(Happenings(lane, mark, z, goal, way, index, found))
+            self.hidden.append(Events(lane, mark, z, goal, way, index, found))
         return there
 
     def drop(self, lanes: Some) -> None:

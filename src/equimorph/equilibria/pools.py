@@ -9,8 +9,8 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
 from equimorph.equilibria.deflation import deflated_newton
 from equimorph.equilibria.newton import newton
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL, RETURN, TraceOptions
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Structure
 
@@ -110,8 +110,8 @@ class Pools:
             return
         structure, p = self.ground.structure, self.ground.p[group]
         curve = NewtonHomotopy(structure, p, structure.residual(guess, p))
-        outcome = follow(curve, guess, (), WIDE_STEPS)
-        arrived = outcome.code == ARRIVAL
+        outcome = trace(curve, guess, (), WIDE_STEPS)
+        arrived = outcome.code == EventCode.ARRIVED
         self.failures.append(("the Newton homotopy did not arrive", group[~arrived]))
         self._polished(outcome.z[arrived], group[arrived])
 
@@ -138,9 +138,9 @@ class Pools:
         direction = self._directions(len(lanes))
         velocity = np.concatenate([direction, -direction])
         line = ParameterLine(self.ground.structure, self.ground.p[group], velocity)
-        outcome = follow(line, np.tile(self.z[lanes], (2, 1)), (), WIDE_STEPS)
-        returned = outcome.code == RETURN
-        lost = ~returned & (outcome.code != ARRIVAL)
+        outcome = trace(line, np.tile(self.z[lanes], (2, 1)), (), WIDE_STEPS)
+        returned = outcome.code == EventCode.RETURNED
+        lost = ~returned & (outcome.code != EventCode.ARRIVED)
         self.failures.append(("a line was not followed to its end", group[lost]))
         self._polished(outcome.z[returned], group[returned])
 

@@ -9,8 +9,8 @@ from jaxtyping import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.newton import newton
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL, TraceOptions
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, position
 from equimorph.structures import Structure
@@ -87,8 +87,8 @@ class _Range:
         arrived, end = np.ones(len(z), bool), z.copy()
         if len(moving):
             line = ParameterLine(self.structure, p[moving], velocity[moving])
-            outcome = follow(line, z[moving], (), TraceOptions(record=False))
-            arrived[moving], end[moving] = outcome.code == ARRIVAL, outcome.z
+            outcome = trace(line, z[moving], (), TraceOptions(record=False))
+            arrived[moving], end[moving] = outcome.code == EventCode.ARRIVED, outcome.z
         return end, p + velocity, arrived
 
     def _excess(self, z: Lanes, p: Parameters) -> Values:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.equilibria.critical import NormalForm, normal_form
 from equimorph.equilibria.curves import ParameterLine, dual
-from equimorph.equilibria.fronts import Front, step_along
 from equimorph.equilibria.lift import Path, check_start
-from equimorph.equilibria.normal_form import NormalForm, normal_form
+from equimorph.equilibria.steps import Front, step_along
 from equimorph.errors import InputError
 from equimorph.model import position
 from equimorph.structures import State

@@ -18,7 +18,7 @@ from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 _HERE = Path(__file__)
-SOURCES = sorted([_HERE, _HERE.with_name("simd.py"), *_HERE.parents[1].rglob("kernels.py")])
+SOURCES = sorted([_HERE, _HERE.with_name("simd.py"), *_HERE.parents[1].rglob("*kernels.py")])
 """Every file with code that goes into kernels."""
 DIGEST = hashlib.sha256(b"".join(each.read_bytes() for each in SOURCES)).hexdigest()
 

@@ -9,9 +9,9 @@ from jaxtyping import Float, Int
 
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.critical import null_border
-from equimorph.equilibria.fronts import Front, step_along
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL, RETURN
+from equimorph.equilibria.steps import Front, step_along
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.geometry.crossing_points import reduction
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim
@@ -89,10 +89,10 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> Seeds:
         options = TraceOptions(
             through_folds=True, through_branch_points=True, first_step=0.005, record=False
         )
-        outcome = follow(ParameterLine(setting.structure, p, way), z, setting.constraints, options)
-        there = outcome.code == ARRIVAL
+        outcome = trace(ParameterLine(setting.structure, p, way), z, setting.constraints, options)
+        there = outcome.code == EventCode.ARRIVED
         reached.append(polished(setting, mesh, goal[there], outcome.z[there])[0])
-        back = np.flatnonzero(outcome.code == RETURN)
+        back = np.flatnonzero(outcome.code == EventCode.RETURNED)
         z, p, edges, towards = outcome.z[back], p[back], edges[back], 1 - towards[back]
         if len(back) == 0:
             break

@@ -12,7 +12,7 @@ from equimorph.errors import InputError
 from equimorph.manifold.geometry.points import GRID, Points
 from equimorph.manifold.lifting.pairing import HARD, LONG, UNTRACED, Pairing, Rays
 from equimorph.manifold.lifting.single_steps import lift_directly
-from equimorph.manifold.lifting.traced_edges import trace
+from equimorph.manifold.lifting.traced_edges import trace_rays
 from equimorph.model import Progress, step_of
 
 STEPS = 4
@@ -41,7 +41,7 @@ def flood(pairing: Pairing, progress: Progress) -> None:
         if len(hard.points) == 0:
             return
         for at in range(0, len(hard.points), CHUNK):
-            trace(pairing, hard.take(slice(at, at + CHUNK)))
+            trace_rays(pairing, hard.take(slice(at, at + CHUNK)))
 
 
 def flood_directly(pairing: Pairing, progress: Progress) -> None:

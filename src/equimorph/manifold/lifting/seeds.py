@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import ParameterLine, TraceOptions, search_points
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.single_steps import lift_directly
@@ -87,8 +87,8 @@ def _from_natural_states(
     options = TraceOptions(
         through_folds=True, through_branch_points=True, record=False, locate_passed=False
     )
-    outcome = follow(line, z[moving], setting.constraints, options)
-    arrived = outcome.code == ARRIVAL
+    outcome = trace(line, z[moving], setting.constraints, options)
+    arrived = outcome.code == EventCode.ARRIVED
     return (
         np.concatenate([vertices[~moving], vertices[moving][arrived]]),
         np.concatenate([z[~moving], outcome.z[arrived]]),

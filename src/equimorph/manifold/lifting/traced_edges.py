@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags
 from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.outcome import Outcome, follow
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, RETURN
+from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.geometry.crossing_points import corrected_crossings
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
@@ -58,7 +58,7 @@ class Traced:
         return out
 
 
-def trace(pairing: Pairing, rays: Rays) -> None:
+def trace_rays(pairing: Pairing, rays: Rays) -> None:
     """Lift rays by pseudo-arclength; what fails is to be traced again with finer steps."""
     line = pairing.line(rays)
     efforts = pairing.effort[rays.edges]
@@ -109,14 +109,14 @@ def _number(pairing: Pairing, point: Inner, edge: int) -> int:
 def _traced(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOptions) -> Traced:
     """Follow rays to their ends."""
     mesh, setting = pairing.mesh, pairing.setting
-    outcome = follow(line, pairing.points.z[rays.points], setting.constraints, options)
-    good = np.isin(outcome.code, (ARRIVAL, RETURN, CONSTRAINT))
+    outcome = trace(line, pairing.points.z[rays.points], setting.constraints, options)
+    good = np.isin(outcome.code, (EventCode.ARRIVED, EventCode.RETURNED, EventCode.CONSTRAINT))
     inner = _inner(pairing, rays, outcome, line, good)
     for lane, cap in _caps(pairing, outcome, line, good).items():
         inner.setdefault(lane, []).append(cap)
-    side = np.where(outcome.code == RETURN, rays.sides, 1 - rays.sides)
+    side = np.where(outcome.code == EventCode.RETURNED, rays.sides, 1 - rays.sides)
     vertices = mesh.edges[rays.edges, side]
-    vertices[outcome.code == CONSTRAINT] = -1
+    vertices[outcome.code == EventCode.CONSTRAINT] = -1
     there = np.flatnonzero(good & (vertices >= 0))
     rows = [(lane, *each) for lane, own in inner.items() for each in own]
     lanes, z, p, index, kind = zip(*rows, strict=True) if rows else 5 * ((),)
@@ -138,9 +138,9 @@ def _ends(pairing: Pairing, traced: Traced) -> Int[np.ndarray, " lanes"]:
     return ends
 
 
-def _caps(pairing: Pairing, outcome: Outcome, line: ParameterLine, good: Flags) -> dict[int, Inner]:
+def _caps(pairing: Pairing, outcome: Traces, line: ParameterLine, good: Flags) -> dict[int, Inner]:
     """Points at which lanes left through a constraint."""
-    lanes = np.flatnonzero(good & (outcome.code == CONSTRAINT))
+    lanes = np.flatnonzero(good & (outcome.code == EventCode.CONSTRAINT))
     z, p = outcome.z[lanes], line.take(lanes).parameters(outcome.t[lanes])
     # counted anew: a fold may lie between the last step and the constraint
     index = pairing.setting.structure.index(z, p).tolist()
@@ -150,7 +150,7 @@ def _caps(pairing: Pairing, outcome: Outcome, line: ParameterLine, good: Flags) 
 def _inner(
     pairing: Pairing,
     rays: Rays,
-    outcome: Outcome,
+    outcome: Traces,
     line: ParameterLine,
     good: Flags,
 ) -> dict[int, list[Inner]]:
@@ -159,10 +159,10 @@ def _inner(
     Lanes on which a crossing cannot be polished are not `good` any more.
     """
     passed = outcome.passed
-    at = np.flatnonzero(np.isin(passed.code, (FOLD, BRANCH)))
+    at = np.flatnonzero(np.isin(passed.code, (EventCode.FOLD, EventCode.BRANCH_POINT)))
     z, index = passed.z[at].copy(), passed.index[at].min(axis=1)
     p = line.start[passed.lanes[at]] + passed.t[at][:, None] * line.velocity[passed.lanes[at]]
-    kind = np.where(passed.code[at] == FOLD, ON_FOLD, CROSSING)
+    kind = np.where(passed.code[at] == EventCode.FOLD, ON_FOLD, CROSSING)
     keep = np.ones(len(at), bool)
     own = np.flatnonzero(kind == CROSSING)
     if len(own):
@@ -174,7 +174,9 @@ def _inner(
         keep[own] = _first_ones(pairing, crossed, pinned)
         doubtful = np.flatnonzero((kind == ON_FOLD) & np.isin(passed.lanes[at], crossed))
         there = (z[doubtful], p[doubtful])
-        keep[doubtful] = _pinned(pairing, rays.take(passed.lanes[at[doubtful]]), there, FOLD).found
+        keep[doubtful] = _pinned(
+            pairing, rays.take(passed.lanes[at[doubtful]]), there, EventCode.FOLD
+        ).found
     rows: dict[int, list[Inner]] = {}
     places: dict[int, float] = {}
     for k in np.flatnonzero(keep):
@@ -212,7 +214,7 @@ def _pinned(
     ends = mesh.vertices[mesh.edges[rays.edges]] / setting.scales
     span = ends[:, 1] - ends[:, 0]
     span /= np.linalg.norm(span, axis=1, keepdims=True)
-    place, fold = embed(setting, *states), kind == FOLD
+    place, fold = embed(setting, *states), kind == EventCode.FOLD
     aim = Aim(setting, fold, False, span[:, None], place, place[:, None][:, :0])
     pinned = (corrected if fold else corrected_crossings)(aim, *states, np.zeros(len(place)))
     if fold:
@@ -221,7 +223,7 @@ def _pinned(
     return pinned
 
 
-def _between(outcome: Outcome, line: ParameterLine, lane: int, span: tuple[float, float]) -> Inner:
+def _between(outcome: Traces, line: ParameterLine, lane: int, span: tuple[float, float]) -> Inner:
     """Recorded point of a lane nearest to the middle of an interval of its length."""
     points = outcome.points
     own = slice(*np.searchsorted(points.lanes, [lane, lane + 1]))

@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL, RETURN
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.model import Constraint
 from equimorph.structures import States
 
@@ -20,8 +20,8 @@ def turned_back(
 ) -> tuple[Float[np.ndarray, "some size"], Int[np.ndarray, " some"]]:
     """States in which moves of the parameters end that turn back at a fold; which moves do."""
     line = ParameterLine(states.structure, states.p.copy(), velocity)
-    outcome = follow(line, states.z.copy(), (), STRAIGHT_ON)
-    which = np.flatnonzero(outcome.code == RETURN)
+    outcome = trace(line, states.z.copy(), (), STRAIGHT_ON)
+    which = np.flatnonzero(outcome.code == EventCode.RETURNED)
     return outcome.z[which], which
 
 
@@ -33,7 +33,7 @@ def lift_to(
     still = np.abs(velocity).max(axis=1, initial=0.0) == 0.0
     moving = np.flatnonzero(~still)
     line = ParameterLine(states.structure, states.p[moving].copy(), velocity[moving])
-    outcome = follow(line, states.z[moving].copy(), constraints, STRAIGHT_ON)
-    arrived = outcome.code == ARRIVAL
+    outcome = trace(line, states.z[moving].copy(), constraints, STRAIGHT_ON)
+    arrived = outcome.code == EventCode.ARRIVED
     which = np.concatenate([np.flatnonzero(still), moving[arrived]])
     return np.concatenate([states.z[still], outcome.z[arrived]]), which

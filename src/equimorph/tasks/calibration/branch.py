@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters
-from equimorph.equilibria import ParameterLine, TraceOptions, follow, newton
-from equimorph.equilibria.outcome import KINDS
-from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.equilibria import ParameterLine, TraceOptions, newton, trace
+from equimorph.equilibria.trace import KINDS
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.structures import States, Structure
 from equimorph.tasks.calibration.measurements import Columns, Measurement, by_data, derivative
@@ -167,10 +167,10 @@ class Branch:
         lanes = np.flatnonzero(far)
         if len(lanes):
             line = ParameterLine(structure, self.p[lanes].copy(), p[lanes] - self.p[lanes])
-            ended = follow(
+            ended = trace(
                 line, z[lanes].copy(), (), TraceOptions(record=False, steps=STEPS, retries=0)
             )
-            short = np.flatnonzero(ended.code != ARRIVAL)
+            short = np.flatnonzero(ended.code != EventCode.ARRIVED)
             if len(short):
                 self._note(KINDS[int(ended.code[short[0]])], int(lanes[short[0]]))
                 return None

@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Bool
 
 from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
-from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, follow, limit_load
+from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, limit_load, trace
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Grid, Progress, Silent, position
 from equimorph.structures import States, Structure
@@ -24,7 +24,12 @@ from equimorph.tasks.maps.curves import curves_through, edge_of_definition, plac
 KINDS = (*START_KINDS, "fold", "branch point", "constraint", "none below the bound")
 """What ended the path at a setting, in the order of their numbers."""
 END_FOLD, END_BRANCH, END_CONSTRAINT, END_NONE = range(len(START_KINDS), len(KINDS))
-_OF_CODE = {FOLD: END_FOLD, BRANCH: END_BRANCH, CONSTRAINT: END_CONSTRAINT, ARRIVAL: END_NONE}
+_OF_CODE: dict[int, int] = {
+    EventCode.FOLD: END_FOLD,
+    EventCode.BRANCH_POINT: END_BRANCH,
+    EventCode.CONSTRAINT: END_CONSTRAINT,
+    EventCode.ARRIVED: END_NONE,
+}
 
 
 JUMP = 5e-3
@@ -162,7 +167,7 @@ class LimitLoadRays:
         velocity[:, self.load] = self.bound - p[ready, self.load]
         if len(ready):
             line = ParameterLine(self.sheet.structure, p[ready].copy(), velocity)
-            ended = follow(line, z[ready].copy(), self.within, self.options)
+            ended = trace(line, z[ready].copy(), self.within, self.options)
             kind[ready] = [_OF_CODE.get(int(code), LOST) for code in ended.code]
             z[ready], p[ready] = ended.z, line.parameters(ended.t)
             value[ready] = np.where(kind[ready] == LOST, np.nan, p[ready, self.load])

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.equilibria import Leg
-from equimorph.equilibria.lifting.legs import changed
+from equimorph.equilibria.legs import changed
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, position
 from equimorph.structures import State, Structure

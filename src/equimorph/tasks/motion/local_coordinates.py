@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.equilibria.steering import answers, slopes_along
+from equimorph.equilibria.sensitivity import answers, slopes_along
 from equimorph.model import Descriptor
 from equimorph.structures import Structure
 

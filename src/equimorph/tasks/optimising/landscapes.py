@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes, Values
-from equimorph.equilibria import ParameterLine, TraceOptions, follow
-from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.equilibria import ParameterLine, TraceOptions, trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, StatesOver
 from equimorph.manifold.queries.locate import pieces_of
@@ -202,5 +202,5 @@ def _barriers(
 def _lifted(a: States, b: States) -> tuple[Flags, Lanes]:
     """Whether states stay stable on the way to the parameters of others, and where they end."""
     line = ParameterLine(a.structure, a.p.copy(), b.p - a.p)
-    ended = follow(line, a.z.copy(), (), TraceOptions(record=False))
-    return np.asarray(ended.code == ARRIVAL), ended.z
+    ended = trace(line, a.z.copy(), (), TraceOptions(record=False))
+    return np.asarray(ended.code == EventCode.ARRIVED), ended.z

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
-from equimorph.equilibria.steering import answers
+from equimorph.equilibria.sensitivity import answers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected

@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.outcome import Outcome, follow
-from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint
@@ -81,8 +81,8 @@ def lift_straight(source: States, p: Parameters, demands: Demands) -> tuple[Lane
     moving = np.flatnonzero(np.abs(velocity).max(axis=1, initial=0.0) > 0.0)
     if len(moving):
         line = ParameterLine(structure, source.p[moving].copy(), velocity[moving])
-        outcome = follow(line, z[moving], demands.constraints, demands.options)
-        arrived = outcome.code == ARRIVAL
+        outcome = trace(line, z[moving], demands.constraints, demands.options)
+        arrived = outcome.code == EventCode.ARRIVED
         if demands.margin > 0.0:
             arrived &= _keeps_margin(line, outcome, demands)
         z[moving], there[moving] = outcome.z, arrived
@@ -95,7 +95,7 @@ def distances(mass: Float[np.ndarray, " n"], dz: Lanes) -> Values:
     return np.asarray(np.sqrt(dz[:, : len(mass)] ** 2 @ mass))
 
 
-def _keeps_margin(line: ParameterLine, outcome: Outcome, demands: Demands) -> Flags:
+def _keeps_margin(line: ParameterLine, outcome: Traces, demands: Demands) -> Flags:
     """Whether every recorded point of the lifts has at least the margin."""
     keeps = np.ones(len(outcome.code), bool)
     points = outcome.points
@@ -106,7 +106,7 @@ def _keeps_margin(line: ParameterLine, outcome: Outcome, demands: Demands) -> Fl
     return keeps
 
 
-def _costs(source: States, line: ParameterLine, outcome: Outcome, objective: Objective) -> Values:
+def _costs(source: States, line: ParameterLine, outcome: Traces, objective: Objective) -> Values:
     """Cost of each lift, summed up over its recorded points."""
     if objective.is_length:
         return np.asarray(outcome.travelled * sum(weight for weight, _ in objective.terms))

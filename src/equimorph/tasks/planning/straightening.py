@@ -8,8 +8,8 @@ from jaxtyping import Bool, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.equilibria import ParameterLine, TraceOptions, check_start, newton
-from equimorph.equilibria.outcome import follow
-from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, position
@@ -138,9 +138,9 @@ def _divided(corners: States, demands: Demands) -> States:
 def _lifted(states: States, p: Parameters, demands: Demands) -> tuple[Lanes, Flags]:
     """States lifted straight to parameters, and whether they arrived."""
     line = ParameterLine(states.structure, states.p.copy(), p - states.p)
-    outcome = follow(line, states.z.copy(), demands.constraints, TraceOptions(record=False))
+    outcome = trace(line, states.z.copy(), demands.constraints, TraceOptions(record=False))
     z, found = newton(states.structure, outcome.z, p, iterations=4)
-    return z, (outcome.code == ARRIVAL) & found
+    return z, (outcome.code == EventCode.ARRIVED) & found
 
 
 def _thinned(corners: States, demands: Demands, same_class: bool) -> States:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.equilibria.steering import steering
+from equimorph.equilibria.sensitivity import steering
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.locate import cell_of

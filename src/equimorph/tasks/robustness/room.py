@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Parameters, Values
-from equimorph.equilibria import ParameterLine, TraceOptions, follow
-from equimorph.equilibria.outcome import KINDS
-from equimorph.equilibria.starts import check_starts
-from equimorph.equilibria.tracing import ARRIVAL
+from equimorph.equilibria import ParameterLine, TraceOptions, trace
+from equimorph.equilibria.legs import check_starts
+from equimorph.equilibria.trace import KINDS
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position
 from equimorph.structures import State, States
@@ -163,7 +163,7 @@ class _Rays:
         self.scale = np.full(count, most)
         self.direction = np.zeros((count, len(self.widths)))
         self.z, self.p = states.z.copy(), states.p.copy()
-        self.code = np.full(count, ARRIVAL)
+        self.code = np.full(count, EventCode.ARRIVED)
 
     def try_all(self, directions: Directions) -> None:
         """Lift rays in the same directions from all states."""
@@ -190,8 +190,8 @@ class _Rays:
         reach = self._furthest(start.p, velocity, self.scale[lanes])
         velocity *= reach[:, None]
         line = ParameterLine(self.states.structure, start.p.copy(), velocity)
-        outcome = follow(line, start.z.copy(), self.within, TraceOptions(record=False))
-        ended = np.where(outcome.code == ARRIVAL, np.inf, outcome.t * reach)
+        outcome = trace(line, start.z.copy(), self.within, TraceOptions(record=False))
+        ended = np.where(outcome.code == EventCode.ARRIVED, np.inf, outcome.t * reach)
         for lane in np.flatnonzero(ended < self.scale[lanes]):
             owner = lanes[lane]
             if ended[lane] < self.scale[owner]:

@@ -1,4 +1,4 @@
-"""Compiled kernels of root finding inside steps: one lane a row, beside those of the march.
+"""Compiled kernels of events: copies of steps and points, and roots of scalars inside steps.
 
 The scalar is known at both ends of a bracket and at the point before; a trial point between them is
 predicted by the cubic through the ends and corrected like any step, then the bracket shrinks.
@@ -7,23 +7,32 @@ predicted by the cubic through the ends and corrected like any step, then the br
 import numpy as np
 
 from equimorph.equilibria.kernels import (
+    BRIEF,
     CONVERGED,
     CORNER,
     CORRECTING,
     DEFECT,
     ENDED,
+    HEAD,
+    INDEX,
     ITERATION,
     LANE,
     LAST,
     LENGTH,
+    LEVEL,
+    NEW_INDEX,
     NEW_SLOPE,
     NORM,
     REFUSED,
+    SLOPE,
     STAGE,
     STEPS,
     SUMS,
+    TRAVELLED,
     TRIAL,
     WEIGHT,
+    WHAT,
+    T,
 )
 from equimorph.linalg.compiled import njit
 
@@ -165,3 +174,46 @@ def hand_out(places, counts, ends, active, z, t, at, found):
             z[lane, j] = one[i, j]
         t[lane], at[lane], found[lane] = ends[T1, i], ends[X1, i], stage == ENDED
         counts[STAGE, i] = ENDED
+
+
+@njit(**BRIEF)
+def file_events(new_tangent, stops, places, numbers, counts, active, buffer, filled):
+    """Copy the steps in which something happened behind others; end lanes; return how many."""
+    z, tangent, trial, _ = places
+    size = trial.shape[1]
+    z0, tangent0, z1, tangent1, values, names = buffer
+    for i in range(active):
+        what = counts[WHAT, i]
+        if counts[STAGE, i] != CONVERGED or what == 0:
+            continue
+        norm, here = 1.0 / numbers[NORM, i], counts[HEAD, i]
+        for j in range(size):
+            z0[filled, j], tangent0[filled, j] = z[i, here, j], tangent[i, here, j]
+        for j in range(size):
+            z1[filled, j], tangent1[filled, j] = trial[i, j], new_tangent[i, j] * norm
+        values[0, filled], values[1, filled] = numbers[T, i], numbers[SLOPE, i]
+        values[2, filled], values[3, filled] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
+        values[4, filled], values[5, filled] = numbers[LENGTH, i], numbers[TRAVELLED, i]
+        names[0, filled], names[1, filled] = counts[LANE, i], what
+        names[2, filled], names[3, filled] = counts[INDEX, i], counts[NEW_INDEX, i]
+        filled += 1
+        if what & stops:
+            counts[STAGE, i] = ENDED
+    return filled
+
+
+@njit(**SUMS)
+def file_points(trial, numbers, counts, active, buffer, filled):
+    """Copy the ends of good steps of lanes that go on behind other points; return how many."""
+    z, values, names = buffer
+    for i in range(active):
+        if counts[STAGE, i] != CONVERGED:
+            continue
+        for j in range(trial.shape[1]):
+            z[filled, j] = trial[i, j]
+        values[0, filled] = numbers[TRAVELLED, i] + numbers[LENGTH, i]
+        values[1, filled] = numbers[TRIAL, i]
+        names[0, filled], names[1, filled] = counts[LANE, i], counts[NEW_INDEX, i]
+        names[2, filled] = counts[LEVEL, i]
+        filled += 1
+    return filled

@@ -1,8 +1,8 @@
-"""Events that neither index nor direction betray: eigenvalues that touch zero, or cross it twice.
+"""Events that steps do not show: eigenvalues that touch zero, cross it twice, or vanish together.
 
 Between neighbouring points of a path the eigenvalue of F_z nearest to zero is the cubic through its
-values and slopes. Where that comes close to zero, the step is looked into. For many lanes, a test
-function that costs one solve for each point tells before where the eigenvalue is worth its price.
+values and slopes. Where that comes close to zero, the step is searched. For many lanes, a test
+function that costs one solve per point tells first where the eigenvalue is worth its price.
 """
 
 from dataclasses import replace
@@ -10,24 +10,14 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Lanes, Some
-from equimorph.equilibria.cubics import least_inside
+from equimorph.arrays import Lanes, Parameters, Some, Values
 from equimorph.equilibria.curves import Curve, dual
-from equimorph.equilibria.fronts import Front
-from equimorph.equilibria.happenings import Happenings, locate_all
-from equimorph.equilibria.outcome import LOST, Outcome
-from equimorph.equilibria.probing import AT_EVENT, CLOSE, look_inside, probed, step_between
-from equimorph.equilibria.tracing import (
-    ARRIVAL,
-    CONSTRAINT,
-    FOLD,
-    RETURN,
-    Points,
-    TraceOptions,
-)
-
-Values = Float[np.ndarray, " points"]
-Flags = Bool[np.ndarray, " points"]
+from equimorph.equilibria.events import Events, locate_all
+from equimorph.equilibria.inside_steps import AT_EVENT, CLOSE, look_inside, probed, step_between
+from equimorph.equilibria.steps import Front, Points, least_inside
+from equimorph.equilibria.trace import Traces
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
+from equimorph.structures import Structure
 
 DOUBTFUL = 0.4
 """Least value of the test function between two points, as a share of those at its ends, from which
@@ -35,26 +25,28 @@ on the eigenvalue is looked at."""
 COLUMNS = 3
 """Right-hand sides of the solve for the test function: the smallest eigenvalues that it sees."""
 AT_ONCE = 1024
-"""Points whose test functions are evaluated together: they stay in the cache."""
-REGULAR_ENDS = (ARRIVAL, RETURN, CONSTRAINT)
+"""Points, or lanes, that are evaluated together: they stay in the cache."""
+Counts = Int[np.ndarray, " lanes"]
+
+REGULAR_ENDS = (EventCode.ARRIVED, EventCode.RETURNED, EventCode.CONSTRAINT)
 
 
 def with_hidden_events(
     curve: Curve,
     z: Lanes,
-    outcome: Outcome,
+    outcome: Traces,
     options: TraceOptions,
     *,
     thorough: bool = True,
-) -> Outcome:
-    """Outcome of recorded lanes, started at z, completed by what their steps did not show.
+) -> Traces:
+    """Traces of recorded lanes, started at z, completed by what their steps did not show.
 
     The first hidden event that stops a lane becomes its end. See `hidden_events`.
     """
     points = _points(curve, z, outcome)
     inside = hidden_events(curve, points, options, thorough=thorough)
     last_ones = _before_ends(curve, points, outcome)
-    hidden = Happenings.joined([inside, last_ones], z.shape[1])
+    hidden = Events.joined([inside, last_ones], z.shape[1])
     if len(hidden.code) == 0:
         return outcome
     stops = np.flatnonzero((hidden.code & options.stops != 0) | ~hidden.found)
@@ -65,10 +57,10 @@ def with_hidden_events(
     places, t = outcome.z.copy(), outcome.t.copy()
     travelled, last = outcome.travelled.copy(), np.full(len(code), np.inf)
     index[last_ones.lanes] = last_ones.index[:, 1]
-    code[lanes], index[lanes] = np.where(located, end.code, LOST), end.index[:, 0]
+    code[lanes], index[lanes] = np.where(located, end.code, EventCode.LOST), end.index[:, 0]
     places[lanes], t[lanes] = end.z, end.t
     travelled[lanes] = last[lanes] = end.travelled
-    passed = Happenings.joined([outcome.passed, hidden], z.shape[1])
+    passed = Events.joined([outcome.passed, hidden], z.shape[1])
     why = outcome.why | {int(end.lanes[i]): _why(end, i) for i in range(len(lanes))}
     return replace(
         outcome,
@@ -82,19 +74,19 @@ def with_hidden_events(
     )
 
 
-def _why(end: Happenings, i: int) -> str:
+def _why(end: Events, i: int) -> str:
     if not end.found[i]:
         return "a hidden pair of events could not be located"
-    touching = end.index[i, 0] == end.index[i, 1] and end.code[i] == FOLD
+    touching = end.index[i, 0] == end.index[i, 1] and end.code[i] == EventCode.FOLD
     return "the path touches a fold and goes on" if touching else ""
 
 
-def _before_ends(curve: Curve, points: Points, outcome: Outcome) -> Happenings:
+def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     """Events between the last point of a lane and its end, inside a longer step with two of them.
 
     They show where the index at the end is another than the steps tell.
     """
-    size, found = curve.structure.size, list[Happenings]()
+    size, found = curve.structure.size, list[Events]()
     last = np.flatnonzero(np.append(np.diff(points.lanes) != 0, True))
     last = last[np.isin(outcome.code[points.lanes[last]], REGULAR_ENDS)]
     lanes = points.lanes[last]
@@ -111,10 +103,10 @@ def _before_ends(curve: Curve, points: Points, outcome: Outcome) -> Happenings:
         pair = probe.at(np.array([0])), probe.at(np.array([1]))
         events = locate_all(one, [step_between(pair, None)], (), TraceOptions())
         found.append(replace(events, lanes=lanes[i : i + 1]))
-    return Happenings.joined(found, size)
+    return Events.joined(found, size)
 
 
-def _points(curve: Curve, z: Lanes, outcome: Outcome) -> Points:
+def _points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
     """Starts, recorded points, and the ends that are regular ones."""
     lanes, none = np.arange(len(z)), np.zeros(len(z))
     index = curve.structure.index(z, curve.parameters(none))
@@ -126,7 +118,7 @@ def _points(curve: Curve, z: Lanes, outcome: Outcome) -> Points:
 
 def hidden_events(
     curve: Curve, points: Points, options: TraceOptions, *, thorough: bool = True
-) -> Happenings:
+) -> Events:
     """Folds and branch points between the points of traced paths that their steps do not show.
 
     An eigenvalue that touches zero is one event that leaves the index as it is; one that crosses
@@ -143,10 +135,10 @@ def hidden_events(
         `gaps`, by one solve each, leaves a doubt: enough for rods, whose lowest modes are smooth,
         but an eigenvalue that is small in a mode unlike its columns may touch zero unseen.
     """
-    found = list[Happenings]()
+    found = list[Events]()
     near = np.arange(len(points.t)) if thorough else _doubtful_points(points, gaps(curve, points))
     if len(near) < 2:
-        return Happenings.joined(found, curve.structure.size)
+        return Events.joined(found, curve.structure.size)
     lanes, index = points.lanes[near], points.index[near]
     many = curve.take(lanes)
     probe = probed(many, _fronts(many, points, near), points.travelled[near])
@@ -167,7 +159,7 @@ def hidden_events(
         lane = lanes[kept[i] : kept[i] + 1]
         inside = look_inside(curve.take(lane), pair, first, options)
         found += [replace(each, lanes=np.full(len(each.code), lane[0])) for each in inside]
-    return Happenings.joined(found, curve.structure.size)
+    return Events.joined(found, curve.structure.size)
 
 
 def gaps(curve: Curve, points: Points) -> Values:
@@ -265,3 +257,73 @@ def _fronts(curve: Curve, points: Points, near: Some) -> Front:
     norm = np.sqrt((along * move.tangent_z).sum(axis=1) + alongside * move.tangent_t)
     tangent = move.tangent_z / norm[:, None], move.tangent_t / norm
     return Front(z, t, *tangent, points.index[near])
+
+
+VANISHED, LOCATED = 1e-4, 1e-8
+"""Eigenvalue, relative to the small ones at the start of the path, that counts as zero; that of a
+simple fold where it is located."""
+
+
+def with_multiple_points(
+    curve: Curve, start: Float[np.ndarray, "lanes extended"], outcome: Traces
+) -> Traces:
+    """The outcome with lanes that ended at points of multiplicity two or more named so.
+
+    One border row removes one null vector: where two eigenvalues vanish together, as symmetry or
+    equal parts make them do, steps shrink until the lane is lost, within round-off of the point,
+    or it ends as at a fold if their number is odd. The inertia of F_z ∓ εM counts the eigenvalues
+    within ±ε. A fold with another small eigenvalue is located to round-off: one vanishes alone.
+
+    Parameters
+    ----------
+    curve, start
+        Curves and unknowns at their beginning, one per lane.
+    outcome
+        How the lanes ended.
+    """
+    ended = np.flatnonzero(np.isin(outcome.code, (EventCode.LOST, EventCode.FOLD)))
+    if len(ended) == 0 or not curve.folds_change_index:
+        return outcome
+    code, why = outcome.code.copy(), dict(outcome.why)
+    for first in range(0, len(ended), AT_ONCE):
+        some = ended[first : first + AT_ONCE]
+        for lane, several in zip(some.tolist(), _several(curve, start, outcome, some), strict=True):
+            if several > 1:
+                code[lane] = EventCode.MULTIPLE_POINT
+                why[lane] = (
+                    f"{several} eigenvalues vanish at once, and no direction leads on: an "
+                    "imperfection that parts them, however small, does"
+                )
+    return replace(outcome, code=code, why=why)
+
+
+def _several(
+    curve: Curve, start: Lanes, outcome: Traces, ended: Int[np.ndarray, " some"]
+) -> list[int]:
+    """How many eigenvalues vanish where some lanes ended."""
+    here, structure = curve.take(ended), curve.structure
+    begun = here.states(start[ended], np.zeros(len(ended)))
+    z, p = here.states(outcome.z[ended], outcome.t[ended])
+    small = _small_eigenvalue(structure, *begun)
+    count = multiplicity(structure, z, p, VANISHED * small)
+    folds = np.flatnonzero((count > 1) & (outcome.code[ended] == EventCode.FOLD))
+    alone = multiplicity(structure, z[folds], p[folds], LOCATED * small[folds]) == 1
+    count[folds[alone]] = 1
+    return [int(n) for n in count]
+
+
+def multiplicity(structure: Structure, z: Lanes, p: Parameters, near: Values) -> Counts:
+    """Number of eigenvalues of the constrained Hessian, in the metric, within ±near of zero."""
+    nothing = np.zeros((len(z), 0, structure.size))
+    above, below = (structure.solve(z, p, nothing, shift=sign * near) for sign in (1.0, -1.0))
+    return np.asarray(above.negative - below.negative)
+
+
+def _small_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:
+    """Harmonic mean of the eigenvalues, of the size of the smallest one: by a single solution."""
+    n, mass = structure.unknowns, structure.mass
+    vector = np.cos(1.7 * np.arange(n)) + 1.3
+    rhs = np.zeros((len(z), 1, structure.size))
+    rhs[:, 0, :n] = mass * vector
+    yielding = structure.solve(z, p, rhs).x[:, 0, :n] @ (mass * vector)
+    return np.asarray(np.abs(mass @ vector**2 / np.where(yielding == 0.0, np.inf, yielding)))

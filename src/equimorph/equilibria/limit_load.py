@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Shaped
 
 from equimorph.arrays import Values
+from equimorph.equilibria.legs import check_starts, violated
 from equimorph.equilibria.lift import Path, lift
-from equimorph.equilibria.starts import check_starts, violated
-from equimorph.equilibria.tracing import TraceOptions
+from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress, position
 from equimorph.structures import State, States

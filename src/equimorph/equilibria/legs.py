@@ -1,4 +1,4 @@
-"""What a lift can be asked to follow: way-points and smooth curves, one leg after the other."""
+"""What a lift is asked: starts that are equilibria, and legs to follow one after the other."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,14 +7,18 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.equilibria.curves import Curve, ParameterLine
-from equimorph.equilibria.lifting.pieces import Pieces, approximated, interpolated
-from equimorph.equilibria.lifting.smooth import SmoothCurve
-from equimorph.equilibria.lifting.tracked import TrackedCurve
+from equimorph.equilibria.prescribed_curves import (
+    Pieces,
+    SmoothCurve,
+    TrackedCurve,
+    approximated,
+    interpolated,
+)
 from equimorph.errors import InputError
-from equimorph.model import Descriptor, Spline, position
-from equimorph.structures import States, Structure
+from equimorph.model import Constraint, Descriptor, Spline, position
+from equimorph.structures import State, States, Structure
 
 Value = float | np.ndarray | None
 Waypoint = Mapping[Any, Value]
@@ -216,3 +220,48 @@ def _tracked(states: States, leg: Leg, first: Waypoint) -> Prepared:
         pieces = interpolated(np.array([0.0, 1.0]), line, len(here), 1)
     curve = TrackedCurve(structure, pieces, free, descriptors, pieces.lengths(scales))
     return Prepared(curve, curve.begin(states.z, here))
+
+
+ON_BOUND = 1e-9
+"""Relative excess up to which a start counts as on a bound: an earlier lift may end there."""
+EQUILIBRIUM = 1e-8
+"""Residual below which a state is an equilibrium."""
+
+
+def _size(constraint: Constraint) -> float:
+    return max(1.0, abs(constraint.bound))
+
+
+def check_start(state: State, within: Sequence[Constraint] = ()) -> None:
+    """Raise `InputError` unless `state` is an equilibrium that obeys the constraints."""
+    if not state.residual < EQUILIBRIUM:
+        raise InputError(
+            f"`state` must be an equilibrium (largest residual below {EQUILIBRIUM:g}); "
+            f"got a residual of {state.residual:.2g}."
+        )
+    for constraint in within:
+        if constraint.excess(state.z[None], state.p[None])[0] > ON_BOUND * _size(constraint):
+            value = constraint.descriptor(state)
+            raise InputError(
+                f"`state` must obey {constraint}; got {constraint.descriptor.name} = {value:.6g}."
+            )
+
+
+def check_starts(states: States) -> None:
+    """Raise `InputError` unless all of one or more states are equilibria."""
+    if len(states) == 0:
+        raise InputError("`state` must hold at least one state; got none.")
+    worst = int(np.argmax(states.residual))
+    if not states.residual[worst] < EQUILIBRIUM:
+        raise InputError(
+            f"`state` must hold equilibria (largest residual below {EQUILIBRIUM:g}); got a "
+            f"residual of {states.residual[worst]:.2g} in number {worst}."
+        )
+
+
+def violated(states: States, within: Sequence[Constraint]) -> Flags:
+    """Which states exceed a bound by more than round-off."""
+    over = np.zeros(len(states), bool)
+    for c in within:
+        over |= c.excess(states.z, states.p) > ON_BOUND * _size(c)
+    return over

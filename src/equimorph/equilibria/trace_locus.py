@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import brentq
 
-from equimorph.equilibria.cubics import least_inside
 from equimorph.equilibria.locus import Locus, Point, Spot, Test, advance
-from equimorph.equilibria.tracing import TraceOptions
+from equimorph.equilibria.steps import least_inside
+from equimorph.equilibria.trace_options import TraceOptions
 
 Values = Float[np.ndarray, " watches"]
 

@@ -11,13 +11,12 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Lanes
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.cubics import least_inside
 from equimorph.equilibria.curves import Curve, squared_length
-from equimorph.equilibria.fronts import Bracket, Front, step_along
-from equimorph.equilibria.happenings import Happenings, locate_all
+from equimorph.equilibria.events import Events, locate_all
 from equimorph.equilibria.kernels import EARLY_DIP, EARLY_NEAR
-from equimorph.equilibria.location import hermite
-from equimorph.equilibria.tracing import BRANCH, FOLD, TraceOptions
+from equimorph.equilibria.locate import hermite
+from equimorph.equilibria.steps import Bracket, Front, least_inside, step_along
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 
 Values = Float[np.ndarray, " points"]
 
@@ -61,7 +60,7 @@ def probed(curve: Curve, front: Front, length: Values) -> Probe:
 
 def inside_step(
     curve: Curve, ends: tuple[Front, Front], lengths: tuple[float, ...], options: TraceOptions
-) -> list[Happenings]:
+) -> list[Events]:
     """Events between two points of one lane that neither the index nor the direction shows.
 
     `lengths` on the way of the ends, and of a point between them at which F_z is nearly singular,
@@ -79,7 +78,7 @@ def inside_step(
     return look_inside(curve, pair, first, options)
 
 
-def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> list[Happenings]:
+def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> list[Events]:
     """Events inside steps that are the only one of their lane, which nothing before them tells.
 
     The determinant at the middle of the step tells where to look.
@@ -92,7 +91,7 @@ def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> 
     here, old, new = curve.take(step.lanes), step.before, step.after
     middle = hermite(step, np.full(len(step.lanes), 0.5))
     places = ((old.z, old.t), middle, (new.z, new.t))
-    found = list[Happenings]()
+    found = list[Events]()
     for i in np.flatnonzero(_may_vanish(np.stack([_determinant(here, *at) for at in places]))):
         one, lengths = step.take(np.array([i])), (0.0, float(step.step[i]))
         lane = curve.take(one.lanes)
@@ -123,7 +122,7 @@ def look_inside(
     ends: tuple[Probe, Probe],
     first: float | None,
     options: TraceOptions,
-) -> list[Happenings]:
+) -> list[Events]:
     """What an eigenvalue does between two points where it seems to come close to zero.
 
     `first` is a length at which it is known to be small.
@@ -152,7 +151,7 @@ def look_inside(
             low = middle
         else:
             high = middle
-    return [_event(BRANCH, low.front.z, low.front.t, low, found=False)]
+    return [_event(EventCode.BRANCH_POINT, low.front.z, low.front.t, low, found=False)]
 
 
 def _zero(ends: tuple[Probe, Probe]) -> float:
@@ -188,13 +187,11 @@ def _between(curve: Curve, start: Probe, span: tuple[Values, Values], share: flo
     return None
 
 
-def _event(
-    code: int, z: Float[np.ndarray, "1 size"], t: Values, low: Probe, found: bool
-) -> Happenings:
+def _event(code: int, z: Float[np.ndarray, "1 size"], t: Values, low: Probe, found: bool) -> Events:
     """One event that leaves the index as it is."""
     index = np.stack([low.front.index, low.front.index], 1)
     kind, sure = np.array([code]), np.array([found])
-    return Happenings(np.zeros(1, int), kind, z, t, low.length, index, sure)
+    return Events(np.zeros(1, int), kind, z, t, low.length, index, sure)
 
 
 def _chord(curve: Curve, low: Probe, high: Probe) -> Values:
@@ -216,7 +213,7 @@ def _at_the_least(
     near: tuple[Probe, Probe],
     ends: tuple[Probe, Probe],
     options: TraceOptions,
-) -> list[Happenings]:
+) -> list[Events]:
     """Decide on a narrow piece: nothing, one event that touches, or two."""
     low, high = near
     share, least, _ = _least(curve, low, high)
@@ -235,7 +232,7 @@ def _at_the_least(
                 ends[0].front.index,
                 options,
             )
-    code = FOLD if _turns(curve, z, t) else BRANCH
+    code = EventCode.FOLD if _turns(curve, z, t) else EventCode.BRANCH_POINT
     return [_event(code, z, t, replace(low, length=length), found=True)]
 
 
@@ -252,7 +249,7 @@ def _both(
     points: tuple[Probe, Probe, Probe],
     index: Int[np.ndarray, " 1"],
     options: TraceOptions,
-) -> list[Happenings]:
+) -> list[Events]:
     """Locate the events on both sides of a point with another index than that around."""
     low, middle, high = points
     # at a point that is itself singular the index is one of round-off
@@ -265,6 +262,10 @@ def step_between(pair: tuple[Probe, Probe], what: int | None) -> Bracket:
     """Step between two points, with what its ends tell."""
     low, high = pair
     flipped = np.sign(low.front.tangent_t) != np.sign(high.front.tangent_t)
-    code = np.where(flipped, FOLD, BRANCH) if what is None else np.array([what])
+    code = (
+        np.where(flipped, EventCode.FOLD, EventCode.BRANCH_POINT)
+        if what is None
+        else np.array([what])
+    )
     step = high.length - low.length
     return Bracket(np.zeros(1, int), low.front, high.front, step, low.length, code)

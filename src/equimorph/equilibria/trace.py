@@ -11,19 +11,11 @@ from jaxtyping import Bool, Int
 
 from equimorph.arrays import Lanes, Some, Values
 from equimorph.equilibria.curves import Curve
-from equimorph.equilibria.happenings import Happenings, locate_all
+from equimorph.equilibria.events import Events, locate_all
+from equimorph.equilibria.inside_steps import inside_only_steps
 from equimorph.equilibria.march import Block, Loss
-from equimorph.equilibria.probing import inside_only_steps
-from equimorph.equilibria.tracing import (
-    ARRIVAL,
-    BRANCH,
-    CONSTRAINT,
-    CRITICAL,
-    FOLD,
-    RETURN,
-    Points,
-    TraceOptions,
-)
+from equimorph.equilibria.steps import Points
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import CancelledError
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.model import Constraint, Progress, Silent
@@ -32,12 +24,12 @@ Names = Int[np.ndarray, " lanes"]
 
 LOST, CANCELLED, MULTIPLE = 0, -1, -3
 KINDS = {
-    ARRIVAL: "arrived",
-    RETURN: "returned",
-    FOLD: "fold",
-    BRANCH: "branch point",
-    CONSTRAINT: "constraint",
-    CRITICAL: "critical",
+    EventCode.ARRIVED: "arrived",
+    EventCode.RETURNED: "returned",
+    EventCode.FOLD: "fold",
+    EventCode.BRANCH_POINT: "branch point",
+    EventCode.CONSTRAINT: "constraint",
+    EventCode.CRITICAL: "critical",
     LOST: "lost",
     MULTIPLE: "multiple point",
     CANCELLED: "cancelled",
@@ -62,7 +54,7 @@ class Batching:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Traces:
     """How each lane ended, the events on its way, and its points if they were recorded."""
 
     code: Names
@@ -71,11 +63,11 @@ class Outcome:
     index: Names
     travelled: Values
     why: dict[int, str]
-    passed: Happenings
+    passed: Events
     points: Points
 
 
-def follow(
+def trace(
     curve: Curve,
     z: Lanes,
     constraints: tuple[Constraint, ...] = (),
@@ -83,7 +75,7 @@ def follow(
     *,
     batching: Batching | None = None,
     progress: Progress | None = None,
-) -> Outcome:
+) -> Traces:
     """Trace every lane from t = 0 until it arrives, returns or something ends it.
 
     Lanes wait in a queue; each thread takes as many as march well together and fills up from the
@@ -164,7 +156,7 @@ class _Job:
     ledger: _Ledger
     z: Lanes
     again: list[int] = field(default_factory=list)
-    passed: list[tuple[Happenings, Some]] = field(default_factory=list)
+    passed: list[tuple[Events, Some]] = field(default_factory=list)
     missed: dict[int, str] = field(default_factory=dict)
 
     def run(self, report: Callable[[], None] = lambda: None) -> None:
@@ -213,7 +205,7 @@ class _Job:
         curve, bracket, options = block.curve, block.events.drain(), block.options
         shown = locate_all(curve, [bracket], block.constraints, options)
         only = inside_only_steps(curve, bracket, options)
-        events = Happenings.joined([shown, *block.hidden, *only], curve.metric.size)
+        events = Events.joined([shown, *block.hidden, *only], curve.metric.size)
         block.hidden = []
         bad = np.unique(events.lanes[~events.found])
         again = bad[ledger.retries[bad] < block.options.retries]
@@ -226,7 +218,7 @@ class _Job:
             events = events.take(~np.isin(events.lanes, again))
         self._settle(events)
 
-    def _settle(self, events: Happenings) -> None:
+    def _settle(self, events: Events) -> None:
         """Each lane's end is its first terminal event; what lies before was passed."""
         ledger, stop = self.ledger, self.block.options.stops
         terminal = np.flatnonzero(events.code & stop)
@@ -278,7 +270,7 @@ def _run(jobs: list[_Job], queue: _Queue, progress: Progress) -> None:
         future.result()
 
 
-def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Outcome:
+def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Traces:
     """Put together what the jobs left; first tries of lanes that were retried are dropped."""
     for lane, reason in (pair for job in jobs for pair in job.missed.items()):
         ledger.code[lane], ledger.why[lane] = LOST, reason
@@ -292,19 +284,19 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Outcome:
     joined = Points.joined(points, size)
     # an event that the first step hid is known after the second
     beyond = (joined.travelled > ledger.travelled[joined.lanes]) & (ledger.code[joined.lanes] > 0)
-    return Outcome(
+    return Traces(
         ledger.code,
         ledger.z,
         ledger.t,
         ledger.index,
         ledger.travelled,
         ledger.why,
-        Happenings.joined(passed, size),
+        Events.joined(passed, size),
         joined.take(~beyond) if beyond.any() else joined,
     )
 
 
-def _last(ledger: _Ledger, part: Points | Happenings, tries: Some) -> Bool[np.ndarray, " some"]:
+def _last(ledger: _Ledger, part: Points | Events, tries: Some) -> Bool[np.ndarray, " some"]:
     """Which entries belong to the last try of a lane that was finished."""
     of_last = ledger.retries[part.lanes] == tries
     return np.asarray(of_last & (ledger.code[part.lanes] != CANCELLED))

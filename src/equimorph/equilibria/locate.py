@@ -1,29 +1,26 @@
 """Exact places of events inside bracketing steps, many at a time.
 
-Folds and branch points are regular solutions of minimally augmented systems [Govaerts2000]_: with
+Branch points are regular solutions of minimally augmented systems [Govaerts2000]_: with
 ``[F_z b; bᵀ 0] [v; g] = [0; 1]`` the matrix F_z is singular exactly where g = 0, and
-``∂g = −∂(vᵀF_z v)`` at fixed v. Constraints are roots of a scalar along the curve.
+``∂g = −∂(vᵀF_z v)`` at fixed v. Folds, constraints and other scalars are roots along the curve,
+found by inverse quadratic interpolation where the last three points allow it, else by bisection
+[Chandrupatla1997]_; every trial point is corrected onto the curve.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Values
+from equimorph.arrays import Flags, Lanes, Some, Values
+from equimorph.equilibria import event_kernels as roots
+from equimorph.equilibria import kernels
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.curves import (
-    Curve,
-    correction_size,
-    dual,
-    squared_length,
-)
-from equimorph.equilibria.fronts import Bracket, Front
+from equimorph.equilibria.curves import Curve, correction_size, dual, squared_length
 from equimorph.equilibria.kernels import cubic_shares
-from equimorph.equilibria.roots import root_inside
-
-Some = Int[np.ndarray, " lanes"]
+from equimorph.equilibria.steps import Bracket, Front, new_scalars
+from equimorph.structures import Advance
 
 NEWTON_STEPS = 24
 POLISHED = 1e-9
@@ -258,3 +255,100 @@ def locate_critical(curve: Curve, bracket: Bracket) -> Located:
 
     root = root_inside(curve, bracket, scalar, (ends[0], ends[1]), share)
     return Located(root.z, root.t, root.at, root.found & change)
+
+
+Scalar = Callable[[Some, Front], Float[np.ndarray, " some"]]
+
+VALUE = 1e-13
+"""Value of the scalar over that at the ends of the step that counts as zero."""
+
+
+@dataclass(frozen=True)
+class Root:
+    """Points where the scalar vanishes, their lengths from the start of the step, and success."""
+
+    z: Lanes
+    t: Values
+    at: Values
+    found: Flags
+
+
+def root_inside(
+    curve: Curve, bracket: Bracket, scalar: Scalar, ends: tuple[Values, Values], guess: Values
+) -> Root:
+    """Zero of a scalar with values of opposite signs at the ends of a step.
+
+    Parameters
+    ----------
+    scalar
+        Values at points on some of the lanes, whose numbers come first.
+    ends
+        Values at both ends of the step; a zero at the start is the root.
+    guess
+        Share of the step that is tried first.
+    """
+    search = _Search(curve, bracket, ends, guess)
+    while search.active:
+        search.round(scalar)
+    return search.root
+
+
+class _Search:
+    """All lanes of one search, each somewhere in an iteration of its own."""
+
+    def __init__(
+        self, curve: Curve, bracket: Bracket, ends: tuple[Values, Values], guess: Values
+    ) -> None:
+        lanes, (old, new) = len(guess), (bracket.before, bracket.after)
+        self.curve, self.active = curve, lanes
+        ends_of_steps = (old.z, new.z, new.tangent_z, old.z, old.tangent_z)
+        work = (np.empty_like(old.z), np.empty_like(old.z))
+        self._places = (*(each.copy() for each in ends_of_steps), *work)
+        self._scalars, self._ends = new_scalars(lanes), np.empty((roots.ENDS, lanes))
+        self._scalars[1][kernels.LANE] = np.arange(lanes)
+        for row_number, column in (
+            (roots.X1, bracket.step), (roots.F1, ends[1]), (roots.T1, new.t),
+            (roots.SLOPE1, new.tangent_t), (roots.X2, 0.0), (roots.F2, ends[0]),
+            (roots.T2, old.t), (roots.SLOPE2, old.tangent_t), (roots.T0, old.t),
+            (roots.SHARE, 1.0 - guess),
+            (roots.SMALL, VALUE * (np.abs(ends[0]) + np.abs(ends[1]))),
+        ):  # fmt: skip
+            self._ends[row_number] = column
+        self.root = Root(old.z.copy(), np.empty(lanes), np.empty(lanes), np.zeros(lanes, bool))
+        mass = curve.metric.mass
+        roots.begin(curve.weight, mass, self._places, *self._scalars, self._ends, lanes)
+        self._here = curve
+        self._close()
+
+    def round(self, scalar: Scalar) -> None:
+        """One Newton step of every lane, and all that follows from it."""
+        active, (numbers, counts) = self.active, self._scalars
+        trial, row = (place[:active] for place in self._places[5:])
+        closing = numbers[kernels.CORNER, :active], numbers[kernels.DEFECT, :active]
+        move = self._here.advance(trial, numbers[kernels.TRIAL, :active], row, *closing)
+        mass, steps = self.curve.metric.mass, (move.dz, move.dt, move.tangent_z, move.tangent_t)
+        kernels.correct(*steps, mass, trial, numbers, counts, active, kernels.EXACT, 0.0)
+        values = np.zeros(active)
+        there = np.flatnonzero(counts[kernels.STAGE, :active] == kernels.CONVERGED)
+        if len(there):
+            values[there] = scalar(counts[kernels.LANE, there], self._front(there, move))
+            state = (self._places, numbers, counts, self._ends, active)
+            roots.shrink(values, move.tangent_z, mass, *state)
+        if (counts[kernels.STAGE, :active] != kernels.CORRECTING).any():
+            self._close()
+
+    def _front(self, at: Some, move: Advance) -> Front:
+        """Trial points that converged, with unit tangents."""
+        numbers = self._scalars[0][:, at]
+        tangent = move.tangent_z[at] / numbers[kernels.NORM][:, None]
+        t, slope = numbers[kernels.TRIAL], numbers[kernels.NEW_SLOPE]
+        return Front(self._places[5][at], t, tangent, slope, move.index[at])
+
+    def _close(self) -> None:
+        """Write down what is finished and close the gaps."""
+        root, counts = self.root, self._scalars[1]
+        state = (self._places, counts, self._ends, self.active)
+        roots.hand_out(*state, root.z, root.t, root.at, root.found)
+        left = (self._places, *self._scalars, self._ends, self.active)
+        self.active = kernels.close_gaps(*left)
+        self._here = self.curve.take(counts[kernels.LANE, : self.active])

@@ -7,8 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Lanes, Values
 from equimorph.equilibria.curves import Curve
-from equimorph.equilibria.fronts import Bracket, Front
-from equimorph.equilibria.location import (
+from equimorph.equilibria.locate import (
     Located,
     locate_branch_point,
     locate_critical,
@@ -16,20 +15,13 @@ from equimorph.equilibria.location import (
     locate_goal,
     locate_root,
 )
-from equimorph.equilibria.tracing import (
-    ARRIVAL,
-    BRANCH,
-    CONSTRAINT,
-    CRITICAL,
-    FOLD,
-    RETURN,
-    TraceOptions,
-)
+from equimorph.equilibria.steps import Bracket, Front
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint
 
 
 @dataclass(frozen=True)
-class Happenings:
+class Events:
     """Located events of lanes, sorted by lane and then by arclength.
 
     `code` as in `tracing`; `index` before and after; `found` tells which could be located.
@@ -43,12 +35,12 @@ class Happenings:
     index: Int[np.ndarray, "events 2"]
     found: Bool[np.ndarray, " events"]
 
-    def take(self, events: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"]) -> "Happenings":
+    def take(self, events: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"]) -> "Events":
         """Return some of the events."""
-        return Happenings(*(column[events] for column in vars(self).values()))
+        return Events(*(column[events] for column in vars(self).values()))
 
     @classmethod
-    def joined(cls, parts: list["Happenings"], size: int) -> "Happenings":
+    def joined(cls, parts: list["Events"], size: int) -> "Events":
         """All events of some parts, sorted by lane and then by arclength."""
         none = np.zeros(0, int)
         nothing = cls(
@@ -71,9 +63,16 @@ def locate_all(
     brackets: list[Bracket],
     constraints: tuple[Constraint, ...],
     options: TraceOptions,
-) -> Happenings:
+) -> Events:
     """Locate the events in all brackets that have to be located, all of a kind at once."""
-    bits = [FOLD, BRANCH, CRITICAL, ARRIVAL, RETURN, CONSTRAINT]
+    bits = [
+        EventCode.FOLD,
+        EventCode.BRANCH_POINT,
+        EventCode.CRITICAL,
+        EventCode.ARRIVED,
+        EventCode.RETURNED,
+        EventCode.CONSTRAINT,
+    ]
     if not options.locate_passed:
         bits = [bit for bit in bits if bit & options.stops]
     parts = []
@@ -83,7 +82,7 @@ def locate_all(
             continue
         place = _locate(curve, bracket, bit, constraints)
         parts.append(
-            Happenings(
+            Events(
                 bracket.lanes,
                 np.full(len(bracket.lanes), bit),
                 place.z,
@@ -93,7 +92,7 @@ def locate_all(
                 place.found,
             )
         )
-    return Happenings.joined(parts, curve.metric.size)
+    return Events.joined(parts, curve.metric.size)
 
 
 def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
@@ -121,14 +120,14 @@ def _locate(
     curve: Curve, bracket: Bracket, bit: int, constraints: tuple[Constraint, ...]
 ) -> Located:
     here = curve.take(bracket.lanes)
-    if bit == FOLD:
+    if bit == EventCode.FOLD:
         return locate_fold(here, bracket)
-    if bit == BRANCH:
+    if bit == EventCode.BRANCH_POINT:
         return locate_branch_point(here, bracket)
-    if bit == CRITICAL:
+    if bit == EventCode.CRITICAL:
         return locate_critical(here, bracket)
-    if bit in {ARRIVAL, RETURN}:
-        return locate_goal(here, bracket, 1.0 if bit == ARRIVAL else 0.0)
+    if bit in {EventCode.ARRIVED, EventCode.RETURNED}:
+        return locate_goal(here, bracket, 1.0 if bit == EventCode.ARRIVED else 0.0)
 
     def worst(some: Int[np.ndarray, " lanes"], z: Lanes, t: Values) -> Values:
         z, p = here.take(some).states(z, t)

@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve, ParameterLine
-from equimorph.equilibria.hidden import with_hidden_events
-from equimorph.equilibria.lifting.legs import Leg, listed, prepared
+from equimorph.equilibria.hidden_events import with_hidden_events, with_multiple_points
+from equimorph.equilibria.legs import Leg, listed, prepared
 from equimorph.equilibria.march import UNRESOLVED
-from equimorph.equilibria.multiple import with_multiple_points
-from equimorph.equilibria.normal_form import criticality
-from equimorph.equilibria.outcome import KINDS, LOST, Outcome, follow
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, FOLD, TraceOptions
+from equimorph.equilibria.trace import KINDS, Traces, trace
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import State, States
@@ -96,7 +95,7 @@ def lift_one(
         begun = prepared(here.batch, leg)
         if not begun.curve.weight[0] > 0.0:
             continue
-        outcome = follow(begun.curve, begun.z, within, options, progress=progress)
+        outcome = trace(begun.curve, begun.z, within, options, progress=progress)
         if begun.curve.folds_change_index:
             outcome = with_hidden_events(begun.curve, begun.z, outcome, options)
         outcome = with_multiple_points(begun.curve, begun.z, outcome)
@@ -120,12 +119,12 @@ def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOpti
     curve = ParameterLine(structure, begin.p.copy(), end.p - begin.p)
     if not (curve.weight > 0.0).all():
         return None
-    outcome = follow(curve, begin.z.copy(), within, options)
+    outcome = trace(curve, begin.z.copy(), within, options)
     outcome = with_hidden_events(curve, begin.z, outcome, options)
     outcome = with_multiple_points(curve, begin.z, outcome)
     n = structure.unknowns
     gap = np.sqrt((outcome.z[:, :n] - end.z[:, :n]) ** 2 @ structure.mass)
-    if not ((outcome.code == ARRIVAL) & (gap < SAME)).all():
+    if not ((outcome.code == EventCode.ARRIVED) & (gap < SAME)).all():
         return None
     lanes = range(len(begin))
     return _joined(states[0], [_segment(curve, outcome, lane, within, lane) for lane in lanes])
@@ -144,15 +143,15 @@ class _Segment:
 
 
 def _segment(
-    curve: Curve, outcome: Outcome, number: int, within: tuple[Constraint, ...], lane: int = 0
+    curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...], lane: int = 0
 ) -> _Segment:
     """One lane of an outcome, as leg number so much of a path."""
     if len(outcome.code) > 1:
         curve, outcome = curve.take(np.array([lane])), _lane(outcome, lane)
     events = (*_passed(curve, outcome, number), _end(curve, outcome, number, within))
-    last = outcome.travelled[0] if outcome.code[0] != LOST else np.inf
+    last = outcome.travelled[0] if outcome.code[0] != EventCode.LOST else np.inf
     points = outcome.points.take(outcome.points.travelled < last)
-    ended = slice(0, int(outcome.code[0] != LOST))
+    ended = slice(0, int(outcome.code[0] != EventCode.LOST))
     t = np.concatenate([points.t, outcome.t[ended]])
     z, p = _states(curve, np.concatenate([points.z, outcome.z[ended]]), t)
     length = np.concatenate([points.travelled, outcome.travelled[ended]])
@@ -160,10 +159,10 @@ def _segment(
     return _Segment(z, p, number + t, length, index, events)
 
 
-def _lane(outcome: Outcome, lane: int) -> Outcome:
-    """Outcome of one lane alone."""
+def _lane(outcome: Traces, lane: int) -> Traces:
+    """Traces of one lane alone."""
     one = slice(lane, lane + 1)
-    return Outcome(
+    return Traces(
         outcome.code[one],
         outcome.z[one],
         outcome.t[one],
@@ -182,7 +181,7 @@ def _states(
     return curve.take(np.zeros(len(t), int)).states(z, t)
 
 
-def _passed(curve: Curve, outcome: Outcome, number: int) -> list[Event]:
+def _passed(curve: Curve, outcome: Traces, number: int) -> list[Event]:
     passed = outcome.passed
     z, p = _states(curve, passed.z, passed.t)
     return [
@@ -190,26 +189,28 @@ def _passed(curve: Curve, outcome: Outcome, number: int) -> list[Event]:
             KINDS[int(code)],
             State(curve.structure, z[i], p[i]),
             number + float(passed.t[i]),
-            criticality(curve, z[i : i + 1], passed.t[i : i + 1])[0] if code == BRANCH else None,
+            criticality(curve, z[i : i + 1], passed.t[i : i + 1])[0]
+            if code == EventCode.BRANCH_POINT
+            else None,
         )
         for i, code in enumerate(passed.code)
     ]
 
 
-def _end(curve: Curve, outcome: Outcome, number: int, within: tuple[Constraint, ...]) -> Event:
+def _end(curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...]) -> Event:
     code, t = int(outcome.code[0]), outcome.t
     z, p = _states(curve, outcome.z, t)
     state = State(curve.structure, z[0], p[0])
     kind, detail, critical = KINDS[code], outcome.why.get(0, ""), None
-    if code == CONSTRAINT:
+    if code == EventCode.CONSTRAINT:
         worst = max(within, key=lambda c: c.excess(state.z[None], state.p[None])[0])
         detail = str(worst)
-    if code == FOLD and not curve.folds_change_index:
+    if code == EventCode.FOLD and not curve.folds_change_index:
         detail = "the Jacobian of the descriptors by the unknown parameters is singular"
-    if code == BRANCH:
+    if code == EventCode.BRANCH_POINT:
         critical = criticality(curve, z, t)[0]
         detail = critical
-    if code != LOST and not detail and not state.resolved:
+    if code != EventCode.LOST and not detail and not state.resolved:
         detail = UNRESOLVED
     return Event(kind, state, number + float(t[0]), critical, detail)
 

@@ -7,14 +7,13 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve
-from equimorph.equilibria.lifting.legs import Leg, listed, of_some, prepared
-from equimorph.equilibria.lifting.paths import Event
-from equimorph.equilibria.multiple import with_multiple_points
-from equimorph.equilibria.normal_form import criticality
-from equimorph.equilibria.outcome import CANCELLED, KINDS, Outcome, follow
-from equimorph.equilibria.starts import violated
-from equimorph.equilibria.tracing import ARRIVAL, BRANCH, CONSTRAINT, TraceOptions
+from equimorph.equilibria.hidden_events import with_multiple_points
+from equimorph.equilibria.legs import Leg, listed, of_some, prepared, violated
+from equimorph.equilibria.paths import Event
+from equimorph.equilibria.trace import KINDS, Traces, trace
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import States
@@ -122,7 +121,7 @@ def lift_many(
     ledger = _Ledger(states, within)
     moved = False
     for number, leg in enumerate(listed(to)):
-        going = np.flatnonzero(ledger.code == ARRIVAL)
+        going = np.flatnonzero(ledger.code == EventCode.ARRIVED)
         if len(going) == 0:
             break
         everyone = len(going) == len(states)
@@ -133,13 +132,13 @@ def lift_many(
         if len(far) < len(going):
             begun = replace(begun, curve=begun.curve.take(far), z=begun.z[far])
         if len(far):
-            outcome = follow(begun.curve, begun.z, within, options, progress=progress)
+            outcome = trace(begun.curve, begun.z, within, options, progress=progress)
             outcome = with_multiple_points(begun.curve, begun.z, outcome)
             ledger.enter(going[far], begun.curve, outcome, number)
-        ledger.at[ledger.code == ARRIVAL] = number + 1.0
-        if (ledger.code == CANCELLED).any():
+        ledger.at[ledger.code == EventCode.ARRIVED] = number + 1.0
+        if (ledger.code == EventCode.CANCELLED).any():
             break
-    if not moved and (ledger.code == ARRIVAL).any():
+    if not moved and (ledger.code == EventCode.ARRIVED).any():
         raise InputError("`to` must change at least one parameter; got the starts themselves.")
     return ledger.lifts(within, options.record)
 
@@ -171,7 +170,10 @@ class _Ledger:
         self.at, self.length = np.zeros(lanes), np.zeros(lanes)
         self.index = self.begun.structure.index(self.z, self.p)
         over = violated(self.begun, self.within)
-        self.code, self.words = np.where(over, CONSTRAINT, ARRIVAL), np.full(lanes, "", "U16")
+        self.code, self.words = (
+            np.where(over, EventCode.CONSTRAINT, EventCode.ARRIVED),
+            np.full(lanes, "", "U16"),
+        )
         self.detail: dict[int, str] = {}
         self.events: list[_Part] = []
         self.points: list[_Part] = []
@@ -181,20 +183,20 @@ class _Ledger:
         """Where the lanes are."""
         return States(self.begun.structure, self.z, self.p)
 
-    def enter(self, lanes: Some, curve: Curve, outcome: Outcome, number: int) -> None:
+    def enter(self, lanes: Some, curve: Curve, outcome: Traces, number: int) -> None:
         """Take up the outcome of a leg."""
         self.z[lanes], self.p[lanes] = curve.states(outcome.z, outcome.t)
         self.code[lanes], self.index[lanes] = outcome.code, outcome.index
         self.at[lanes] = number + outcome.t
         self.length[lanes] += outcome.travelled
         self.detail.update({int(lanes[lane]): why for lane, why in outcome.why.items()})
-        branched = np.flatnonzero(outcome.code == BRANCH)
+        branched = np.flatnonzero(outcome.code == EventCode.BRANCH_POINT)
         self.words[lanes[branched]] = _criticality(
             curve.take(branched), outcome.z[branched], outcome.t[branched]
         )
         passed = outcome.passed
         words = np.full(len(passed.code), "", "U16")
-        at = np.flatnonzero(passed.code == BRANCH)
+        at = np.flatnonzero(passed.code == EventCode.BRANCH_POINT)
         words[at] = _criticality(curve.take(passed.lanes[at]), passed.z[at], passed.t[at])
         z, p = curve.take(passed.lanes).states(passed.z, passed.t)
         event = (passed.code, passed.index[:, 0], words)
@@ -208,7 +210,7 @@ class _Ledger:
 
     def lifts(self, within: tuple[Constraint, ...], recorded: bool) -> Lifts:
         """Everything together."""
-        met = np.flatnonzero(self.code == CONSTRAINT)
+        met = np.flatnonzero(self.code == EventCode.CONSTRAINT)
         if len(met):
             excess = np.array([c.excess(self.z[met], self.p[met]) for c in within])
             for lane, which in zip(met, excess.argmax(axis=0), strict=True):

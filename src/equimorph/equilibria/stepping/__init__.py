@@ -1,1 +1,0 @@
-"""From step to step: start, length and prediction."""

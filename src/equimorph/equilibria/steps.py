@@ -1,0 +1,250 @@
+"""Steps along curves: their control, the points at their ends, and files of both."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.arrays import Flags, Lanes, Values
+from equimorph.equilibria import event_kernels, kernels
+from equimorph.equilibria.curves import Curve, dual, squared_length
+
+
+@dataclass(frozen=True)
+class Front:
+    """Points on the curves with unit tangents: where each lane is now."""
+
+    z: Lanes
+    t: Values
+    tangent_z: Lanes
+    tangent_t: Values
+    index: Int[np.ndarray, " lanes"]
+
+    def take(self, lanes: Int[np.ndarray, " some"] | Flags) -> "Front":
+        """Return some of the lanes."""
+        return Front(
+            self.z[lanes],
+            self.t[lanes],
+            self.tangent_z[lanes],
+            self.tangent_t[lanes],
+            self.index[lanes],
+        )
+
+    def updated(self, new: "Front", where: Flags) -> "Front":
+        """Return `new` on some of the lanes and this on the others."""
+        wide = where[:, None]
+        return Front(
+            np.where(wide, new.z, self.z),
+            np.where(where, new.t, self.t),
+            np.where(wide, new.tangent_z, self.tangent_z),
+            np.where(where, new.tangent_t, self.tangent_t),
+            np.where(where, new.index, self.index),
+        )
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """Steps in which something happened: lane numbers, both ends, step lengths, arclength before.
+
+    what: bits of `EventCode`.
+    """
+
+    lanes: Int[np.ndarray, " some"]
+    before: Front
+    after: Front
+    step: Float[np.ndarray, " some"]
+    travelled: Float[np.ndarray, " some"]
+    what: Int[np.ndarray, " some"]
+
+    def take(self, at: Int[np.ndarray, " fewer"]) -> "Bracket":
+        """Return some of the brackets."""
+        return Bracket(
+            self.lanes[at],
+            self.before.take(at),
+            self.after.take(at),
+            self.step[at],
+            self.travelled[at],
+            self.what[at],
+        )
+
+
+def initial_front(curve: Curve, z: Lanes, t: Values) -> Front:
+    """Unit tangents at known points, pointing towards growing t."""
+    still = np.zeros_like(z)
+    one, none = np.ones(len(z)), np.zeros(len(z))
+    step = curve.advance(z, t, still, one, none)
+    return _unit(curve, Front(z + step.dz, t, step.tangent_z, step.tangent_t, step.index))
+
+
+def _unit(curve: Curve, front: Front) -> Front:
+    length = squared_length(curve.metric, curve.weight, front.tangent_z, front.tangent_t)
+    norm = np.sqrt(length)
+    return replace(
+        front, tangent_z=front.tangent_z / norm[:, None], tangent_t=front.tangent_t / norm
+    )
+
+
+def step_along(curve: Curve, front: Front, length: Values) -> tuple[Front, Flags]:
+    """Go `length` along each curve, predicted by the tangent; see `onto_curve`."""
+    z = front.z + length[:, None] * front.tangent_z
+    return onto_curve(curve, front, (z, front.t + length * front.tangent_t), length)
+
+
+def onto_curve(
+    curve: Curve, front: Front, guess: tuple[Lanes, Values], length: Values
+) -> tuple[Front, Flags]:
+    """Points at pseudo-arclength `length` from `front`, corrected from guesses, and the success.
+
+    The corrector is Newton on the curve and the pseudo-arclength condition. A point counts only if
+    the first correction is below a quarter of the length and its tangent within acos 0.9 of that of
+    `front`.
+    """
+    metric, lanes = curve.metric, len(length)
+    numbers, counts = new_scalars(lanes)
+    trial = np.ascontiguousarray(guess[0]).copy()
+    row, corner = dual(metric, curve.weight, front.tangent_z, front.tangent_t)
+    numbers[kernels.TRIAL], numbers[kernels.CORNER] = guess[1], corner
+    numbers[kernels.DEFECT] = kernels.row_sums(row, trial - front.z) - length
+    numbers[kernels.DEFECT] += corner * (guess[1] - front.t)
+    numbers[kernels.LENGTH], numbers[kernels.WEIGHT] = length, curve.weight**2
+    out = replace(front, tangent_z=np.zeros_like(trial), index=np.zeros(lanes, int))
+    closing = (numbers[kernels.CORNER], numbers[kernels.DEFECT])
+    while (counts[kernels.STAGE] == kernels.CORRECTING).any():
+        open_lanes = counts[kernels.STAGE] == kernels.CORRECTING
+        move = curve.advance(trial, numbers[kernels.TRIAL], row, *closing)
+        state = (trial, numbers, counts, lanes, kernels.EXACT, 0.0)
+        kernels.correct(move.dz, move.dt, move.tangent_z, move.tangent_t, metric.mass, *state)
+        new = open_lanes & (counts[kernels.STAGE] == kernels.CONVERGED)
+        out.tangent_z[new] = move.tangent_z[new] / numbers[kernels.NORM, new, None]
+        out.index[new] = move.index[new]
+    good = counts[kernels.STAGE] == kernels.CONVERGED
+    t, slope = numbers[kernels.TRIAL].copy(), np.where(good, numbers[kernels.NEW_SLOPE], 0.0)
+    return replace(out, z=trial, t=t, tangent_t=slope), good
+
+
+def new_scalars(
+    lanes: int,
+) -> tuple[Float[np.ndarray, "numbers lanes"], Int[np.ndarray, "counts lanes"]]:
+    """Empty scalars of lanes: the rows are named in `kernels`."""
+    return np.zeros((kernels.NUMBERS, lanes)), np.zeros((kernels.COUNTS, lanes), np.int64)
+
+
+@dataclass(frozen=True)
+class Points:
+    """Regular points of many lanes: lane, length from its start, place, index."""
+
+    lanes: Int[np.ndarray, " points"]
+    travelled: Float[np.ndarray, " points"]
+    z: Float[np.ndarray, "points size"]
+    t: Float[np.ndarray, " points"]
+    index: Int[np.ndarray, " points"]
+
+    def take(self, at: Int[np.ndarray, " some"] | Bool[np.ndarray, " points"]) -> "Points":
+        """Return some of the points."""
+        return Points(*(column[at] for column in vars(self).values()))
+
+    @classmethod
+    def joined(cls, parts: list["Points"], size: int) -> "Points":
+        """All points of some parts, sorted by lane and then by length."""
+        count = sum(len(part.t) for part in parts)
+        lanes, index, travelled, t = np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0)
+        lanes = np.concatenate([lanes, *(part.lanes for part in parts)])
+        index = np.concatenate([index, *(part.index for part in parts)])
+        travelled = np.concatenate([travelled, *(part.travelled for part in parts)])
+        t = np.concatenate([t, *(part.t for part in parts)])
+        order = np.lexsort((travelled, lanes))
+        place = np.empty(count, int)
+        place[order] = np.arange(count)
+        # by far the most bytes: each part goes to its places at once
+        z, start = np.empty((count, size)), 0
+        for part in parts:
+            stop = start + len(part.t)
+            z[place[start:stop]], start = part.z, stop
+        return cls(lanes[order], travelled[order], z, t[order], index[order])
+
+
+def least_inside(
+    values: tuple[Values, Values], slopes: tuple[Values, Values], length: Values
+) -> tuple[Values, Values]:
+    """Place and least value of the cubics; places are shares of the length, ends included."""
+    (f, g), (a, b) = values, (slopes[0] * length, slopes[1] * length)
+    c2, c3 = 3.0 * (g - f) - 2.0 * a - b, a + b - 2.0 * (g - f)
+    # roots of the slope a + 2 c2 s + 3 c3 s², without cancellation
+    root = np.sqrt(np.maximum(c2**2 - 3.0 * a * c3, 0.0))
+    sum_ = -(c2 + np.where(c2 >= 0.0, root, -root))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turns = np.stack([a / sum_, sum_ / (3.0 * c3)])
+    shares = np.stack([np.zeros_like(f), np.ones_like(f), *np.nan_to_num(turns, posinf=0.0)])
+    shares = np.clip(shares, 0.0, 1.0)
+    heights = f + shares * (a + shares * (c2 + shares * c3))
+    at = np.argmin(heights, axis=0)[None]
+    return np.take_along_axis(shares, at, 0)[0], np.take_along_axis(heights, at, 0)[0]
+
+
+Places = tuple[np.ndarray, ...]
+Names = Int[np.ndarray, " points"]
+
+
+class EventFile:
+    """Steps in which something happened, until they are located: room for `room` of them."""
+
+    def __init__(self, size: int, room: int) -> None:
+        self.count = 0
+        ends = tuple(np.empty((room, size)) for _ in range(4))
+        self._buffer = (*ends, np.empty((6, room)), np.empty((4, room), np.int64))
+
+    def add(self, tangent: Lanes, stops: int, places: Places, scalars: Places, active: int) -> None:
+        """Copy such steps of all lanes, and end those lanes that they stop."""
+        state = (places, *scalars, active, self._buffer, self.count)
+        self.count = event_kernels.file_events(tangent, stops, *state)
+
+    def drain(self) -> Bracket:
+        """Hand out everything."""
+        count, self.count = self.count, 0
+        z0, tangent0, z1, tangent1 = (each[:count].copy() for each in self._buffer[:4])
+        values, (lanes, what, before, after) = (each[:, :count].copy() for each in self._buffer[4:])
+        return Bracket(
+            lanes,
+            Front(z0, values[0], tangent0, values[1], before),
+            Front(z1, values[2], tangent1, values[3], after),
+            values[4],
+            values[5],
+            what,
+        )
+
+
+class PointFile:
+    """Regular points of all lanes, with the number of the try in which they were found."""
+
+    def __init__(self, size: int, most: int) -> None:
+        self._size, self._most, self._room = size, most, max(ROOM, 2 * most)
+        self._count, self._buffer = 0, self._new()
+        self._parts: list[tuple[Points, Names]] = []
+
+    def _new(self) -> Places:
+        room = self._room
+        return np.empty((room, self._size)), np.empty((2, room)), np.empty((3, room), np.int64)
+
+    def add(self, trial: Lanes, scalars: Places, active: int) -> None:
+        """Copy the ends of good steps of lanes that go on."""
+        if self._count + self._most > self._room:
+            self._seal()
+        count = self._count
+        self._count = event_kernels.file_points(trial, *scalars, active, self._buffer, count)
+
+    def _seal(self) -> None:
+        z, values, names = self._buffer
+        count = slice(0, self._count)
+        lanes, index, tries = names[:, count]
+        points = Points(lanes, values[0, count], z[count], values[1, count], index)
+        self._parts.append((points, tries))
+        self._count, self._buffer = 0, self._new()
+
+    def parts(self) -> list[tuple[Points, Names]]:
+        """Everything so far, in parts."""
+        self._seal()
+        return self._parts
+
+
+ROOM = 4096
+"""Points in one part."""
