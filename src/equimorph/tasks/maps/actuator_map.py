@@ -86,7 +86,18 @@ class ActuatorMap(ABC):
 def unloaded_base(
     structure: Structure, grid: Grid, load: str, fixed: Mapping[str, float]
 ) -> Float[np.ndarray, " parameters"]:
-    """All parameters unloaded, with the lower corner of the grid.
+    """All parameters of the unloaded structure at the lower corner of a grid.
+
+    Parameters
+    ----------
+    structure
+        The structure.
+    grid
+        Two parameters with their ranges and intervals.
+    load
+        Name of the load parameter of the map.
+    fixed
+        Values of other parameters.
 
     Raises
     ------
@@ -106,7 +117,24 @@ def unloaded_base(
 def natural_states_over(
     structure: Structure, grid: Grid, load: str, fixed: Mapping[str, float] | None = None
 ) -> NaturalSheet:
-    """Unloaded states over a grid; see `unloaded_base` for what is refused."""
+    """Unloaded states over a grid.
+
+    Parameters
+    ----------
+    structure
+        The structure; it must have natural states.
+    grid
+        Two parameters with their ranges and intervals.
+    load
+        Name of the load parameter of the map.
+    fixed
+        Values of other parameters; those not named keep their defaults.
+
+    Raises
+    ------
+    InputError
+        As `unloaded_base`.
+    """
     return natural_sheet(structure, grid, unloaded_base(structure, grid, load, fixed or {}))
 
 

@@ -105,18 +105,26 @@ def landscape(  # the knobs of the public face, most by keyword
     within: Sequence[Constraint] = (),
     start: State | None = None,
 ) -> Landscape:
-    """Reduce a set to its best stable states over a grid, with barriers and gaps between them.
+    """Find the best stable state of a set at every setting of a grid, with barriers and gaps.
 
     Parameters
     ----------
-    objective, sense
-        What makes a state better than the others over the same setting.
+    eset
+        Equilibrium set over two parameters.
+    objective
+        Descriptor by which the states over one setting are compared.
     grid
         Settings in the box of the set.
+    sense
+        "min" or "max": whether lower or higher values are better.
     within
-        Constraints, beside those of the set.
+        Constraints, besides those of the set.
     start
-        Only states on the stable piece of the set that it lies on count.
+        Restricts the choice to the stable piece of the set around this state.
+
+    Returns
+    -------
+    The landscape: values, states, and edges of the grid across which the best state jumps.
 
     Raises
     ------

@@ -154,15 +154,17 @@ def optimise(  # the knobs of the public face, all by keyword
 
     Parameters
     ----------
+    eset
+        Equilibrium set over the parameters to choose.
     objective
-        A descriptor of the set's structure; make others by `combined`.
+        A descriptor of the set's structure; `combined` makes others.
     sense
         "min" or "max".
     within
-        Constraints, beside those of the set.
+        Constraints, besides those of the set.
     start
-        Stable state: only what can be reached from it without a snap counts, and the route is
-        planned.
+        Stable state. With it only states count that can be reached from it without a snap, and the
+        route is planned.
     margin
         Smallest stability margin allowed.
 

@@ -116,12 +116,18 @@ def robust_optimum(
 
     Parameters
     ----------
+    eset
+        Equilibrium set over the parameters to choose.
     objective
         A descriptor of the set's structure.
     offsets
         Largest errors of parameters, by name: actuators, loads, any others.
-    sense, within, margin
-        As for `optimise`; constraints and margin hold without imperfections.
+    sense
+        "min" or "max".
+    within
+        Constraints, besides those of the set; they hold without imperfections.
+    margin
+        Smallest stability margin allowed without imperfections.
 
     Returns
     -------

@@ -146,6 +146,10 @@ def strongest(
         large as possible. The box is looked at in its centre, corners and middles of sides, and
         where it is smallest of 21 × 21 settings, until that changes nothing.
 
+    Returns
+    -------
+    Local optima, the best first; with offsets the robust one, what it guarantees and its price.
+
     Raises
     ------
     InputError

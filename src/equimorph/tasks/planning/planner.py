@@ -45,32 +45,36 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     """Plan a route from `start` to `goal` on which every state is stable.
 
     With `via`, the way-points are lifted as given. Without, the cheapest path over the stable cells
-    of the complex is found, straightened by lifting and drawn to where it costs least; its corners
-    are the way-points. Either way the route is lifted again at a finer step before it is returned.
-    The network of the cells is kept with the set, so that later routes take less time.
+    of the complex is found, straightened by lifting, and its corners are moved to where it costs
+    least; they are the way-points. Either way the route is lifted again with finer steps before it
+    is returned. The network of the cells is kept with the set, so that later routes take less time.
 
     Parameters
     ----------
-    start, goal
-        Equilibria in the box of the set, with its fixed parameters; for the start, what `locate` or
-        `estimate_state` says of a measured one will do.
+    eset
+        Equilibrium set over the actuators.
+    start
+        Stable equilibrium in the box of the set, with its fixed parameters; or what `locate` or
+        `estimate_state` says of a measured one.
+    goal
+        Another equilibrium of the set's problem.
     via
         Way-points {name: value}, each changing some of the free parameters.
     within
-        Constraints to obey on the way, beside those of the set.
+        Constraints to obey on the way, besides those of the set.
     margin
         Smallest stability margin allowed, in the structure's metric.
     objective
-        What the route should have least of: "length" (metric), "travel" (scaled parameters), "work"
-        (actuators that get nothing back), "clearance" (``∫ ds/margin``), `Rates` (time), or a sum
-        ``[(1, "length"), (0.2, "work")]``; see `Objective`. A local minimum near the best path over
-        the mesh.
+        What the route minimises: "length" (metric), "travel" (scaled parameters), "work" (of
+        actuators that recover no energy), "clearance" (``∫ ds/margin``), `Rates` (time), or a sum
+        ``[(1, "length"), (0.2, "work")]``; see `Objective`. The result is a local minimum near the
+        best path over the mesh.
     snap_price
-        What a snap costs, in units of the objective, if snaps are allowed. Then the route may leave
-        its stable stratum over a fold and go on where the snap lands: `route.snaps` has the
-        landings, with the energy that is freed; before a snap no margin is kept.
+        Cost of a snap-through in units of the objective; None forbids them. With a price the route
+        may leave its stable stratum over a fold and continue where the snap lands: `route.snaps`
+        has the landings, with the energy released; no margin is kept before a snap.
     monitor
-        Descriptors to record in the schedule, beside those of the constraints.
+        Descriptors to record in the schedule, besides those of the constraints.
 
     Returns
     -------

@@ -50,19 +50,29 @@ def alternatives(
     objective: Wish = "length",
     monitor: Sequence[Descriptor] = (),
 ) -> tuple[Route, ...]:
-    """Plan several routes none of which can be drawn into another on the stable, feasible set.
+    """Plan several routes that cannot be deformed into each other on the stable, feasible set.
 
-    The best path of each class over the mesh by Dijkstra's algorithm on pairs of a vertex and a
-    class [Bhattacharya2012]_, straightened within its class and verified.
+    Dijkstra's algorithm on pairs of a vertex and a class [Bhattacharya2012]_ finds the best path of
+    each class over the mesh; it is straightened within its class and verified.
 
     Parameters
     ----------
     eset
-        A set over two parameters.
-    start, goal, within, margin, objective, monitor
-        As of `plan`.
+        Equilibrium set over two parameters.
+    start
+        Stable equilibrium with the set's fixed parameters.
+    goal
+        Another one.
     count
-        Most routes.
+        Largest number of routes.
+    within
+        Constraints to obey on the way, besides those of the set.
+    margin
+        Smallest stability margin allowed, in the structure's metric.
+    objective
+        What each route minimises; see `plan`.
+    monitor
+        Descriptors to record in the schedules, besides those of the constraints.
 
     Returns
     -------

@@ -41,8 +41,12 @@ def smoothed(
         A route that arrived.
     tolerance
         Largest distance from the polygon, in scaled parameters.
-    within, margin, monitor
-        As of `plan`: the demands that the smooth route has to obey.
+    within
+        Constraints that the smooth route has to obey.
+    margin
+        Smallest stability margin allowed, in the structure's metric.
+    monitor
+        Further descriptors for the schedule.
 
     Returns
     -------

@@ -104,7 +104,7 @@ def reachable(
     Parameters
     ----------
     eset
-        Set over the actuators.
+        Equilibrium set over the actuators.
     state
         A stable state of the set.
     descriptors
@@ -162,10 +162,25 @@ def attainable(
     *,
     within: Sequence[Constraint] = (),
 ) -> Reach:
-    """Find all stable states that hang together with a state by stable states.
+    """Find all states that a stable motion of the parameters reaches from a state.
 
-    Like `reachable`, but not cut along ``det J_S = 0``: the parameters are free to go where the
-    descriptors do not tell the way. Any number of descriptors.
+    Like `reachable`, but not cut along ``det J_S = 0``: the parameters may also move where they do
+    not steer the descriptors.
+
+    Parameters
+    ----------
+    eset
+        Equilibrium set over the actuators.
+    state
+        A stable state of the set.
+    descriptors
+        Any number of descriptors; their values form the image of the region.
+    within
+        Constraints, besides those of the set.
+
+    Returns
+    -------
+    One region with its boundary by kinds.
 
     Raises
     ------

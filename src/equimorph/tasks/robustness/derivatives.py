@@ -61,7 +61,11 @@ def sensitivity(
     descriptors
         Scalars; where they have a kink the mean of both sides is given.
     names
-        Parameters, imperfections among them; all of them by default.
+        Parameters, including imperfections; by default all of them.
+
+    Returns
+    -------
+    Derivatives of the unknowns and of each descriptor.
 
     Raises
     ------
@@ -104,6 +108,10 @@ def limit_sensitivity(
         Parameters and imperfections.
     within
         The constraints of the limit load, where one of them was met.
+
+    Returns
+    -------
+    dq/da by the name of each parameter.
 
     Raises
     ------

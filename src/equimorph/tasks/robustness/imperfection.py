@@ -82,12 +82,18 @@ def imperfection_law(
     ----------
     start
         Stable state of the perfect structure, usually unloaded.
-    load, imperfection
-        Names of parameters.
+    load
+        Name of the parameter that grows up to the limit load.
+    imperfection
+        Name of the parameter that is zero for the perfect structure.
     within
         Constraints that end the paths.
     sizes
-        Imperfections in scales of the parameter, three or more, falling.
+        Imperfections in scales of the parameter, three or more, in descending order.
+
+    Returns
+    -------
+    The fitted law; or that no limit load was found at an imperfection.
 
     Raises
     ------

@@ -106,7 +106,11 @@ def stable_room(  # all but two by keyword
     most
         Largest multiple of the tolerances that is tried.
     seed
-        Of the random directions.
+        Seed of the random directions.
+
+    Returns
+    -------
+    The largest multiple of the tolerances for each state, and what was met there.
 
     Raises
     ------

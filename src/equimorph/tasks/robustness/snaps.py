@@ -55,6 +55,17 @@ def least_snap(eset: EquilibriumSet, state: State) -> LeastSnap:
 
     With a load among the free parameters of the set this is the least change of actuators and load.
 
+    Parameters
+    ----------
+    eset
+        Equilibrium set over the parameters that may change.
+    state
+        A stable state of the set.
+
+    Returns
+    -------
+    The change, and where the snap lands; or that no loss of stability is known in the box.
+
     Raises
     ------
     InputError

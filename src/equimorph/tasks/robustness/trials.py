@@ -105,10 +105,16 @@ def random_trials(  # all but three by keyword
         A schedule of the structure, or way-points.
     spreads
         Standard deviations by parameter.
-    trials, seed
-        Number of trials, and seed of the random numbers.
+    trials
+        Number of trials.
     within
         Constraints to obey.
+    seed
+        Seed of the random numbers.
+
+    Returns
+    -------
+    How each trial ended.
 
     Raises
     ------

@@ -154,11 +154,11 @@ def solve_shape(
     Parameters
     ----------
     eset
-        The set over the actuators.
+        Equilibrium set over the actuators.
     targets
         Descriptors of the structure with their values.
     within
-        Constraints that solutions have to obey, beside those of the set.
+        Constraints that solutions have to obey, besides those of the set.
     start
         Stable state from which to plan a route to each stable solution.
     rank
@@ -189,7 +189,24 @@ def solve_shapes(
 ) -> tuple[Shapes, ...]:
     """Answer many questions of `solve_shape` at once: values of each descriptor, one per question.
 
-    What the set has to be asked is kept with it, so that later questions are answered faster.
+    Tables of the set are kept with it, so that later questions are answered faster.
+
+    Parameters
+    ----------
+    eset
+        Equilibrium set over the actuators.
+    targets
+        Descriptors of the structure with their values, one per question.
+    within
+        Constraints that solutions have to obey, besides those of the set.
+    start
+        Stable state from which to plan a route to each stable solution.
+    rank
+        Order of the solutions; see `solve_shape`.
+
+    Returns
+    -------
+    The solutions of each question.
 
     Raises
     ------
