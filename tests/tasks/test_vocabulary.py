@@ -1,9 +1,13 @@
 """All answers speak the same words: status, why, states, margin, schedule."""
 
+import inspect
+import re
+
 import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph import tasks
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +96,14 @@ def test_landscapes_have_a_status(spring, eset):
     assert none.status == "refused"
     assert none.why
     assert len(none.margin) == 0
+
+
+def test_every_task_documents_each_of_its_parameters_on_its_own():
+    """Study files take the keys of a section and their words from signature and docstring."""
+    for name in tasks.__all__:
+        task = getattr(tasks, name)
+        if inspect.isclass(task):
+            continue
+        section = re.search(r"Parameters\n-+\n(.*?)(\n\n\w+\n-+\n|\Z)", inspect.getdoc(task), re.S)
+        documented = [line for line in section[1].splitlines() if line and line[0] != " "]
+        assert documented == list(inspect.signature(task).parameters), name
