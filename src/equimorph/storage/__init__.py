@@ -2,7 +2,7 @@
 
 from equimorph.storage.charts import load_chart, save_chart
 from equimorph.storage.journal import open_journal
-from equimorph.storage.map_table import write_map
+from equimorph.storage.maps import write_map
 from equimorph.storage.results import (
     Results,
     append_results,

@@ -1,7 +1,9 @@
-"""Writing files so that a reader finds the old one or the new one, never half of one."""
+"""Files that a reader finds old or new, never half-written, and locks on them."""
 
+import fcntl
 import hashlib
 import os
+import socket
 import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -79,6 +81,42 @@ def read_text(path: Path) -> str:
 def checksum(content: bytes) -> str:
     """SHA-256 of a file's content."""
     return hashlib.sha256(content).hexdigest()
+
+
+@contextmanager
+def locked(path: Path, what: str) -> Generator[None]:
+    """Hold the lock on a file while the block lasts: one process at a time.
+
+    The file stays where it is and names its last holder. There is no stale lock: the system frees
+    it with the process, however that ends.
+
+    Parameters
+    ----------
+    path
+        The file; made if it does not exist.
+    what
+        What is being locked, for the message.
+
+    Raises
+    ------
+    InputError
+        If another process, or another place in this one, holds the lock.
+    """
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            holder = os.pread(handle, 200, 0).decode("utf-8", "replace").strip()
+            raise InputError(
+                f"`{what}` must not be in use by another run; got one that {holder or 'just began'}"
+                " is writing to. Wait for it, or choose another one with --out."
+            ) from error
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _synchronise(path: Path) -> None:

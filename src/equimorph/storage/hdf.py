@@ -193,6 +193,12 @@ def opened(path: Path, kind: str, version: int) -> Generator[h5py.File]:
         ) from error
 
 
+def is_sealed(path: Path) -> bool:
+    """Whether a file ends with a checksum; one that another program has changed does not."""
+    size = len(MARK) + hashlib.sha256().digest_size
+    return path.read_bytes()[-size:].startswith(MARK)
+
+
 def _unsealed(content: bytes) -> bytes:
     """Content without its checksum, if it has one, which must be right."""
     start = len(content) - len(MARK) - hashlib.sha256().digest_size

@@ -2,7 +2,7 @@
 
 Groups: ``set`` (vertices and cells of the equilibrium set), ``equilibria/<number>`` (states
 over one point each), ``routes/<name>`` and ``maps/<name>`` (one each), ``answers/<table>/<name>``
-(to the other questions of a study), and ``VTKHDF``, an unstructured grid whose arrays are hard
+(to the other questions of a study; see `records`), and ``VTKHDF``, an unstructured grid whose arrays are hard
 links to those of ``set``. The points of the grid are the free parameters and a descriptor: that
 embedding is for looking at, the states are in ``set``.
 """
@@ -17,25 +17,20 @@ import h5py
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
-from equimorph.storage import map_group, route_group, set_group, states_group
-from equimorph.storage.hdf import extend, get_json, opened, put_json, write
-from equimorph.storage.parts import PARTS, Part
-from equimorph.storage.vtkhdf import link_grid
+from equimorph.storage.hdf import DAMAGE, extend, get_json, is_sealed, opened, put_json, write
+from equimorph.storage.owner import Owner
+from equimorph.storage.records import label, read_record, write_record
+from equimorph.storage.schemas import UnreadableError
+from equimorph.storage.sets import link_grid, write_set
 from equimorph.structures import States, Structure, from_identity
 from equimorph.tasks import ActuatorMap, Route
 
 FORMAT = "equimorph results"
-VERSION = 2
+VERSION = 3
 SET, ROUTES, MAPS, EQUILIBRIA, ANSWERS = "set", "routes", "maps", "equilibria", "answers"
-STRUCTURE, KIND = "structure", "kind"
-
-
-@dataclass(frozen=True)
-class Answer:
-    """An answer to a question of a study, and how such answers are stored."""
-
-    part: Part[Any]
-    value: Any
+STRUCTURE = "structure"
+SCHEMAS = {ROUTES: "route", MAPS: "map", EQUILIBRIA: "states"}
+"""Of groups in files of the first releases, which do not say."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +38,8 @@ class Results:
     """What a results file holds: a set, equilibria over points, and what else was asked for.
 
     Routes and maps are there by name, other answers by table and name:
-    ``results.answers["optimum"]["flattest"]``.
+    ``results.answers["optimum"]["flattest"]``. What this release cannot read, because another one
+    wrote it otherwise, is left out and named in `unreadable`, with the reason.
     """
 
     equilibrium_set: EquilibriumSet | None
@@ -51,6 +47,7 @@ class Results:
     equilibria: tuple[States, ...]
     maps: dict[str, ActuatorMap] = field(default_factory=dict)
     answers: dict[str, dict[str, Any]] = field(default_factory=dict)
+    unreadable: dict[str, str] = field(default_factory=dict)
 
 
 def write_results(
@@ -61,7 +58,7 @@ def write_results(
     equilibria: Sequence[States] = (),
     maps: Mapping[str, ActuatorMap] | None = None,
     *,
-    answers: Mapping[str, Mapping[str, Answer]] | None = None,
+    answers: Mapping[str, Mapping[str, Any]] | None = None,
     structure: Structure | None = None,
 ) -> Path:
     """Write an equilibrium set and what was found on it, and maps, in one step.
@@ -101,14 +98,13 @@ def write_results(
     def fill(file: h5py.File) -> None:
         put_json(file, STRUCTURE, identity)
         if eset is not None:
-            set_group.write(file.create_group(SET), eset, height)
+            label(file.create_group(SET), "set")
+            write_set(file[SET], eset, height)
             link_grid(file, file[SET], eset.cells.shape[1])
         _add(file, routes or {}, equilibria, maps or {})
         for table, named in (answers or {}).items():
             for name, answer in named.items():
-                group = file.create_group(f"{ANSWERS}/{table}/{name}")
-                group.attrs[KIND] = answer.part.kind
-                answer.part.write(group, answer.value)
+                write_record(file.create_group(f"{ANSWERS}/{table}/{name}"), answer)
 
     return write(Path(path), FORMAT, VERSION, fill)
 
@@ -187,7 +183,8 @@ def load_set(path: str | Path) -> EquilibriumSet:
     with opened(Path(path), FORMAT, VERSION) as file:
         if SET not in file:
             raise InputError(f"`{path}` must hold an equilibrium set; got a file without one.")
-        return set_group.read(file[SET], from_identity(get_json(file, STRUCTURE)))
+        eset: EquilibriumSet = read_record(file[SET], _owner(file), SET)
+        return eset
 
 
 def _add(
@@ -198,11 +195,11 @@ def _add(
 ) -> None:
     first = len(file[EQUILIBRIA]) if EQUILIBRIA in file else 0
     for number, states in enumerate(equilibria, first):
-        states_group.write(file.create_group(f"{EQUILIBRIA}/{number}"), states)
+        write_record(file.create_group(f"{EQUILIBRIA}/{number}"), states)
     for name, route in routes.items():
-        route_group.write(file.create_group(f"{ROUTES}/{name}"), route)
+        write_record(file.create_group(f"{ROUTES}/{name}"), route)
     for name, amap in maps.items():
-        map_group.write(file.create_group(f"{MAPS}/{name}"), amap)
+        write_record(file.create_group(f"{MAPS}/{name}"), amap)
 
 
 def read_results(path: str | Path) -> Results:
@@ -213,28 +210,57 @@ def read_results(path: str | Path) -> Results:
     path
         Name of the file.
 
+    Returns
+    -------
+    All that this release can read; `Results.unreadable` names the rest.
+
     Raises
     ------
     InputError
         If it is missing, no results file, newer than this release, truncated or damaged.
     """
-    with opened(Path(path), FORMAT, VERSION) as file:
-        structure = from_identity(get_json(file, STRUCTURE))
-        eset = set_group.read(file[SET], structure) if SET in file else None
-        names = list(file[ROUTES]) if ROUTES in file else []
-        routes = {name: route_group.read(file[ROUTES][name], structure) for name in names}
-        count = len(file[EQUILIBRIA]) if EQUILIBRIA in file else 0
-        equilibria = tuple(
-            states_group.read(file[f"{EQUILIBRIA}/{number}"], structure) for number in range(count)
+    path = Path(path)
+    with opened(path, FORMAT, VERSION) as file:
+        reader = _Reader(file, is_sealed(path))
+        eset = reader.read(SET, SET) if SET in file else None
+        equilibria = reader.named(EQUILIBRIA)
+        tables = list(file[ANSWERS]) if ANSWERS in file else []
+        return Results(
+            eset,
+            reader.named(ROUTES),
+            tuple(equilibria[number] for number in sorted(equilibria, key=int)),
+            reader.named(MAPS),
+            {table: reader.named(f"{ANSWERS}/{table}") for table in tables},
+            reader.unreadable,
         )
-        names = list(file[MAPS]) if MAPS in file else []
-        maps = {name: map_group.read(file[MAPS][name], structure) for name in names}
-        answers = {
-            table: {name: _answer(group, structure) for name, group in named.items()}
-            for table, named in (file[ANSWERS].items() if ANSWERS in file else ())
-        }
-    return Results(eset, routes, equilibria, maps, answers)
 
 
-def _answer(group: h5py.Group, structure: Structure) -> Any:
-    return PARTS[group.attrs[KIND]].read(group, structure)
+class _Reader:
+    """Reads the records of a file one by one, and names those that it cannot read."""
+
+    def __init__(self, file: h5py.File, sealed: bool) -> None:
+        self.unreadable: dict[str, str] = {}
+        self._file, self._sealed, self._owner = file, sealed, _owner(file)
+
+    def named(self, place: str) -> dict[str, Any]:
+        """Read all records in a group, by name."""
+        names = list(self._file[place]) if place in self._file else []
+        found = {n: self.read(f"{place}/{n}", SCHEMAS.get(place, "record")) for n in names}
+        return {n: each for n, each in found.items() if f"{place}/{n}" not in self.unreadable}
+
+    def read(self, place: str, schema: str) -> Any:
+        """Read one record; None where this release cannot."""
+        try:
+            return read_record(self._file[place], self._owner, schema)
+        except UnreadableError as error:
+            self.unreadable[place] = str(error)
+        except DAMAGE as error:
+            # A whole file makes sense to the release that wrote it: the record is another one.
+            if not self._sealed:
+                raise
+            self.unreadable[place] = f"`record` must be one that this release can read: {error}"
+        return None
+
+
+def _owner(file: h5py.File) -> Owner:
+    return Owner(from_identity(get_json(file, STRUCTURE)))

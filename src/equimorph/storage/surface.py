@@ -17,7 +17,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.storage.files import write_bytes
-from equimorph.storage.set_group import embedding
+from equimorph.storage.sets import embedding
 
 FOLD, BOX, CAP, MIXED = range(4)
 """Kinds of surfaces of sets over three parameters."""

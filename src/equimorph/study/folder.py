@@ -18,7 +18,7 @@ from typing import Any
 
 from equimorph.errors import InputError
 from equimorph.storage.files import checksum, move_whole
-from equimorph.storage.lock import locked
+from equimorph.storage.files import locked
 from equimorph.study.fingerprint import FINGERPRINT, fingerprint
 from equimorph.study.problem import Study
 

@@ -1,19 +1,20 @@
-"""A route as an HDF5 group: path, events, snaps, schedule, or the reason of its refusal."""
+"""Routes as HDF5 groups: path, events, snaps, schedule, or the reason of a refusal."""
 
 import h5py
 import numpy as np
 
 from equimorph.equilibria import Event, Path
 from equimorph.model import Schedule
-from equimorph.storage import record_group
 from equimorph.storage.hdf import get, get_json, put, put_json
+from equimorph.storage.owner import Owner
+from equimorph.storage.values import read_value, write_value
 from equimorph.structures import State, States, Structure
 from equimorph.tasks import Route
 
 ABOUT, EVENTS, SCHEDULE, SNAPS = "about", "events", "schedule", "snaps"
 
 
-def write(group: h5py.Group, route: Route) -> None:
+def write_route(group: h5py.Group, route: Route) -> None:
     """Write a route into an empty group."""
     words = {"status": route.status, "why": route.why, "way_points": route.way_points}
     words |= {"objective": route.objective}
@@ -25,19 +26,23 @@ def write(group: h5py.Group, route: Route) -> None:
     if route.schedule is not None:
         _write_schedule(group.create_group(SCHEDULE), route.schedule)
     if route.snaps:
-        record_group.write(group.create_group(SNAPS), route.snaps)
+        write_value(group.create_group(SNAPS), route.snaps)
 
 
-def read(group: h5py.Group, structure: Structure) -> Route:
-    """Read what `write` wrote."""
+def read_route(group: h5py.Group, owner: Owner) -> Route:
+    """Read what `write_route` wrote."""
+    about = get_json(group, ABOUT)
     return Route(
+        status=about["status"],
+        why=about["why"],
+        way_points=about["way_points"],
+        objective=about.get("objective", "length"),  # older files have neither this
+        cost=float(group.attrs.get("cost", np.nan)),  # nor this
         margin=float(group.attrs["margin"]),
         length=float(group.attrs["length"]),
-        cost=float(group.attrs.get("cost", np.nan)),  # older files have none
-        path=_read_path(group, structure) if "z" in group else None,
+        path=_read_path(group, owner.structure) if "z" in group else None,
         schedule=_read_schedule(group[SCHEDULE]) if SCHEDULE in group else None,
-        snaps=record_group.read(group[SNAPS], structure) if SNAPS in group else (),
-        **get_json(group, ABOUT),
+        snaps=read_value(group[SNAPS], owner) if SNAPS in group else (),
     )
 
 

@@ -1,20 +1,26 @@
-"""A map over actuator settings as an HDF5 group."""
+"""Maps over actuator settings: as HDF5 groups, and as tables for people."""
 
+import csv
+import io
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.model import Constraint, Grid
+from equimorph.model import Grid
+from equimorph.storage.files import write_text
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json
+from equimorph.storage.owner import Owner, words_of
 from equimorph.structures import States, Structure
 from equimorph.tasks import ActuatorMap, CurvatureMap, LimitLoadMap, MapCurve, natural_states_over
 
 ABOUT = "about"
 
 
-def write(group: h5py.Group, amap: ActuatorMap) -> None:
+def write_map_group(group: h5py.Group, amap: ActuatorMap) -> None:
     """Write a map with its grid lines as coordinates; the curves one after the other."""
     first, second = amap.grid.names
     for name, axis in zip((first, second), amap.grid.axes(), strict=True):
@@ -42,18 +48,15 @@ def write(group: h5py.Group, amap: ActuatorMap) -> None:
     put_json(group, ABOUT, _about(amap))
 
 
-def read(group: h5py.Group, structure: Structure) -> ActuatorMap:
-    """Read what `write` wrote; natural states are computed again."""
-    about = get_json(group, ABOUT)
+def read_map_group(group: h5py.Group, owner: Owner) -> ActuatorMap:
+    """Read what `write_map_group` wrote; natural states are computed again."""
+    about, structure = get_json(group, ABOUT), owner.structure
     grid = Grid(**about["grid"])
     shared: dict[str, Any] = {
         "structure": structure,
         "grid": grid,
         "load": about["load"],
-        "within": tuple(
-            Constraint(structure.descriptor(text), sense, bound)
-            for text, sense, bound in about["within"]
-        ),
+        "within": tuple(map(owner.constraint, about["within"])),
         "fixed": about["fixed"],
         "value": get(group, "value"),
         "status": get(group, "status"),
@@ -65,7 +68,7 @@ def read(group: h5py.Group, structure: Structure) -> ActuatorMap:
     if "at" not in about:
         return LimitLoadMap(**shared)
     return CurvatureMap(
-        **shared, at=about["at"], descriptor=structure.descriptor(about["descriptor"])
+        **shared, at=about["at"], descriptor=owner.descriptor(about["descriptor"])
     )
 
 
@@ -75,7 +78,7 @@ def _about(amap: ActuatorMap) -> dict[str, Any]:
     about = {
         "grid": {name: [low, high, count] for name, low, high, count in sides},
         "load": amap.load,
-        "within": [[c.descriptor.name, c.sense, c.bound] for c in amap.within],
+        "within": [words_of(each) for each in amap.within],
         "fixed": dict(amap.fixed),
         "bound": amap.bound,
     }
@@ -103,3 +106,56 @@ def _curves(group: h5py.Group, structure: Structure) -> tuple[MapCurve, ...]:
 
 def _split(group: h5py.Group, name: str, ends: Int[np.ndarray, " curves"]) -> list[np.ndarray]:
     return np.split(get(group, f"curve_{name}"), ends[:-1])
+
+
+def write_map(amap: ActuatorMap, path: str | Path) -> tuple[Path, Path]:
+    """Write the values of a map, setting by setting, and its curves, point by point.
+
+    Parameters
+    ----------
+    amap
+        The map.
+    path
+        Name of the table of the grid, ending in ``.csv``; that of the curves ends in
+        ``-curves.csv``. A value that does not exist is left empty; "error"
+        bounds that of a place along its grid line.
+
+    Raises
+    ------
+    InputError
+        If the files cannot be written.
+    """
+    table = Path(path)
+    first, second = amap.grid.axes()
+    settings = ((x, y) for x in first.tolist() for y in second.tolist())
+    known = zip(amap.value.ravel().tolist(), amap.status.ravel().tolist(), strict=True)
+    rows = (
+        [repr(x), repr(y), _number(value), amap.kinds[status]]
+        for (x, y), (value, status) in zip(settings, known, strict=True)
+    )
+    write_text(table, _csv([*amap.grid.names, "value", "status"], rows))
+    points = (
+        [str(k), curve.kind, repr(x), repr(y), _number(low), _number(high), f"{error:.1e}"]
+        for k, curve in enumerate(amap.curves)
+        for (x, y), (low, high), error in zip(
+            curve.points.tolist(), curve.values.tolist(), curve.errors.tolist(), strict=True
+        )
+    )
+    curves = table.with_name(f"{table.stem}-curves.csv")
+    write_text(
+        curves, _csv(["curve", "kind", *amap.grid.names, "lower", "higher", "error"], points)
+    )
+    return table, curves
+
+
+def _number(value: float) -> str:
+    """Shortest decimal that gives the number back exactly; nothing for none."""
+    return repr(value) if np.isfinite(value) else ""
+
+
+def _csv(header: list[str], rows: Iterable[list[str]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue()

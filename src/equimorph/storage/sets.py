@@ -1,30 +1,41 @@
-"""An equilibrium set as an HDF5 group."""
+"""Equilibrium sets as HDF5 groups, and the grid of a set that ParaView opens.
+
+References
+----------
+VTKHDF file format 2.0, unstructured grid, https://docs.vtk.org/en/latest/vtk_file_formats/.
+"""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import h5py
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
-from equimorph.manifold import Audit, Boundary, Component, EquilibriumSet, Stratum
+from equimorph.manifold import Boundary, EquilibriumSet
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.model import Box, Constraint, Descriptor, names_of
+from equimorph.model import Box, Descriptor, names_of
 from equimorph.storage.hdf import add_dimension, get, get_json, put, put_json
-from equimorph.structures import States, Structure
+from equimorph.storage.owner import Owner, words_of
+from equimorph.storage.schemas import schema_named
+from equimorph.structures import States
 
 ABOUT = "about"
 GRID = ("vertices", "edges", "triangles", "sides", "tetrahedra", "faces")
 """Arrays of the triangulation of the box."""
+INSIDE = ("Component", "Stratum", "Audit")
+"""Records that a set consists of."""
 LARGEST_RESIDUAL = 1e-6
 SAMPLE = 1000
 """States whose residuals are looked at when a set is read."""
+VTK_TYPES = {2: 3, 3: 5, 4: 10}
+"""Cell types of VTK by the number of corners: line, triangle, tetrahedron."""
 
 
-def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
+def write_set(
+    group: h5py.Group, eset: EquilibriumSet, height: Descriptor | None = None
+) -> None:
     """Write a set.
 
     Parameters
@@ -34,8 +45,10 @@ def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
     eset
         The set.
     height
-        Coordinate of the embedding after the free parameters.
+        Coordinate of the embedding after the free parameters; by default the descriptor that tells
+        states apart.
     """
+    height = height or eset.structure.elevation
     points, parameters = eset.points, names_of(eset.structure.parameters)
     # At the top, so that the arrays keep their dimensions where the grid links to them; further
     # sets of a file, as regions have them, keep theirs to themselves.
@@ -51,7 +64,9 @@ def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
     put(group, "index", eset.index, ["vertex"], "negative eigenvalues; 0 is stable")
     put(group, "energy", points.energy, ["vertex"], "potential energy")
     for one in {d.name: d for d in [height, *(c.descriptor for c in eset.constraints)]}.values():
-        put(group, one.name.replace("/", "_over_"), one(points), ["vertex"], one.unit)
+        name = one.name.replace("/", "_over_")
+        if name not in group:
+            put(group, name, one(points), ["vertex"], one.unit)
     each = f"vertices of each cell, {eset.cells.shape[1]} at a time"
     put(group, "connectivity", eset.cells.ravel(), ["corner"], each)
     put(group, "cell_index", eset.cell_index, ["cell"], "index of the stratum")
@@ -66,8 +81,8 @@ def write(group: h5py.Group, eset: EquilibriumSet, height: Descriptor) -> None:
     put_json(group, ABOUT, _about(eset))
 
 
-def read(group: h5py.Group, structure: Structure) -> EquilibriumSet:
-    """Read what `write` wrote.
+def read_set(group: h5py.Group, owner: Owner) -> EquilibriumSet:
+    """Read what `write_set` wrote.
 
     Raises
     ------
@@ -80,15 +95,12 @@ def read(group: h5py.Group, structure: Structure) -> EquilibriumSet:
     d = len(about["box"])
     chains = zip(_chains(group, "boundary", d), about["boundary_kinds"], strict=True)
     eset = EquilibriumSet(
-        structure=structure,
+        structure=owner.structure,
         box=Box(**about["box"]),
         fixed=about["fixed"],
-        constraints=tuple(
-            Constraint(worst_named(structure, text), sense, bound)
-            for text, sense, bound in about["constraints"]
-        ),
+        constraints=tuple(map(owner.constraint, about["constraints"])),
         intervals=tuple(about["intervals"]),
-        points=States(structure, get(group, "z"), get(group, "p")),
+        points=States(owner.structure, get(group, "z"), get(group, "p")),
         kinds=get(group, "kind"),
         index=get(group, "index"),
         cells=get(group, "connectivity").reshape(-1, d + 1),
@@ -97,9 +109,9 @@ def read(group: h5py.Group, structure: Structure) -> EquilibriumSet:
         stratum=get(group, "stratum"),
         folds=tuple(_chains(group, "fold", d)),
         boundaries=tuple(Boundary(vertices, kind) for vertices, kind in chains),
-        components=tuple(Component(**_tuples(each)) for each in about["components"]),
-        strata=tuple(Stratum(**_tuples(each)) for each in about["strata"]),
-        audit=Audit(**_tuples(about["audit"])),
+        components=tuple(_built("Component", each, about) for each in about["components"]),
+        strata=tuple(_built("Stratum", each, about) for each in about["strata"]),
+        audit=_built("Audit", about["audit"], about),
         # sets over two parameters were once stored without tetrahedra
         mesh=BaseMesh(
             **{name: get(group, f"grid_{name}") for name in GRID if f"grid_{name}" in group}
@@ -156,13 +168,20 @@ def _about(eset: EquilibriumSet) -> dict[str, object]:
     return {
         "box": {name: [low, high] for name, low, high in sides},
         "fixed": dict(eset.fixed),
-        "constraints": [[c.descriptor.name, c.sense, c.bound] for c in eset.constraints],
+        "constraints": [words_of(each) for each in eset.constraints],
         "intervals": list(eset.intervals),
         "boundary_kinds": [each.kind for each in eset.boundaries],
-        "components": [asdict(each) for each in eset.components],
-        "strata": [asdict(each) for each in eset.strata],
-        "audit": asdict(eset.audit),
+        "components": [schema_named("Component").values(each) for each in eset.components],
+        "strata": [schema_named("Stratum").values(each) for each in eset.strata],
+        "audit": schema_named("Audit").values(eset.audit),
+        "versions": {name: schema_named(name).change.version for name in INSIDE},
     }
+
+
+def _built(name: str, values: dict[str, Any], about: dict[str, Any]) -> Any:
+    """Record inside a set; older files give no versions."""
+    version = about.get("versions", {}).get(name, 1)
+    return schema_named(name).build(version, _tuples(values))
 
 
 def _tuples(value: Any) -> Any:
@@ -194,3 +213,42 @@ def _chains(group: h5py.Group, name: str, d: int) -> list[Int[np.ndarray, "..."]
         raise ValueError(f"pieces named {name} do not end where they should")
     flat = np.split(joined, ends[:-1]) if len(ends) else []
     return [piece.reshape(-1, 3) for piece in flat] if d == 3 else list(flat)
+
+
+def link_grid(file: h5py.File, group: h5py.Group, size: int) -> None:
+    """Add ``/VTKHDF`` to a file whose `group` holds an equilibrium set.
+
+    Parameters
+    ----------
+    file
+        Where the grid goes.
+    group
+        With ``embedding``, ``connectivity`` and arrays along the file's dimensions vertex and cell.
+    size
+        Corners of a cell.
+    """
+    grid = file.create_group("VTKHDF")
+    grid.attrs["Version"] = np.array([2, 0])
+    grid.attrs["Type"] = np.bytes_("UnstructuredGrid")
+    grid["Points"], grid["Connectivity"] = group["embedding"], group["connectivity"]
+    points, corners = len(group["embedding"]), len(group["connectivity"])
+    for name, number in (
+        ("NumberOfPoints", points),
+        ("NumberOfCells", corners // size),
+        ("NumberOfConnectivityIds", corners),
+    ):
+        put(grid, name, np.array([number], dtype=np.int64), ["piece"])
+    put(grid, "Offsets", np.arange(0, corners + 1, size, dtype=np.int64), ["offset"])
+    put(grid, "Types", np.full(corners // size, VTK_TYPES[size], dtype=np.uint8), ["cell"])
+    for kind, dimension in (("PointData", "vertex"), ("CellData", "cell")):
+        fields = grid.create_group(kind)
+        for name, dataset in group.items():
+            if _lies_along(dataset, file[dimension]):
+                fields[name] = dataset
+
+
+def _lies_along(dataset: h5py.Dataset, dimension: h5py.Dataset) -> bool:
+    """Whether an array has one number for each entry of a dimension."""
+    if dataset.ndim != 1 or dataset.is_scale:
+        return False
+    return any(scale == dimension for scale in dataset.dims[0].values())

@@ -1,0 +1,46 @@
+"""To what the records of a file belong, which they refer to by names."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from equimorph.equilibria import worst_named
+from equimorph.model import Constraint, Descriptor
+from equimorph.structures import Structure
+
+
+@dataclass(frozen=True)
+class Owner:
+    """The structure of all records of a file, and descriptors that only the caller has.
+
+    Parameters
+    ----------
+    structure
+        Knows its own descriptors by their names.
+    descriptors
+        Others, by names, as users make them of functions.
+    """
+
+    structure: Structure
+    descriptors: Mapping[str, Descriptor] = field(default_factory=dict)
+
+    def descriptor(self, name: str) -> Descriptor:
+        """Descriptor of a name.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        return self.descriptors.get(name) or worst_named(self.structure, name)
+
+    def constraint(self, words: list[Any]) -> Constraint:
+        """Constraint that `words_of` wrote."""
+        name, sense, bound, *ease = words
+        return Constraint(self.descriptor(name), sense, bound, *ease)
+
+
+def words_of(constraint: Constraint) -> list[Any]:
+    """Constraint as plain data; its ease only where it has one."""
+    ease = [constraint.ease] if constraint.ease else []
+    return [constraint.descriptor.name, constraint.sense, constraint.bound, *ease]

@@ -1,0 +1,159 @@
+"""Schemas: under which names records and their fields stand in files, and how older ones are read.
+
+A record is one of our frozen dataclasses. Files name it by its schema, not by its class, and give
+the version of the schema beside it. A class or field may be renamed at any time: say so in
+`CHANGES`, and raise the version there. A record that this release cannot read is named, and the
+rest of its file is read.
+"""
+
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from equimorph import tasks
+from equimorph.equilibria import Event, Landing, LimitLoad, Path
+from equimorph.errors import InputError
+from equimorph.manifold import Audit, Component, Snap, StabilityDistance, Stratum
+from equimorph.model import Schedule
+from equimorph.tasks.reach import Answer, Region
+
+OTHERS = (
+    *(Audit, Component, Stratum, Snap, StabilityDistance),
+    *(Event, Landing, LimitLoad, Path, Schedule, Answer, Region),
+)
+"""Records of the layers below the tasks, and those whose names other dataclasses have, too."""
+
+
+class UnreadableError(InputError):
+    """One record of a file cannot be read by this release; others can."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """How a record changed since files were first written.
+
+    Parameters
+    ----------
+    version
+        Of the schema: 1, and one more for each change that older releases cannot read.
+    schema
+        Name in files, where the class is called otherwise now.
+    renamed
+        Names of fields in older versions, with those of today.
+    added
+        Values for fields that older versions lack; defaults of the class need not be repeated.
+    removed
+        Fields of older versions that are no longer there.
+    """
+
+    version: int = 1
+    schema: str | None = None
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    added: Mapping[str, Any] = field(default_factory=dict)
+    removed: tuple[str, ...] = ()
+
+
+CHANGES: Mapping[str, Change] = {}
+"""What changed, by the names of the classes; all others are as they were in version 1."""
+
+
+@dataclass(frozen=True)
+class Schema:
+    """How a kind of record stands in files."""
+
+    name: str
+    kind: type
+    change: Change
+
+    @property
+    def fields(self) -> list[Field[Any]]:
+        """Fields that are written."""
+        return [each for each in fields(self.kind) if each.metadata.get("kept", True)]
+
+    def values(self, record: Any) -> dict[str, Any]:
+        """Return the values of a record, under the names that they have in files."""
+        return {each.name: getattr(record, each.name) for each in self.fields}
+
+    def build(self, version: int, values: Mapping[str, Any]) -> Any:
+        """Return the record that has values, as a version of this schema names them.
+
+        Raises
+        ------
+        UnreadableError
+            If this release does not know the version or one of the fields, or lacks one.
+        """
+        change = self.change
+        here = {change.renamed.get(name, name): value for name, value in values.items()
+                if name not in change.removed}  # fmt: skip
+        known = {each.name: each for each in self.fields}
+        missing = known.keys() - here.keys() - {n for n, each in known.items() if _optional(each)}
+        filled = {name: change.added[name] for name in missing if name in change.added}
+        strange, lacking = sorted(here.keys() - known.keys()), sorted(missing - filled.keys())
+        if version > change.version or strange or lacking:
+            raise UnreadableError(
+                f"`record` must be one that this release can read ({self.name}, version "
+                f"{change.version} with {', '.join(known)}); got version {version} with "
+                f"{', '.join(values)}. Compute it again, or read it with the release that wrote it."
+            )
+        return self.kind(**here, **filled)
+
+
+def schema_of(record: Any) -> Schema | None:
+    """Return the schema of a record; None for what is no record of ours."""
+    found = schemas().get(_name(type(record)))
+    return found if found is not None and found.kind is type(record) else None
+
+
+def schema_named(name: str) -> Schema:
+    """Return the schema that a file names.
+
+    Raises
+    ------
+    UnreadableError
+        If this release has none.
+    """
+    if name not in schemas():
+        raise UnreadableError(
+            f"`record` must be of a kind that this release knows; got {name}. Compute it again, or "
+            "read it with the release that wrote it."
+        )
+    return schemas()[name]
+
+
+def build(kind: type, values: Mapping[str, Any], version: int = 1) -> Any:
+    """Return a record of a kind that stands in a layout of its own; see `Schema.build`."""
+    return schema_named(_name(kind)).build(version, values)
+
+
+@cache
+def schemas() -> dict[str, Schema]:
+    """All records, by the names of their schemas; those of tasks are found by themselves."""
+    kinds = [*_dataclasses(tasks), *OTHERS]
+    return {
+        _name(kind): Schema(_name(kind), kind, CHANGES.get(kind.__name__, Change()))
+        for kind in kinds
+    }
+
+
+def _name(kind: type) -> str:
+    return CHANGES.get(kind.__name__, Change()).schema or kind.__name__
+
+
+def _dataclasses(package: ModuleType) -> list[type]:
+    """Dataclasses that the modules of a package define, those that it exports last."""
+    found: list[type] = []
+    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        inside = vars(import_module(module.name)).values()
+        found += [each for each in inside
+                  if isinstance(each, type) and is_dataclass(each)
+                  and each.__module__ == module.name]  # fmt: skip
+    exported = {getattr(package, name) for name in package.__all__}
+    return sorted(found, key=lambda kind: kind in exported)
+
+
+def _optional(each: Field[Any]) -> bool:
+    return each.default is not MISSING or each.default_factory is not MISSING
