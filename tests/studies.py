@@ -73,8 +73,8 @@ def finished_run(base: Path) -> tuple[Outcome, Path]:
 
 def only_route(outcome: Outcome) -> Route:
     """Route of a study that asks for one."""
-    (journey,) = outcome.of("route").values()
-    route: Route = journey.route
+    ((route, *_),) = outcome.of("route").values()
+    assert isinstance(route, Route)
     return route
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.storage import record_group
+from equimorph.storage.owner import Owner
+from equimorph.storage.values import read_value, write_value
 from equimorph.structures.naming import descriptor_named
 
 
@@ -53,9 +54,9 @@ def _parts(record):
 
 def back(tmp_path, record, structure):
     with h5py.File(tmp_path / "record.h5", "w") as file:
-        record_group.write(file.create_group("record"), record)
+        write_value(file.create_group("record"), record)
     with h5py.File(tmp_path / "record.h5") as file:
-        return record_group.read(file["record"], structure)
+        return read_value(file["record"], Owner(structure))
 
 
 def test_shapes_with_their_routes_come_back(tmp_path, eset, spring):
@@ -95,7 +96,7 @@ def test_functions_are_refused_by_the_place_they_stand_at(tmp_path):
         h5py.File(tmp_path / "record.h5", "w") as file,
         pytest.raises(em.InputError, match=r"`0` must be data that a file can hold; got builtin"),
     ):
-        record_group.write(file.create_group("record"), {"x_l": abs})
+        write_value(file.create_group("record"), {"x_l": abs})
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ def test_a_route_may_be_planned_for_time_and_length(run):
 
 
 def test_alternatives_have_schedules_of_their_own_and_one_table(run):
-    first, second = run[0].of("route")["several"].all
+    first, second = run[0].of("route")["several"]
     for name, route in (("several", first), ("several-2", second)):
         schedule = read_schedule(run[1] / f"{name}-schedule.csv")
         np.testing.assert_array_equal(schedule.values, route.schedule.values)
@@ -128,8 +128,8 @@ def test_routes_come_from_the_folder_when_asked_again(run, monkeypatch):
     draw_dots(monkeypatch)
     with unchecked():
         again = run_study(run[1].parent / "spring.toml", run[1])
-    assert again.of("route")["several"].others[0].length == pytest.approx(
-        run[0].of("route")["several"].others[0].length, rel=0, abs=0
+    assert again.of("route")["several"][1].length == pytest.approx(
+        run[0].of("route")["several"][1].length, rel=0, abs=0
     )
     assert again.of("route")["snapping"].route.snaps[0].landed
 

@@ -67,9 +67,7 @@ def read_map_group(group: h5py.Group, owner: Owner) -> ActuatorMap:
     }
     if "at" not in about:
         return LimitLoadMap(**shared)
-    return CurvatureMap(
-        **shared, at=about["at"], descriptor=owner.descriptor(about["descriptor"])
-    )
+    return CurvatureMap(**shared, at=about["at"], descriptor=owner.descriptor(about["descriptor"]))
 
 
 def _about(amap: ActuatorMap) -> dict[str, Any]:

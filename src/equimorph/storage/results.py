@@ -2,9 +2,9 @@
 
 Groups: ``set`` (vertices and cells of the equilibrium set), ``equilibria/<number>`` (states
 over one point each), ``routes/<name>`` and ``maps/<name>`` (one each), ``answers/<table>/<name>``
-(to the other questions of a study; see `records`), and ``VTKHDF``, an unstructured grid whose arrays are hard
-links to those of ``set``. The points of the grid are the free parameters and a descriptor: that
-embedding is for looking at, the states are in ``set``.
+(to the other questions of a study; see `records`), and ``VTKHDF``, an unstructured grid whose
+arrays are hard links to those of ``set``. The points of the grid are the free parameters and a
+descriptor: that embedding is for looking at, the states are in ``set``.
 """
 
 from collections.abc import Mapping, Sequence

@@ -33,9 +33,7 @@ VTK_TYPES = {2: 3, 3: 5, 4: 10}
 """Cell types of VTK by the number of corners: line, triangle, tetrahedron."""
 
 
-def write_set(
-    group: h5py.Group, eset: EquilibriumSet, height: Descriptor | None = None
-) -> None:
+def write_set(group: h5py.Group, eset: EquilibriumSet, height: Descriptor | None = None) -> None:
     """Write a set.
 
     Parameters

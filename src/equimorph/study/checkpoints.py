@@ -7,13 +7,13 @@ found by asking the same question again, in this study or an edited one; a damag
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from equimorph.errors import InputError
 from equimorph.model import Journal
 from equimorph.storage import open_journal
 from equimorph.storage.files import checksum, move_whole
-from equimorph.storage.parts import Part
+from equimorph.storage.records import content_of, load_record
 from equimorph.structures import Structure
 from equimorph.study.fingerprint import fingerprint
 from equimorph.study.folder import ResultsFolder, writable
@@ -42,9 +42,7 @@ class Checkpoints:
     asked: set[str] = field(default_factory=set)
     found: set[str] = field(default_factory=set)
 
-    def answer(
-        self, question: dict[str, Any], part: Part[Answer], compute: Callable[[], Answer]
-    ) -> Answer:
+    def answer(self, question: dict[str, Any], compute: Callable[[], Answer]) -> Answer:
         """Return the stored answer to a question; without one, compute it and store it.
 
         The answer is always the one read from the file, so that a run that was interrupted goes on
@@ -54,8 +52,6 @@ class Checkpoints:
         ----------
         question
             All that the answer depends on, as plain data.
-        part
-            How such answers are stored.
         compute
             Finds the answer.
 
@@ -64,38 +60,35 @@ class Checkpoints:
         InputError
             If the folder cannot be written.
         """
-        key = _key(question, part)
+        key = fingerprint(question)
         self.asked.add(key)
         for file in self.results.checkpoints.glob(f"{key}-*"):
-            answer = self._load(file, part)
-            if answer is not None:
+            found = self._load(file)
+            if found is not None:
                 self.found.add(key)
-                return answer
+                (kept,) = found
+                return cast(Answer, kept)
             file.unlink()
-        return part.load(self._store(key, part.content(compute())), self.structure)
+        file = self._store(key, content_of(compute()))
+        return cast(Answer, load_record(file, self.structure))
 
-    def long_answer(
-        self,
-        question: dict[str, Any],
-        part: Part[Answer],
-        compute: Callable[[Journal], Answer],
-    ) -> Answer:
-        """Return the answer of a computation that goes on from what it had found; see `answer`.
+    def long_answer(self, question: dict[str, Any], compute: Callable[[Journal], Answer]) -> Answer:
+        """Return the answer of a computation that keeps answers to parts of it; see `answer`.
 
         Parameters
         ----------
-        question, part
+        question
             As of any answer.
         compute
-            Finds the answer, with a journal of its steps, which is removed at the end.
+            Finds the answer, with a journal, which is removed at the end.
         """
-        path = self.results.checkpoints / f"{_key(question, part)}.journal"
+        path = self.results.checkpoints / f"{fingerprint(question)}.journal"
 
         def resume() -> Answer:
             with open_journal(path, replace=True) as journal:
                 return compute(journal)
 
-        answer = self.answer(question, part, resume)
+        answer = self.answer(question, resume)
         path.unlink(missing_ok=True)
         return answer
 
@@ -113,15 +106,11 @@ class Checkpoints:
             move_whole(partial, file)
         return file
 
-    def _load(self, file: Path, part: Part[Answer]) -> Answer | None:
-        """Answer in a file, unless it is damaged."""
+    def _load(self, file: Path) -> tuple[Any] | None:
+        """Return the answer in a file, unless it is damaged or of another release."""
         if not file.name.endswith(checksum(file.read_bytes())):
             return None
         try:
-            return part.load(file, self.structure)
+            return (load_record(file, self.structure),)
         except InputError:
             return None
-
-
-def _key(question: dict[str, Any], part: Part[Any]) -> str:
-    return fingerprint({"part": part.kind, **question})

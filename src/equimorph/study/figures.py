@@ -47,7 +47,7 @@ def _figures_of_set(outcome: Outcome, eset: EquilibriumSet) -> list[Figure]:
         return [still(DIAGRAM, partial(plotting.diagram, eset, height))]
     if len(eset.names) == 3:
         return []
-    routes = [journey.route for journey in outcome.of("route").values()]
+    routes = [found[0] for found in outcome.of("route").values()]
     first = next((route for route in routes if route.arrived), None)
     figures = [
         still(SURFACE, partial(plotting.surface, eset, height, route=first)),

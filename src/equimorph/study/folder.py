@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from equimorph.errors import InputError
-from equimorph.storage.files import checksum, move_whole
-from equimorph.storage.files import locked
+from equimorph.storage.files import checksum, locked, move_whole
 from equimorph.study.fingerprint import FINGERPRINT, fingerprint
 from equimorph.study.problem import Study
 

@@ -10,9 +10,8 @@ from typing import Any
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Journal, Progress, Silent
+from equimorph.storage import write_results
 from equimorph.storage.files import read_text
-from equimorph.storage.parts import STATES_PART, set_part
-from equimorph.storage.results import Answer, write_results
 from equimorph.structures import States
 from equimorph.study.checkpoints import Checkpoints
 from equimorph.study.figures import draw_figures
@@ -151,14 +150,14 @@ def _equilibrium_set(
                 journal=journal,
             )
 
-    return checkpoints.long_answer(_question(study, of_set=True), set_part(ground.height), compute)
+    return checkpoints.long_answer(_question(study, of_set=True), compute)
 
 
 def _equilibria(
     study: Study, eset: EquilibriumSet, point: dict[str, float], checkpoints: Checkpoints
 ) -> States:
     question = {**_question(study, of_set=True), "at": point}
-    return checkpoints.answer(question, STATES_PART, lambda: eset.at(**point))
+    return checkpoints.answer(question, lambda: eset.at(**point))
 
 
 def _answered(  # all that an answer depends on
@@ -176,7 +175,7 @@ def _answered(  # all that an answer depends on
     def compute() -> Any:
         return kind.answer(ground, eset, asked.task, progress)
 
-    return Answered(asked, checkpoints.answer(question, kind.part, compute))
+    return Answered(asked, checkpoints.answer(question, compute))
 
 
 def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
@@ -192,13 +191,13 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
 def _write_results(outcome: Outcome, path: Path) -> None:
     """Write all answers as one file: routes and maps in groups of their own."""
     routes: dict[str, Route] = {}
-    for name, journey in outcome.of("route").items():
-        routes |= {route_name(name, k): each for k, each in enumerate(journey.all, 1)}
-    answers: dict[str, dict[str, Answer]] = {}
+    for name, found in outcome.of("route").items():
+        routes |= {route_name(name, k): each for k, each in enumerate(found, 1)}
+    answers: dict[str, dict[str, Any]] = {}
     for each in outcome.answers:
         kind = each.asked.kind
         if kind.table not in ("route", "map"):
-            answers.setdefault(kind.table, {})[each.name] = Answer(kind.part, each.answer)
+            answers.setdefault(kind.table, {})[each.name] = each.answer
     write_results(
         path,
         outcome.equilibrium_set,

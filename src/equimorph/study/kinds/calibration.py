@@ -17,7 +17,6 @@ from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress, parameter_vector
-from equimorph.storage.parts import CALIBRATION_PART
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study import html
 from equimorph.study.kinds.found import heading
@@ -50,7 +49,6 @@ class CalibrationKind(Kind[CalibrationSection, CalibrationTask, Calibration]):
     """Parameters or data of the structure, fitted to measured shapes."""
 
     table = "calibration"
-    part = CALIBRATION_PART
 
     def prepared(self, ground: Ground, section: CalibrationSection, key: str) -> CalibrationTask:
         """Look up columns, parameters and data."""

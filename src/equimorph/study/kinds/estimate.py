@@ -10,7 +10,6 @@ from rich.markup import escape as plain
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.kinds.found import (
     figures_of_states,
@@ -39,7 +38,6 @@ class EstimateKind(Kind[EstimateSection, EstimateTask, StateEstimate]):
     """On which branch, and under which load, a measured structure is."""
 
     table = "estimate"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: EstimateSection, key: str) -> EstimateTask:
         """Look up what was measured; every value needs its error."""

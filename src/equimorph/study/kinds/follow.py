@@ -14,7 +14,6 @@ from equimorph.equilibria import Leg
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.storage import write_schedule
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.choose import choose_state
 from equimorph.study.kinds.found import heading
@@ -52,7 +51,6 @@ class FollowKind(Kind[FollowSection, FollowTask, FollowedOptimum]):
     """How the best state moves while loads and targets do, and where it jumps."""
 
     table = "follow"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: FollowSection, key: str) -> FollowTask:
         """Look up objective, start, legs, actuators and constraints."""

@@ -11,7 +11,6 @@ from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.kinds.found import heading
 from equimorph.study.kinds.kind import Figure, Kind, still
@@ -28,7 +27,6 @@ class ImperfectionKind(Kind[ImperfectionSection, ImperfectionTask, Mapping[str, 
     """How a limit load changes with imperfections."""
 
     table = "imperfection"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: ImperfectionSection, key: str) -> ImperfectionTask:
         """Look up state, load, imperfections and constraints."""

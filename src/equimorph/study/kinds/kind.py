@@ -13,7 +13,6 @@ from matplotlib.figure import Figure as Drawn
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
-from equimorph.storage.parts import Part
 from equimorph.study.lookup import Extent, Ground
 from equimorph.study.sections.fields import TaskSection
 
@@ -39,8 +38,6 @@ class Kind(ABC, Generic[S, T, A]):
 
     table: ClassVar[str]
     """Its tables in the file are ``[[table]]``."""
-    part: Part[A]
-    """How answers are stored."""
 
     @abstractmethod
     def prepared(self, ground: Ground, section: S, key: str) -> T:

@@ -14,7 +14,6 @@ from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Grid, Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.choose import chosen_start
 from equimorph.study.kinds.found import heading
@@ -55,7 +54,6 @@ class LandscapeKind(Kind[LandscapeSection, LandscapeTask, Landscape]):
     """The best stable state at every setting, with barriers and gaps between them."""
 
     table = "landscape"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: LandscapeSection, key: str) -> LandscapeTask:
         """Look up objective, grid, start and constraints."""

@@ -12,7 +12,6 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Grid, Progress
 from equimorph.storage import write_map
-from equimorph.storage.parts import MAP_PART
 from equimorph.structures import Structure
 from equimorph.study import html
 from equimorph.study.kinds.actuator_grid import common_of, grid_of, unloaded_load
@@ -45,7 +44,6 @@ class MapKind(Kind[MapSection, MapTask, ActuatorMap]):
     """Limit loads, or the first stable states under a load, over two actuators."""
 
     table = "map"
-    part = MAP_PART
 
     def prepared(self, ground: Ground, section: MapSection, key: str) -> MapTask:
         """Look up actuators, load and descriptor."""

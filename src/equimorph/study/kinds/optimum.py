@@ -9,7 +9,6 @@ from rich.markup import escape as plain
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.storage import write_schedule
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.choose import chosen_start
 from equimorph.study.kinds.found import (
@@ -40,7 +39,6 @@ class OptimumKind(Kind[OptimumSection, OptimumTask, Optima]):
     """The stable states at which an objective is least or largest."""
 
     table = "optimum"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: OptimumSection, key: str) -> OptimumTask:
         """Look up objective, start and constraints."""

@@ -14,7 +14,6 @@ from rich.markup import escape as plain
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.choose import choose_state
 from equimorph.study.kinds.found import heading
@@ -51,7 +50,6 @@ class ReachKind(Kind[ReachSection, ReachTask, Reached]):
     """What stable motions lead to from a state, and what bounds it."""
 
     table = "reach"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: ReachSection, key: str) -> ReachTask:
         """Look up start, descriptors and constraints."""

@@ -10,7 +10,6 @@ from rich.markup import escape as plain
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.structures import State
 from equimorph.study import html
 from equimorph.study.kinds.found import heading
@@ -28,7 +27,6 @@ class RoomKind(Kind[RoomSection, RoomTask, tuple[State, Room]]):
     """How far parameters may stray from a state."""
 
     table = "room"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: RoomSection, key: str) -> RoomTask:
         """Look up state, tolerances and constraints."""

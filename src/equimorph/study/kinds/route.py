@@ -15,7 +15,6 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Progress
 from equimorph.storage import write_schedule
-from equimorph.storage.parts import JOURNEY_PART, Journey
 from equimorph.structures import State
 from equimorph.study import html
 from equimorph.study.choose import choose_state
@@ -34,6 +33,9 @@ from equimorph.study.names import route_name, schedule_table
 from equimorph.study.sections.routes import RouteSection
 from equimorph.tasks import Route, alternatives, plan, smoothed
 
+Routes = tuple[Route, ...]
+"""The route that was asked for, or its refusal; then others, if any were asked for."""
+
 
 @dataclass(frozen=True)
 class RouteTask:
@@ -49,11 +51,10 @@ class RouteTask:
         return f"{self.section.name}-alternatives"
 
 
-class RouteKind(Kind[RouteSection, RouteTask, Journey]):
+class RouteKind(Kind[RouteSection, RouteTask, Routes]):
     """Routes between two states: along way-points, planned, with snaps, or several of them."""
 
     table = "route"
-    part = JOURNEY_PART
 
     def prepared(self, ground: Ground, section: RouteSection, key: str) -> RouteTask:
         """Look up ends, way-points, rates and constraints."""
@@ -72,35 +73,34 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
 
     def answer(
         self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, sink: Progress
-    ) -> Journey:
+    ) -> Routes:
         """Choose both ends, plan, and round the corners if that is wanted."""
         assert eset is not None
         section = task.section
         start = choose_state(eset, section.start, f"{task.key}.start")
         goal = choose_state(eset, section.goal, f"{task.key}.goal")
         with at_key(task.key):
-            first, *others = _routes(ground, eset, task, (start, goal))
-        return Journey(start, goal, first, tuple(others))
+            return tuple(_routes(ground, eset, task, (start, goal)))
 
-    def write_tables(self, task: RouteTask, answer: Journey, folder: Path) -> None:
+    def write_tables(self, task: RouteTask, answer: Routes, folder: Path) -> None:
         """Write the schedules."""
         for name, route in _named(task, answer):
             if route.schedule is not None:
                 write_schedule(route.schedule, folder / schedule_table(name))
 
     def figures(
-        self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, answer: Journey
+        self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, answer: Routes
     ) -> Sequence[Figure]:
         """Shapes, margins, plane and film of the best; all of them on one plane."""
-        found = [*figures_of_way(eset, task.section.name, answer.route)]
-        if answer.others and eset is not None:
-            draw = partial(plotting.alternative_routes, eset, answer.all)
+        found = [*figures_of_way(eset, task.section.name, answer[0])]
+        if len(answer) > 1 and eset is not None:
+            draw = partial(plotting.alternative_routes, eset, answer)
             found.insert(0, still(task.overview, draw))
         return found
 
-    def report(self, task: RouteTask, answer: Journey, folder: Path) -> list[str]:
+    def report(self, task: RouteTask, answer: Routes, folder: Path) -> list[str]:
         """Verdict, schedule and figures."""
-        name, route = task.section.name, answer.route
+        name, route = task.section.name, answer[0]
         heading = f"<h2>Route {escape(name)}</h2>"
         pictures = pictures_of_way(folder, name, "route")
         if not route.arrived:
@@ -116,14 +116,12 @@ class RouteKind(Kind[RouteSection, RouteTask, Journey]):
             pictures,
         ]
 
-    def verdict(self, task: RouteTask, answer: Journey) -> str:
+    def verdict(self, task: RouteTask, answer: Routes) -> str:
         """Say whether it arrived."""
-        route, head = answer.route, f"Route {task.section.name}"
+        route, head = answer[0], f"Route {task.section.name}"
         if not route.arrived:
             return f"{head}: [bold red]refused[/]. {plain(route.why)}"
-        others = (
-            f" {len(answer.all)} routes differ in how they pass holes." if answer.others else ""
-        )
+        others = f" {len(answer)} routes differ in how they pass holes." if len(answer) > 1 else ""
         how = snaps_in_words(route) or "without a snap"
         size = _size(route, lambda value: f"{value:.3f}")
         return f"{head}: [bold green]arrived[/] {how}, {size}{_cost(route)}.{others}"
@@ -150,8 +148,8 @@ def _routes(
     ]
 
 
-def _named(task: RouteTask, answer: Journey) -> list[tuple[str, Route]]:
-    return [(route_name(task.section.name, k), route) for k, route in enumerate(answer.all, 1)]
+def _named(task: RouteTask, answer: Routes) -> list[tuple[str, Route]]:
+    return [(route_name(task.section.name, k), route) for k, route in enumerate(answer, 1)]
 
 
 def _size(route: Route, number: Any) -> str:
@@ -172,11 +170,11 @@ def _rounding(task: RouteTask) -> str:
     return "" if smooth is None else f", corners rounded by {html.number(smooth)} at most"
 
 
-def _report_of_all(task: RouteTask, answer: Journey, folder: Path) -> list[str]:
+def _report_of_all(task: RouteTask, answer: Routes, folder: Path) -> list[str]:
     """Routes side by side; nothing where there is only one."""
     if task.section.alternatives is None:
         return []
-    if not answer.others:
+    if len(answer) == 1:
         return ["<p>No other route passes the holes of the stable set differently.</p>"]
     rows = [
         [
@@ -188,7 +186,7 @@ def _report_of_all(task: RouteTask, answer: Journey, folder: Path) -> list[str]:
         ]
         for number, (name, route) in enumerate(_named(task, answer), 1)
     ]
-    head = ["", "length", "smallest margin", escape(answer.route.objective), "schedule"]
+    head = ["", "length", "smallest margin", escape(answer[0].objective), "schedule"]
     caption = "Routes that cannot be drawn into each other; the first is the best."
     return [
         html.table(head, rows),

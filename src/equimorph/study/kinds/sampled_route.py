@@ -11,7 +11,6 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Box, Constraint, Progress, names_of, parameter_vector
 from equimorph.storage import write_schedule
-from equimorph.storage.parts import RECORD_PART
 from equimorph.structures import State, Structure
 from equimorph.study import html
 from equimorph.study.kinds.found import heading
@@ -48,7 +47,6 @@ class SampledRouteKind(Kind[SampledRouteSection, SampledRouteTask, Route]):
     """Routes by random trees of lifted edges, where no set can be computed."""
 
     table = "sampled_route"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: SampledRouteSection, key: str) -> SampledRouteTask:
         """Look up ends, actuators, loads and constraints."""

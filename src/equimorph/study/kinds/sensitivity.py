@@ -12,7 +12,6 @@ from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, Progress
 from equimorph.plotting.robustness import MOST_BARS
-from equimorph.storage.parts import RECORD_PART
 from equimorph.structures import Structure
 from equimorph.study import html
 from equimorph.study.choose import choose_state
@@ -38,7 +37,6 @@ class SensitivityKind(Kind[SensitivitySection, SensitivityTask, Sensitivity]):
     """How descriptors change with parameters."""
 
     table = "sensitivity"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: SensitivitySection, key: str) -> SensitivityTask:
         """Look up state, descriptors and parameters."""

@@ -9,7 +9,6 @@ from rich.markup import escape as plain
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.choose import chosen_start
 from equimorph.study.kinds.found import (
@@ -45,7 +44,6 @@ class ShapeKind(Kind[ShapeSection, ShapeTask, Shapes]):
     """All settings at which the structure takes a shape."""
 
     table = "shape"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: ShapeSection, key: str) -> ShapeTask:
         """Look up targets, start and constraints."""

@@ -9,7 +9,6 @@ from rich.markup import escape as plain
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.structures import State, States
 from equimorph.study import html
 from equimorph.study.kinds.found import figures_of_states, heading, report_of_states
@@ -26,7 +25,6 @@ class SnapKind(Kind[SnapSection, SnapTask, tuple[State, LeastSnap]]):
     """The least change of parameters that makes a state snap, and where it lands."""
 
     table = "snap"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: SnapSection, key: str) -> SnapTask:
         """Look up the state."""

@@ -13,7 +13,6 @@ from rich.markup import escape as plain
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
 from equimorph.model import Descriptor, Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.structures import States
 from equimorph.study import html
 from equimorph.study.kinds.kind import Figure, Kind, still
@@ -47,7 +46,6 @@ class SnapGraphKind(Kind[SnapGraphSection, SnapGraphTask, Snaps]):
     """Runs of the stability boundary, where snaps from them land, and the energy freed."""
 
     table = "snap_graph"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: SnapGraphSection, key: str) -> SnapGraphTask:
         """Look up the descriptor."""

@@ -13,7 +13,6 @@ from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Grid, Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.kinds.actuator_grid import common_of, grid_of
 from equimorph.study.kinds.found import heading
@@ -47,7 +46,6 @@ class StrongestKind(Kind[StrongestSection, StrongestTask, Answer]):
     """Settings with the largest limit load, sure and robust."""
 
     table = "strongest"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: StrongestSection, key: str) -> StrongestTask:
         """Look up actuators, load, offsets and constraints."""

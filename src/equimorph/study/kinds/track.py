@@ -12,7 +12,6 @@ from equimorph.equilibria import Leg
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Progress
 from equimorph.storage import write_schedule
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.choose import choose_state
 from equimorph.study.kinds.found import heading
@@ -48,7 +47,6 @@ class TrackKind(Kind[TrackSection, TrackTask, Tracking]):
     """Actuators that lead descriptors along given targets while loads move."""
 
     table = "track"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: TrackSection, key: str) -> TrackTask:
         """Look up start, targets, actuators and constraints; limits are those of the box."""

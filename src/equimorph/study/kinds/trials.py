@@ -9,7 +9,6 @@ from pathlib import Path
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.kinds.found import heading
 from equimorph.study.kinds.given import GivenWay, given_way
@@ -24,7 +23,6 @@ class TrialsKind(Kind[TrialsSection, GivenWay, Trials]):
     """What becomes of a schedule under random imperfections."""
 
     table = "trials"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: TrialsSection, key: str) -> GivenWay:
         """Look up the way and the parameters that are off."""

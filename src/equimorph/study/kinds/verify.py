@@ -11,7 +11,6 @@ from rich.markup import escape as plain
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
 from equimorph.storage import write_schedule
-from equimorph.storage.parts import RECORD_PART
 from equimorph.study import html
 from equimorph.study.kinds.found import heading
 from equimorph.study.kinds.given import GivenWay, given_way
@@ -27,7 +26,6 @@ class VerifyKind(Kind[VerifySection, GivenWay, Verification]):
     """Whether a schedule can be executed without a snap, and whether that is proved."""
 
     table = "verify"
-    part = RECORD_PART
 
     def prepared(self, ground: Ground, section: VerifySection, key: str) -> GivenWay:
         """Look up the way and its constraints."""
