@@ -193,7 +193,7 @@ def test_a_set_over_one_parameter_gets_its_diagram(tmp_path):
     with unchecked():
         outcome = run_study(tmp_path / "spring.toml", tmp_path / "out")
     assert outcome.equilibrium_set.audit.clean
-    assert outcome.of("route")["a"].route.arrived
+    assert outcome.of("route")["a"][0].arrived
     names = {file.name for file in (tmp_path / "out").iterdir()}
     assert {"diagram.png", "diagram.svg", "a-shapes.png", "a-margins.png"} <= names
     assert not {"surface.png", "a-plane.png"} & names

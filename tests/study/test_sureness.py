@@ -238,7 +238,7 @@ def test_a_robust_optimum_is_that_of_the_worst_load(run):
 
 def test_a_route_is_planned_for_what_is_asked(run):
     """The cost is read back from the folder."""
-    route = run[0].of("route")["cheap"].route
+    route = run[0].of("route")["cheap"][0]
     assert route.objective == "work"
     spent = em.Objective(((1.0, "work"),)).along(route.path.states)
     np.testing.assert_allclose(route.cost, spent, rtol=1e-12)

@@ -75,7 +75,7 @@ def page(out: Path) -> str:
 
 def test_a_snap_is_told_with_its_place_and_the_energy_it_frees(run):
     """At the fold x_l = cos³δ, F = sin³δ; what is freed is a difference of U + F x_l tan δ."""
-    route = run[0].of("route")["snapping"].route
+    route = run[0].of("route")["snapping"][0]
     (snap,) = route.snaps
     x, force = snap.state["x_l"], snap.state["F"]
     np.testing.assert_allclose(x ** (2 / 3) + force ** (2 / 3), 1.0, rtol=1e-9)
@@ -91,7 +91,7 @@ def test_a_snap_is_told_with_its_place_and_the_energy_it_frees(run):
 
 def test_the_landings_of_a_route_are_in_the_results(run):
     stored = read_results(run[1] / "results.h5").routes["snapping"].snaps
-    found = run[0].of("route")["snapping"].route.snaps
+    found = run[0].of("route")["snapping"][0].snaps
     assert [each.released for each in stored] == [each.released for each in found]
     np.testing.assert_array_equal(stored[0].way.z, found[0].way.z)
 
@@ -105,7 +105,7 @@ def test_a_smoothed_route_passes_beside_its_corner(run):
 
 
 def test_a_route_may_be_planned_for_time_and_length(run):
-    route = run[0].of("route")["timed"].route
+    route = run[0].of("route")["timed"][0]
     rates = em.Rates({"x_l": 0.1, "F": 0.05})
     assert route.objective == "time + 0.5 length"
     time = rates.times(route.schedule)[-1]
@@ -131,7 +131,7 @@ def test_routes_come_from_the_folder_when_asked_again(run, monkeypatch):
     assert again.of("route")["several"][1].length == pytest.approx(
         run[0].of("route")["several"][1].length, rel=0, abs=0
     )
-    assert again.of("route")["snapping"].route.snaps[0].landed
+    assert again.of("route")["snapping"][0].snaps[0].landed
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from equimorph.model.box import Box, Grid
 from equimorph.model.descriptor import Constraint, Descriptor, combined, eased, largest_of
+from equimorph.model.function_content import content_of_descriptor, content_of_function
 from equimorph.model.journal import (
     Findings,
     Forgetful,
@@ -45,6 +46,8 @@ __all__ = [
     "Spline",
     "all_recalled",
     "combined",
+    "content_of_descriptor",
+    "content_of_function",
     "eased",
     "largest_of",
     "names_of",
