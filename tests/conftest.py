@@ -1,43 +1,29 @@
-"""Every array shape in the package is checked at run time while the tests run.
+"""Types and array shapes are checked at run time in the whole package while the tests run.
 
-The checks cost ten times a lift; EQUIMORPH_SHAPES=unchecked leaves them out for a single file.
+EQUIMORPH_SHAPES=unchecked leaves the checks out; see `typecheck`.
 """
 
 import os
 import sys
-from collections.abc import Sequence
-from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from hypothesis import settings
-from jaxtyping import install_import_hook
-
-COMPILED = ("kernels", "simd")
-
-
-class PlainCompiledModules(MetaPathFinder):
-    """Keeps the hook away from modules that numba compiles: it can compile bare functions only."""
-
-    def find_spec(
-        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        if fullname.startswith("equimorph.") and fullname.endswith(COMPILED):
-            return PathFinder.find_spec(fullname, path, target)
-        return None
-
 
 # a test that is right stays right on a busy machine, and says the same each time
 settings.register_profile("equimorph", deadline=None, derandomize=True)
 settings.load_profile("equimorph")
 
+# checked modules and rewritten tests take seconds to compile: kept, whatever the environment says
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # whichever way pytest is started, `typecheck` and `oracles` are found beside this file
 sys.path.insert(0, str(Path(__file__).parent))
 if os.environ.get("EQUIMORPH_SHAPES", "checked") != "unchecked":
-    install_import_hook("equimorph", "typecheck.check")
-    sys.meta_path.insert(0, PlainCompiledModules())
+    from typecheck import install
+
+    install()
 
 
 @pytest.fixture(scope="session")

@@ -1,20 +1,168 @@
-"""The run-time type checker of the tests: beartype, with integers accepted where floats are."""
+"""Checks of types and array shapes at run time: beartype, with integers accepted as floats.
 
-from collections.abc import Iterator
+Whether a call passes depends on types, dtypes and shapes only (on values too where the annotations
+name literals), and so a function checks each combination once: a call that looks like one that
+passed is not checked again. Checks are built at the first call of a function, not at its import.
+"""
+
+import sys
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
+from dataclasses import is_dataclass
+from functools import partial, wraps
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from inspect import isclass
+from itertools import islice
+from types import FunctionType, ModuleType
+from typing import Any
 
+import jaxtyping
+import numpy as np
 from beartype import BeartypeConf, beartype
-from jaxtyping import config
+from jaxtyping import config, install_import_hook, jaxtyped
+
+COMPILED = ("kernels", "simd")
+# Entries of a long container that are looked at; beartype looks at one.
+LOOKED_AT = 100
+MARK = "__checks_shapes__"
 
 check = beartype(conf=BeartypeConf(is_pep484_tower=True))
 
 
+def install() -> None:
+    """Check all functions and dataclasses of the package, imported from now on."""
+    jaxtyping.jaxtyped = checked  # the name that the hook puts above each function
+    install_import_hook("equimorph", "typecheck.check")
+    sys.meta_path.insert(0, PlainCompiledModules())
+
+
 @contextmanager
 def unchecked() -> Iterator[None]:
-    """Leave out the checks of shapes, which cost ten times a lift, where others make them."""
+    """Leave out the checks, where a wrong argument must reach the package's own error."""
     before = config.jaxtyping_disable
     config.update("jaxtyping_disable", True)
     try:
         yield
     finally:
         config.update("jaxtyping_disable", before)
+
+
+class PlainCompiledModules(MetaPathFinder):
+    """Keeps the hook away from modules that numba compiles: it can compile bare functions only."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if fullname.startswith("equimorph.") and fullname.endswith(COMPILED):
+            return PathFinder.find_spec(fullname, path, target)
+        return None
+
+
+def checked(thing: Any = None, *, typechecker: Callable[..., Any] = check) -> Any:
+    """`jaxtyping.jaxtyped`, which checks each combination of types and shapes once."""
+    if thing is None:
+        return partial(checked, typechecker=typechecker)
+    if isinstance(thing, FunctionType):
+        return _check_each_form_once(thing)
+    if isclass(thing):
+        if is_dataclass(thing) and not hasattr(thing.__init__, MARK):
+            thing.__init__ = _check_each_form_once(thing.__init__)
+        return thing
+    return jaxtyped(thing, typechecker=typechecker)
+
+
+def _check_each_form_once(function: FunctionType) -> Callable[..., Any]:
+    passed: dict[Hashable, set[Hashable]] = _passed(function)
+    checks: list[Callable[..., Any]] = []
+    form_of = _form_with_values if "Literal" in str(function.__annotations__) else form
+
+    @wraps(function)
+    def wrapper(*args: Any, **kwargs: Any) -> Any:
+        __tracebackhide__ = True
+        if config.jaxtyping_disable:
+            return function(*args, **kwargs)
+        given = (*map(form_of, args), *kwargs, *map(form_of, kwargs.values()))
+        results = passed.get(given)
+        if results is None:
+            if not checks:
+                checks.append(jaxtyped(function, typechecker=check))
+            result = checks[0](*args, **kwargs)
+            passed[given] = {form_of(result)}
+            return result
+        result = function(*args, **kwargs)
+        if form_of(result) not in results:
+            _check_result(function, result, args, kwargs)
+            results.add(form_of(result))
+        return result
+
+    setattr(wrapper, MARK, True)
+    return wrapper
+
+
+def _passed(function: FunctionType) -> dict[Hashable, set[Hashable]]:
+    """Forms that passed, shared by the closures that a function makes again and again."""
+    if function.__closure__ is None:
+        return {}
+    return CLOSURES.setdefault((function.__code__, *function.__annotations__.items()), {})
+
+
+def _check_result(function: FunctionType, result: Any, args: Any, kwargs: Any) -> None:
+    """Check a result together with the arguments that it was made of, without a second call."""
+
+    def call(*_: Any, **__: Any) -> Any:
+        return result
+
+    again = FunctionType(call.__code__, function.__globals__, closure=call.__closure__)
+    jaxtyped(wraps(function)(again), typechecker=check)(*args, **kwargs)
+
+
+def form(value: Any) -> Hashable:
+    """All that decides whether a value passes, other than literals."""
+    kind = type(value)
+    if kind is np.ndarray:
+        return value.dtype, value.shape
+    return FORMS.get(kind, _other_form)(value)
+
+
+def _form_with_values(value: Any) -> Hashable:
+    if isinstance(value, str | int | None):
+        return type(value), value
+    return form(value)
+
+
+def _container_form(values: Any) -> Hashable:
+    some = islice(values, 0, None, 1 + len(values) // LOOKED_AT)
+    return type(values), frozenset(map(form, some))
+
+
+def _mapping_form(values: Mapping[Any, Any]) -> Hashable:
+    return type(values), _container_form(values.keys()), _container_form(values.values())
+
+
+def _tuple_form(values: tuple[Any, ...]) -> Hashable:
+    if len(values) > LOOKED_AT:
+        return _container_form(values)
+    return type(values), *map(form, values)
+
+
+def _other_form(value: Any) -> Hashable:
+    """Remember how values of this type are looked at."""
+    kind = type(value)
+    if issubclass(kind, np.ndarray):
+        FORMS[kind] = lambda array: (kind, array.dtype, array.shape)
+    elif issubclass(kind, tuple):
+        FORMS[kind] = _tuple_form
+    elif issubclass(kind, Mapping):
+        FORMS[kind] = _mapping_form
+    elif issubclass(kind, Sequence | Set) and kind not in (str, bytes, range):
+        FORMS[kind] = _container_form
+    elif issubclass(kind, type):
+        FORMS[kind] = lambda thing: thing
+    else:
+        FORMS[kind] = type
+    return FORMS[kind](value)
+
+
+FORMS: dict[type, Callable[[Any], Hashable]] = {}
+CLOSURES: dict[Hashable, dict[Hashable, set[Hashable]]] = {}
