@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.lines import Line2D
 from PIL import Image
 
 from equimorph import plotting
@@ -14,8 +14,8 @@ from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Schedule, names_of
 from equimorph.plotting.curves import states_along
-from equimorph.plotting.furniture import draw_supports, moving_parts
-from equimorph.structures import PointForce, Rod
+from equimorph.plotting.surroundings import Surroundings
+from equimorph.structures import Couple, PointForce, Rod
 from equimorph.tasks import Route
 
 NOWHERE = Route("refused", "the goal is unstable", [])
@@ -111,53 +111,85 @@ def test_one_shape_is_too_few(route):
 
 
 def test_pointers_of_an_arch_lie_along_its_end_tangents():
-    """θ(0) = Δ + Θ, θ(1) = Δ − Θ."""
+    """θ(0) = Δ + Θ, θ(1) = Δ − Θ: at B the direction into the rod is the opposite one."""
     states = lift(Rod().natural_state(Theta=0.9), {"Delta": 0.3}).states
-    parts = moving_parts(Figure().add_subplot(), states)
-    along = parts.pointer_lines[:, -1, 1] - parts.pointer_lines[:, -1, 0]
-    np.testing.assert_allclose(np.arctan2(along[:, 1], along[:, 0]), [1.2, -0.6], atol=1e-12)
+    around = Surroundings(states)
+    directions = [each.directions[-1] for each in around.drawing.supports]
+    np.testing.assert_allclose(_angles(directions), [1.2, np.pi - 0.6], atol=1e-12)
+    ax = Figure().add_subplot()
+    parts = around.moving_parts(ax)
+    pointers = [each.artist for each in parts if isinstance(each.artist, Line2D)]
+    for part in parts:
+        part.place(-1)
+    drawn = [np.diff(each.get_xydata(), axis=0)[0] for each in pointers[:2]]
+    np.testing.assert_allclose(_angles(drawn), [1.2, np.pi - 0.6], atol=1e-12)
 
 
 def test_load_arrows_point_down_where_there_is_load():
     path = lift(Rod("left-half").natural_state(Theta=0.9), {"q": 1.0})
-    parts = moving_parts(Figure().add_subplot(), path.states)
-    heads = parts.heads[-1]
-    assert (heads[:, 0] == 0).all()
-    assert (heads[:6, 1] < 0).all()
-    assert (heads[7:, 1] == 0).all()
-    assert np.abs(parts.heads[0]).max() == 0.0
+    ((tails, heads),) = Surroundings(path.states).arrows
+    along = heads - tails
+    assert (along[..., 0] == 0).all()
+    assert (along[-1, :6, 1] < 0).all()
+    assert (along[-1, 7:, 1] == 0).all()
+    assert np.abs(along[0]).max() == 0.0
 
 
 def test_an_unloaded_arch_has_no_arrows():
     states = lift(Rod().natural_state(Theta=0.9), {"Theta": 1.0}).states
-    assert moving_parts(Figure().add_subplot(), states).arrows is None
+    assert Surroundings(states).arrows == []
+    ax = Figure().add_subplot()
+    Surroundings(states).draw_still(ax)
+    assert not [each for each in ax.get_children() if each.get_gid() == "load"]
 
 
 def test_point_forces_have_arrows_that_end_at_the_rod():
     """One arrow along the force, as long as the picture allows; units of the user."""
     rod = Rod(ends=("clamped", "free"), loads={"P": PointForce(1.0, (0.6, -0.8))}, EI=2.0, length=3)
     path = lift(rod.natural_state(), {"P": 0.5})
-    ax = Figure().add_subplot()
-    draw_supports(ax, path.states)
-    parts = moving_parts(ax, path.states)
-    head, tail = parts.heads[-1, -1], parts.tails[-1, -1]
-    np.testing.assert_allclose(head / np.hypot(*head), [0.6, -0.8], rtol=1e-12)
+    around = Surroundings(path.states)
+    ((tails, heads),) = around.arrows
+    head, tail = heads[-1, 0], tails[-1, 0]
+    along = (head - tail) / np.hypot(*(head - tail))
+    np.testing.assert_allclose(along, [0.6, -0.8], rtol=1e-12)
     tip = path.states.shape()[-1, -1]
-    assert np.hypot(*(tail + head - tip)) == pytest.approx(0.012 * 3, rel=1e-9)
-    hubs = [patch for patch in ax.patches if isinstance(patch, Circle)]
-    assert [hub.radius for hub in hubs] == pytest.approx([0.026 * 3])
+    assert np.hypot(*(head - tip)) == pytest.approx(0.012 * around.size, rel=1e-9)
+    assert around.size == pytest.approx(3.0, rel=1e-9)
+    ax = Figure().add_subplot()
+    around.draw_still(ax)
+    (clamp,) = [patch for patch in ax.patches if patch.get_gid() == "clamp"]
+    assert np.ptp(clamp.get_xy()[:, 1]) == pytest.approx(4.4 * 0.022 * 3)
 
 
 def test_a_hinge_and_a_rail_show_how_a_rod_is_held():
-    """The pinned end moves along a rail; no hub there."""
+    """The pinned end moves along a rail; the other is clamped, and turns in no state."""
     rod = Rod(ends=("clamped", "pinned"), curvature=-2.0)
     states = lift(rod.natural_state(theta_A=1.0), {"nu": 0.8}).states
     ax = Figure().add_subplot()
-    draw_supports(ax, states)
-    kinds = [type(patch).__name__ for patch in ax.patches]
-    assert kinds == ["Circle", "Polygon", "Polygon"]
-    rails = [line for line in ax.lines if line.get_linewidth() == 3.0]
-    np.testing.assert_allclose(rails[0].get_xdata()[[0, -1]], [states["nu"][0], 0.8], atol=1e-9)
+    Surroundings(states).draw_still(ax)
+    triangles = [each for each in ax.patches if len(each.get_xy()) == 4]
+    assert [each.get_gid() for each in triangles] == ["pin", "pin"]
+    assert {each.get_gid() for each in ax.patches} == {"clamp", "pin"}
+    (rail,) = [line for line in ax.lines if line.get_gid() == "rail"]
+    np.testing.assert_allclose(rail.get_xdata()[[0, -1]], [states["nu"][0], 0.8], atol=1e-9)
+
+
+def test_couples_turn_the_way_they_act():
+    """The arc's head is where it ends, counterclockwise about the place for a positive couple."""
+    for sign in (1.0, -1.0):
+        rod = Rod(ends=("clamped", "free"), loads={"M": Couple(1.0)})
+        states = lift(rod.natural_state(), {"M": 0.05 * sign}).states
+        around = Surroundings(states)
+        parts = around.moving_parts(Figure().add_subplot())
+        (arc,) = [each for each in parts if each.artist.get_gid() == "load"]
+        arc.place(-1)
+        spokes = arc.artist.get_xydata()[:40] - states.shape()[-1, -1]
+        turning = spokes[:-1, 0] * spokes[1:, 1] - spokes[:-1, 1] * spokes[1:, 0]
+        assert (sign * turning > 0.0).all()
+
+
+def _angles(vectors):
+    return np.arctan2(*np.array(vectors).T[::-1])
 
 
 def _route_of(path, descriptors):

@@ -2,6 +2,15 @@
 
 from equimorph.model.box import Box, Grid
 from equimorph.model.descriptor import Constraint, Descriptor, combined, eased, largest_of
+from equimorph.model.drawing import (
+    Actuator,
+    ActuatorKind,
+    Couples,
+    Drawing,
+    Forces,
+    Support,
+    SupportKind,
+)
 from equimorph.model.function_content import content_of_descriptor, content_of_function
 from equimorph.model.journal import (
     Findings,
@@ -27,11 +36,16 @@ from equimorph.model.spline import Spline
 
 __all__ = [
     "NOT_KEPT",
+    "Actuator",
+    "ActuatorKind",
     "Box",
     "Constraint",
+    "Couples",
     "Descriptor",
     "Disc",
+    "Drawing",
     "Findings",
+    "Forces",
     "Forgetful",
     "Grid",
     "HalfPlane",
@@ -44,6 +58,8 @@ __all__ = [
     "Schedule",
     "Silent",
     "Spline",
+    "Support",
+    "SupportKind",
     "all_recalled",
     "combined",
     "content_of_descriptor",

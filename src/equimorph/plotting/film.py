@@ -21,8 +21,8 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import position
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along, track
-from equimorph.plotting.furniture import MovingParts, draw_supports, frame_shapes, moving_parts
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane, shade_regions
+from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes
 from equimorph.plotting.symbols import symbol
 from equimorph.structures import States
 from equimorph.tasks import Route
@@ -93,7 +93,7 @@ class _Stage:
     canvas: Any  # matplotlib's canvas has no types
     background: Any
     shape: Line2D
-    parts: MovingParts
+    parts: tuple[Moving, ...]
     travelled: Line2D
     point: Line2D
     texts: tuple[Text, ...]
@@ -108,7 +108,9 @@ class _Stage:
         return Image.fromarray(np.asarray(self.canvas.buffer_rgba())).convert("RGB")
 
     def _moving(self) -> tuple[Artist, ...]:
-        return (self.shape, *self.parts.artists(), self.travelled, self.point, *self.texts)
+        parts = (self.shape, *(part.artist for part in self.parts))
+        in_depth = sorted(parts, key=lambda each: each.get_zorder())
+        return (*in_depth, self.travelled, self.point, *self.texts)
 
 
 def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
@@ -117,11 +119,11 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
     canvas: Any = FigureCanvasAgg(figure)
     left = figure.add_axes((0.01, 0.15, 0.54, 0.84))
     right = figure.add_axes((0.64, 0.17, 0.335, 0.79))
-    outlines = states.shape()
-    frame_shapes(left, outlines, room=0.15)
+    around = Surroundings(states)
+    frame_shapes(left, around, room=0.1)
     left.axis("off")
-    draw_supports(left, states)
-    for outline in outlines[[0, -1]]:
+    around.draw_grounds(left)
+    for outline in around.outlines[[0, -1]]:
         left.plot(*outline.T, color="#cfcfcf", linewidth=2.0, zorder=1)
     frame_plane(right, eset)
     shade_regions(right, eset, count_regions(eset.coordinates, eset.cells))
@@ -130,7 +132,7 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
     (shape,) = left.plot([], [], color=style.INDEX_COLOURS[0], linewidth=3.0, zorder=4)
     (travelled,) = right.plot([], [], color=style.ROUTE_COLOUR, linewidth=2.4, zorder=8)
     (point,) = right.plot([], [], "o", color=style.INK, markeredgecolor="white", ms=7, zorder=9)
-    parts = moving_parts(left, states)
+    parts = around.moving_parts(left)
     texts, numbers = _place_readings(figure, _readings(states, eset, route))
     # Animated artists are left out of the background.
     stage = _Stage(canvas, None, shape, parts, travelled, point, texts, numbers)
@@ -147,7 +149,8 @@ def _pictures(stage: _Stage, states: States, eset: EquilibriumSet, path: Path) -
     pictures = []
     for k in range(len(states)):
         stage.shape.set_data(*outlines[k].T)
-        stage.parts.follow(k)
+        for part in stage.parts:
+            part.place(k)
         stage.travelled.set_data(*ways[k].T)
         stage.point.set_data(*places[k : k + 1].T)
         for text, number in zip(stage.texts, stage.numbers[k], strict=True):

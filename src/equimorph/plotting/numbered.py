@@ -5,27 +5,26 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.patheffects import AbstractPathEffect, withStroke
 from mpl_toolkits.mplot3d import proj3d
 
 from equimorph.plotting import style
 from equimorph.plotting.badges import BOX
-from equimorph.plotting.furniture import draw_supports, frame_shapes
 from equimorph.plotting.outlines import farthest_apart
+from equimorph.plotting.surroundings import Surroundings, frame_shapes
 from equimorph.plotting.symbols import with_unit
 from equimorph.structures import States
 
 _SAME = 1e-6
 _ROOM = 0.09
-_RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.0, foreground="white")]
 _AWAY = 11.0  # from a point to its number, in typographic points
 
 
 def numbered_shapes(ax: Axes, states: States) -> None:
     """Shapes of states, each numbered where it is farthest from the others; equal ones once."""
-    outlines = states.shape()
-    frame_shapes(ax, outlines, room=_ROOM)
-    draw_supports(ax, states)
+    around = Surroundings(states)
+    outlines = around.outlines
+    frame_shapes(ax, around, _ROOM)
+    around.draw_still(ax)
     different = [
         k
         for k, outline in enumerate(outlines)
@@ -41,7 +40,7 @@ def numbered_shapes(ax: Axes, states: States) -> None:
             textcoords="offset points", ha="center", va="bottom" if up else "top",
             color=colours[k], weight="bold", zorder=4,
         )  # fmt: skip
-        text.set_path_effects(_RIM)
+        text.set_path_effects(style.RIM)
     unit = states.structure.length_unit
     ax.set_xlabel(with_unit("$x$", unit))
     ax.set_ylabel(with_unit("$y$", unit))

@@ -1,11 +1,11 @@
-"""The frame in which outlines of states are drawn: aspect, limits, labels, supports."""
+"""The frame in which outlines of states are drawn: aspect, limits, labels, surroundings."""
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from equimorph.plotting import style
-from equimorph.plotting.furniture import draw_supports, frame_shapes
+from equimorph.plotting.surroundings import Surroundings, frame_shapes, limits
 from equimorph.plotting.symbols import with_unit
 from equimorph.structures import States
 
@@ -15,7 +15,7 @@ Outlines = Float[np.ndarray, "states points 2"]
 
 
 def framed(states: States, ax: Axes | None, *, room: float, below: float = 0.0) -> Axes:
-    """Axes with the supports of states and limits around all their outlines.
+    """Axes with the surroundings of states and limits around all their outlines.
 
     Parameters
     ----------
@@ -28,24 +28,24 @@ def framed(states: States, ax: Axes | None, *, room: float, below: float = 0.0) 
     below
         Inches of a new figure that stay free for what comes below the axes.
     """
-    outlines = states.shape()
+    around = Surroundings(states)
     if ax is None:
-        height = _height(outlines, room) + below
+        height = _height(around, room) + below
         ax = style.new_axes(style.SINGLE_COLUMN, height, _MARGINS)
-    frame_shapes(ax, outlines, room=room)
+    frame_shapes(ax, around, room)
     unit = states.structure.length_unit
     ax.set_xlabel(with_unit("$x$", unit))
     ax.set_ylabel(with_unit("$y$", unit))
     ax.xaxis.set_major_locator(style.few_ticks())
     ax.yaxis.set_major_locator(style.few_ticks())
-    draw_supports(ax, states)
+    around.draw_still(ax)
     return ax
 
 
-def _height(outlines: Outlines, room: float) -> float:
+def _height(around: Surroundings, room: float) -> float:
     """Height of a figure one column wide whose drawing keeps its aspect without empty bands."""
-    low, high = outlines.min(axis=(0, 1)), outlines.max(axis=(0, 1))
-    width, height = high - low + 2 * room * float(max(high - low))
+    low, high = limits(around, room)
+    width, height = high - low
     left, bottom, right, top = _MARGINS
     drawing = (style.SINGLE_COLUMN - left - right) * float(height / width)
     return bottom + top + min(drawing, 1.4 * style.SINGLE_COLUMN)

@@ -51,6 +51,7 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
             above = outline[at, 1] >= np.median(outlines[:, at, 1])
             ax.annotate(
                 names[k], tuple(outline[at].tolist()), (0, 3 if above else -3), ha="center",
-                va="bottom" if above else "top", textcoords="offset points", zorder=5,
+                va="bottom" if above else "top", textcoords="offset points", zorder=8,
+                path_effects=style.RIM,
             )  # fmt: skip
     return ax

@@ -70,7 +70,7 @@ def _name_ends(
     if apart.max() < 1e-6:
         ax.annotate(
             "start = goal", first[middle], (0, -4), textcoords="offset points", ha="center",
-            va="top", weight="bold",
+            va="top", weight="bold", path_effects=style.RIM, zorder=8,
         )  # fmt: skip
         return
     at = middle if apart[middle] > 0.9 * apart.max() else int(apart.argmax())
@@ -79,5 +79,5 @@ def _name_ends(
     for name, place, side in (("start", start, above), ("goal", goal, -above)):
         ax.annotate(
             name, place, (0, 4 * side), textcoords="offset points", ha="center",
-            va="bottom" if side > 0 else "top", weight="bold",
+            va="bottom" if side > 0 else "top", weight="bold", path_effects=style.RIM, zorder=8,
         )  # fmt: skip

@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
 MILLIMETRE = 1 / 25.4
@@ -31,6 +32,9 @@ HAIRLINE = 0.5
 ROUTE_COLOUR = "#d1004b"
 LIMIT_LINE: dict[str, Any] = {"color": INK, "linewidth": 1.2, "linestyle": (0, (2.4, 1.0))}
 """Bounds that a set was not cut at: wider than its edges, longer dashes than hidden folds."""
+
+RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.0, foreground="white")]
+"""White around letters that lie on lines."""
 
 # Lightness (CIE L*) 38, 67, 86, 94: four greys that can be told apart in print.
 INDEX_COLOURS = ("#1f5f99", "#e8902a", "#f3d65c", "#ececec")

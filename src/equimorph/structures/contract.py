@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
-from equimorph.model import Descriptor, Parameter, names_of
+from equimorph.model import Descriptor, Drawing, Parameter, names_of
 from equimorph.structures.approach import straight_arcs
 
 Direction = tuple[Lanes, Parameters]
@@ -178,6 +178,11 @@ class Structure(ABC):
     def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 2"]:
         """Shape as cubic arcs: both ends, and the derivatives there; straight lines by default."""
         return straight_arcs(self.shape(z, p))
+
+    def drawing(self, z: Lanes, p: Parameters) -> Drawing:
+        """Supports, loads and actuators to draw around the shape; none by default."""
+        del z, p
+        return Drawing()
 
     @abstractmethod
     def descriptor(self, text: str) -> Descriptor:

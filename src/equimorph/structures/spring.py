@@ -11,7 +11,15 @@ from jaxtyping import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.linalg import BorderedSolution, solve_bordered
-from equimorph.model import Descriptor, Parameter, parameter_vector
+from equimorph.model import (
+    Descriptor,
+    Drawing,
+    Forces,
+    Parameter,
+    Support,
+    SupportKind,
+    parameter_vector,
+)
 from equimorph.structures.contract import Direction, Majorant, Structure, Symmetry
 from equimorph.structures.states import State
 
@@ -216,6 +224,16 @@ class Spring(Structure):
         at = np.linspace(0.0, 1.0, 2) if s is None else np.asarray(s, dtype=float)
         x = p[:, :1] * (1.0 - at)
         return np.stack([x, p[:, :1] * np.tan(z) * at], axis=2)
+
+    def drawing(self, z: Lanes, p: Parameters) -> Drawing:
+        """A slides on y = 0, B on x = 0, where the force acts downward."""
+        ends = self.shape(z, p)
+        supports = tuple(
+            Support(SupportKind.ROLLER, ends[:, i], np.tile(along, (len(z), 1)))
+            for i, along in enumerate(np.eye(2))
+        )
+        down = p[:, 1:2, None] * np.array([0.0, -1.0])
+        return Drawing(supports, (Forces(ends[:, 1:], down),))
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror: δ → −δ, F → −F."""

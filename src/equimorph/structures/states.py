@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.model import names_of, position
+from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
 
@@ -99,6 +99,10 @@ class States:
     ) -> Float[np.ndarray, "lanes points 2"]:
         """Coordinates to draw, in the structure's unit of length."""
         return self.structure.shape(self.z, self.p, s)
+
+    def drawing(self) -> Drawing:
+        """Supports, loads and actuators to draw around the shapes."""
+        return self.structure.drawing(self.z, self.p)
 
 
 @dataclass(frozen=True, eq=False)

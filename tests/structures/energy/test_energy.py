@@ -1,5 +1,7 @@
 """Energies as formulas: against the written-out spring, against CasADi's values, and as data."""
 
+import re
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import equimorph as em
+from equimorph.errors import InputError
 from equimorph.model import Parameter
 from equimorph.structures import EnergyStructure, Spring, Unknown, from_identity
 from equimorph.structures.energy.expressions import FUNCTIONS, expression, written
@@ -143,3 +146,51 @@ def test_a_natural_state_that_is_lost_on_the_way_is_refused():
         made.natural_state(c=-1.0)
     with pytest.raises(em.InputError, match="`M` must be 0 in the natural state; got 1"):
         made.natural_state(M=1.0)
+
+
+def test_points_that_no_unknown_moves_are_pins_and_others_as_their_author_says():
+    """A foot that is clamped, a tip under a force, a point that the parameter a alone moves."""
+    made = EnergyStructure(
+        "phi**2/2 - M*phi + a*phi**3",
+        ["phi"],
+        [
+            Parameter("a", "1", 1.0, "actuator", 0.5),
+            Parameter("M", "1", 1.0, "load"),
+        ],
+        draw=[[0, 0], ["cos(phi)", "sin(phi)"], ["a", 1]],
+        supports=[{"point": 0, "kind": "clamp", "angle": 0.5}],
+        forces=[{"point": 1, "force": ["-M*sin(phi)", "M*cos(phi)"]}],
+    )
+    z, p = np.array([[0.3], [0.4]]), np.array([[0.5, 2.0], [0.6, 0.0]])
+    for structure in (made, from_identity(made.identity())):
+        drawing = structure.drawing(z, p)
+        clamp, pin = drawing.supports
+        assert (clamp.kind, pin.kind) == ("clamp", "pin")
+        np.testing.assert_allclose(clamp.directions, [[np.cos(0.5), np.sin(0.5)]] * 2)
+        np.testing.assert_allclose(pin.places, [[0.5, 1.0], [0.6, 1.0]])
+        (push,) = drawing.forces
+        np.testing.assert_allclose(push.places[0, 0], [np.cos(0.3), np.sin(0.3)])
+        tip = [-2.0 * np.sin(0.3), 2.0 * np.cos(0.3)]
+        np.testing.assert_allclose(push.vectors[:, 0], [tip, [0.0, 0.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"supports": [{"point": 2}]}, "`supports[0].point` must be the number of a point"),
+        ({"supports": [{"point": 0, "kind": "rope"}]}, "`supports[0].kind` must be one of clamp"),
+        ({"supports": [{"point": 0, "angle": np.inf}]}, "`supports[0].angle` must be a finite"),
+        ({"supports": [{"at": 0}]}, "`supports[0]` must be a table of angle, kind, point"),
+        ({"forces": [{"point": 0, "force": "M"}]}, "`forces[0].force` must be two expressions"),
+        ({"forces": [{"point": 0, "force": ["M", "x"]}]}, "forces[0].force[1]"),
+    ],
+)
+def test_wrong_supports_and_forces_are_refused(given, text):
+    with pytest.raises(InputError, match=re.escape(text)):
+        EnergyStructure(
+            "phi**2/2 - M*phi",
+            ["phi"],
+            [Parameter("M", "1", 1.0, "load")],
+            draw=[[0, 0], ["cos(phi)", "sin(phi)"]],
+            **given,
+        )

@@ -84,11 +84,12 @@ class Formulas:
     constraints: tuple[Any, ...]
     natural: tuple[Any, ...]
     draw: tuple[tuple[Any, Any], ...]
+    forces: tuple[tuple[Any, Any], ...]
     descriptors: Mapping[str, Any]
 
     def flat(self) -> list[Any]:
         """All of them, one after the other."""
-        points = [coordinate for point in self.draw for coordinate in point]
+        points = [component for pair in (*self.draw, *self.forces) for component in pair]
         rest = (*self.natural, *points, *self.descriptors.values())
         return [self.energy, *self.constraints, *rest]
 
@@ -100,12 +101,14 @@ class Formulas:
             tuple(next(each) for _ in self.constraints),
             tuple(next(each) for _ in self.natural),
             tuple((next(each), next(each)) for _ in self.draw),
+            tuple((next(each), next(each)) for _ in self.forces),
             {name: next(each) for name in self.descriptors},
         )
 
     def labels(self, unknowns: Sequence[Unknown]) -> list[str]:
         """Name of each for messages, in the order of `flat`."""
         points = [f"draw[{i}][{k}]" for i in range(len(self.draw)) for k in (0, 1)]
+        points += [f"forces[{i}].force[{k}]" for i in range(len(self.forces)) for k in (0, 1)]
         named = [f"natural of {unknown.name}" for unknown in unknowns]
         constraints = [f"constraints[{i}]" for i in range(len(self.constraints))]
         described = [f"descriptors.{name}" for name in self.descriptors]

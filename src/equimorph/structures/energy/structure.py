@@ -6,12 +6,12 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.model import Descriptor, position
+from equimorph.model import Descriptor, Drawing, position
 from equimorph.structures.contract import Direction, Majorant
 from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.energy.declared import (
@@ -22,6 +22,7 @@ from equimorph.structures.energy.declared import (
     unknowns_of,
 )
 from equimorph.structures.energy.derivatives import Derivatives
+from equimorph.structures.energy.drawing import energy_drawing, forces_of, marks_of
 from equimorph.structures.energy.enclosures import can_enclose, enclosed
 from equimorph.structures.energy.tape import Tape, casadi, tape
 
@@ -45,6 +46,12 @@ class EnergyStructure(DiscreteStructure):
         Expressions that vanish.
     draw
         Points [x, y] of the line to draw. Without them the unknowns are drawn over their numbers.
+    supports
+        Supports to draw, as tables: the number of a `point` of `draw`, counted from 0, the `kind`
+        ("pin", "clamp", "roller", "sleeve", "grip", "spring", "coil"; see `SupportKind`), and the
+        `angle` of its direction. Points that no unknown moves are pins without being named.
+    forces
+        Forces to draw, as tables: the number of a `point`, and the `force` [x, y].
     descriptors
         More descriptors by name; every unknown and ``energy`` are there anyway. The first one is
         the height of figures of the set.
@@ -84,7 +91,7 @@ class EnergyStructure(DiscreteStructure):
 
     kind: ClassVar[str] = "energy"
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  # what an energy can have
         self,
         energy: Any,
         unknowns: Any,
@@ -92,6 +99,8 @@ class EnergyStructure(DiscreteStructure):
         *,
         constraints: Sequence[Any] = (),
         draw: Sequence[Sequence[Any]] = (),
+        supports: Sequence[Mapping[str, Any]] = (),
+        forces: Sequence[Mapping[str, Any]] = (),
         descriptors: Mapping[str, Any] | None = None,
         definitions: Mapping[str, Any] | None = None,
     ) -> None:
@@ -99,8 +108,11 @@ class EnergyStructure(DiscreteStructure):
         self.unknowns, self.constraints = len(self._unknowns), len(constraints)
         self.mass = np.array([float(unknown.mass) for unknown in self._unknowns])
         natural = tuple(unknown.natural for unknown in self._unknowns)
+        points = _points(draw)
+        self._marks = marks_of(supports, len(points))
+        self._loaded, pushes = forces_of(forces, len(points))
         given = Formulas(
-            energy, tuple(constraints), natural, _points(draw), dict(descriptors or {})
+            energy, tuple(constraints), natural, points, pushes, dict(descriptors or {})
         )
         self._given, self._definitions = given, dict(definitions or {})
         self._symbols = Symbols(self._unknowns, self.parameters, self._definitions, given)
@@ -119,6 +131,9 @@ class EnergyStructure(DiscreteStructure):
             data_of(replace(unknown, natural=natural))
             for unknown, natural in zip(self._unknowns, formulas.natural, strict=True)
         ]
+        pairs = zip(self._loaded, formulas.forces, strict=True)
+        forces = [{"point": at, "force": list(force)} for at, force in pairs]
+        drawn = {"supports": [mark.data() for mark in self._marks], "forces": forces}
         return {
             "kind": self.kind,
             "energy": formulas.energy,
@@ -126,6 +141,7 @@ class EnergyStructure(DiscreteStructure):
             "parameters": [data_of(parameter) for parameter in self.parameters],
             "constraints": list(formulas.constraints),
             "draw": [list(point) for point in formulas.draw],
+            **{key: value for key, value in drawn.items() if value},
             "descriptors": dict(formulas.descriptors),
             "definitions": dict(definitions),
         }
@@ -240,6 +256,26 @@ class EnergyStructure(DiscreteStructure):
         """Points of the line to draw; `s` runs from 0 to 1 from the first to the last."""
         corners = self._corners(z, p).reshape(len(z), -1, 2)
         return corners if s is None else along_corners(corners, s)
+
+    def drawing(self, z: Lanes, p: Parameters) -> Drawing:
+        """Supports and forces as the author gives them; pins where no unknown moves a point."""
+        vectors = self._pushes(z, p).reshape(len(z), len(self._loaded), 2)
+        return energy_drawing(self.shape(z, p), self._still, self._marks, self._loaded, vectors)
+
+    @cached_property
+    def _pushes(self) -> Tape:
+        ca = casadi()
+        pushes = [ca.SX(each) for pair in self._symbols.formulas.forces for each in pair]
+        return self._graphs.tape(ca.vertcat(*pushes))
+
+    @cached_property
+    def _still(self) -> Bool[np.ndarray, " written"]:
+        """Which points of the line that the author wrote do not depend on the unknowns."""
+        ca, draw = casadi(), self._symbols.formulas.draw
+        moved = [
+            any(ca.which_depends(ca.vertcat(*point), self._symbols.u, 1, False)) for point in draw
+        ]
+        return ~np.array(moved, bool)
 
     # --- descriptors ----------------------------------------------------------------------------
 

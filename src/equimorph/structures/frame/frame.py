@@ -10,11 +10,12 @@ from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Descriptor, Parameter
+from equimorph.model import Descriptor, Drawing, Parameter
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame import descriptors
 from equimorph.structures.frame.accuracy import discretisation_error
 from equimorph.structures.frame.checks import refuse_singular
+from equimorph.structures.frame.drawing import frame_drawing
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import Network, network
@@ -210,6 +211,10 @@ class Frame(FrameFields):
             at = share[here] if forward else 1.0 - share[here]
             out[:, here] = self.outline(z, p, at)[:, member]
         return np.asarray(out * self.model.length)
+
+    def drawing(self, z: Lanes, p: Parameters) -> Drawing:
+        """Supports of the joints, loads on joints and members, members that bend or lengthen."""
+        return frame_drawing(self, z, p)
 
     # --- descriptors ----------------------------------------------------------------------------
 

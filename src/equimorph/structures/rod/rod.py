@@ -5,14 +5,14 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Parameter, names_of, parameter_vector
+from equimorph.model import Drawing, Parameter, names_of, parameter_vector
 from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.described import Described
 from equimorph.structures.rod.discretisation import mesh_with_kinks
+from equimorph.structures.rod.drawing import Amplitudes, rod_drawing
 from equimorph.structures.rod.general.assembly import Description
 from equimorph.structures.rod.general.ends import End
 from equimorph.structures.rod.general.mechanics import GeneralMechanics
@@ -305,23 +305,20 @@ class Rod(Described):
         z, found = self.natural(p)
         return States(self, z, p), found
 
-    def line_load(
-        self, p: Parameters, s: Float[np.ndarray, " points"]
-    ) -> Float[np.ndarray, "lanes points 2"]:
-        """Dead load per arclength at shares s of the length, in the user's units."""
-        if self._general is not None:
-            return self._general.line_load(p, self._raw_matrix[self.constraints :], s)
-        assert self._load is not None
-        down = -p[:, 2:3] * self._load.density(s)
-        return np.stack([np.zeros_like(down), down], axis=2)
+    def drawing(self, z: Lanes, p: Parameters) -> Drawing:
+        """Supports of the ends, loads, tendons and segments that bend."""
+        return rod_drawing(self, self.ends, self._amplitudes(p), z, p)
 
-    def point_forces(
-        self, p: Parameters
-    ) -> tuple[Float[np.ndarray, " points"], Float[np.ndarray, "lanes points 2"]]:
-        """Shares of the length at which point forces act, and the forces in the user's units."""
-        if self._general is None:
-            return np.zeros(0), np.zeros((len(p), 0, 2))
-        return self._general.point_forces(p, self._raw_matrix[self.constraints :])
+    def _amplitudes(self, p: Parameters) -> Amplitudes:
+        """Every term that acts on the rod, with its amplitude in the user's units."""
+        if self._general is not None:
+            return self._general.amplitudes(p, self._raw_matrix[self.constraints :])
+        return [(self._arch_load, p[:, 2])]
+
+    @property
+    def _arch_load(self) -> LineLoad:
+        assert self._load is not None
+        return LineLoad(self._load.density, kinks=self._load.kinks.tolist())
 
     @property
     def ends(self) -> tuple[End, End]:
@@ -342,10 +339,7 @@ class Rod(Described):
         """The arch as a general rod with a rise; general rods as they are."""
         if isinstance(self.mechanics, GeneralMechanics):
             return self.mechanics
-        assert self._load is not None
-        uniform = LineLoad(self._load.density, kinks=self._load.kinks.tolist())
-        twin = Description(
-            CLAMPED, 1.0, 0.0, None, {"q": uniform}, {}, None, DEFAULT_SPAN, 0.0, (), self.units
-        )
+        loads, units = {"q": self._arch_load}, self.units
+        twin = Description(CLAMPED, 1.0, 0.0, None, loads, {}, None, DEFAULT_SPAN, 0.0, (), units)
         raw, matrix = twin.mechanics(*self._resolution)
         return GeneralMechanics(raw.model.mapped(names_of(twin.parameters), matrix))

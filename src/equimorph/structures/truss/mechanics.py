@@ -10,8 +10,10 @@ from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
+from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
 from equimorph.structures.contract import Direction
 from equimorph.structures.discrete import DiscreteStructure, along_corners
+from equimorph.structures.supports import supports_of_point
 from equimorph.structures.truss.kernels import linearise_lanes
 from equimorph.structures.truss.network import Network
 from equimorph.structures.truss.strain import Energies
@@ -194,11 +196,31 @@ class TrussMechanics(DiscreteStructure):
         full[:, ~self.network.held] += z
         return self._seen(full)
 
-    def nodal_forces(self, p: Parameters) -> Float[np.ndarray, "lanes joints 2"]:
-        """Loads on the joints as they are drawn."""
-        full = np.zeros((len(p), *self.network.held.shape))
-        full[:, ~self.network.held] = multiply(p, self.pulls)
-        return self._seen(full)
+    def drawing(self, z: Lanes, p: Parameters) -> Drawing:
+        """Supports of the joints, forces on them, and bars that change their length."""
+        made, places = self.network, self.joint_places(z)
+        supports: list[Support] = []
+        for joint, held in enumerate(made.held):
+            here = places[:, joint]
+            if made.space == 3 and held.any():
+                kind = SupportKind.PIN if held.all() else SupportKind.ROLLER
+                supports.append(Support(kind, here, np.tile([1.0, 0.0], (len(z), 1))))
+            elif held.any():
+                stiffness = np.where([*held, False], np.inf, 0.0)
+                supports += supports_of_point(stiffness, here, np.tile([1.0, 0.0], (len(z), 1)))
+        forces = np.zeros((len(p), *made.held.shape))
+        forces[:, ~made.held] = multiply(p, self.pulls)
+        moved = np.flatnonzero(self.rates.any(axis=1))
+        loaded = np.zeros(made.held.shape)
+        loaded[~made.held] = np.abs(self.pulls).sum(axis=0)
+        at = np.flatnonzero(loaded.any(axis=1))
+        return Drawing(
+            tuple(supports),
+            (Forces(places[:, at], self._seen(forces)[:, at]),) if len(at) else (),
+            actuators=tuple(
+                Actuator(ActuatorKind.LENGTH, places[:, ends]) for ends in made.ends[moved]
+            ),
+        )
 
     def _seen(
         self, vectors: Float[np.ndarray, "lanes joints space"]

@@ -149,6 +149,21 @@ class ParameterSection(Section):
     upper: Number | None = None
 
 
+class DrawnSupportSection(Section):
+    """A support on a point of the line that is drawn; see `equimorph.EnergyStructure`."""
+
+    point: int = Field(ge=0)
+    kind: Literal["pin", "clamp", "roller", "sleeve", "grip", "spring", "coil"] = "pin"
+    angle: Number = 0.0
+
+
+class DrawnForceSection(Section):
+    """A force on a point of the line that is drawn."""
+
+    point: int = Field(ge=0)
+    force: list[Formula] = Field(min_length=2, max_length=2)
+
+
 class EnergySection(Section):
     """A structure given by its energy; see `equimorph.EnergyStructure`."""
 
@@ -162,6 +177,8 @@ class EnergySection(Section):
     draw: list[Annotated[list[Formula], Field(min_length=2, max_length=2)]] = Field(
         default_factory=list
     )
+    supports: list[DrawnSupportSection] = Field(default_factory=list)
+    forces: list[DrawnForceSection] = Field(default_factory=list)
 
 
 class BarSection(Section):

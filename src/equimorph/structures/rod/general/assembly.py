@@ -16,7 +16,7 @@ from equimorph.structures.rod.discretisation import mesh_with_kinks
 from equimorph.structures.rod.general.ends import End, check_supports, end, support_axes
 from equimorph.structures.rod.general.mechanics import GeneralMechanics
 from equimorph.structures.rod.general.model import Build, RodModel, raw_model
-from equimorph.structures.rod.general.terms import LineLoad, PointForce, Pressure, Term, term
+from equimorph.structures.rod.general.terms import Pressure, Term, term
 from equimorph.structures.rod.loads import LoadShape
 from equimorph.structures.rod.profiles import profile
 from equimorph.structures.units import Units
@@ -230,30 +230,10 @@ class Description:
                 matrix[m + i, m + names.index(name)] = weights.get(raw, 0.0) / unit
         return matrix
 
-    def line_load(
-        self, p: Parameters, matrix: Matrix, s: Float[np.ndarray, " n"]
-    ) -> Float[np.ndarray, "lanes n 2"]:
-        """Dead load per arclength, in the user's units; matrix: what `mechanics` returns."""
-        out = np.zeros((len(p), len(s), 2))
-        for one, amplitude in self._amplitudes(p, matrix):
-            if isinstance(one, LineLoad):
-                force = one.density().density(s)[:, None] * np.array(one.direction)
-                out += amplitude[:, None, None] * force
-        return out
-
-    def point_forces(
-        self, p: Parameters, matrix: Matrix
-    ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "lanes n 2"]]:
-        """Arclengths of point forces, and the forces in the user's units."""
-        terms = [each for each in self._amplitudes(p, matrix) if isinstance(each[0], PointForce)]
-        forces = np.zeros((len(p), len(terms), 2))
-        for i, (one, amplitude) in enumerate(terms):
-            forces[:, i] = amplitude[:, None] * np.array(one.direction)
-        return np.array([float(one.s) for one, _ in terms]), forces
-
-    def _amplitudes(self, p: Parameters, matrix: Matrix) -> list[tuple[Any, Values]]:
-        """Every term with its amplitude, in the user's units."""
-        columns, out = matrix[:, -len(self.parameters) - 1 : -1], []
+    def amplitudes(self, p: Parameters, matrix: Matrix) -> list[tuple[Term, Values]]:
+        """Every term with its amplitude in the user's units; matrix: what `mechanics` returns."""
+        columns = matrix[:, -len(self.parameters) - 1 : -1]
+        out: list[tuple[Term, Values]] = []
         for name, terms in self.terms.items():
             row = columns[self._raw.index(name)] * self.units.value(self.quantity(name))
             amplitude = np.einsum("j,lj->l", row, p)
