@@ -73,31 +73,48 @@ def checked(thing: Any = None, *, typechecker: Callable[..., Any] = check) -> An
 
 
 def _check_each_form_once(function: FunctionType) -> Callable[..., Any]:
-    passed: dict[Hashable, set[Hashable]] = _passed(function)
-    checks: list[Callable[..., Any]] = []
-    form_of = _form_with_values if "Literal" in str(function.__annotations__) else form
+    memory = _Memory(function)
 
     @wraps(function)
     def wrapper(*args: Any, **kwargs: Any) -> Any:
         __tracebackhide__ = True
         if config.jaxtyping_disable:
             return function(*args, **kwargs)
-        given = (*map(form_of, args), *kwargs, *map(form_of, kwargs.values()))
-        results = passed.get(given)
-        if results is None:
-            if not checks:
-                checks.append(jaxtyped(function, typechecker=check))
-            result = checks[0](*args, **kwargs)
-            passed[given] = {form_of(result)}
-            return result
-        result = function(*args, **kwargs)
-        if form_of(result) not in results:
-            _check_result(function, result, args, kwargs)
-            results.add(form_of(result))
-        return result
+        return memory.call(args, kwargs)
 
     setattr(wrapper, MARK, True)
     return wrapper
+
+
+class _Memory:
+    """What passed of a function's arguments and results."""
+
+    def __init__(self, function: FunctionType) -> None:
+        self._function = function
+        self._check: Callable[..., Any] | None = None
+        self._form = _form_with_values if "Literal" in str(function.__annotations__) else form
+        self._passed = _passed(function)
+
+    def identity(self) -> str:
+        """For those who tell functions by what they close over: checks change nothing."""
+        return ""
+
+    def call(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+        __tracebackhide__ = True
+        of = self._form
+        given = (*map(of, args), *kwargs, *map(of, kwargs.values()))
+        results = self._passed.get(given)
+        if results is None:
+            if self._check is None:
+                self._check = jaxtyped(self._function, typechecker=check)
+            result = self._check(*args, **kwargs)
+            self._passed[given] = {of(result)}
+            return result
+        result = self._function(*args, **kwargs)
+        if of(result) not in results:
+            _check_result(self._function, result, args, kwargs)
+            results.add(of(result))
+        return result
 
 
 def _passed(function: FunctionType) -> dict[Hashable, set[Hashable]]:
