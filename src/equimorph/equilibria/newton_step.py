@@ -147,12 +147,14 @@ class Points:
 
     def moved(self, step: Step, share: Values) -> "Points":
         """Points after shares of a step, with the border and the rows renewed."""
-        problem, still = self.problem, share == 0.0
-        dz, da = share[:, None] * step.dz, share[:, None] * step.da
-        dz[still], da[still] = 0.0, 0.0
+        problem, still, wide = self.problem, share == 0.0, share[:, None]
+        dz = wide * step.dz
+        dz[still] = 0.0
         z, beta = self.z + dz, self.beta
         if problem.width == 0:
-            return replace(self, z=z)
+            return Points(problem, z, self.p, beta, self.b, self.rows)
+        da = wide * step.da
+        da[still] = 0.0
         if problem.unfolded:
             beta = beta + da[:, -1]
         b, rows = step.null, self.rows

@@ -232,26 +232,26 @@ class _Run:
         """Status of each lane after a step, and the share of the step that is taken."""
         guards, before = self.guards, self.size[self.lanes]
         size = length(here.problem.structure, step, guards.multipliers)
-        status = np.full(len(size), Status.OPEN.value)
         small = size < guards.converged
         if guards.following > 0.0:
             known = np.where(np.isfinite(before), before, 0.0)
             small |= (size < NEAR) & (size**3 < guards.following * known**2)
-        if self.number >= guards.free:
-            status[~(size <= guards.contraction * before)] = Status.NOT_SHRINKING
-        status[~(size < guards.too_long)] = Status.TOO_LONG
-        status[small] = Status.FOUND
-        factor = np.ones(len(size)) if self.known is None else _lengthening(here, step, self.known)
-        whole = np.isfinite(size) & np.isfinite(factor)
-        status[~whole] = Status.SINGULAR
-        share = factor * np.minimum(1.0, guards.longest / np.maximum(np.abs(factor) * size, 1e-300))
-        self.size[self.lanes] = size
-        if self.number == 0:
-            self.first = size
         self.number += 1
-        if self.number >= guards.iterations:
-            status[status == Status.OPEN] = Status.UNFINISHED
-        return status, np.where(status > Status.UNFINISHED, 0.0, share)
+        goes_on = Status.OPEN if self.number < guards.iterations else Status.UNFINISHED
+        status = np.where(small, Status.FOUND.value, goes_on.value)
+        if guards.contraction < np.inf and self.number > guards.free:
+            status[~small & ~(size <= guards.contraction * before)] = Status.NOT_SHRINKING
+        if guards.too_long < np.inf:
+            status[~(size < guards.too_long)] = Status.TOO_LONG
+        share = np.ones(len(size)) if self.known is None else _lengthening(here, step, self.known)
+        status[~np.isfinite(share * size)] = Status.SINGULAR
+        if guards.longest < np.inf:
+            share *= np.minimum(1.0, guards.longest / np.maximum(np.abs(share) * size, 1e-300))
+        share[status > Status.UNFINISHED] = 0.0
+        self.size[self.lanes] = size
+        if self.number == 1:
+            self.first = size
+        return status, share
 
     def without_ended(self, here: Points, step: Step, status: Numbers) -> Points:
         """Record the lanes that ended, and go on with the others."""
