@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import equimorph as em
-from equimorph.equilibria import distinct, newton
+from equimorph.equilibria import distinct, settle
 from equimorph.errors import InputError
 from oracles.polynomial import Polynomial, pitchfork_form
 
@@ -96,6 +96,6 @@ def test_parameters_without_meaning_are_refused(arch, at, message):
 def test_newton_reports_lanes_without_root_and_keeps_the_others():
     """x² = a: the lane with a < 0 has no root, and does not spoil the lane with a > 0."""
     form = Polynomial(lambda x, a: x**3 * (1 / 3) - a * x, 1, ("a",))
-    z, found = newton(form, np.array([[3.0], [3.0]]), np.array([[4.0], [-1.0]]))
-    assert found.tolist() == [True, False]
-    assert z[0, 0] == pytest.approx(2.0, rel=1e-14)
+    near = settle(form, np.array([[3.0], [3.0]]), np.array([[4.0], [-1.0]]))
+    assert near.found.tolist() == [True, False]
+    assert near.z[0, 0] == pytest.approx(2.0, rel=1e-14)

@@ -226,7 +226,7 @@ CASES = [
     (Guards(), 0.0, Status.SINGULAR),
     (Guards(too_long=0.5), 9.0, Status.TOO_LONG),
     (Guards(contraction=0.3), 9.0, Status.NOT_SHRINKING),
-    (Guards(contraction=0.3, free=8), 9.0, Status.FOUND),
+    (Guards(contraction=0.3, free=30), 9.0, Status.FOUND),
     (Guards(trust=np.array([0.5])), 9.0, Status.FAR),
     (Guards(index=np.array([1])), 1.5, Status.WRONG_INDEX),
     (Guards(index=np.array([0])), 1.5, Status.FOUND),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria import newton
+from equimorph.equilibria import settle
 from equimorph.paper import curvatures, limit_loads
 from equimorph.tasks.maps.curvature import FirstStablePaths
 from typecheck import unchecked
@@ -64,13 +64,13 @@ def first_stable(rest, at):
         for k in np.flatnonzero((q[:-1] - at) * (q[1:] - at) <= 0.0):
             share = (at - q[k]) / (q[k + 1] - q[k])
             p = states.p[k] + share * (states.p[k + 1] - states.p[k])
-            z, good = newton(
+            near = settle(
                 rest.structure,
                 (states.z[k] + share * (states.z[k + 1] - states.z[k]))[None],
                 p[None],
             )
-            there = em.States(rest.structure, z, p[None])
-            assert good[0]
+            there = em.States(rest.structure, near.z, p[None])
+            assert near.found[0]
             if there.index[0] == 0:
                 return there[0]
         assert path.end.kind == "returned", path.end

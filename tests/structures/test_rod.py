@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from equimorph.equilibria.newton import newton as equilibria_near
+from equimorph.equilibria import Guards, settle
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import Rod, State, States
@@ -33,7 +33,8 @@ def many_equilibria(rod, guesses=300, seed=0):
     """Equilibria of all kinds with max |κ| ≤ 30, by Newton from random shapes."""
     generator = np.random.default_rng(seed)
     p = np.column_stack([generator.normal(size=(guesses, 3)), np.full(guesses, 0.8)])
-    z, found = equilibria_near(rod, rod.sample(p, generator), p, iterations=30)
+    near = settle(rod, rod.sample(p, generator), p, guards=Guards(iterations=30))
+    z, found = near.z, near.found
     found[found] = rod.largest_curvature(z[found], p[found])[0] < 30.0
     assert found.sum() > 20
     return z[found], p[found]

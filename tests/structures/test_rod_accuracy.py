@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equimorph.equilibria.newton import newton
+from equimorph.equilibria import Guards, settle
 from equimorph.structures import Rod, State, States
 from oracles.shooting import LEFT_HALF, UNIFORM, Load, from_package
 
@@ -43,8 +43,8 @@ def equilibria(rod, generator, bends, guesses=400):
     """Regular equilibria with max |κ| in `bends`, at random Θ, Δ, q, ν, from random shapes."""
     low, high = (0.1, -1.5, -4.0, 0.6), (2.2, 1.5, 5.0, 0.95)
     p = generator.uniform(low, high, (guesses, 4))
-    z, found = newton(rod, rod.sample(p, generator), p, iterations=40)
-    z, p = z[found], p[found]
+    near = settle(rod, rod.sample(p, generator), p, guards=Guards(iterations=40))
+    z, p = near.z[near.found], p[near.found]
     kappa = rod.largest_curvature(z, p)[0]
     kept = (kappa > bends[0]) & (kappa <= bends[1]) & rod.resolved(z, p)
     states = States(rod, z[kept], p[kept])
@@ -57,9 +57,9 @@ def on_finer_rod(state, load):
     matrix = rod.mesh.interpolation(finer.mesh.nodes[1:-1])
     theta = rod.nodal_angles(state.z[None], state.p[None])
     guess = np.concatenate([theta @ matrix.T, state.z[None, -2:]], axis=1)
-    z, found = newton(finer, guess, state.p[None])
-    assert found.all()
-    return State(finer, z[0], state.p)
+    near = settle(finer, guess, state.p[None])
+    assert near.found.all()
+    return State(finer, near.z[0], state.p)
 
 
 def errors(state, exact):
@@ -166,9 +166,9 @@ def test_accuracy_of_the_vertices_is_of_order_twice_the_degree():
         matrix = reference.mesh.interpolation(rod.mesh.nodes[1:-1])
         theta = reference.nodal_angles(state.z[None], state.p[None])
         guess = np.concatenate([theta @ matrix.T, state.z[None, -2:]], axis=1)
-        z, converged = newton(rod, guess, state.p[None])
-        assert converged.all()
-        found.append(np.abs(rod.fields(z, state.p[None], s) - exact)[0, :, 1].max())
+        near = settle(rod, guess, state.p[None])
+        assert near.found.all()
+        found.append(np.abs(rod.fields(near.z, state.p[None], s) - exact)[0, :, 1].max())
     assert np.log2(found[0] / found[1]) > 5.5
 
 

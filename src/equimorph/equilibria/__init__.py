@@ -10,16 +10,15 @@ from equimorph.equilibria.critical_curves import (
     grazing_curve,
 )
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
-from equimorph.equilibria.deflation import deflated_newton
 from equimorph.equilibria.imperfections import Corner, corners_of, worst_named, worst_over
 from equimorph.equilibria.legs import Leg, Waypoint
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
 from equimorph.equilibria.limit_load import LimitLoad, LimitLoads, limit_load
-from equimorph.equilibria.newton import newton
 from equimorph.equilibria.paths import lift_legs
 from equimorph.equilibria.pools import distinct
 from equimorph.equilibria.ranges import held_over
 from equimorph.equilibria.search import FoundStates, find_equilibria, search_points
+from equimorph.equilibria.settle import Guards, Settled, settle
 from equimorph.equilibria.snap import Landing, snap_landing
 from equimorph.equilibria.switching import Branch, branches
 from equimorph.equilibria.trace import Traces, trace
@@ -32,6 +31,7 @@ __all__ = [
     "CriticalCurve",
     "Event",
     "FoundStates",
+    "Guards",
     "Landing",
     "Leg",
     "Lifts",
@@ -40,6 +40,7 @@ __all__ = [
     "NewtonHomotopy",
     "ParameterLine",
     "Path",
+    "Settled",
     "TraceOptions",
     "Traces",
     "Waypoint",
@@ -49,7 +50,6 @@ __all__ = [
     "constraint_curve",
     "corners_of",
     "cusp_curve",
-    "deflated_newton",
     "distinct",
     "find_equilibria",
     "fold_curve",
@@ -58,8 +58,8 @@ __all__ = [
     "lift",
     "lift_legs",
     "limit_load",
-    "newton",
     "search_points",
+    "settle",
     "snap_landing",
     "trace",
     "way_points",

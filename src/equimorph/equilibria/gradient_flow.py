@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
-from equimorph.equilibria.newton import newton
+from equimorph.equilibria.settle import Guards, settle
 from equimorph.linalg import multiply
 from equimorph.structures import Structure
 
@@ -190,12 +190,13 @@ def _ends(
     near = np.flatnonzero(front.moved & (size < np.where(index == 0, NEAR, NEAR_SADDLE)))
     if len(near) == 0:
         return code, z
-    there, found = newton(structure, z[near], p[near], iterations=12)
+    newton = settle(structure, z[near], p[near], guards=Guards(iterations=12))
+    there = newton.z
     close = metric_length(structure, there[:, :n] - z[near, :n]) < 2.0 * NEAR
     energy = structure.energy(z[near], p[near])
     lower = structure.energy(there, p[near]) <= energy + ROUND_OFF * (1.0 + np.abs(energy))
-    same = structure.index(there, p[near]) == index[near]
-    good = found & close & same & (lower | (index[near] > 0))
+    same = newton.index == index[near]
+    good = newton.found & close & same & (lower | (index[near] > 0))
     code[near[good]] = np.where(index[near[good]] == 0, LANDED, SADDLE)
     z[near[good]] = there[good]
     return code, z

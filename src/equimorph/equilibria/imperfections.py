@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
-from equimorph.equilibria.newton import newton
+from equimorph.equilibria.settle import settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
@@ -129,9 +129,9 @@ class _Ray:
 
     def _ended(self, z: Lanes, p: Parameters) -> tuple[Values, Lanes, Parameters]:
         share = np.full(len(z), -1.0)
-        end, alive = newton(self.structure, z, p)
-        alive &= self.structure.index(end, p) == 0
-        lanes, at = np.flatnonzero(alive), p.copy()
+        near = settle(self.structure, z, p)
+        end, at = near.z, p.copy()
+        lanes = np.flatnonzero(near.found & (near.index == 0))
         if len(lanes):
             velocity = np.tile(TWICE * self.corner, (len(lanes), 1))
             line = ParameterLine(self.structure, p[lanes], velocity)
@@ -187,9 +187,8 @@ class _Corners:
 
     def _values(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes m"]:
         out = np.full((len(z), len(self.corners)), np.inf)
-        here, known = newton(self.structure, z, p)
-        known &= self.structure.index(here, p) == 0
-        lanes = np.flatnonzero(known)
+        near = settle(self.structure, z, p)
+        here, lanes = near.z, np.flatnonzero(near.found & (near.index == 0))
         if len(lanes) == 0:
             return out
         out[lanes, 0] = self.descriptor.function(here[lanes], p[lanes])

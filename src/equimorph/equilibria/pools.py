@@ -7,8 +7,7 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
-from equimorph.equilibria.deflation import deflated_newton
-from equimorph.equilibria.newton import newton
+from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint
@@ -87,9 +86,10 @@ class Pools:
         group = np.repeat(np.arange(len(self.ground.p)), guesses)
         p = self.ground.p[group]
         guess = structure.sample(p, self.generator)
-        z, found = newton(structure, guess, p, iterations=40)
+        near = settle(structure, guess, p, guards=Guards(iterations=40))
+        found = near.found
         self.failures.append(("Newton did not converge", group[~found]))
-        self._take(z[found], group[found])
+        self._take(near.z[found], group[found])
         number = np.arange(len(group)) % guesses
         again = ~found & (number < np.ceil(HOMOTOPIES * guesses))
         self._by_homotopy(guess[again], group[again])
@@ -120,9 +120,10 @@ class Pools:
             return
         structure, p = self.ground.structure, self.ground.p[self.group]
         guess = self.z + NUDGE * (structure.sample(p, self.generator) - self.z)
-        z, found = deflated_newton(structure, guess, p, self._known())
+        away = settle(structure, guess, p, guards=Guards(iterations=30, known=self._known()))
+        found = away.found
         self.failures.append(("deflated Newton did not converge", self.group[~found]))
-        self._take(z[found], self.group[found])
+        self._take(away.z[found], self.group[found])
 
     def _known(self) -> Float[np.ndarray, "lanes roots unknowns"]:
         """The pool of its group for each state; rows of NaN fill up."""
@@ -154,8 +155,9 @@ class Pools:
         return np.asarray(direction * structure.scales * (REACH / length))
 
     def _polished(self, z: Lanes, group: Groups) -> None:
-        z, found = newton(self.ground.structure, z, self.ground.p[group], iterations=12)
-        self._take(z[found], group[found])
+        guards = Guards(iterations=12)
+        exact = settle(self.ground.structure, z, self.ground.p[group], guards=guards)
+        self._take(exact.z[exact.found], group[exact.found])
 
     def _take(self, z: Lanes, group: Groups) -> None:
         """Add what is resolved, not far outside the constraints, and new in its group."""

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
-from equimorph.equilibria.newton import newton
+from equimorph.equilibria.settle import settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
@@ -65,11 +65,11 @@ class _Range:
     def worst(self, z: Lanes, p: Parameters) -> Values:
         """Worst relative excess over the range; see `held_over`."""
         out = np.full(len(z), -1.0)
-        here, alive = newton(self.structure, z, p)
-        alive &= self.structure.index(here, p) == 0
+        near = settle(self.structure, z, p)
+        alive = near.found & (near.index == 0)
         out[~alive] = 2.0
         lanes = np.flatnonzero(alive)
-        here, p = here[lanes], p[lanes]
+        here, p = near.z[lanes], p[lanes]
         excesses: list[Values] = []
         for number, value in enumerate(self.values):
             here, p, arrived = self._moved(here, p, value)

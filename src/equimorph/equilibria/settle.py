@@ -109,8 +109,8 @@ class Guards:
         Constraints that the point must obey.
     """
 
-    iterations: int = 15
-    longest: float = np.inf
+    iterations: int = 60
+    longest: float = 0.7
     too_long: float = np.inf
     converged: float = CONVERGED
     following: float = 0.0

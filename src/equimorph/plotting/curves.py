@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from equimorph.equilibria import Path, newton
+from equimorph.equilibria import Path, settle
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet
 from equimorph.manifold.geometry.topology import adjacency, pieces
@@ -168,12 +168,12 @@ def states_along(path: Path, count: int) -> States:
     share = (length - path.length[after - 1]) / np.where(width > 0, width, 1.0)
     z = known.z[after - 1] + share[:, None] * (known.z[after] - known.z[after - 1])
     p = known.p[after - 1] + share[:, None] * (known.p[after] - known.p[after - 1])
-    solved, found = newton(structure, z, p)
-    shift = (solved - z)[:, : structure.unknowns]
-    found &= np.sqrt(shift**2 @ structure.mass) <= 0.5 * width
+    solved = settle(structure, z, p)
+    shift = (solved.z - z)[:, : structure.unknowns]
+    found = solved.found & (np.sqrt(shift**2 @ structure.mass) <= 0.5 * width)
     found &= (share > 0) & (share < 1)  # known states stay as they are
     nearest = np.where(share < 0.5, after - 1, after)
-    z = np.where(found[:, None], solved, known.z[nearest])
+    z = np.where(found[:, None], solved.z, known.z[nearest])
     p = np.where(found[:, None], p, known.p[nearest])
     return States(structure, z, p)
 

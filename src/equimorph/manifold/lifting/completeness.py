@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.equilibria import search_points
-from equimorph.equilibria.newton import newton
+from equimorph.equilibria.settle import Guards, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
@@ -89,7 +89,9 @@ def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator)
     p = np.tile(eset.parameters_at(middle), (count, 1))
     free = [position(structure.parameters, name) for name in names]
     p[:, free] = generator.uniform(eset.box.lower, eset.box.upper, (count, len(free)))
-    z, found = newton(structure, structure.sample(p, generator), p, iterations=ITERATIONS)
+    guess = structure.sample(p, generator)
+    near = settle(structure, guess, p, guards=Guards(iterations=ITERATIONS))
+    z, found = near.z, near.found
     found[found] = structure.resolved(z[found], p[found])
     for constraint in eset.constraints:
         found[found] = constraint.excess(z[found], p[found]) <= 0.0

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters
-from equimorph.equilibria import ParameterLine, TraceOptions, newton, trace
+from equimorph.equilibria import ParameterLine, TraceOptions, settle, trace
 from equimorph.equilibria.trace import KINDS
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
@@ -146,8 +146,8 @@ class Branch:
             z, good = self.z.copy(), True
             for k in range(1, steps + 1):
                 made = self.unknowns.made(self.x + (x - self.x) * (k / steps))
-                z, found = newton(made, z, self.p)
-                good = bool(found.all())
+                there = settle(made, z, self.p)
+                z, good = there.z, bool(there.found.all())
                 if not good:
                     break
             if good and np.array_equal(States(made, z, self.p).index, index):
@@ -160,9 +160,10 @@ class Branch:
         length = np.linalg.norm((p - self.p) / structure.scales, axis=1)
         near, far = np.flatnonzero((length > 0.0) & (length <= SHORT)), length > SHORT
         if len(near):
-            z[near], found = newton(structure, z[near], p[near])
-            if not found.all():
-                self._note("lost", int(near[~found][0]))
+            there = settle(structure, z[near], p[near])
+            z[near] = there.z
+            if not there.found.all():
+                self._note("lost", int(near[~there.found][0]))
                 return None
         lanes = np.flatnonzero(far)
         if len(lanes):

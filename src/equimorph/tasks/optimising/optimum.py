@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
-from equimorph.equilibria import check_start, newton
+from equimorph.equilibria import check_start, settle
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import local_minima
@@ -381,5 +381,5 @@ def _in_the_box(eset: EquilibriumSet, state: State) -> State:
     box, free = eset.box, unconstrained_setting(eset).free
     p = state.p.copy()
     p[free] = np.clip(p[free], box.lower, box.upper)
-    z, good = newton(state.structure, state.z[None], p[None])
-    return State(state.structure, z[0], p) if good[0] else state
+    inside = settle(state.structure, state.z[None], p[None])
+    return State(state.structure, inside.z[0], p) if inside.found[0] else state

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Values
-from equimorph.equilibria import newton
+from equimorph.equilibria import Guards, settle
 from equimorph.model import Box
 from equimorph.structures import States
 from equimorph.tasks.planning.network import Demands, connect
@@ -16,6 +16,7 @@ Room = tuple[Box, Int[np.ndarray, " d"]]
 """The box, and which parameters are free in it."""
 Some = Int[np.ndarray, " n"]
 
+FEW = Guards(iterations=8)
 SIZES = (0.12, 0.04, 0.013)
 """Moves of corners, in scaled parameters, that are tried one after the other."""
 ROUNDS, POLISHING = 6, 2
@@ -99,7 +100,8 @@ def _chords(
     """Whether the states amid two admissible ones are so, too, and the cost by way of them."""
     a, b = first.states, second.states
     p = 0.5 * (a.p + b.p)
-    z, good = newton(a.structure, 0.5 * (a.z + b.z), p, iterations=8)
+    halfway = settle(a.structure, 0.5 * (a.z + b.z), p, guards=FEW)
+    z, good = halfway.z, halfway.found
     some = np.flatnonzero(good)
     amid = States(a.structure, z[some], p[some])
     middle, between = demands.objective.places(amid), demands.objective.between
@@ -162,8 +164,9 @@ def _candidates(corners: States, move: tuple[int, float], room: Room) -> tuple[S
     p[:, free] = np.clip(p[:, free] + step, box.lower, box.upper)
     some = np.flatnonzero(np.abs(p - corners.p[tried]).max(axis=1, initial=0.0) > 0.0)
     tried, p = tried[some], p[some]
-    z, there = newton(structure, corners.z[tried], p, iterations=8)
-    return tried[there], States(structure, z[there], p[there])
+    moved = settle(structure, corners.z[tried], p, guards=FEW)
+    there = moved.found
+    return tried[there], States(structure, moved.z[there], p[there])
 
 
 def _directions(d: int) -> Float[np.ndarray, "directions d"]:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters
-from equimorph.equilibria import ParameterLine, TraceOptions, check_start, newton
+from equimorph.equilibria import Guards, ParameterLine, TraceOptions, check_start, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
@@ -139,8 +139,8 @@ def _lifted(states: States, p: Parameters, demands: Demands) -> tuple[Lanes, Fla
     """States lifted straight to parameters, and whether they arrived."""
     line = ParameterLine(states.structure, states.p.copy(), p - states.p)
     outcome = trace(line, states.z.copy(), demands.constraints, TraceOptions(record=False))
-    z, found = newton(states.structure, outcome.z, p, iterations=4)
-    return z, (outcome.code == EventCode.ARRIVED) & found
+    there = settle(states.structure, outcome.z, p, guards=Guards(iterations=4))
+    return there.z, (outcome.code == EventCode.ARRIVED) & there.found
 
 
 def _thinned(corners: States, demands: Demands, same_class: bool) -> States:

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria import newton
+from equimorph.equilibria import settle
 from equimorph.structures import States, Structure
 from equimorph.tasks.verification.newton_kantorovich import Bounds, can_be_sampled, segment_bounds
 
@@ -143,7 +143,8 @@ def _bisected(
     structure: Structure = states.structure
     middle = 0.5 * (states.z[bad] + states.z[bad + 1])
     p = 0.5 * (states.p[bad] + states.p[bad + 1])
-    z, found = newton(structure, middle, p)
+    amid = settle(structure, middle, p)
+    z, found = amid.z, amid.found
     n, mass = structure.unknowns, structure.mass
     away = np.sqrt((z - middle)[:, :n] ** 2 @ mass)
     chord = np.sqrt((states.z[bad + 1] - states.z[bad])[:, :n] ** 2 @ mass)

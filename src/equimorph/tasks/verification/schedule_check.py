@@ -16,7 +16,7 @@ from equimorph.equilibria import (
     TraceOptions,
     check_start,
     lift,
-    newton,
+    settle,
     way_points,
 )
 from equimorph.errors import InputError
@@ -84,10 +84,10 @@ def _by_newton(start: State, rows: Rows) -> States:
     """States over rows by Newton from each to the next; at least one beyond the start."""
     structure, z = start.structure, [start.z]
     for row in rows:
-        new, found = newton(structure, z[-1][None], row[None])
-        if not found[0]:
+        new = settle(structure, z[-1][None], row[None])
+        if not new.found[0]:
             break
-        z.append(new[0])
+        z.append(new.z[0])
     # a leg that Newton cannot take is given to the lift, whatever its end
     if len(z) == 1:
         z.append(start.z)
@@ -338,13 +338,13 @@ def first_state(schedule: Schedule, structure: Structure | None) -> State:
     state = State(owner, z, schedule.values[0].copy())
     if state.residual < 1e-10:
         return state
-    near, found = newton(owner, z[None], state.p[None])
-    gap = float(np.sqrt((near[0] - z)[: owner.unknowns] ** 2 @ owner.mass))
-    if not (found[0] and gap <= NEAR):
+    near = settle(owner, z[None], state.p[None])
+    gap = float(np.sqrt((near.z[0] - z)[: owner.unknowns] ** 2 @ owner.mass))
+    if not (near.found[0] and gap <= NEAR):
         raise InputError(
             f"`schedule` must start at an equilibrium; got a residual of {state.residual:.2g}."
         )
-    return State(owner, near[0], state.p)
+    return State(owner, near.z[0], state.p)
 
 
 def _wrong_start(start: State, within: tuple[Constraint, ...], margin: float) -> str:
