@@ -5,7 +5,6 @@ import pytest
 
 from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.complex.marked_complex import fabric_of
-from equimorph.manifold.queries.levels import fabric_setting
 from equimorph.manifold.refining.corners import corner_angles, squeezed
 from equimorph.model import Box
 from oracles.surfaces import transcriticals
@@ -22,7 +21,7 @@ def test_triangles_in_a_sharp_corner_are_told():
         box = Box(a=(-1.0, 1.1), b=(-0.05, 1.2))
         eset = equilibrium_set(transcriticals(1.0, 10.0), box, checks=0, intervals=(3, 4))
         eset = refine(eset, 0.01)
-        fabric = fabric_of(fabric_setting(eset), eset)
+        fabric = fabric_of(eset)
         corners = np.degrees(corner_angles(fabric))
         tight = squeezed(fabric, np.radians(10.0))
     assert eset.audit.clean

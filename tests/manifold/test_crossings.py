@@ -9,7 +9,6 @@ from equimorph import lift, plotting, storage
 from equimorph.manifold import EquilibriumSet, equilibrium_set, locate, refine, restricted
 from equimorph.manifold.complex.marked_complex import fabric_of
 from equimorph.manifold.geometry.topology import adjacency
-from equimorph.manifold.queries.levels import fabric_setting
 from equimorph.manifold.refining.corners import squeezed
 from equimorph.manifold.refining.surgery import angles
 from equimorph.model import Box, Descriptor
@@ -312,7 +311,7 @@ def test_figure_names_the_branch_points(symmetric_slice):
 
 def angles_off_curves(eset: EquilibriumSet) -> np.ndarray:
     """Smallest angles, in degrees, of triangles that are not squeezed between curves."""
-    fabric = fabric_of(fabric_setting(eset), eset)
+    fabric = fabric_of(eset)
     return np.degrees(angles(fabric)[~squeezed(fabric, np.radians(10.0))])
 
 

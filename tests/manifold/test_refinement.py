@@ -19,7 +19,6 @@ from equimorph.manifold.complex.marked_complex import (
     edges_of,
     fabric_of,
 )
-from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import adjacency, chains, euler_characteristic
 from equimorph.manifold.queries.cusps import with_cusps_beside
@@ -288,8 +287,7 @@ def test_accuracy_must_be_positive(accuracy):
 @pytest.fixture(scope="module")
 def coarse() -> Fabric:
     eset = lifted(torus(0.5), Box(a=(-1.7, 1.6), b=(-1.5, 1.5)), (12, 12))
-    setting = Setting(eset.structure, eset.points.p[0], np.array([0, 1]), ())
-    return fabric_of(setting, eset)
+    return fabric_of(eset)
 
 
 def test_flips_keep_vertices_and_topology_and_widen_angles(coarse):
@@ -456,7 +454,7 @@ def test_cusps_are_not_put_on_the_rim_of_a_patch():
     with unchecked():
         box = Box(b=(-1.7, 1.9), c=(-1, 0.7))
         eset = equilibrium_set(swallowtail(), box, fixed={"a": -1.0}, checks=0, intervals=(5, 6))
-    fabric = fabric_of(Setting(eset.structure, eset.points.p[0], np.array([1, 2]), ()), eset)
+    fabric = fabric_of(eset)
     everywhere = np.ones(len(fabric.cells), bool)
     cut = with_cusps_beside(fabric, everywhere)
     assert len(cut.cells) == len(fabric.cells) + 4

@@ -12,7 +12,6 @@ from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, stability_distance
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.topology import faces_of, keys_of
-from equimorph.manifold.queries.nearest import setting_of
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.model import Box
 from equimorph.structures import Rod, Spring
@@ -139,7 +138,7 @@ def shortest_over_triangles(eset, state, stratum: int) -> float:
 
     Five points on each side, 6600 vertices: up to 3.4 % too long.
     """
-    setting = setting_of(eset)
+    setting = eset.setting
     cells, x = eset.cells[eset.stratum == stratum], embed(setting, eset.points.z, eset.points.p)
     sides = faces_of(cells, 2)
     share = np.linspace(0.0, 1.0, 7)[1:-1, None]

@@ -1,5 +1,7 @@
 """Sets over three parameters: balls and spheres known by name, the spring, and a coarse arch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,6 @@ from equimorph.manifold import (
 from equimorph.manifold.complex.marked_complex import fabric_of
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected
-from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     adjacency,
@@ -295,10 +296,8 @@ def test_refined_arch_over_three_parameters_has_no_slivers():
         fine = refine(coarse, 0.05)
         assert fine.audit.smallest_dihedral > 1.0
         assert fine.audit.unrefined <= 1
-        names = [parameter.name for parameter in arch.parameters]
-        free = np.array([names.index(name) for name in fine.names])
-        setting = Setting(arch, fine.points.p[0], free, ())
-        fabric = fabric_of(setting, fine)
+        setting = replace(fine.setting, constraints=())
+        fabric = replace(fabric_of(fine), setting=setting)
         generator = np.random.default_rng(5)
         cells = fabric.cells[generator.integers(len(fabric.cells), size=1000)]
         share = generator.dirichlet(np.ones(4), 1000)

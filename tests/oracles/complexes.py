@@ -15,7 +15,6 @@ from equimorph.manifold.geometry.topology import (
     orientation,
     projected_volume,
 )
-from equimorph.manifold.queries.levels import fabric_setting
 
 REGULAR = (0, 3, 5, 6)
 FOLDED = (1, 4)
@@ -127,8 +126,7 @@ def assert_upright(eset: EquilibriumSet) -> None:
     for k in range(patch.max(initial=-1) + 1):
         own = volume[patch == k]
         assert (own * np.sign(own.sum()) >= 0.0).all()
-    setting = fabric_setting(eset)
-    fabric = fabric_of(setting, eset)
+    fabric = fabric_of(eset)
     # the signs of those parts of sheets between which others cross are their own
     corners = fabric.vertices.place[fabric.cells]
     total = np.zeros(len(eset.cells))

@@ -1,4 +1,4 @@
-"""A set whose lift was interrupted, however often, is that of an undisturbed one, bit for bit."""
+"""A journal keeps whole sets: what it gives back is what was computed, bit for bit."""
 
 import random
 from collections.abc import Callable, Iterator
@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from equimorph.errors import CancelledError, InputError
-from equimorph.manifold import EquilibriumSet, equilibrium_set, refine
-from equimorph.manifold.complex import edge_points
-from equimorph.manifold.lifting import flood, traced_edges
+from equimorph.manifold import EquilibriumSet, build, equilibrium_set, refine
+from equimorph.manifold.refining import refinement
 from equimorph.model import Box, Journal, Progress
 from equimorph.storage import open_journal
 from equimorph.storage.journal import MARK
@@ -64,7 +63,15 @@ def same(one: EquilibriumSet, other: EquilibriumSet) -> bool:
         pair = getattr(one, each.name), getattr(other, each.name)
         if isinstance(pair[0], np.ndarray):
             arrays.append(pair)
-    return one.audit == other.audit and all(np.array_equal(a, b) for a, b in arrays)
+    pieces = [(*each.folds, *each.crossings) for each in (one, other)]
+    arrays.extend(zip(*pieces, strict=True))
+    arrays.extend(
+        (a.vertices, b.vertices) for a, b in zip(one.boundaries, other.boundaries, strict=True)
+    )
+    for name in ("audit", "components", "strata", "intervals", "fixed"):
+        assert getattr(one, name) == getattr(other, name)
+    kinds = [[piece.kind for piece in each.boundaries] for each in (one, other)]
+    return kinds[0] == kinds[1] and all(np.array_equal(a, b) for a, b in arrays)
 
 
 class Cancelling:
@@ -106,18 +113,6 @@ def test_a_set_that_is_cancelled_again_and_again_is_the_same_in_the_end(lift: Li
     assert same(last, whole)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("lift", [spring, spring_in_three, spring_slice, arch])
-def test_cancelling_at_any_report_changes_nothing(lift: Lift, tmp_path: Path):
-    watch = Cancelling(np.inf)
-    whole = lift(watch, None)
-    for at in range(1, watch.count + 1, 1 + watch.count // 40):
-        assert interrupted(lift, tmp_path / f"{at}", at) is None
-        last = interrupted(lift, tmp_path / f"{at}", np.inf)
-        assert last is not None
-        assert same(last, whole)
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[EquilibriumSet, bytes]:
     """The refined set of the spring, and its journal."""
@@ -132,12 +127,7 @@ def test_what_is_in_the_journal_is_not_computed_again(
     whole, content = finished
     path = tmp_path / "journal"
     path.write_bytes(content)
-    for module, name in (
-        (flood, "lift_directly"),
-        (traced_edges, "follow"),
-        (edge_points, "on_edges"),
-    ):
-        monkeypatch.setattr(module, name, None)
+    monkeypatch.setattr(build, "_of_grid", None)
     with open_journal(path) as journal:
         assert same(spring(None, journal), whole)
     assert path.read_bytes() == content
@@ -235,15 +225,10 @@ def test_steps_that_are_not_those_of_the_journal_are_found_anew(tmp_path: Path):
         assert journal.recall("step 2") is None
 
 
-def test_refinement_goes_on_where_it_was(tmp_path: Path):
+def test_a_refined_set_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     eset = spring(None, None)
-    watch = Cancelling(np.inf)
-    whole = refine(eset, 0.01, watch)
-
-    def lift(progress: Progress | None, journal: Journal | None) -> EquilibriumSet:
-        return refine(eset, 0.01, progress, journal)
-
-    assert interrupted(lift, tmp_path / "journal", watch.count) is None
-    last = interrupted(lift, tmp_path / "journal", np.inf)
-    assert last is not None
-    assert same(last, whole)
+    with open_journal(tmp_path / "journal") as journal:
+        whole = refine(eset, 0.01, None, journal)
+    monkeypatch.setattr(refinement, "fabric_of", None)
+    with open_journal(tmp_path / "journal") as journal:
+        assert same(refine(eset, 0.01, None, journal), whole)

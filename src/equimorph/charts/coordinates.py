@@ -12,7 +12,6 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import border_of, placed_frames, split_step
 from equimorph.manifold.lookup.exact_states import exact_states
-from equimorph.manifold.queries.nearest import setting_of
 from equimorph.model import Descriptor, position
 
 Values = Float[np.ndarray, "lanes d"]
@@ -300,7 +299,7 @@ def coordinates_of(eset: EquilibriumSet, chosen: Sequence[Descriptor | str]) -> 
     if len(set(scalars)) < d:
         names = ", ".join(scalar.name for scalar in scalars)
         raise InputError(f"`coordinates` must be different ones; got {names}.")
-    return Coordinates(setting_of(eset), tuple(scalars), np.array(places))
+    return Coordinates(eset.setting, tuple(scalars), np.array(places))
 
 
 def parameter_descriptor(eset: EquilibriumSet, name: str) -> Descriptor:

@@ -19,7 +19,7 @@ from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.points import REFINED
 from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labels
 from equimorph.manifold.lookup.exact_states import exact_states
-from equimorph.manifold.queries.levels import fabric_setting, part_of
+from equimorph.manifold.queries.levels import part_of
 from equimorph.structures import States
 
 RINGS = 3
@@ -101,7 +101,7 @@ class _Work:
     @classmethod
     def of(cls, eset: EquilibriumSet) -> "_Work":
         """Nothing is cut: charts are strata."""
-        fabric = fabric_of(fabric_setting(eset), eset)
+        fabric = fabric_of(eset)
         number = np.arange(len(eset.strata))
         return cls(eset, replace(fabric, cell_index=eset.stratum.copy()), number)
 

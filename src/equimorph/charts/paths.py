@@ -16,7 +16,6 @@ from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.lookup.over import rooted
-from equimorph.manifold.queries.nearest import setting_of
 from equimorph.structures import State, States
 
 AT_VERTEX = 1e-6
@@ -101,7 +100,7 @@ def _over_edges(
     eset: EquilibriumSet, start: tuple[State, int], goal: tuple[State, int]
 ) -> list[int] | None:
     """Vertices of the shortest way over edges from one cell to another."""
-    setting, count = setting_of(eset), len(eset.points)
+    setting, count = eset.setting, len(eset.points)
     place = embed(setting, eset.points.z, eset.points.p)
     pairs = faces_of(eset.cells, 2) if eset.cells.shape[1] > 2 else eset.cells
     pairs = pairs[~_at_end(eset)[pairs].any(axis=1)]

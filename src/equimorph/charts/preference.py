@@ -25,7 +25,7 @@ from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFI
 from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.lookup.over import rooted
-from equimorph.manifold.queries.levels import fabric_setting, part_of
+from equimorph.manifold.queries.levels import part_of
 from equimorph.structures import States
 
 DIFFERENT = 1e-4
@@ -102,7 +102,7 @@ class Preference:
 def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndarray, " V"], int]:
     """The preferred part of a set, which of its vertices lie on cuts, and edges without a cut."""
     eset = preference.cells.eset
-    fabric = fabric_of(fabric_setting(eset), eset)
+    fabric = fabric_of(eset)
     among = np.zeros(len(eset.cells), bool)
     among[preference.cells.numbers] = True
     values = _signs(preference)

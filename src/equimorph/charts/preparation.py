@@ -19,7 +19,7 @@ from equimorph.manifold.geometry.topology import (
     pieces,
 )
 from equimorph.manifold.queries.cusps import cusps_on_edges
-from equimorph.manifold.queries.levels import fabric_setting, part_of
+from equimorph.manifold.queries.levels import part_of
 
 ROUNDS = 6
 
@@ -88,7 +88,7 @@ def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
     """A set with vertices at its cusps; the set itself if it has none."""
     if len(eset.names) != 2:
         return eset
-    fabric, cusps = add_cusp_vertices(fabric_of(fabric_setting(eset), eset))
+    fabric, cusps = add_cusp_vertices(fabric_of(eset))
     if len(cusps) == 0:
         return eset
     nothing = np.zeros(len(fabric.vertices), bool)

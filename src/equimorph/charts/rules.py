@@ -19,7 +19,6 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.embedding import embed
-from equimorph.manifold.queries.nearest import setting_of
 from equimorph.model import Box, Descriptor, Grid, parameter_vector, position
 from equimorph.structures import State, States, Structure
 
@@ -178,7 +177,7 @@ def _distance_from(eset: EquilibriumSet, stratum: int) -> Callable[[Found], Scor
         raise InputError(
             f"`nearest` must name one of {len(eset.strata)} strata, from 0 on; got {stratum!r}."
         )
-    setting = setting_of(eset)
+    setting = eset.setting
     used = np.unique(eset.cells[eset.stratum == stratum])
     tree = cKDTree(embed(setting, eset.points.z[used], eset.points.p[used]))
 
@@ -264,7 +263,7 @@ class _OnPath(Rule):
         """Prefer the ends of paths."""
         start = Unloaded.of(eset, self.parameter)
         ends = self.ends(eset, start.load, start.low)
-        setting, n = setting_of(eset), eset.structure.unknowns
+        setting, n = eset.setting, eset.structure.unknowns
 
         def over(points: Points) -> Lanes:
             p = np.tile(setting.base, (len(points), 1))

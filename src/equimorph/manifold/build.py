@@ -17,6 +17,7 @@ from equimorph.manifold.complex.arguments import (
 )
 from equimorph.manifold.complex.base_mesh import BaseMesh, Lines, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.kept_sets import recall_set
 from equimorph.manifold.complex.questions import question_of_set
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.account import account
@@ -31,14 +32,11 @@ from equimorph.manifold.refining.refinement import refined
 from equimorph.model import (
     Box,
     Constraint,
-    Forgetful,
     Journal,
     Progress,
     Silent,
     parameter_vector,
     position,
-    recalled,
-    step_of,
 )
 from equimorph.structures import States, Structure
 
@@ -109,9 +107,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     progress
         Sink for progress reports; one that raises an exception cancels.
     journal
-        Keeps all that costs much as soon as it is found, like `storage.open_journal`: called again
-        with the same journal, a lift that was cancelled or killed goes on where it was. The set is
-        the same, bit for bit.
+        Keeps the set when it is found, like `storage.open_journal`: called again with the same
+        journal, the set is read from there, the same bit for bit.
 
     Returns
     -------
@@ -132,14 +129,27 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     seed, checks = whole_number("seed", seed, 0), whole_number("checks", checks, 0)
     intervals = _intervals(box, intervals)
     setting = _setting(structure, box, fixed or {}, constraints(within))
-    if journal is not None:
-        journal.begin(question_of_set(setting, box, intervals, (seed, checks, accuracy)))
-    journal = journal or Forgetful()
+    effort = (seed, checks, accuracy)
+    compute = partial(_on_grids, setting, (box, dict(fixed or {}), intervals), effort, progress)
+    if journal is None:
+        return compute()
+    question = question_of_set(setting, box, intervals, effort)
+    return recall_set(journal, question, setting, box, dict(fixed or {}), compute)
+
+
+def _on_grids(
+    setting: Setting,
+    given: tuple[Box, Mapping[str, float], tuple[int, ...]],
+    effort: tuple[int, int, float | None],
+    progress: Progress,
+) -> EquilibriumSet:
+    """Set over a grid, or a finer one if it is too coarse."""
+    box, fixed, intervals = given
+    seed, checks, accuracy = effort
     for number in range(GRIDS):
-        given = (box, dict(fixed or {}), intervals)
-        eset = _of_grid(setting, given, (seed, checks), progress, journal)
+        eset = _of_grid(setting, (box, fixed, intervals), (seed, checks), progress)
         if accuracy is not None:
-            eset = refined(eset, accuracy, progress, journal)
+            eset = refined(eset, accuracy, progress)
         # over one parameter no cells are bisected to find what they hide
         hidden = eset.audit.missing if len(intervals) == 1 else 0
         if eset.audit.unrefined + hidden == 0 or number == GRIDS - 1:
@@ -154,7 +164,6 @@ def _of_grid(
     given: tuple[Box, Mapping[str, float], tuple[int, ...]],
     effort: tuple[int, int],
     progress: Progress,
-    journal: Journal,
 ) -> EquilibriumSet:
     """Set over a grid, with checks.
 
@@ -164,7 +173,7 @@ def _of_grid(
     seed, checks = effort
     lines = grid_lines(box, intervals, _off_zero(setting))
     progress.report("seeds", 0, 1)
-    pairing = start_pairing(setting, grid_mesh(lines), journal)
+    pairing = start_pairing(setting, grid_mesh(lines))
     pairing.points.over_vertices(*_spread(pairing, lines, seed, progress))
     generator = np.random.default_rng([seed, 1])
     recovered = 0
@@ -173,7 +182,7 @@ def _of_grid(
         pairing.fit()
         cells, bisected = _lifted(pairing, finder, progress)
         eset = account(pairing, cells, given, bisected)
-        found = check(eset, generator, _checks(checks, setting), progress, journal)
+        found = check(eset, generator, _checks(checks, setting), progress)
         lacking = len(found.missing)
         if lacking == 0 or number == SEARCHES - 1:
             break
@@ -259,10 +268,8 @@ def _recover(pairing: Pairing, missing: States) -> None:
     """
     for _ in range(HIDDEN):
         known, mesh = pairing.points.count, pairing.mesh
-        step = step_of("recover", missing.z)
-        seek = partial(seeds_from, pairing.setting, mesh, missing)
-        *seeds, origin = recalled(pairing.journal, step, seek)
-        ids, _ = pairing.points.over_vertices(*seeds)
+        found, origin = seeds_from(pairing.setting, mesh, missing)
+        ids, _ = pairing.points.over_vertices(*found)
         missing = missing[np.setdiff1d(np.arange(len(missing)), origin[ids >= known])]
         if len(missing) == 0 or mesh.dimension == 1:
             return
@@ -279,11 +286,10 @@ def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Se
     So the flood of the fine grid starts everywhere at once, with many edges at a time, and on
     pieces, too, that hang together only beyond the box.
     """
-    setting, journal = pairing.setting, pairing.journal
+    setting = pairing.setting
     mesh, number = coarse_grid(lines, COARSE[len(lines)], setting.limits)
-    coarse = start_pairing(setting, mesh, journal)
-    seek = partial(seeds, setting, mesh, np.flatnonzero(number >= 0), seed)
-    coarse.points.over_vertices(*recalled(journal, step_of("seeds", mesh.vertices), seek))
+    coarse = start_pairing(setting, mesh)
+    coarse.points.over_vertices(*seeds(setting, mesh, np.flatnonzero(number >= 0), seed))
     flood(coarse, progress)
     store = coarse.points
     vertex = store.vertex[: store.count]

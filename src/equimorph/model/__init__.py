@@ -14,11 +14,8 @@ from equimorph.model.drawing import (
 from equimorph.model.function_content import content_of_descriptor, content_of_function
 from equimorph.model.journal import (
     Findings,
-    Forgetful,
     Journal,
-    all_recalled,
     recalled,
-    step_of,
 )
 from equimorph.model.keeping import NOT_KEPT
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
@@ -46,7 +43,6 @@ __all__ = [
     "Drawing",
     "Findings",
     "Forces",
-    "Forgetful",
     "Grid",
     "HalfPlane",
     "Journal",
@@ -60,7 +56,6 @@ __all__ = [
     "Spline",
     "Support",
     "SupportKind",
-    "all_recalled",
     "combined",
     "content_of_descriptor",
     "content_of_function",
@@ -70,5 +65,4 @@ __all__ = [
     "parameter_vector",
     "position",
     "recalled",
-    "step_of",
 ]

@@ -20,7 +20,6 @@ from equimorph.manifold.queries.nearest import (
     Residuals,
     Spot,
     local_minima,
-    setting_of,
     spots,
 )
 from equimorph.model import Descriptor
@@ -209,7 +208,7 @@ def _settled(
     eset: EquilibriumSet, residuals: Residuals, unstable: bool
 ) -> tuple[Spot, Values, Flags]:
     """Best fits, their misfits, and whether they are minima; those on folds are none."""
-    ground = Ground(setting_of(eset), eset)
+    ground = Ground(eset.setting, eset)
     value = np.linalg.norm(residuals(eset.points.z, eset.points.p), axis=1)
     cells = eset.cells if unstable else eset.cells[eset.cell_index == 0]
     starts = local_minima(faces_of(cells, 2), value)[:STARTS]
@@ -314,7 +313,7 @@ def _coordinates(states: States) -> dict[Descriptor, float]:
 
 def _standard_errors(eset: EquilibriumSet, spot: Spot, residuals: Residuals) -> dict[str, Values]:
     """Linearised: covariance (JᵀJ)⁻¹ of tangent coordinates, carried over to the parameters."""
-    setting, d = setting_of(eset), len(eset.names)
+    setting, d = eset.setting, len(eset.names)
     frames, _ = Ground(setting, eset).frames(spot)
     columns = []
     for k in range(frames.shape[1]):

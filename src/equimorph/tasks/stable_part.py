@@ -12,7 +12,6 @@ from equimorph.manifold import EquilibriumSet, part, restricted
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.locate import cell_of, pieces_of
-from equimorph.manifold.queries.nearest import setting_of
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State
 
@@ -91,7 +90,7 @@ def cell_near(eset: EquilibriumSet, state: State) -> int:
     found = cell_of(eset, state)
     if found >= 0:
         return found
-    setting = setting_of(eset)
+    setting = eset.setting
     corners = embed(setting, eset.points.z, eset.points.p)[eset.cells]
     here = embed(setting, state.z[None], state.p[None])[0]
     count = eset.cells.shape[1]

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.marked_complex import (
     ON_CAP,
     ON_CROSSING,
@@ -23,7 +24,6 @@ from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, low
 from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import Cubics, Ends, split_step
-from equimorph.model import Findings, Journal, all_recalled, step_of
 
 CHUNK = 512
 """Edges that are worked on together: their work arrays stay small, and threads share the chunks."""
@@ -72,16 +72,13 @@ class Places:
     t: Float[np.ndarray, " n"]
 
 
-def recalled_on_edges(journal: Journal, fabric: Fabric, parts: Sequence[Places]) -> list[Tried]:
-    """Exact vertices on edges, from a journal if it has them; see `on_edges`."""
+def on_all_edges(fabric: Fabric, parts: Sequence[Places]) -> list[Tried]:
+    """Exact vertices on edges, several parts at the same time; see `on_edges`."""
 
-    def compute(part: Places) -> Findings:
-        found, vertices = on_edges(fabric, part.ends, part.mark, part.lowest, part.t, rough=True)
-        return found, *vertices.columns.values()
+    def find(part: Places) -> Tried:
+        return on_edges(fabric, part.ends, part.mark, part.lowest, part.t, rough=True)
 
-    steps = [step_of(f"bisect {part.mark}", part.ends, part.t) for part in parts]
-    findings = all_recalled(journal, steps, [partial(compute, part) for part in parts])
-    return [(found, Vertices(*columns)) for found, *columns in findings]
+    return list(results_of([partial(find, part) for part in parts]))
 
 
 def unmet(fabric: Fabric, tried: Sequence[Tried]) -> list[Tried]:

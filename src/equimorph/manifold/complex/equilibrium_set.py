@@ -116,6 +116,14 @@ class EquilibriumSet:
         """Free parameters of the vertices."""
         return np.stack([self.points[name] for name in self.names], axis=1)
 
+    @cached_property
+    def setting(self) -> Setting:
+        """The structure, its free parameters and the constraints that bound the set."""
+        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
+        base = parameter_vector(self.structure.parameters, {**self.fixed, **low})
+        free = [position(self.structure.parameters, name) for name in self.names]
+        return Setting(self.structure, base, np.array(free), self.constraints)
+
     def parameters_at(self, at: Mapping[str, float]) -> Float[np.ndarray, " P"]:
         """All parameters over a point of the box.
 
@@ -132,20 +140,7 @@ class EquilibriumSet:
             )
         if not self.box.contains(point, slack=1e-12):
             raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
-        p = self._corner.copy()
-        p[self._free] = point
-        return p
-
-    @cached_property
-    def _corner(self) -> Float[np.ndarray, " P"]:
-        """All parameters at the lower corner of the box."""
-        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
-        return parameter_vector(self.structure.parameters, {**self.fixed, **low})
-
-    @cached_property
-    def _free(self) -> Int[np.ndarray, " d"]:
-        """Places of the free parameters."""
-        return np.array([position(self.structure.parameters, name) for name in self.names])
+        return np.asarray(self.setting.parameters(point[None])[0])
 
     def at(self, **at: float) -> States:
         """Exact states over one point of the box, sorted by energy; see `over`."""
@@ -200,9 +195,7 @@ class EquilibriumSet:
         if len(outside):
             worst = dict(zip(self.names, points[outside[0]].tolist(), strict=True))
             raise InputError(f"`at` must lie in {self.box}; got {worst} (point {outside[0]}).")
-        p = np.tile(self._corner, (len(points), 1))
-        p[:, self._free] = points
-        return p
+        return self.setting.parameters(points)
 
     @cached_property
     def _sheets(self) -> Sheets:
@@ -215,7 +208,7 @@ class EquilibriumSet:
                 flags[piece] = True
         return Sheets(
             self.points,
-            self._free,
+            self.setting.free,
             self.cells,
             self.cell_index,
             self.component,
@@ -229,14 +222,12 @@ class EquilibriumSet:
         """Facets along which sheets cross, if they do."""
         if not self.crossings:
             return None
-        low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
-        setting = Setting(self.structure, self.parameters_at(low), self._free, self.constraints)
         d = len(self.names)
         pieces = [
             np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
             for piece in self.crossings
         ]
-        return of_set(setting, self.points, self.cells, np.concatenate(pieces))
+        return of_set(self.setting, self.points, self.cells, np.concatenate(pieces))
 
 
 def _check_names(names: tuple[str, ...], at: Mapping[str, object]) -> None:

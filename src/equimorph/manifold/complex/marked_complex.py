@@ -242,9 +242,9 @@ def held(mark: int, dimension: int) -> list[int]:
     return [k for k in range(dimension) if mark & (3 * SIDES << 2 * k)]
 
 
-def fabric_of(setting: Setting, eset: EquilibriumSet) -> Fabric:
+def fabric_of(eset: EquilibriumSet) -> Fabric:
     """Return a set as a fabric: its sheets are parted where they cross."""
-    d = len(eset.names)
+    setting, d = eset.setting, len(eset.names)
     crossings, folds = (
         np.concatenate([np.zeros((0, d), int), *(_facets(piece, d) for piece in pieces)])
         for pieces in (eset.crossings, eset.folds)

@@ -1,6 +1,6 @@
 """Exact points amid others: on a fold, on a constraint, on both, or just on the set."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
@@ -13,7 +13,6 @@ from equimorph.equilibria.critical import null_border
 from equimorph.manifold.geometry.embedding import embed, principal_directions
 from equimorph.manifold.geometry.points import CAP, CORNER, FOLD, Points
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.model import Journal, recalled, step_of
 
 Span = Float[np.ndarray, "lanes k d"]
 
@@ -73,14 +72,6 @@ class Aim:
         dp = np.zeros((len(self.span), len(self.setting.base)))
         dp[:, self.setting.free] = self.span[:, k] * self.setting.scales
         return dp
-
-
-def recalled_pin(
-    journal: Journal, groups: Sequence[Sequence[int]], kind: int, pinned: Callable[[], Pinned]
-) -> Pinned:
-    """Points of a kind amid groups, from a journal if it has them."""
-    step = step_of(f"pin {kind}", np.array([point for group in groups for point in group], int))
-    return Pinned(*recalled(journal, step, lambda: tuple(vars(pinned()).values())))
 
 
 def pin(

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Int
 
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.crossing_points import pin_crossings
-from equimorph.manifold.geometry.exact_points import Pinned, recalled_pin
+from equimorph.manifold.geometry.exact_points import Pinned
 from equimorph.manifold.geometry.points import AMID, CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import distinct
@@ -258,9 +258,7 @@ def _new(
     if not groups:
         return out
     store = pairing.points
-    pinned = recalled_pin(
-        pairing.journal, groups, kind, lambda: _pin_inside(pairing, groups, kind, owner, cap=cap)
-    )
+    pinned = _pin_inside(pairing, groups, kind, owner, cap=cap)
     for lane in np.flatnonzero(pinned.found).tolist():
         # on folds and crossings that of the lower side, elsewhere that of all
         low = int(store.index[list(groups[lane])].min())

@@ -4,16 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from equimorph.equilibria import search_points
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.lifting.seeds import polished
+from equimorph.manifold.lifting.seeds import Seeds, polished
 from equimorph.manifold.lookup.straight_lifts import lift_to
-from equimorph.model import Findings, Journal, Progress, position, recalled, step_of
+from equimorph.model import Progress, position
 from equimorph.structures import States
 
 APART = 1e-5
@@ -38,7 +38,6 @@ def check(
     generator: np.random.Generator,
     points: int,
     progress: Progress,
-    journal: Journal,
 ) -> Check:
     """Search at random points, half of them anywhere in the box, half below the set.
 
@@ -56,12 +55,10 @@ def check(
     if not places:
         return Check(0, eset.points[:0])
     seed = int(generator.integers(2**31))
-    step = step_of("check", np.stack(chosen))
-    found, z, p = recalled(journal, step, lambda: _missing(eset, places, seed))
-    return Check(int(found), States(eset.structure, z, p))
+    return _missing(eset, places, seed)
 
 
-def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) -> Findings:
+def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) -> Check:
     """How many equilibria the searches find, and those that the set lacks."""
     searched = search_points(
         eset.structure,
@@ -72,8 +69,7 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     )
     scattered = _scattered(eset, SCATTERED, np.random.default_rng(seed))
     found = _together([*searched, scattered])
-    lacking = _lacking(found, eset)
-    return np.array(len(found)), lacking.z, lacking.p
+    return Check(len(found), _lacking(found, eset))
 
 
 def _together(parts: Sequence[States]) -> States:
@@ -117,10 +113,12 @@ def _in_the_box(eset: EquilibriumSet, generator: np.random.Generator) -> Float[n
     return np.asarray(generator.uniform(eset.box.lower, eset.box.upper))
 
 
-def seeds_from(setting: Setting, mesh: BaseMesh, missing: States) -> Findings:
+def seeds_from(
+    setting: Setting, mesh: BaseMesh, missing: States
+) -> tuple[Seeds, Int[np.ndarray, " n"]]:
     """Equilibria over the corners of grid cells around states and around their mirror images.
 
-    Vertices, unknowns, parameters, index, and the number of the state that each comes from.
+    Returned with them is the number of the state that each comes from.
     """
     states = _together([missing, *_images(setting, missing)])
     cells = np.array([mesh.locate(point) for point in states.p[:, setting.free]], dtype=int)
@@ -129,7 +127,7 @@ def seeds_from(setting: Setting, mesh: BaseMesh, missing: States) -> Findings:
     targets = setting.parameters(mesh.vertices[vertices.ravel()])
     z, which = lift_to(states[origin], targets, setting.constraints)
     found, good = polished(setting, mesh, vertices.ravel()[which], z)
-    return (*found, origin[which][good])
+    return found, origin[which][good]
 
 
 def _images(setting: Setting, states: States) -> list[States]:

@@ -19,7 +19,7 @@ from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polished
 from equimorph.manifold.lifting.traced_edges import EFFORTS
-from equimorph.model import Progress, recalled, step_of
+from equimorph.model import Progress
 
 DISTANCES = (0.03, 0.003, 0.0003)
 """Lengths of the first step from a crossing, in the metric, tried one after the other."""
@@ -67,8 +67,7 @@ def _trace_again(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
 
 def _switch(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
     """Enter the equilibria over vertices that the curves through crossings lead to."""
-    step = step_of("switch", alone)
-    pairing.points.over_vertices(*recalled(pairing.journal, step, lambda: _beyond(pairing, alone)))
+    pairing.points.over_vertices(*_beyond(pairing, alone))
     pairing.fit()
 
 

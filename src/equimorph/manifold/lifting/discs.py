@@ -1,13 +1,12 @@
 """Sheet lifting, part four: polygons become triangulated discs that fit together."""
 
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.geometry.embedding import embed
-from equimorph.manifold.geometry.exact_points import pin, recalled_pin
+from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.geometry.topology import flags_of
 from equimorph.manifold.lifting.crossing_branches import lonely
@@ -291,12 +290,7 @@ def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int
             continue
         pairs = [wanted[k][1] for k in own]
         span = planes(pairing, [wanted[k][0].polygon.triangle for k in own])
-        pinned = recalled_pin(
-            pairing.journal,
-            pairs,
-            kind,
-            partial(pin, pairing.setting, pairing.points, pairs, kind, span),
-        )
+        pinned = pin(pairing.setting, pairing.points, pairs, kind, span)
         good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
         lows = pairing.points.index[np.array(pairs)].min(axis=1)
         for lane, low in zip(np.flatnonzero(good).tolist(), lows[good].tolist(), strict=True):

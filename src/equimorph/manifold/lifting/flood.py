@@ -6,23 +6,19 @@ constraint. New ends are new equilibria.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
-from equimorph.manifold.geometry.points import GRID, Points
+from equimorph.manifold.geometry.points import GRID
 from equimorph.manifold.lifting.pairing import HARD, LONG, UNTRACED, Pairing, Rays
 from equimorph.manifold.lifting.single_steps import lift_directly
 from equimorph.manifold.lifting.traced_edges import trace_rays
-from equimorph.model import Progress, step_of
+from equimorph.model import Progress
 
 STEPS = 4
 """Into so many equal steps long edges are cut before they count as hard."""
 CHUNK = 4096
 ENDLESS = 250
 """More equilibria than this over one point, and the set is refused: it may wind for ever."""
-
-Lifted = tuple[Bool[np.ndarray, " rays"], Float[np.ndarray, "n size"]]
-"""Which rays could be lifted, and where those end."""
 
 
 def flood(pairing: Pairing, progress: Progress) -> None:
@@ -89,36 +85,13 @@ def _lift(pairing: Pairing, rays: Rays, steps: int) -> None:
 
 
 def _lift_some(pairing: Pairing, rays: Rays, steps: int) -> None:
-    store, setting, mesh, journal = pairing.points, pairing.setting, pairing.mesh, pairing.journal
-    step = step_of(f"lift {steps}", rays.points, rays.edges)
-    known = journal.recall(step)
-    good, z = _lifted(pairing, rays, steps) if known is None else _recalled(store, *known)
-    done = rays.take(good)
+    store, setting, mesh = pairing.points, pairing.setting, pairing.mesh
+    start = store.z[rays.points], store.index[rays.points]
+    direct = lift_directly(pairing.line(rays), *start, setting.constraints, steps)
+    done, z = rays.take(direct.good), direct.z[direct.good]
     vertices = mesh.edges[done.edges, 1 - done.sides]
     p = setting.parameters(mesh.vertices[vertices])
     # where it is lifted in one sweep, the index stays what it was
-    ids, new = store.over_vertices(vertices, z, p, store.index[done.points])
-    if known is None:
-        journal.keep(step, (good, ids, z[new]))
+    ids, _ = store.over_vertices(vertices, z, p, store.index[done.points])
     pairing.fit()
     pairing.enter_many(done, ids)
-
-
-def _lifted(pairing: Pairing, rays: Rays, steps: int) -> Lifted:
-    """Lift rays in so many steps: which can be, and their ends."""
-    store = pairing.points
-    start = store.z[rays.points], store.index[rays.points]
-    direct = lift_directly(pairing.line(rays), *start, pairing.setting.constraints, steps)
-    return direct.good, direct.z[direct.good]
-
-
-def _recalled(
-    store: Points,
-    good: Bool[np.ndarray, " rays"],
-    ids: Int[np.ndarray, " n"],
-    fresh: Float[np.ndarray, "new size"],
-) -> Lifted:
-    """Which rays were lifted, and their ends: points that are known by now, and fresh ones."""
-    z, new = np.empty((len(ids), fresh.shape[1])), ids >= store.count
-    z[~new], z[new] = store.z[ids[~new]], fresh[ids[new] - store.count]
-    return good, z

@@ -9,7 +9,6 @@ from equimorph.equilibria import ParameterLine
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import CROSSING, SAME, Points
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.model import Forgetful, Journal
 
 UNTRACED, ABANDONED, LONG, HARD = -1, -2, -3, -4
 """Marks of rays without a curve: long are those that one step cannot lift, hard if few neither."""
@@ -80,7 +79,6 @@ class Pairing:
     """Points of each edge at which two curves cross."""
     hubs: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points between two of these at which a fold of one of the sheets crosses, too."""
-    journal: Journal = field(default_factory=Forgetful)
 
     def ray(self, point: int, edge: int) -> int:
         """Curve at a point along an edge."""
@@ -221,7 +219,7 @@ def _incidence(mesh: BaseMesh) -> tuple[Int[np.ndarray, "V slots"], Int[np.ndarr
     return incident, place.reshape(-1, 2)
 
 
-def start_pairing(setting: Setting, mesh: BaseMesh, journal: Journal) -> Pairing:
+def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
     """Empty pairing on a mesh."""
     incident, slots = _incidence(mesh)
     pairing = Pairing(
@@ -233,7 +231,6 @@ def start_pairing(setting: Setting, mesh: BaseMesh, journal: Journal) -> Pairing
         slots,
         incident,
         np.zeros(len(mesh.edges), int),
-        journal=journal,
     )
     pairing.fit()
     return pairing

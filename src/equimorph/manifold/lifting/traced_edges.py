@@ -18,7 +18,6 @@ from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, low
 from equimorph.manifold.geometry.points import BETWEEN, CAP, CROSSING
 from equimorph.manifold.geometry.points import FOLD as ON_FOLD
 from equimorph.manifold.lifting.pairing import ABANDONED, Pairing, Rays
-from equimorph.model import recalled, step_of
 
 EFFORTS = 4
 NOISE = 1e-6
@@ -80,11 +79,7 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
         turning=0.25 * finer,
         look_inside=False,
     )
-    step = step_of(f"trace {effort}", rays.points, rays.edges)
-    found = recalled(
-        pairing.journal, step, lambda: tuple(vars(_traced(pairing, rays, line, options)).values())
-    )
-    traced = Traced(*found)
+    traced = _traced(pairing, rays, line, options)
     np.add.at(pairing.effort, rays.edges[~traced.good], 1)
     ends = _ends(pairing, traced)
     inner = traced.inner

@@ -16,7 +16,6 @@ from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import lower_index
 from equimorph.manifold.geometry.points import CROSSING
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.queries.levels import fabric_setting
 from equimorph.structures import States
 
 REACH = 1.5
@@ -52,7 +51,7 @@ def cusps(eset: EquilibriumSet) -> Cusps:
     """
     if len(eset.names) != 2:
         raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
-    fabric = fabric_of(fabric_setting(eset), eset)
+    fabric = fabric_of(eset)
     ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
     hubs = _turning_hubs(fabric, ends)
     ends = ends[(fabric.vertices.kinds[ends] != CROSSING).all(axis=1)]

@@ -74,7 +74,7 @@ def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Lev
         For another number of descriptors, or what is none.
     """
     _check_count(eset, descriptors)
-    return _level(eset, lambda v: jacobian(fabric_setting(eset), v, descriptors))
+    return _level(eset, lambda v: jacobian(eset.setting, v, descriptors))
 
 
 def _check_count(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> None:
@@ -109,13 +109,13 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
         For another number of descriptors than of free parameters.
     """
     _check_count(eset, descriptors)
-    fabric = _fabric(eset)
+    fabric = fabric_of(eset)
     return _divided(eset, _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors)))
 
 
 def divided_by(eset: EquilibriumSet, constraint: Constraint) -> Division:
     """Cut a set exactly along the bound of a constraint; the side is -1 where it is obeyed."""
-    return _divided(eset, _cut(_fabric(eset), lambda v: constraint.excess(v.z, v.p)))
+    return _divided(eset, _cut(fabric_of(eset), lambda v: constraint.excess(v.z, v.p)))
 
 
 def _divided(eset: EquilibriumSet, cut: "Cut") -> Division:
@@ -152,7 +152,7 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
     """
     wanted = "a constraint, like `rod.max_curvature <= 6`"
     check_kind("constraint", constraint, Constraint, wanted)
-    fabric = _fabric(eset)
+    fabric = fabric_of(eset)
     cut = _cut(fabric, lambda v: constraint.excess(v.z, v.p))
     inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
     constraints = (*eset.constraints, constraint)
@@ -162,8 +162,7 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
 
 def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
     """Lengths, areas or volumes of the cells in the metric of the embedding."""
-    setting = fabric_setting(eset)
-    corners = embed(setting, eset.points.z, eset.points.p)[eset.cells]
+    corners = embed(eset.setting, eset.points.z, eset.points.p)[eset.cells]
     sides = corners[:, 1:] - corners[:, :1]
     gram = sides @ np.swapaxes(sides, 1, 2)
     share = {1: 1.0, 2: 0.5, 3: 1.0 / 6.0}[len(eset.names)]
@@ -172,25 +171,13 @@ def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
 
 def part(eset: EquilibriumSet, cells: Bool[np.ndarray, " C"]) -> EquilibriumSet:
     """Some of the cells as a set of its own, like the stable ones: ``eset.cell_index == 0``."""
-    fabric = _fabric(eset)
+    fabric = fabric_of(eset)
     nothing = np.zeros(len(fabric.vertices), bool)
     return part_of(eset, fabric, cells, (nothing, 0))
 
 
-def fabric_setting(eset: EquilibriumSet) -> Setting:
-    """Return the structure and the free parameters of a set."""
-    names = [parameter.name for parameter in eset.structure.parameters]
-    free = np.array([names.index(name) for name in eset.names])
-    base = eset.points.p[0].copy() if len(eset.points) else np.zeros(len(names))
-    return Setting(eset.structure, base, free, eset.constraints)
-
-
-def _fabric(eset: EquilibriumSet) -> Fabric:
-    return fabric_of(fabric_setting(eset), eset)
-
-
 def _level(eset: EquilibriumSet, function: Function) -> Level:
-    cut = _cut(_fabric(eset), function)
+    cut = _cut(fabric_of(eset), function)
     store, whole = cut.fabric.vertices, adjacency(cut.fabric.cells)
     facets = whole.facets[cut.on_level[whole.facets].all(axis=1)]
     facets = np.unique(np.sort(cut.fabric.points[facets], axis=1), axis=0)

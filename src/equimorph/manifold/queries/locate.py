@@ -12,7 +12,7 @@ from equimorph.manifold.complex.arguments import check_kind
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.lookup.states_over import StatesOver
-from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, setting_of, spots
+from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
 from equimorph.model import Descriptor, position
 from equimorph.structures import State, States, Structure
 
@@ -121,7 +121,7 @@ def locate(
     )  # fmt: skip
     misfit = np.linalg.norm(fit.residuals(eset.points.z, eset.points.p), axis=1)
     starts = local_minima(faces_of(eset.cells, 2), misfit)[:CANDIDATES]
-    ground = Ground(setting_of(eset), eset)
+    ground = Ground(eset.setting, eset)
     found, value, inside = ground.nearest(spots(eset, starts), fit.residuals)
     chosen = different(eset.structure, found, value)[:2]
     places = _places(eset, found.take(chosen), value[chosen], inside[chosen])

@@ -18,7 +18,6 @@ from equimorph.manifold.geometry.tangents import (
     split_step,
     tangent_frames,
 )
-from equimorph.model import position
 
 Frames = Float[np.ndarray, "lanes k full"]
 Residuals = Callable[[Lanes, Parameters], Float[np.ndarray, "lanes m"]]
@@ -35,13 +34,6 @@ STILL = 1e-9
 """Length of a step that is the last."""
 FAR = 1e3
 """Distance from its guess within which any corrected point will do."""
-
-
-def setting_of(eset: EquilibriumSet) -> Setting:
-    """Structure of a set, and how points of its box become parameters."""
-    low = dict(zip(eset.names, eset.box.lower.tolist(), strict=True))
-    free = [position(eset.structure.parameters, name) for name in eset.names]
-    return Setting(eset.structure, eset.parameters_at(low), np.array(free), eset.constraints)
 
 
 @dataclass(frozen=True)
@@ -68,7 +60,7 @@ def spots(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> Spot:
     around = eset.cells[np.isin(eset.cells, vertices).any(axis=1)]
     used, corners = np.unique(around, return_inverse=True)
     near = eset.points[used]
-    rows = best_corners(setting_of(eset), near.z, near.p, corners.reshape(around.shape))
+    rows = best_corners(eset.setting, near.z, near.p, corners.reshape(around.shape))
     place = np.searchsorted(used, vertices)
     return Spot(near.z[place], near.p[place], rows[place])
 

@@ -15,7 +15,7 @@ from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.tangents import placed_frames
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.locate import pieces_of
-from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, setting_of, spots
+from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.structures import State, States
 
@@ -102,7 +102,7 @@ def _in_parameters(
     eset: EquilibriumSet, state: State, boundary: Int[np.ndarray, "n d"]
 ) -> tuple[float, State | None]:
     """Shortest straight change to the boundary that can be lifted, and where it ends."""
-    setting = setting_of(eset)
+    setting = eset.setting
     free, scales = setting.free, setting.scales
 
     def change(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes d"]:
@@ -137,7 +137,7 @@ def _nearest_of_each_part(
 def _reached(eset: EquilibriumSet, state: State, p: Float[np.ndarray, " P"]) -> float | None:
     """Share of a straight change after which stability is lost; None if it is not."""
     goal = state.p + (1.0 - SHORT_OF) * (p - state.p)
-    to = {name: float(goal[k]) for name, k in zip(eset.names, setting_of(eset).free, strict=True)}
+    to = {name: float(goal[k]) for name, k in zip(eset.names, eset.setting.free, strict=True)}
     path = lift(state, to=to)
     if path.end.kind in {"fold", "branch point"}:
         return float(path.end.at)
@@ -166,7 +166,7 @@ def _ways(
     eset: EquilibriumSet, state: State, stratum: int, boundary: Int[np.ndarray, "n d"]
 ) -> list[Spot]:
     """Shortest ways over the edges of a stratum from a state to different parts of its boundary."""
-    setting = setting_of(eset)
+    setting = eset.setting
     cells = eset.cells[eset.stratum == stratum]
     pairs = faces_of(cells, 2) if len(eset.names) > 1 else cells
     place = embed(setting, eset.points.z, eset.points.p)
@@ -226,7 +226,7 @@ class _Chain:
     """
 
     def __init__(self, eset: EquilibriumSet, path: Spot) -> None:
-        self.setting, self.spot = setting_of(eset), path
+        self.setting, self.spot = eset.setting, path
         self.on_set, self.on_fold = Ground(self.setting, eset), Ground(self.setting, eset, True)
 
     def straightened(self, links: int) -> float:

@@ -22,7 +22,6 @@ from equimorph.manifold.complex.marked_complex import (
 from equimorph.manifold.geometry.kernels import measure_edges
 from equimorph.manifold.geometry.tangents import S_SHAPE, Cubics
 from equimorph.manifold.geometry.topology import keys_of
-from equimorph.model import Journal
 
 PREFERENCE = 1.6
 """How much longer an edge must be than those that deviate to be bisected before them."""
@@ -82,7 +81,6 @@ class Edges:
 class Memory:
     """Deviations of edges that were measured before, and edges that could not be bisected."""
 
-    journal: Journal
     keys: Int[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, int))
     """Of the edges whose deviation is known, in order: lower ends in the upper half of the bits."""
     error: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
@@ -106,7 +104,7 @@ class Memory:
         stuck = {(a, b) for a, b in self.stuck if inside[a] and inside[b]}
         own = inside[self.cut].all(axis=1)
         cut, put, lost = self.cut[own], self.put[own], set(self.lost)
-        return Memory(self.journal, self.keys, self.error, stuck, cut, put, lost=lost)
+        return Memory(self.keys, self.error, stuck, cut, put, lost=lost)
 
     def copy(self) -> "Memory":
         """What is remembered by now."""

@@ -7,6 +7,7 @@ of the box along these.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -14,9 +15,9 @@ from equimorph.manifold.complex.arguments import check_accuracy
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.description import Frame, Lifting, described
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.kept_sets import recall_set
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
 from equimorph.manifold.complex.questions import question_of_refinement
-from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.refining.bettering import sharp
 from equimorph.manifold.refining.corners import smallest_free_angle
 from equimorph.manifold.refining.deviations import Memory, known
@@ -24,7 +25,7 @@ from equimorph.manifold.refining.righting import righted
 from equimorph.manifold.refining.settling import settled, tidied, told_apart
 from equimorph.manifold.refining.surgery import smallest_angle
 from equimorph.manifold.refining.tetrahedra import smallest_dihedral
-from equimorph.model import Forgetful, Journal, Progress, Silent
+from equimorph.model import Journal, Progress, Silent
 
 TRIALS = 4
 """How often slivers of tetrahedra are taken away and edges are cut in turn."""
@@ -51,7 +52,7 @@ def refine(
     progress
         Sink for progress reports; one that raises an exception cancels.
     journal
-        Keeps new vertices as soon as they are found, to go on from; see `equilibrium_set`.
+        Keeps the refined set when it is found; see `equilibrium_set`.
 
     Returns
     -------
@@ -64,23 +65,20 @@ def refine(
         If `accuracy` is not positive, or the journal is of something else.
     """
     check_accuracy(accuracy)
-    if journal is not None:
-        journal.begin(question_of_refinement(eset, accuracy))
-    return refined(eset, accuracy, progress or Silent(), journal or Forgetful())
+    compute = partial(refined, eset, accuracy, progress or Silent())
+    if journal is None:
+        return compute()
+    question = question_of_refinement(eset, accuracy)
+    return recall_set(journal, question, eset.setting, eset.box, eset.fixed, compute)
 
 
-def refined(
-    eset: EquilibriumSet, accuracy: float, progress: Progress, journal: Journal
-) -> EquilibriumSet:
-    """Return a refined set; a journal that has begun goes on."""
-    free = np.array([[q.name for q in eset.structure.parameters].index(n) for n in eset.names])
-    base = eset.points.p[0].copy() if len(eset.points) else np.zeros(0)
-    setting = Setting(eset.structure, base, free, eset.constraints)
+def refined(eset: EquilibriumSet, accuracy: float, progress: Progress) -> EquilibriumSet:
+    """Return the set with cells so small that they are within a tolerance of it."""
     if len(eset.cells) == 0:
         return eset
-    memory = Memory(journal)
-    fabric = tidied(fabric_of(setting, eset), memory)
-    fabric = _settled_and_righted(fabric, SHARE[len(free)] * accuracy, memory, progress)
+    memory = Memory()
+    fabric = tidied(fabric_of(eset), memory)
+    fabric = _settled_and_righted(fabric, SHARE[len(eset.names)] * accuracy, memory, progress)
     fabric = told_apart(fabric, memory)
     edges = known(fabric, memory)
     audit = eset.audit
@@ -88,7 +86,7 @@ def refined(
         audit.unpaired, audit.conflicts, audit.retraced,
         audit.parity_violations, audit.undecided, audit.bisected,
     )  # fmt: skip
-    frame = Frame(setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
+    frame = Frame(eset.setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
     out = described(frame, fabric.complex(), lifting)
     quality = replace(
         out.audit,
@@ -96,8 +94,8 @@ def refined(
         missing=audit.missing,
         recovered=audit.recovered,
         accuracy=accuracy,
-        deviation=float(edges.error.max(initial=0.0) / SHARE[len(free)]),
-        unrefined=int((edges.error > SHARE[len(free)] * accuracy).sum()),
+        deviation=float(edges.error.max(initial=0.0) / SHARE[len(eset.names)]),
+        unrefined=int((edges.error > SHARE[len(eset.names)] * accuracy).sum()),
         smallest_angle=smallest_angle(fabric),
         smallest_dihedral=smallest_dihedral(fabric),
         changed=_changed(audit, out.audit),

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.manifold.complex.edge_points import Places, chunks, recalled_on_edges, unmet
+from equimorph.manifold.complex.edge_points import Places, chunks, on_all_edges, unmet
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric
 from equimorph.manifold.complex.shared_edges import copies, doubled, first_copies, with_copies
 from equimorph.manifold.complex.vertices import Vertices, gathered
@@ -14,7 +14,7 @@ from equimorph.manifold.refining.leading import led_between, on_plain_curves
 from equimorph.manifold.refining.patches import patch_around
 from equimorph.manifold.refining.smoothing import SHARP, smooth
 from equimorph.manifold.refining.surgery import SHORT, angles, collapse, flip
-from equimorph.model import Journal, Progress, Silent
+from equimorph.model import Progress, Silent
 
 ROUNDS = 200
 GROWN = 1.6
@@ -119,7 +119,7 @@ def bisected(
     for side in edges.of_cells.T:
         np.minimum.at(lowest, side, fabric.cell_index)
 
-    done, parts, left = _found(fabric, edges, at_once, lowest, memory.journal)
+    done, parts, left = _found(fabric, edges, at_once, lowest)
     for edge in left[on_plain_curves(fabric, ends[left], edges.marks[left])].tolist():
         led = led_between(fabric, ends[edge], int(edges.marks[edge]), int(lowest[edge]))
         if led is None:
@@ -152,7 +152,6 @@ def _found(
     edges: Edges,
     wanted: Int[np.ndarray, " n"],
     lowest: Int[np.ndarray, " E"],
-    journal: Journal,
 ) -> tuple[list[Int[np.ndarray, " _"]], list[Vertices], Int[np.ndarray, " m"]]:
     """Edges with vertices on them, part by part, and those on which none was found."""
     done: list[Int[np.ndarray, " _"]] = []
@@ -164,7 +163,7 @@ def _found(
             Places(edges.ends[some], int(edges.marks[some[0]]), lowest[some], np.full(len(some), t))
             for some in own
         ]
-        tried = unmet(fabric, recalled_on_edges(journal, fabric, places))
+        tried = unmet(fabric, on_all_edges(fabric, places))
         done.extend(some[found] for some, (found, _) in zip(own, tried, strict=True))
         parts.extend(vertices for _, vertices in tried)
         failed = [some[~found] for some, (found, _) in zip(own, tried, strict=True)]

@@ -12,7 +12,7 @@ from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
-from equimorph.manifold.queries.nearest import setting_of, spots
+from equimorph.manifold.queries.nearest import spots
 from equimorph.structures import State
 
 Steps = Float[np.ndarray, "lanes d"]
@@ -64,7 +64,7 @@ def tangent_plane_at(setting: Setting, state: State) -> Float[np.ndarray, "1 d c
 
 def unconstrained_setting(eset: EquilibriumSet) -> Setting:
     """Structure and free parameters of a set, without its constraints: steps may cross these."""
-    return replace(setting_of(eset), constraints=())
+    return replace(eset.setting, constraints=())
 
 
 def tangents_at(setting: Setting, at: SetPoints) -> tuple[Frames, SetPoints]:

@@ -1,0 +1,105 @@
+"""An equilibrium set as one entry of a journal."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields
+from typing import Any
+
+import numpy as np
+
+from equimorph.manifold.complex.audit import Audit
+from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.complex.equilibrium_set import (
+    Boundary,
+    Component,
+    EquilibriumSet,
+    Stratum,
+)
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.model import Box, Findings, Journal, recalled
+from equimorph.structures import States
+
+ARRAYS = ("kinds", "index", "cells", "cell_index", "component", "stratum", "grid_vertex")
+MESH = tuple(each.name for each in fields(BaseMesh))
+PIECES = ("folds", "crossings")
+
+
+def recall_set(
+    journal: Journal,
+    question: str,
+    setting: Setting,
+    box: Box,
+    fixed: Mapping[str, float],
+    compute: Callable[[], EquilibriumSet],
+) -> EquilibriumSet:
+    """Return the set that a journal keeps for a question; without one, compute and keep it.
+
+    Raises
+    ------
+    InputError
+        If the journal is that of another question.
+    """
+    journal.begin(question)
+    entry = recalled(journal, "set", lambda: _entry(compute()))
+    return _set(entry, setting, box, fixed)
+
+
+def _entry(eset: EquilibriumSet) -> Findings:
+    """All arrays of a set, after the rest of it as text."""
+    pieces = {name: getattr(eset, name) for name in PIECES}
+    text = json.dumps(
+        {
+            "intervals": eset.intervals,
+            "pieces": {name: len(own) for name, own in pieces.items()},
+            "boundaries": [each.kind for each in eset.boundaries],
+            "components": [asdict(each) for each in eset.components],
+            "strata": [asdict(each) for each in eset.strata],
+            "audit": asdict(eset.audit),
+        }
+    )
+    return (
+        np.frombuffer(text.encode(), np.uint8),
+        eset.points.z,
+        eset.points.p,
+        *(getattr(eset, name) for name in ARRAYS),
+        *(getattr(eset.mesh, name) for name in MESH),
+        *(each.vertices for each in eset.boundaries),
+        *(piece for own in pieces.values() for piece in own),
+    )
+
+
+def _set(entry: Findings, setting: Setting, box: Box, fixed: Mapping[str, float]) -> EquilibriumSet:
+    """Return the set that `_entry` took apart."""
+    header, z, p, *arrays = entry
+    text = json.loads(header.tobytes(), object_hook=_with_tuples)
+    rest = iter(arrays)
+    named: dict[str, Any] = {name: next(rest) for name in ARRAYS}
+    mesh = BaseMesh(**{name: next(rest) for name in MESH})
+    boundaries = tuple(Boundary(next(rest), kind) for kind in text["boundaries"])
+    pieces: dict[str, Any] = {
+        name: tuple(next(rest) for _ in range(count)) for name, count in text["pieces"].items()
+    }
+    return EquilibriumSet(
+        structure=setting.structure,
+        box=box,
+        fixed=fixed,
+        constraints=setting.constraints,
+        intervals=text["intervals"],
+        points=States(setting.structure, z, p),
+        boundaries=boundaries,
+        components=tuple(Component(**each) for each in text["components"]),
+        strata=tuple(Stratum(**each) for each in text["strata"]),
+        audit=Audit(**text["audit"]),
+        mesh=mesh,
+        **named,
+        **pieces,
+    )
+
+
+def _with_tuples(value: dict[str, Any]) -> dict[str, Any]:
+    """Lists as tuples, which JSON does not know."""
+    return {name: _tuple(each) for name, each in value.items()}
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(map(_tuple, value)) if isinstance(value, list) else value
