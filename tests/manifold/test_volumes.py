@@ -8,7 +8,6 @@ import pytest
 from equimorph.manifold import (
     EquilibriumSet,
     build,
-    cells,
     equilibrium_set,
     refine,
     stability_distance,
@@ -24,6 +23,7 @@ from equimorph.manifold.geometry.topology import (
     labels,
     orientation,
 )
+from equimorph.manifold.lifting import cells
 from equimorph.manifold.lifting.volumes import volumes_over
 from equimorph.manifold.refining.tetrahedra import dihedrals
 from equimorph.model import Box, Descriptor
