@@ -129,8 +129,8 @@ def passages_of(amap):
     options = em.TraceOptions(record=False, through_folds=True, through_branch_points=True)
     place = [each.name for each in amap.structure.parameters].index(amap.load)
     paths = FirstStablePaths(
-        amap.sheet, place, amap.at, amap.bound, amap.descriptor, amap.within, options
-    )  # fmt: skip
+        amap.sheet, place, amap.within, amap.bound, options, amap.at, amap.descriptor
+    )
     return lambda settings: paths(settings).value
 
 

@@ -1,7 +1,13 @@
-"""Where a task begins: a state, or one that was measured."""
+"""Where a task begins and ends: states that it accepts, and why it refuses others."""
 
+from collections.abc import Sequence
+
+import numpy as np
+
+from equimorph.equilibria import check_start
 from equimorph.errors import InputError
-from equimorph.manifold import Location
+from equimorph.manifold import EquilibriumSet, Location
+from equimorph.model import Constraint
 from equimorph.structures import State
 from equimorph.tasks.estimation import StateEstimate
 
@@ -21,3 +27,66 @@ def start_state(start: Start) -> State:
         raise InputError(f"`start` must be known; got an estimate that is {start.status}: "
                          f"{start.why}.")  # fmt: skip
     return start if isinstance(start, State) else start.state
+
+
+def check_equilibrium(name: str, state: State, within: Sequence[Constraint] = ()) -> None:
+    """Raise `InputError` unless the argument `name` is an equilibrium that obeys constraints."""
+    try:
+        check_start(state, within)
+    except InputError as error:
+        raise InputError(str(error).replace("`state`", f"`{name}`")) from None
+
+
+def check_stable(name: str, state: State) -> None:
+    """Raise `InputError` unless the argument `name` is a stable state."""
+    if not state.stable:
+        raise InputError(f"`{name}` must be stable; got a state of index {state.index}.")
+
+
+def check_fixed_parameters(name: str, state: State, eset: EquilibriumSet) -> None:
+    """Raise `InputError` unless the argument `name` has the fixed parameters of a set."""
+    wanted = eset.parameters_at({free: state[free] for free in eset.names})
+    if not np.allclose(wanted, state.p, rtol=0, atol=1e-9):
+        raise InputError(
+            f"`{name}` must have the fixed parameters of the set ({dict(eset.fixed)}); "
+            f"got {state.parameters}."
+        )
+
+
+def check_margin_demand(margin: float) -> None:
+    """Raise `InputError` for a smallest stability margin that is negative or not a number."""
+    if not margin >= 0.0:
+        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
+
+
+def inadmissible(
+    name: str,
+    state: State,
+    within: Sequence[Constraint],
+    margin: float = 0.0,
+    slack: float = 0.0,
+) -> str:
+    """Why a motion must not begin or end in a state, in words; empty if it may.
+
+    Parameters
+    ----------
+    name
+        What the state is called: "start", "goal".
+    state
+        The state.
+    within
+        Constraints to obey.
+    margin
+        Smallest stability margin allowed.
+    slack
+        Excess over a bound that counts as none.
+    """
+    for constraint in within:
+        if not constraint.excess(state.z[None], state.p[None])[0] <= slack:
+            value = constraint.descriptor(state)
+            return f"the {name} violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
+    if not state.stable:
+        return f"the {name} is unstable (index {state.index})"
+    if margin > 0.0 and state.margin < margin:
+        return f"the {name} has a stability margin of {state.margin:.4g}, below {margin:g}"
+    return ""

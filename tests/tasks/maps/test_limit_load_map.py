@@ -6,7 +6,7 @@ from scipy import optimize
 
 import equimorph as em
 from equimorph.errors import InputError
-from equimorph.tasks.maps.limit_load import KINDS
+from equimorph.tasks.maps.limit_load import LimitLoadMap
 
 
 def curves(lmap, kind):
@@ -37,8 +37,8 @@ def test_limit_loads_of_the_spring_are_the_closed_form():
     folds = k * np.maximum(1.0 - x_l ** (2 / 3), 0.0) ** 1.5
     stable = x_l > 1.0
     np.testing.assert_allclose(lmap.value[~stable], folds[~stable], rtol=1e-9)
-    assert {KINDS[k] for k in lmap.status[~stable]} == {"fold"}
-    assert {KINDS[k] for k in lmap.status[stable]} == {"none below the bound"}
+    assert {LimitLoadMap.kinds[k] for k in lmap.status[~stable]} == {"fold"}
+    assert {LimitLoadMap.kinds[k] for k in lmap.status[stable]} == {"none below the bound"}
 
 
 def test_values_and_statuses_at_the_settings_of_the_references():
@@ -46,7 +46,7 @@ def test_values_and_statuses_at_the_settings_of_the_references():
     rod = em.Rod()
     grid = em.Grid(Theta=(0.8, 1.0, 2), Delta=(-0.02, 0.02, 2))
     lmap = em.limit_load_map(rod, grid, "q", within=[rod.max_curvature <= 10])
-    assert [KINDS[k] for k in lmap.status[1]] == ["fold", "branch point", "fold"]
+    assert [LimitLoadMap.kinds[k] for k in lmap.status[1]] == ["fold", "branch point", "fold"]
     expected = [3.9485039281, 4.2439977594, 3.9485039281]
     np.testing.assert_allclose(lmap.value[1], expected, rtol=1e-10)
 
@@ -58,7 +58,7 @@ def test_every_vertex_has_the_limit_load_of_its_own_ray(half):
     for i, j in random.integers(0, [13, 16], size=(12, 2)):
         rest = rod.natural_state(Theta=axes[0][i], Delta=axes[1][j])
         found = em.limit_load(rest, "q", within=half.within)
-        assert found.kind == KINDS[half.status[i, j]]
+        assert found.kind == LimitLoadMap.kinds[half.status[i, j]]
         assert half.value[i, j] == pytest.approx(found.value, rel=1e-9, nan_ok=True)
 
 
@@ -69,7 +69,7 @@ def test_a_uniform_load_makes_the_map_symmetric(uniform):
 
 
 def test_settings_whose_unloaded_arch_violates_the_constraint_have_no_value(half):
-    undefined = half.status == KINDS.index("undefined unloaded")
+    undefined = half.status == LimitLoadMap.kinds.index("undefined unloaded")
     assert undefined.any()
     np.testing.assert_array_equal(np.isnan(half.value), undefined)
     assert limit(half, (0.66, 1.36)).kind == "undefined unloaded"

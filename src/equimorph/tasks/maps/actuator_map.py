@@ -1,4 +1,4 @@
-"""What maps over a grid of actuator settings have in common."""
+"""Maps over a grid of actuator settings: what they have in common, and how they are computed."""
 
 from abc import ABC
 from collections.abc import Mapping
@@ -10,9 +10,15 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Grid, parameter_vector, position
+from equimorph.model import Constraint, Grid, Progress, Silent, parameter_vector, position
 from equimorph.structures import State, States, Structure
-from equimorph.tasks.maps.curves import MapCurve
+from equimorph.tasks.maps.causes import Paths
+from equimorph.tasks.maps.curves import (
+    MapCurve,
+    curves_through,
+    edge_of_definition,
+    places_on,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +87,54 @@ class ActuatorMap(ABC):
         if not found[0]:
             raise InputError(f"`setting` must have a natural state; got {dict(setting)}.")
         return State(self.structure, z[0], self.sheet.parameters(point)[0])
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a map knows of its grid: values, statuses and states at the vertices, and curves."""
+
+    value: Float[np.ndarray, "rows columns"]
+    status: Int[np.ndarray, "rows columns"]
+    states: States
+    curves: tuple[MapCurve, ...]
+
+
+def survey(
+    paths: Paths,
+    grid: Grid,
+    stage: str,
+    progress: Progress | None,
+    near_curves: Paths | None = None,
+) -> Survey:
+    """Compute a map over a grid, and the curves on which it is not smooth.
+
+    Paths are followed from the natural states at all vertices. On edges over which the map jumps or
+    bends the exact places are found, and places of one kind are connected across the cells.
+
+    Parameters
+    ----------
+    paths
+        What the map reads at settings.
+    grid
+        The settings.
+    stage
+        Name of the computation for progress reports.
+    progress
+        Told how far the computation is.
+    near_curves
+        Paths with other step control for the places on edges; by default the same.
+    """
+    sink = progress or Silent()
+    settings, shape = settings_of(grid)
+    sink.report(stage, 0, 2)
+    vertices = paths(settings)
+    sink.report(stage, 1, 2)
+    explained, unexplained = places_on(near_curves or paths, vertices, shape)
+    edge = edge_of_definition(paths, settings, shape)
+    curves = curves_through(paths.sheet, (explained, unexplained, edge), shape)
+    sink.report(stage, 2, 2)
+    states = States(paths.sheet.structure, vertices.z, vertices.p)
+    return Survey(vertices.value.reshape(shape), vertices.kind.reshape(shape), states, curves)
 
 
 def unloaded_base(

@@ -1,8 +1,8 @@
 """Reasons why a map is not smooth between two settings: states at which two tests vanish."""
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -12,30 +12,26 @@ from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.first_stable import none_passed
 from equimorph.equilibria.locus import Test
 from equimorph.equilibria.natural_sheet import NaturalSheet
+from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint, Descriptor
 from equimorph.tasks.maps.brackets import Brackets, Samples
 from equimorph.tasks.maps.singular_states import TestsOf
 
-START_KINDS = ("undefined unloaded", "no natural state", "lost")
-"""Why there is no path at a setting, or that it was lost; the first statuses of every map."""
-UNDEFINED, MISSING, LOST = range(len(START_KINDS))
-
 ELSEWHERE = 0.02
-"""Distance along a structure of two extrema that are not one that moves."""
+"""Arclength between two extrema from which on they are different ones."""
 
 
-def unloaded_samples(
-    sheet: NaturalSheet, within: Sequence[Constraint], settings: Settings
-) -> Samples:
-    """Natural states: `UNDEFINED` or `MISSING` where no path can start, `LOST` elsewhere."""
-    z, found = sheet.states(settings)
-    p = sheet.parameters(settings)
-    kind = np.where(found, LOST, MISSING)
-    at = np.flatnonzero(found)
-    for constraint in within:
-        kind[at[constraint.excess(z[at], p[at]) > 0.0]] = UNDEFINED
-    none = np.full(len(settings), np.nan)
-    return Samples(settings, none, kind, np.zeros(len(p)), z, p, none_passed(len(p)))
+class Start(IntEnum):
+    """Why there is no path at a setting, or that it was lost: the first statuses of every map."""
+
+    UNDEFINED_UNLOADED = 0
+    NO_NATURAL_STATE = 1
+    LOST = 2
+
+
+def labels(statuses: type[IntEnum]) -> tuple[str, ...]:
+    """Statuses of a map in words, in the order of their numbers."""
+    return tuple(each.name.lower().replace("_", " ") for each in statuses)
 
 
 @dataclass(frozen=True)
@@ -64,32 +60,64 @@ class Cause:
         return cls(kind, own, lanes, side.take(lanes))
 
 
-@runtime_checkable
-class Paths(Protocol):
-    """What a map reads at settings, along paths that start at natural states."""
+@dataclass(frozen=True)
+class Paths(ABC):
+    """Paths in a load that start at natural states, and what a map reads along them.
 
-    @property
-    def sheet(self) -> NaturalSheet:
-        """Natural states."""
+    Attributes
+    ----------
+    sheet
+        Natural states.
+    load
+        Place of the parameter along which paths run.
+    within
+        Constraints that end paths.
+    bound
+        Largest load up to which paths are followed.
+    options
+        Step control.
+    """
 
-    @property
-    def load(self) -> int:
-        """Place of the parameter along which paths run."""
+    sheet: NaturalSheet
+    load: int
+    within: tuple[Constraint, ...]
+    bound: float
+    options: TraceOptions
 
+    @abstractmethod
     def __call__(self, settings: Settings) -> Samples:
         """Samples of the map."""
 
+    @abstractmethod
     def causes(self, pairs: Brackets) -> list[Cause]:
         """Causes to try, from the states at both ends of the pairs, the most likely first."""
 
     def suspects(self, vertices: Samples, edges: Edges) -> Bool[np.ndarray, " edges"]:
-        """Edges to look at, besides those over which the map changes much."""
+        """Edges to examine although the map changes little over them; by default none."""
+        del vertices
+        return np.zeros(len(edges), bool)
 
+    @abstractmethod
     def known(self, side: Samples) -> Flags:
-        """Whether the map says something at settings, so that they can be compared."""
+        """Whether the map is defined at settings, so that they can be compared."""
 
+    @abstractmethod
     def unexplained(self, pairs: Brackets) -> np.ndarray:
         """Kinds of places without a cause, by what the ends show; empty for none."""
+
+    def unloaded(self, settings: Settings) -> Samples:
+        """Natural states that obey the constraints, with the status `LOST` until a path is found.
+
+        `UNDEFINED_UNLOADED` or `NO_NATURAL_STATE` where no path can start.
+        """
+        z, found = self.sheet.states(settings)
+        p = self.sheet.parameters(settings)
+        kind = np.where(found, Start.LOST, Start.NO_NATURAL_STATE)
+        at = np.flatnonzero(found)
+        for constraint in self.within:
+            kind[at[constraint.excess(z[at], p[at]) > 0.0]] = Start.UNDEFINED_UNLOADED
+        none = np.full(len(settings), np.nan)
+        return Samples(settings, none, kind, np.zeros(len(p)), z, p, none_passed(len(p)))
 
 
 def equal_extrema(

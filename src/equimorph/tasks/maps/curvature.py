@@ -2,30 +2,42 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool
 
-from equimorph.arrays import Edges, Flags, Settings, Values
+from equimorph.arrays import Flags, Settings, Values
 from equimorph.equilibria import TraceOptions
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical
-from equimorph.equilibria.first_stable import WAYS, FirstStable
-from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
+from equimorph.equilibria.first_stable import FirstStable
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Descriptor, Grid, Progress, Silent, position
-from equimorph.structures import States, Structure
-from equimorph.tasks.maps.actuator_map import ActuatorMap, settings_of, unloaded_base
+from equimorph.model import Constraint, Descriptor, Grid, Progress, position
+from equimorph.structures import Structure
+from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over, survey
 from equimorph.tasks.maps.brackets import Brackets, Samples
-from equimorph.tasks.maps.causes import LOST, START_KINDS, Cause, equal_extrema, unloaded_samples
-from equimorph.tasks.maps.curves import curves_through, edge_of_definition, places_on
+from equimorph.tasks.maps.causes import Cause, Paths, Start, equal_extrema, labels
 
-KINDS = (*START_KINDS, *WAYS[1:])
-"""What a real loading does, or why there is no value, in the order of their numbers."""
-STABLE, SNAPS, OFF, BOUND, NONE = range(len(START_KINDS), len(KINDS))
 JUMP = 1e-2
 """Relative difference of values on both sides of a curve that counts as a jump."""
+
+
+class PathStatus(IntEnum):
+    """What a real loading does up to a setting's state, or why there is no state.
+
+    From `LOST` on in the order of `equimorph.equilibria.first_stable`.
+    """
+
+    UNDEFINED_UNLOADED = Start.UNDEFINED_UNLOADED
+    NO_NATURAL_STATE = Start.NO_NATURAL_STATE
+    LOST = Start.LOST
+    STABLE = 3
+    SNAPS = 4
+    BRANCHES_OFF = 5
+    CONSTRAINT = 6
+    NONE = 7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,7 +65,7 @@ class CurvatureMap(ActuatorMap):
         What the map shows.
     """
 
-    kinds: ClassVar[tuple[str, ...]] = KINDS
+    kinds: ClassVar[tuple[str, ...]] = labels(PathStatus)
 
     at: float
     descriptor: Descriptor
@@ -119,79 +131,60 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     ----------
     [Feher2025]_, section 3.2.2.
     """
-    base = unloaded_base(structure, grid, load, fixed or {})
-    place = position(structure.parameters, load)
-    if not base[place] < at < bound:
+    sheet, place = (
+        natural_states_over(structure, grid, load, fixed),
+        position(structure.parameters, load),
+    )
+    lowest = sheet.base[place]
+    if not lowest < at < bound:
         raise InputError(
-            f"`at` must lie between {load} = {base[place]:g} and `bound` = {bound:g}; got {at!r}."
+            f"`at` must lie between {load} = {lowest:g} and `bound` = {bound:g}; got {at!r}."
         )
     shown = structure.descriptor("max_curvature") if descriptor is None else descriptor
-    sink, constraints = progress or Silent(), tuple(within)
-    settings, shape = settings_of(grid)
-    sheet = natural_sheet(structure, grid, base)
     options = replace(
         options or TraceOptions(), record=False, through_folds=True, through_branch_points=True
     )
-    paths = FirstStablePaths(sheet, place, float(at), float(bound), shown, constraints, options)
-    sink.report("paths", 0, 2)
-    vertices = paths(settings)
-    sink.report("paths", 1, 2)
-    places = places_on(paths, vertices, shape)
-    edge = edge_of_definition(sheet, constraints, settings, shape)
-    curves = curves_through(sheet, (*places, edge), shape)
-    sink.report("paths", 2, 2)
+    paths = FirstStablePaths(sheet, place, tuple(within), float(bound), options, float(at), shown)
+    found = survey(paths, grid, "paths", progress)
     return CurvatureMap(
-        structure, grid, load, constraints, dict(fixed or {}),
-        vertices.value.reshape(shape), vertices.kind.reshape(shape),
-        States(structure, vertices.z, vertices.p), curves, sheet,
-        float(bound), float(at), shown,
+        structure, grid, load, paths.within, dict(fixed or {}),
+        found.value, found.status, found.states, found.curves, sheet, paths.bound, paths.at, shown,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class FirstStablePaths:
+class FirstStablePaths(Paths):
     """The first stable state with load `at` on the path that starts at each natural state.
 
     Attributes
     ----------
-    sheet, load
-        Natural states, and the place of the parameter along which paths run.
-    at, bound
-        The given load; the largest load, of either sign, up to which paths are followed.
+    at
+        The given load.
     descriptor
         What the map shows.
-    within
-        Constraints that end paths.
-    options
-        Step control.
     """
 
-    sheet: NaturalSheet
-    load: int
     at: float
-    bound: float
     descriptor: Descriptor
-    within: tuple[Constraint, ...]
-    options: TraceOptions
 
     def __call__(self, settings: Settings) -> Samples:
         """Values at settings, with their states and what happens on the way."""
-        start = unloaded_samples(self.sheet, self.within, settings)
+        start = self.unloaded(settings)
         z, p, kind = start.z, start.p, start.kind
         value, place = start.value, start.place
-        ready = np.flatnonzero(kind == LOST)
+        ready = np.flatnonzero(kind == PathStatus.LOST)
         passed = start.passed[ready]
         walked = FirstStable(
             self.sheet.structure, self.load, float(self.sheet.base[self.load]), self.bound,
             self.within, self.options,
         )(z[ready], p[ready], np.full(len(ready), self.at), passed)  # fmt: skip
-        z[ready], p[ready], kind[ready] = walked[0], walked[1], LOST + walked[2]
+        z[ready], p[ready], kind[ready] = walked[0], walked[1], PathStatus.LOST + walked[2]
         start.passed[ready] = passed
-        z[kind <= LOST] = np.nan
-        met = np.flatnonzero(kind == BOUND)
+        z[kind <= PathStatus.LOST] = np.nan
+        met = np.flatnonzero(kind == PathStatus.CONSTRAINT)
         if len(met):
             place[met] = np.array([c.excess(z[met], p[met]) for c in self.within]).argmax(axis=0)
-        some = np.flatnonzero((kind >= STABLE) & (kind <= OFF))
+        some = np.flatnonzero((kind >= PathStatus.STABLE) & (kind <= PathStatus.BRANCHES_OFF))
         value[some] = self.descriptor.function(z[some], p[some])
         if self.descriptor.place is not None and len(some):
             place[some] = self.descriptor.place(z[some], p[some])
@@ -216,7 +209,7 @@ class FirstStablePaths:
             limit = bound(constraint)
             touches = grazing(structure, constraint, structure.parameters[self.load].name)
             for side in sides:
-                met = differs & (side.kind == BOUND) & (side.place == k)
+                met = differs & (side.kind == PathStatus.CONSTRAINT) & (side.place == k)
                 for test in (touches, self._level):
                     found.append(Cause.of("gap", (limit, test), met, side))
         return found
@@ -226,14 +219,9 @@ class FirstStablePaths:
         scale = self.sheet.structure.scales[self.load]
         return np.asarray((critical.p[:, self.load] - self.at) / scale)
 
-    def suspects(self, vertices: Samples, edges: Edges) -> Bool[np.ndarray, " edges"]:
-        """No others than those over which the map changes much."""
-        del vertices
-        return np.zeros(len(edges), bool)
-
     def known(self, side: Samples) -> Flags:
         """Whether paths could start and were not lost."""
-        return np.asarray(side.kind > LOST)
+        return np.asarray(side.kind > PathStatus.LOST)
 
     def unexplained(self, pairs: Brackets) -> np.ndarray:
         """Where states end, values jump, snapping begins, or the extremum moves elsewhere."""
@@ -264,4 +252,4 @@ def _forks(pairs: Brackets, back: int) -> list[tuple[Samples, Bool[np.ndarray, "
 
 
 def _reached(side: Samples) -> Flags:
-    return np.asarray((side.kind >= STABLE) & (side.kind <= OFF))
+    return np.asarray((side.kind >= PathStatus.STABLE) & (side.kind <= PathStatus.BRANCHES_OFF))

@@ -8,7 +8,6 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Settings
 from equimorph.equilibria.natural_sheet import NaturalSheet
-from equimorph.model import Constraint
 from equimorph.structures import States
 from equimorph.tasks.maps.brackets import (
     Brackets,
@@ -21,7 +20,7 @@ from equimorph.tasks.maps.brackets import (
     sample_distance,
     suspicious_edges,
 )
-from equimorph.tasks.maps.causes import LOST, Paths, unloaded_samples
+from equimorph.tasks.maps.causes import Paths, Start
 from equimorph.tasks.maps.exact_places import BESIDE, SAME, candidates, is_sharp
 
 ROUNDS = 3
@@ -224,24 +223,15 @@ def curves_through(
     return tuple(curves)
 
 
-def edge_of_definition(
-    sheet: NaturalSheet,
-    within: Sequence[Constraint],
-    settings: Settings,
-    shape: tuple[int, int],
-) -> Places:
-    """Places on grid edges with a natural state that obeys the constraints at one end only."""
-
-    def sampler(where: Settings) -> Samples:
-        return unloaded_samples(sheet, within, where)
-
-    start, edges = sampler(settings), grid_edges(shape)
-    out = start.kind[edges] != LOST
+def edge_of_definition(paths: Paths, settings: Settings, shape: tuple[int, int]) -> Places:
+    """Places on grid edges at only one end of which a path can start."""
+    start, edges = paths.unloaded(settings), grid_edges(shape)
+    out = start.kind[edges] != Start.LOST
     at = np.flatnonzero(out[:, 0] != out[:, 1])
     pairs = Brackets(start.take(edges[at, 0]), start.take(edges[at, 1]), at)
-    found = narrow(sheet.structure, sampler, pairs, EDGE_DIVISIONS)
+    found = narrow(paths.sheet.structure, paths.unloaded, pairs, EDGE_DIVISIONS)
     middle = 0.5 * (found.a.setting + found.b.setting)
-    inside = found.a.where(found.a.kind == LOST, found.b)
+    inside = found.a.where(found.a.kind == Start.LOST, found.b)
     kind = np.full(len(found), "edge", dtype=object)
     return Places(found, kind, half_length(found), middle, inside.z, inside.p)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import ClassVar
 
 import numpy as np
@@ -11,31 +12,38 @@ from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
 from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, limit_load, trace
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Grid, Progress, Silent, position
-from equimorph.structures import States, Structure
-from equimorph.tasks.maps.actuator_map import ActuatorMap, settings_of, unloaded_base
+from equimorph.model import Constraint, Grid, Progress, position
+from equimorph.structures import Structure
+from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over, survey
 from equimorph.tasks.maps.brackets import Brackets, Samples
-from equimorph.tasks.maps.causes import LOST, START_KINDS, Cause, equal_extrema, unloaded_samples
-from equimorph.tasks.maps.curves import curves_through, edge_of_definition, places_on
-
-KINDS = (*START_KINDS, "fold", "branch point", "constraint", "none below the bound")
-"""What ended the path at a setting, in the order of their numbers."""
-END_FOLD, END_BRANCH, END_CONSTRAINT, END_NONE = range(len(START_KINDS), len(KINDS))
-_OF_CODE: dict[int, int] = {
-    EventCode.FOLD: END_FOLD,
-    EventCode.BRANCH_POINT: END_BRANCH,
-    EventCode.CONSTRAINT: END_CONSTRAINT,
-    EventCode.ARRIVED: END_NONE,
-}
-
+from equimorph.tasks.maps.causes import Cause, Paths, Start, equal_extrema, labels
 
 JUMP = 5e-3
 """Difference of limit loads on both sides of a curve that counts as a jump."""
 ALIKE = 0.1
 """Cosine of null vectors whose signs can be compared: beside a pitchfork they turn fast."""
+
+
+class RayStatus(IntEnum):
+    """What ended the path at a setting."""
+
+    UNDEFINED_UNLOADED = Start.UNDEFINED_UNLOADED
+    NO_NATURAL_STATE = Start.NO_NATURAL_STATE
+    LOST = Start.LOST
+    FOLD = 3
+    BRANCH_POINT = 4
+    CONSTRAINT = 5
+    NONE_BELOW_THE_BOUND = 6
+
+
+STATUS_OF_EVENT = {
+    EventCode.FOLD: RayStatus.FOLD,
+    EventCode.BRANCH_POINT: RayStatus.BRANCH_POINT,
+    EventCode.CONSTRAINT: RayStatus.CONSTRAINT,
+    EventCode.ARRIVED: RayStatus.NONE_BELOW_THE_BOUND,
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,7 +58,7 @@ class LimitLoadMap(ActuatorMap):
     but these two are exact: see `MapCurve.errors`.
     """
 
-    kinds: ClassVar[tuple[str, ...]] = KINDS
+    kinds: ClassVar[tuple[str, ...]] = labels(RayStatus)
 
     def at(self, **setting: float) -> LimitLoad:
         """Limit load at one setting of the box, with its path.
@@ -122,59 +130,48 @@ def limit_load_map(
     ----------
     [Feher2025]_, section 3.2.1.
     """
-    base = unloaded_base(structure, grid, load, fixed or {})
-    place = position(structure.parameters, load)
-    if not bound > base[place]:
-        raise InputError(f"`bound` must exceed {load} = {base[place]:g}; got {bound!r}.")
-    sink, constraints = progress or Silent(), tuple(within)
-    settings, shape = settings_of(grid)
-    sheet = natural_sheet(structure, grid, base)
+    sheet, place = (
+        natural_states_over(structure, grid, load, fixed),
+        position(structure.parameters, load),
+    )
+    lowest = sheet.base[place]
+    if not bound > lowest:
+        raise InputError(f"`bound` must exceed {load} = {lowest:g}; got {bound!r}.")
     options = replace(options or TraceOptions(), record=False)
-    rays = LimitLoadRays(sheet, place, constraints, float(bound), options)
-    sink.report("limit loads", 0, 2)
-    vertices = rays(settings)
-    sink.report("limit loads", 1, 2)
+    rays = LimitLoadRays(sheet, place, tuple(within), float(bound), options)
     # close to a cusp the two folds are close together: shorter steps tell them apart
     careful = replace(rays, options=options.finer())
-    places = places_on(careful, vertices, shape)
-    edge = edge_of_definition(sheet, constraints, settings, shape)
-    curves = curves_through(sheet, (*places, edge), shape)
-    sink.report("limit loads", 2, 2)
+    found = survey(rays, grid, "limit loads", progress, near_curves=careful)
     return LimitLoadMap(
-        structure, grid, load, constraints, dict(fixed or {}),
-        vertices.value.reshape(shape), vertices.kind.reshape(shape),
-        States(structure, vertices.z, vertices.p), curves, sheet, float(bound),
+        structure, grid, load, rays.within, dict(fixed or {}),
+        found.value, found.status, found.states, found.curves, sheet, rays.bound,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class LimitLoadRays:
+class LimitLoadRays(Paths):
     """Limit loads at settings: rays in the load from natural states."""
-
-    sheet: NaturalSheet
-    load: int
-    within: tuple[Constraint, ...]
-    bound: float
-    options: TraceOptions
 
     def __call__(self, settings: Settings) -> Samples:
         """Limit loads at settings, with their states."""
-        start = unloaded_samples(self.sheet, self.within, settings)
+        start = self.unloaded(settings)
         z, p, kind = start.z, start.p, start.kind
         value, place = start.value, start.place
-        ready = np.flatnonzero(kind == LOST)
+        ready = np.flatnonzero(kind == RayStatus.LOST)
         velocity = np.zeros((len(ready), p.shape[1]))
         velocity[:, self.load] = self.bound - p[ready, self.load]
         if len(ready):
             line = ParameterLine(self.sheet.structure, p[ready].copy(), velocity)
             ended = trace(line, z[ready].copy(), self.within, self.options)
-            kind[ready] = [_OF_CODE.get(int(code), LOST) for code in ended.code]
+            kind[ready] = [
+                STATUS_OF_EVENT.get(code, RayStatus.LOST) for code in ended.code.tolist()
+            ]
             z[ready], p[ready] = ended.z, line.parameters(ended.t)
-            value[ready] = np.where(kind[ready] == LOST, np.nan, p[ready, self.load])
-            met = ready[kind[ready] == END_CONSTRAINT]
+            value[ready] = np.where(kind[ready] == RayStatus.LOST, np.nan, p[ready, self.load])
+            met = ready[kind[ready] == RayStatus.CONSTRAINT]
             if len(met):
-                place[met] = _places(self.within, z[met], p[met])
-        z[kind <= LOST] = np.nan
+                place[met] = _extrema_met(self.within, z[met], p[met])
+        z[kind <= RayStatus.LOST] = np.nan
         return Samples(settings, value, kind, place, z, p, start.passed)
 
     def causes(self, pairs: Brackets) -> list[Cause]:
@@ -207,7 +204,7 @@ class LimitLoadRays:
         compared.
         """
         structure = self.sheet.structure
-        folds = np.flatnonzero(vertices.kind == END_FOLD)
+        folds = np.flatnonzero(vertices.kind == RayStatus.FOLD)
         z, p = vertices.z[folds], vertices.p[folds]
         at = Critical(structure, z, p, null_border(structure, z, p))
         n = structure.unknowns
@@ -227,22 +224,22 @@ class LimitLoadRays:
         """Jumps, kinks, and other places of the extremum that meets a constraint."""
         a, b = pairs.a, pairs.b
         known = self.known(a) & self.known(b)
-        moved = (a.kind == END_CONSTRAINT) & (b.kind == END_CONSTRAINT)
+        moved = (a.kind == RayStatus.CONSTRAINT) & (b.kind == RayStatus.CONSTRAINT)
         kind = np.where(np.abs(a.value - b.value) > JUMP, "jump", np.where(moved, "place", "kink"))
         return np.where(known, kind, "").astype(object)
 
 
 def _is_critical(side: Samples) -> Bool[np.ndarray, " pairs"]:
     """Whether paths end where stability is lost."""
-    return np.asarray(np.isin(side.kind, (END_FOLD, END_BRANCH)))
+    return np.asarray(np.isin(side.kind, (RayStatus.FOLD, RayStatus.BRANCH_POINT)))
 
 
 def _meets(side: Samples, k: int) -> Bool[np.ndarray, " pairs"]:
     """Whether paths end at constraint number `k`."""
-    return np.asarray((side.kind == END_CONSTRAINT) & (side.place // 2 == k))
+    return np.asarray((side.kind == RayStatus.CONSTRAINT) & (side.place // 2 == k))
 
 
-def _places(
+def _extrema_met(
     within: tuple[Constraint, ...],
     z: Lanes,
     p: Parameters,
