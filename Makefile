@@ -17,8 +17,9 @@ paper: $(INSTALLED)
 test: $(INSTALLED)
 	$(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
+# `make test-slow TENTH=3` runs a tenth of them; TENTH is any number, its last digit counts.
 test-slow: $(INSTALLED)
-	$(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m slow
+	$(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m slow $(if $(TENTH),--tenth $(TENTH))
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .
