@@ -11,6 +11,7 @@ from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure
+from equimorph.tolerances import SAME_STATE
 
 FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=20000)
 """Step control of the final check of every route."""
@@ -88,7 +89,7 @@ def verify_route(
     end = path.end
     if end.kind != "arrived":
         return refusal(_reason(path, names, len(way_points)), way_points, path)
-    if distance(end.state, goal) > 1e-6:
+    if distance(end.state, goal) > SAME_STATE:
         return refusal(
             f"the way-points lead to another equilibrium over the goal's parameters, "
             f"{distance(end.state, goal):.3g} away in the metric",

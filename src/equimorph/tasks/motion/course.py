@@ -1,6 +1,6 @@
 """Motions to follow: targets of descriptors and prescribed parameters as functions of time."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +10,8 @@ from jaxtyping import Float, Int
 from equimorph.equilibria import Leg
 from equimorph.equilibria.legs import changed
 from equimorph.errors import InputError
-from equimorph.model import Descriptor, position
-from equimorph.structures import State, Structure
+from equimorph.model import Constraint, Descriptor, position
+from equimorph.structures import State, Structure, value_of
 
 RATE = 1e-4
 """Share of a leg over which the rates of curves are measured."""
@@ -116,6 +116,25 @@ class Course:
         same = (np.abs(columns - columns[-1]) <= CLOSED * size).all(axis=1)
         first = int(np.flatnonzero(same)[0])
         return (first, self.legs) if first < self.legs else None
+
+
+def actuator_bounds(
+    structure: Structure, limits: Mapping[str, tuple[float, float]]
+) -> tuple[Constraint, ...]:
+    """Limits of actuators as constraints.
+
+    Raises
+    ------
+    InputError
+        For limits that are not in order.
+    """
+    bounds: list[Constraint] = []
+    for name, (low, high) in limits.items():
+        if not low < high:
+            raise InputError(f"`actuators` must give limits in order; got {name} = {low, high}.")
+        itself = value_of(structure, name)
+        bounds += [itself >= low, itself <= high]
+    return tuple(bounds)
 
 
 def _columns(

@@ -12,15 +12,15 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, position
-from equimorph.structures import State, States, Structure, value_of
+from equimorph.structures import State, States
 from equimorph.tasks.motion.blocks import DENSE, path_by_blocks, same_descriptors, stable_path
-from equimorph.tasks.motion.course import Course
+from equimorph.tasks.motion.course import Course, actuator_bounds
 from equimorph.tasks.motion.redundant import follow_redundant
-from equimorph.tasks.optimising.moving_optimum import MovingProblem, actuator_bounds, follow_minimum
+from equimorph.tasks.optimising.moving_optimum import MovingProblem, follow_minimum
 from equimorph.tasks.optimising.optimum_path import FollowedOptimum
 from equimorph.tasks.optimising.programme import Objective, stability
 from equimorph.tasks.route import FINE, describe_place, schedule_of
-from equimorph.tasks.start import Start, start_state
+from equimorph.tasks.start import Start, check_stable, start_state
 
 Failure = Literal["", "snap-through", "singular Jacobian", "actuator limit", "constraint", "lost"]
 SAME = 1e-8
@@ -171,77 +171,91 @@ def track(  # the knobs of the public face, all by keyword
     >>> turned.arrived, float(turned.schedule.values[-1, 0].round(6))
     (True, 0.677282)
     """
-    state = start_state(start)
-    structure, names = state.structure, tuple(actuators)
+    state, names = start_state(start), tuple(actuators)
     limits = dict(actuators) if isinstance(actuators, Mapping) else {}
-    bounds = [bound for name, ends in limits.items() for bound in _limits(structure, name, ends)]
-    if not state.stable:
-        raise InputError(f"`start` must be stable; got a state of index {state.index}.")
+    bounds = actuator_bounds(state.structure, limits)
+    check_stable("start", state)
     legs = _listed(targets)
     asked = _descriptors([_checked(leg(0.0) if callable(leg) else leg, names) for leg in legs])
-    path = _path(state, legs, names, (tuple(within), tuple(bounds), limits))
+    motion = _Motion(state, legs, names, tuple(within), limits, bounds)
+    path = motion.path()
     failure = _failure(path.end, bounds)
     if failure:
         why = _why(path.end, failure, names)
-        rest = _compromise(path, legs, names, (tuple(within), limits)) if beyond else None
+        rest = motion.compromise(path) if beyond else None
         return Tracking("refused", failure, why, path, asked, names, None, rest)
     monitored = tuple(dict.fromkeys((*asked, *(c.descriptor for c in within), *monitor)))
     schedule = schedule_of(path, path.states.margin, monitored)
     return Tracking("arrived", "", "", path, asked, names, schedule)
 
 
-def _path(
-    start: State,
-    legs: Sequence[Leg],
-    names: tuple[str, ...],
-    bounds: tuple[
-        tuple[Constraint, ...], tuple[Constraint, ...], Mapping[str, tuple[float, float]]
-    ],
-) -> Path:
-    """Path of a motion by the method that suits it."""
-    within, at_limits, limits = bounds
-    parameters = start.structure.parameters
-    first = legs[0](0.0) if callable(legs[0]) else legs[0]
-    if sum(isinstance(key, Descriptor) for key in first) < len(names):
-        course = Course.of(start, legs, names)
-        check_start(start, (*within, *at_limits))
-        places = {position(parameters, name): ends for name, ends in limits.items()}
-        motion = follow_redundant(course, start, within, places)
-        return stable_path(motion.stretch.states, motion.stretch.times, motion.end)
-    every = (*within, *at_limits)
-    if len(legs) >= DENSE and same_descriptors(legs):
-        check_start(start, every)
-        return path_by_blocks(Course.of(start, legs, names), start, every, FINE)
-    freed = [_freed(leg, names) for leg in legs]
-    path = lift(start, freed, within=every)
-    return lift(start, freed, within=every, options=FINE) if path.arrived else path
+@dataclass(frozen=True)
+class _Motion:
+    """What is to be followed, with what, and within which bounds.
 
+    Parameters
+    ----------
+    start, legs
+        State from which the targets are followed, and the targets.
+    names
+        The actuators.
+    within
+        Constraints to obey.
+    limits, bounds
+        Limits of the actuators by name, and as constraints.
+    """
 
-def _compromise(
-    path: Path,
-    legs: Sequence[Leg],
-    names: tuple[str, ...],
-    bounds: tuple[tuple[Constraint, ...], Mapping[str, tuple[float, float]]],
-) -> FollowedOptimum:
-    """Least squares from the end of a path on."""
-    structure, (within, limits) = path.states.structure, bounds
-    course = Course.of(path.states[0], legs, names)
+    start: State
+    legs: Sequence[Leg]
+    names: tuple[str, ...]
+    within: tuple[Constraint, ...]
+    limits: Mapping[str, tuple[float, float]]
+    bounds: tuple[Constraint, ...]
 
-    def goal(columns: Float[np.ndarray, " columns"]) -> Objective:
-        wanted = columns[len(structure.parameters) :]
+    @property
+    def course(self) -> Course:
+        """Targets as functions of time; all legs must prescribe the same descriptors."""
+        return Course.of(self.start, self.legs, self.names)
 
-        def miss(z: Lanes, p: Parameters) -> Values:
-            values = np.stack([each.function(z, p) for each in course.descriptors], axis=1)
-            return np.asarray(0.5 * ((values - wanted) ** 2).sum(axis=1))
+    def path(self) -> Path:
+        """Follow the motion by the method that suits it."""
+        every = (*self.within, *self.bounds)
+        first = self.legs[0](0.0) if callable(self.legs[0]) else self.legs[0]
+        if sum(isinstance(key, Descriptor) for key in first) < len(self.names):
+            return self._redundant_path()
+        if len(self.legs) >= DENSE and same_descriptors(self.legs):
+            check_start(self.start, every)
+            return path_by_blocks(self.course, self.start, every, FINE)
+        freed = [_freed(leg, self.names) for leg in self.legs]
+        path = lift(self.start, freed, within=every)
+        return lift(self.start, freed, within=every, options=FINE) if path.arrived else path
 
-        return Objective(Descriptor("miss", "", miss), 1.0)
+    def _redundant_path(self) -> Path:
+        """The shortest motion of more actuators than targets."""
+        course, parameters = self.course, self.start.structure.parameters
+        check_start(self.start, (*self.within, *self.bounds))
+        places = {position(parameters, name): ends for name, ends in self.limits.items()}
+        found = follow_redundant(course, self.start, self.within, places)
+        return stable_path(found.stretch.states, found.stretch.times, found.end)
 
-    rules = (*within, stability(structure, 0.0))
-    problem = MovingProblem(course, goal, rules, actuator_bounds(structure, limits), False)
-    # the end itself may lie on a fold, where the actuators are no coordinates
-    return follow_minimum(
-        problem, path.states[-2 if len(path.states) > 1 else -1], float(path.at[-1])
-    )
+    def compromise(self, path: Path) -> FollowedOptimum:
+        """Follow the least sum of squares of the misses from the end of a path on."""
+        structure, course = self.start.structure, self.course
+
+        def goal(columns: Float[np.ndarray, " columns"]) -> Objective:
+            wanted = columns[len(structure.parameters) :]
+
+            def miss(z: Lanes, p: Parameters) -> Values:
+                values = np.stack([each.function(z, p) for each in course.descriptors], axis=1)
+                return np.asarray(0.5 * ((values - wanted) ** 2).sum(axis=1))
+
+            return Objective(Descriptor("miss", "", miss), 1.0)
+
+        rules = (*self.within, stability(structure, 0.0))
+        problem = MovingProblem(course, goal, rules, self.bounds, held=False)
+        # the end itself may lie on a fold, where the actuators are no coordinates
+        begin = path.states[-2 if len(path.states) > 1 else -1]
+        return follow_minimum(problem, begin, float(path.at[-1]))
 
 
 def _listed(targets: Leg | Sequence[Leg]) -> list[Leg]:
@@ -275,15 +289,6 @@ def _checked(values: Waypoint, actuators: tuple[str, ...]) -> Waypoint:
 def _descriptors(first: Sequence[Waypoint]) -> tuple[Descriptor, ...]:
     keys = (key for leg in first for key in leg)
     return tuple(dict.fromkeys(key for key in keys if isinstance(key, Descriptor)))
-
-
-def _limits(structure: Structure, name: str, ends: tuple[float, float]) -> list[Constraint]:
-    """Both limits of an actuator, as constraints."""
-    low, high = ends
-    if not low < high:
-        raise InputError(f"`actuators` must give limits in order; got {name} = {ends}.")
-    itself = value_of(structure, name)
-    return [itself >= low, itself <= high]
 
 
 def _failure(end: Event, bounds: Sequence[Constraint]) -> Failure:

@@ -109,7 +109,7 @@ def _ridge(slopes: Float[np.ndarray, "tied d"]) -> tuple[float, float] | None:
 def _places(programme: Programme, found: LocalMinimum, tied: list[int]) -> dict[float, float]:
     if not programme.objective.kinked:
         return {}
-    _, places = programme.objective.branches(found.spot.z, found.spot.p)
+    _, places = programme.objective.branches(found.point.z, found.point.p)
     return {float(places[0, k]): float(found.answer.weights[k]) for k in tied}
 
 

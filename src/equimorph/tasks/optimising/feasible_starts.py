@@ -102,7 +102,7 @@ def least_violation(
     if not ends:
         return FeasibleStarts(starts.take(np.zeros(0, int)), np.inf, starts.take(np.zeros(0, int)))
     least = [float(end.expansion.f.max()) for end in ends]
-    spots = join_points([end.spot for end in ends])
+    spots = join_points([end.point for end in ends])
     return FeasibleStarts(
         spots.take(np.array(least) <= MET), min(least), spots.take(np.array([np.argmin(least)]))
     )

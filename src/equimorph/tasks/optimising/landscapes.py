@@ -16,6 +16,8 @@ from equimorph.manifold import EquilibriumSet, StatesOver
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.model import Constraint, Descriptor, Grid
 from equimorph.structures import State, States
+from equimorph.tasks.maps.actuator_map import settings_of
+from equimorph.tasks.maps.brackets import grid_edges
 
 SAME = 1e-5
 """Distance in the metric below which two states are the same."""
@@ -138,8 +140,7 @@ def landscape(  # the knobs of the public face, most by keyword
         )
     if sense not in ("min", "max"):
         raise InputError(f"`sense` must be min or max; got {sense!r}.")
-    axes = grid.axes()
-    settings = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    settings, shape = settings_of(grid)
     over = eset.over(**dict(zip(grid.names, settings.T, strict=True)))
     allowed = _allowed(eset, over, within, start)
     value = objective(over.states) * (1.0 if sense == "min" else -1.0)
@@ -148,7 +149,6 @@ def landscape(  # the knobs of the public face, most by keyword
     states = over.states[best[known]]
     out = np.full(len(settings), np.nan)
     out[known] = objective(states)
-    shape = (len(axes[0]), len(axes[1]))
     place = np.where(known, np.cumsum(known) - 1, -1)
     barriers = _barriers(states, place.reshape(shape), out, settings)
     return Landscape(grid, out.reshape(shape), states, ~known.reshape(shape), barriers)
@@ -186,13 +186,7 @@ def _barriers(
     settings: Float[np.ndarray, "vertices 2"],
 ) -> Barriers:
     """Edges between known neighbours that a straight lift on stable states does not connect."""
-    number = np.arange(place.size).reshape(place.shape)
-    pairs = np.concatenate(
-        [
-            np.stack([number[:-1].ravel(), number[1:].ravel()], axis=1),
-            np.stack([number[:, :-1].ravel(), number[:, 1:].ravel()], axis=1),
-        ]
-    )
+    pairs = grid_edges(place.shape)
     pairs = pairs[(place.ravel()[pairs] >= 0).all(axis=1)]
     ends = place.ravel()[pairs]
     structure, n = states.structure, states.structure.unknowns

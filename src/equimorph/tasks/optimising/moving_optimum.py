@@ -1,7 +1,7 @@
 """`follow_optimum`: a local optimum while loads and targets vary, and where it jumps."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -12,9 +12,9 @@ from equimorph.errors import InputError
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.model import Constraint, Descriptor
-from equimorph.structures import State, States, Structure, value_of
+from equimorph.structures import State, States
 from equimorph.tasks.motion.blocks import stable_path
-from equimorph.tasks.motion.course import Course
+from equimorph.tasks.motion.course import Course, actuator_bounds
 from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.optimum_path import (
     FollowedOptimum,
@@ -32,7 +32,7 @@ from equimorph.tasks.optimising.tangent_steps import (
     tangent_plane_at,
 )
 from equimorph.tasks.route import schedule_of
-from equimorph.tasks.start import Start, start_state
+from equimorph.tasks.start import Start, check_stable, start_state
 
 FIRST, LARGEST = 0.02, 0.1
 """Share of a leg of the first step, and of the longest."""
@@ -53,9 +53,11 @@ SHORT = 10
 FLAT = -1e-6
 """Least curvature of a minimum."""
 NUDGE = 1e-3
+"""Steps aside, in the metric and scaled actuators, from which optima beyond a jump are searched."""
 FEASIBLE = 1e-7
+"""Relative excess over a bound that counts as none."""
 
-Where = Callable[[Float[np.ndarray, " columns"]], Objective]
+Goal = Callable[[Float[np.ndarray, " columns"]], Objective]
 """Objective at given parameters and targets."""
 
 
@@ -121,8 +123,7 @@ def follow_optimum(
         raise InputError(
             f"`sense` must be min or max and `margin` at least 0; got {sense!r}, {margin!r}."
         )
-    if not state.stable:
-        raise InputError(f"`start` must be stable; got a state of index {state.index}.")
+    check_stable("start", state)
     legs = [to] if isinstance(to, Mapping) or callable(to) else list(to)
     course = Course.of(state, legs, names)
     if len(course.descriptors) >= len(names):
@@ -137,19 +138,6 @@ def follow_optimum(
         course, lambda _: goal, rules, actuator_bounds(state.structure, limits), True
     )
     return follow_minimum(problem, state, 0.0)
-
-
-def actuator_bounds(
-    structure: Structure, limits: Mapping[str, tuple[float, float]]
-) -> tuple[Constraint, ...]:
-    """Limits of actuators as constraints."""
-    bounds: list[Constraint] = []
-    for name, (low, high) in limits.items():
-        if not low < high:
-            raise InputError(f"`actuators` must give limits in order; got {name} = {low, high}.")
-        itself = value_of(structure, name)
-        bounds += [itself >= float(low), itself <= float(high)]
-    return tuple(bounds)
 
 
 @dataclass(frozen=True)
@@ -171,7 +159,7 @@ class MovingProblem:
     """
 
     course: Course
-    goal: Where
+    goal: Goal
     rules: tuple[Constraint, ...]
     bounds: tuple[Constraint, ...]
     held: bool
@@ -201,97 +189,126 @@ class _Found:
     @property
     def place(self) -> Float[np.ndarray, " coordinates"]:
         """Where it is, in the metric and scaled actuators."""
-        return np.asarray(embed(self.programme.setting, self.end.spot.z, self.end.spot.p)[0])
+        return np.asarray(embed(self.programme.setting, self.end.point.z, self.end.point.p)[0])
+
+
+@dataclass
+class _Track:
+    """Optima followed so far, and where the next one is looked for.
+
+    Parameters
+    ----------
+    problem
+        What is followed.
+    optima
+        Optima in order of time; the last is where the search stands.
+    jumps
+        Jumps met so far.
+    step
+        Time step to try next.
+    failure
+        Earliest time at which no optimum continued the last one; ∞ if none is known.
+    """
+
+    problem: MovingProblem
+    optima: list[_Found]
+    jumps: list[Jump] = field(default_factory=list)
+    step: float = FIRST
+    failure: float = np.inf
+
+    @property
+    def last(self) -> _Found:
+        """The last optimum."""
+        return self.optima[-1]
+
+    @property
+    def at_jump(self) -> bool:
+        """Whether the failure ahead is so close that the optimum jumps there."""
+        return self.failure - self.last.time <= CLOSEST * (1.0 + self.last.time)
+
+    def smooth_pair(self) -> tuple[_Found, _Found] | None:
+        """Last two optima, if the optimum moves smoothly between them."""
+        if len(self.optima) < 2 or (self.jumps and self.jumps[-1].at >= self.optima[-2].time):
+            return None
+        first, second = self.optima[-2:]
+        return (first, second) if first.time >= np.floor(second.time - 1e-12) else None
+
+    def expected_end(self) -> float:
+        """Time at which the optimum is expected to end; not a number if unknown."""
+        pair = self.smooth_pair()
+        if pair is None or self.failure == np.inf:
+            return np.nan
+        bends = (pair[0].certificate.curvature, pair[1].certificate.curvature)
+        return expected_end((pair[0].time, pair[1].time), bends)
+
+    def predicted(self, ahead: float, end: float) -> SetPoints | None:
+        """State of the set at a time ahead, extrapolated from the last two optima."""
+        course, here = self.problem.course, self.last.end.point
+        z, p = here.z.copy(), here.p.copy()
+        pair = self.smooth_pair()
+        if pair is not None:
+            share = extrapolation_factor((pair[0].time, pair[1].time), ahead, end)
+            z += share * (z - pair[0].end.point.z)
+            p += share * (p - pair[0].end.point.p)
+        given = course.split(course.at(np.array([ahead])))[0]
+        given[:, course.free] = p[:, course.free]
+        found, good = project_onto_set(self.problem.programme(ahead).setting, z, given, here.rows)
+        return found if good[0] else None
 
 
 def follow_minimum(problem: MovingProblem, start: State, time: float) -> FollowedOptimum:
-    """Follow the optimum near a state from a time on."""
+    """Follow the optimum near a state from a time on.
+
+    Steps are tried and shortened until the optimum continues; where no step is short enough it
+    jumps, and the search goes on from the optimum beyond.
+    """
     legs = problem.course.legs
-    begin = SetPoints(
-        start.z[None], start.p[None], tangent_plane_at(problem.programme(time).setting, start)
-    )
+    plane = tangent_plane_at(problem.programme(time).setting, start)
+    begin = SetPoints(start.z[None], start.p[None], plane)
     first = None
     for later in LATER:
         first = first or _solved(problem, begin, min(time + later, legs))
     if first is None:
         why = "the descent from the start ends at no optimum"
-        return _result(problem, [], [], why, start)
-    track, jumps = [first], list[Jump]()
-    step, failure = FIRST, np.inf
-    while track[-1].time < legs:
-        here = track[-1]
-        if failure - here.time <= CLOSEST * (1.0 + here.time):
-            after = _beyond(problem, here, failure)
-            if after is None or np.linalg.norm(after.place - here.place) > NEAR:
-                jumps.append(_jump(here, after))
-            if after is None:
-                return _result(problem, track, jumps, "no optimum is left", start)
-            track.append(after)
-            step, failure = FIRST, np.inf
-            continue
-        corner = min(np.floor(here.time) + 1.0, legs)
-        there, ahead = _onward(problem, (track, jumps), (step, failure), corner)
-        if there is None:
-            failure, step = ahead, SHORTER * (ahead - here.time)
-        else:
-            step = min(1.5 * (ahead - here.time), LARGEST)
-            track.append(there)
-            failure = failure if there.time < failure else np.inf
-    return _result(problem, track, jumps, "", start)
+        return _result(_Track(problem, []), why, start)
+    track = _Track(problem, [first])
+    while track.last.time < legs:
+        if not track.at_jump:
+            _advance(track)
+        elif not _jump_over(track):
+            return _result(track, "no optimum is left", start)
+    return _result(track, "", start)
 
 
-def _onward(
-    problem: MovingProblem,
-    past: tuple[list[_Found], list[Jump]],
-    reach: tuple[float, float],
-    corner: float,
-) -> tuple[_Found | None, float]:
-    """Next optimum, if the last one leads to it; and the time that was tried."""
-    (track, jumps), (step, failure) = past, reach
-    here = track[-1]
-    end = _end(track, jumps) if failure < np.inf else np.nan
-    known = here.time < end < failure
-    ahead = next_trial(here.time, end, failure) if known else here.time + step
-    ahead = min(ahead, corner)
-    guess = _predicted(problem, track, ahead, jumps, end)
-    there = None if guess is None else _solved(problem, guess, ahead, SHORT)
+def _advance(track: _Track) -> None:
+    """Try one step: go on to the next optimum, or remember that it failed, and shorten."""
+    here, end = track.last, track.expected_end()
+    ahead = here.time + track.step
+    if here.time < end < track.failure:
+        ahead = next_trial(here.time, end, track.failure)
+    ahead = min(ahead, np.floor(here.time) + 1.0, track.problem.course.legs)
+    guess = track.predicted(ahead, end)
+    there = None if guess is None else _solved(track.problem, guess, ahead, SHORT)
     if there is None or guess is None or not _goes_on(here, there, guess):
-        return None, ahead
-    return there, ahead
+        track.failure, track.step = ahead, SHORTER * (ahead - here.time)
+        return
+    track.step = min(1.5 * (ahead - here.time), LARGEST)
+    track.optima.append(there)
+    if there.time >= track.failure:
+        track.failure = np.inf
 
 
-def _pair(track: list[_Found], jumps: list[Jump]) -> tuple[_Found, _Found] | None:
-    """Last two optima, if the way between them is smooth."""
-    if len(track) < 2 or (jumps and jumps[-1].at >= track[-2].time):
-        return None
-    first, second = track[-2:]
-    return (first, second) if first.time >= np.floor(second.time - 1e-12) else None
-
-
-def _end(track: list[_Found], jumps: list[Jump]) -> float:
-    """Time at which the optimum is expected to end, if it is."""
-    pair = _pair(track, jumps)
-    if pair is None:
-        return np.nan
-    bends = (pair[0].certificate.curvature, pair[1].certificate.curvature)
-    return expected_end((pair[0].time, pair[1].time), bends)
-
-
-def _predicted(
-    problem: MovingProblem, track: list[_Found], ahead: float, jumps: list[Jump], end: float
-) -> SetPoints | None:
-    """State of the set at a time ahead, where the last two optima lead to."""
-    here, course = track[-1], problem.course
-    z, p = here.end.spot.z.copy(), here.end.spot.p.copy()
-    pair = _pair(track, jumps)
-    if pair is not None:
-        share = extrapolation_factor((pair[0].time, pair[1].time), ahead, end)
-        z += share * (z - pair[0].end.spot.z)
-        p += share * (p - pair[0].end.spot.p)
-    given = course.split(course.at(np.array([ahead])))[0]
-    given[:, course.free] = p[:, course.free]
-    found, good = project_onto_set(problem.programme(ahead).setting, z, given, here.end.spot.rows)
-    return found if good[0] else None
+def _jump_over(track: _Track) -> bool:
+    """Go on at the optimum beyond a failure; false if there is none."""
+    here = track.last
+    after = _beyond(track.problem, here, track.failure)
+    if after is None or np.linalg.norm(after.place - here.place) > NEAR:
+        track.jumps.append(_jump(here, after))
+    if after is None:
+        return False
+    track.optima.append(after)
+    track.step, track.failure = FIRST, np.inf
+    return True
 
 
 def _solved(
@@ -304,7 +321,7 @@ def _solved(
         return None
     end = ends[0]
     found = certificate(programme, end)
-    index = programme.setting.structure.index(end.spot.z, end.spot.p)[0]
+    index = programme.setting.structure.index(end.point.z, end.point.p)[0]
     if found.curvature < FLAT or (index != 0 and found.kind != "stability boundary"):
         return None
     return _Found(time, programme, end, found)
@@ -324,11 +341,11 @@ def _beyond(problem: MovingProblem, here: _Found, ahead: float) -> _Found | None
     setting = problem.programme(ahead).setting
     given = problem.course.split(problem.course.at(np.array([ahead])))[0]
     for step in NUDGE * np.concatenate([np.eye(d), -np.eye(d)]):
-        z, p = step_along(setting, here.end.spot, frames, step[None])
+        z, p = step_along(setting, here.end.point, frames, step[None])
         free = problem.course.free
         at = given.copy()
         at[:, free] = p[:, free]
-        guess, good = project_onto_set(setting, z, at, here.end.spot.rows)
+        guess, good = project_onto_set(setting, z, at, here.end.point.rows)
         found = _solved(problem, guess, ahead) if good[0] else None
         if found is not None:
             return found
@@ -338,7 +355,7 @@ def _beyond(problem: MovingProblem, here: _Found, ahead: float) -> _Found | None
 def _jump(here: _Found, after: _Found | None) -> Jump:
     structure = here.programme.setting.structure
     sides = [
-        None if each is None else State(structure, each.end.spot.z[0], each.end.spot.p[0])
+        None if each is None else State(structure, each.end.point.z[0], each.end.point.p[0])
         for each in (here, after)
     ]
     values = [
@@ -349,32 +366,31 @@ def _jump(here: _Found, after: _Found | None) -> Jump:
     return Jump(here.time, sides[0], sides[1], (float(values[0]), float(values[1])))
 
 
-def _result(
-    problem: MovingProblem, track: list[_Found], jumps: list[Jump], why: str, start: State
-) -> FollowedOptimum:
+def _result(track: _Track, why: str, start: State) -> FollowedOptimum:
+    problem, optima = track.problem, track.optima
     structure = problem.course.structure
     none = np.zeros((0, len(start.z))), np.zeros((0, len(start.p)))
-    z = np.concatenate([none[0], *(each.end.spot.z for each in track)])
-    p = np.concatenate([none[1], *(each.end.spot.p for each in track)])
+    z = np.concatenate([none[0], *(each.end.point.z for each in optima)])
+    p = np.concatenate([none[1], *(each.end.point.p for each in optima)])
     values = [
-        float(each.programme.objective.descriptor.function(each.end.spot.z, each.end.spot.p)[0])
-        for each in track
+        float(each.programme.objective.descriptor.function(each.end.point.z, each.end.point.p)[0])
+        for each in optima
     ]
-    states, times = States(structure, z, p), np.array([each.time for each in track])
+    states, times = States(structure, z, p), np.array([each.time for each in optima])
     found = FollowedOptimum(
         "refused" if why else "arrived",
         why,
         states,
         times,
         np.array(values),
-        tuple(each.certificate for each in track),
-        tuple(jumps),
+        tuple(each.certificate for each in optima),
+        tuple(track.jumps),
     )
-    if why or jumps or len(track) < 2:
+    if why or track.jumps or len(optima) < 2:
         return found
     path = stable_path(states, times, Event("arrived", states[-1], times[-1]))
     if not path.length[-1] > 0.0:
         return found
     rules = [each.descriptor for each in problem.rules if not is_stability(each)]
-    goal = track[0].programme.objective.descriptor
+    goal = optima[0].programme.objective.descriptor
     return replace(found, schedule=schedule_of(path, found.margin, (goal, *rules)))

@@ -1,13 +1,13 @@
 """`optimise`: stable states of a set at which an objective is least or largest."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from equimorph.equilibria import check_start, settle
+from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import local_minima
@@ -38,6 +38,12 @@ from equimorph.tasks.stable_part import (
     stable_piece,
     stable_vertices,
     vertex_values,
+)
+from equimorph.tasks.start import (
+    check_equilibrium,
+    check_fixed_parameters,
+    check_margin_demand,
+    inadmissible,
 )
 
 CANDIDATES = 8
@@ -191,7 +197,7 @@ def optimise(  # the knobs of the public face, all by keyword
     sign = 1.0 if sense == "min" else -1.0
     constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
     goal = Objective(objective, sign)
-    fault = "" if start is None else _violation(start, constraints, margin)
+    fault = "" if start is None else inadmissible("start", start, constraints, margin, VIOLATED)
     if fault:
         return _refused(fault, sense, eset)
     programme = Programme.over(eset, goal, (*constraints, stability(eset.structure, margin)))
@@ -206,12 +212,16 @@ def optimise(  # the knobs of the public face, all by keyword
         starts = _starts_around(ground, programme, start)
     ends = _optima(programme, descend(programme, starts))
     found = [_optimum(programme, end) for end in ends]
-    if start is not None:
-        pairs = list(zip(ends, found, strict=True))
-        reached = _reached((eset, ground), programme, start, (within, margin), pairs)
-        if found and not reached:
+    if start is not None and found:
+        goals = [
+            _in_the_box(eset, _before_the_edge(programme, end) or each.state)
+            for end, each in zip(ends, found, strict=True)
+        ]
+        reached = _first_reached(eset, ground, start, goals, within, margin)
+        if reached is None:
             return _refused(f"no route was found to {found[0]}", sense, eset)
-        found = reached
+        number, route = reached
+        found = [replace(found[number], route=route), *found[number + 1 :]]
     if not found:
         return _refused(_nothing(within, least), sense, eset)
     z, p = (np.array([getattr(each.state, key) for each in found]) for key in "zp")
@@ -225,24 +235,15 @@ def _refused(why: str, sense: Sense, eset: EquilibriumSet) -> Optima:
 def _check(eset: EquilibriumSet, sense: str, margin: float, start: State | None) -> None:
     if sense not in ("min", "max"):
         raise InputError(f"`sense` must be min or max; got {sense!r}.")
-    if not margin >= 0.0:
-        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
+    check_margin_demand(margin)
     if not len(eset.cells):
         raise InputError("`eset` must have cells; got an empty set.")
     if start is None:
         return
-    try:
-        check_start(start, eset.constraints)
-    except InputError as error:
-        raise InputError(str(error).replace("`state`", "`start`")) from None
+    check_equilibrium("start", start, eset.constraints)
     if not start.stable:
         raise InputError(f"`start` must be stable; got index {start.index}.")
-    wanted = eset.parameters_at({name: start[name] for name in eset.names})
-    if not np.allclose(wanted, start.p, rtol=0, atol=1e-9):
-        raise InputError(
-            f"`start` must have the fixed parameters of the set ({dict(eset.fixed)}); "
-            f"got {start.parameters}."
-        )
+    check_fixed_parameters("start", start, eset)
 
 
 def _nothing(within: Sequence[Constraint], least: FeasibleStarts | None) -> str:
@@ -251,17 +252,6 @@ def _nothing(within: Sequence[Constraint], least: FeasibleStarts | None) -> str:
     if least is None or not np.isfinite(least.least):
         return why
     return f"{why}; the least largest excess over the bounds is {least.least:.3g}"
-
-
-def _violation(start: State, constraints: tuple[Constraint, ...], margin: float) -> str:
-    """Why a start is outside what is allowed, if it is."""
-    for constraint in constraints:
-        if not constraint.excess(start.z[None], start.p[None])[0] <= VIOLATED:
-            value = constraint.descriptor(start)
-            return f"the start violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
-    if margin > 0.0 and start.margin < margin:
-        return f"the start has a stability margin of {start.margin:.4g}, below {margin:g}"
-    return ""
 
 
 def _watched(
@@ -317,15 +307,15 @@ def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum
     setting, kept = programme.setting, []
     places: list[Float[np.ndarray, " coordinates"]] = []
     for end in sorted(ends, key=lambda each: float(each.expansion.f.max())):
-        stable = programme.setting.structure.index(end.spot.z, end.spot.p)[0] == 0
+        stable = programme.setting.structure.index(end.point.z, end.point.p)[0] == 0
         on_edge = any(
             is_stability(c) and abs(e) < VIOLATED
             for c, e in zip(programme.all, end.expansion.g[0], strict=True)
         )
         if end.expansion.g.max() > VIOLATED or not (stable or on_edge):
             continue
-        u = end.spot.z[0, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
-        place = np.concatenate([u, end.spot.p[0] / setting.structure.scales])
+        u = end.point.z[0, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
+        place = np.concatenate([u, end.point.p[0] / setting.structure.scales])
         if all(np.linalg.norm(place - other) > SAME for other in places):
             places.append(place)
             kept.append(end)
@@ -333,30 +323,31 @@ def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum
 
 
 def _optimum(programme: Programme, end: LocalMinimum) -> Optimum:
-    state = State(programme.setting.structure, end.spot.z[0], end.spot.p[0])
+    state = State(programme.setting.structure, end.point.z[0], end.point.p[0])
     value = programme.objective.descriptor(state)
     return Optimum(state, value, certificate(programme, end))
 
 
-def _reached(
-    grounds: tuple[EquilibriumSet, EquilibriumSet | None],
-    programme: Programme,
+def _first_reached(
+    eset: EquilibriumSet,
+    piece: EquilibriumSet | None,
     start: State,
-    demands: tuple[Sequence[Constraint], float],
-    found: list[tuple[LocalMinimum, Optimum]],
-) -> list[Optimum]:
-    """Optima from the first on to which a route leads."""
-    (eset, ground), (within, margin) = grounds, demands
-    for number, (end, optimum) in enumerate(found):
-        goal = _in_the_box(eset, _before_the_edge(programme, end) or optimum.state)
+    goals: list[State],
+    within: Sequence[Constraint],
+    margin: float,
+) -> tuple[int, Route] | None:
+    """Number of the first goal to which a route leads, with the route; None if there is none.
+
+    Searched over the whole set, and where a corridor may pass between its vertices, over the
+    feasible piece around the start.
+    """
+    for number, goal in enumerate(goals):
         route = plan(eset, start, goal, within=within, margin=0.99 * margin)
-        if not route.arrived and within and ground is not None and len(ground.cells):
-            # a corridor between the vertices of the whole set
-            route = plan(ground, start, goal, within=within, margin=0.99 * margin)
+        if not route.arrived and within and piece is not None and len(piece.cells):
+            route = plan(piece, start, goal, within=within, margin=0.99 * margin)
         if route.arrived:
-            first = Optimum(optimum.state, optimum.value, optimum.certificate, route)
-            return [first, *(other for _, other in found[number + 1 :])]
-    return []
+            return number, route
+    return None
 
 
 def _before_the_edge(programme: Programme, end: LocalMinimum) -> State | None:
@@ -370,7 +361,7 @@ def _before_the_edge(programme: Programme, end: LocalMinimum) -> State | None:
     slopes = end.expansion.g_slope[0, active]
     slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-300)
     step, *_ = np.linalg.lstsq(slopes, np.full(len(active), -STEP_BACK), rcond=1e-6)
-    spot = SetPoints(end.spot.z, end.spot.p, end.spot.rows)
+    spot = SetPoints(end.point.z, end.point.p, end.point.rows)
     guess = step_along(programme.setting, spot, end.frames, step[None])
     there, good = project_onto_set(programme.setting, *guess, spot.rows)
     return State(programme.setting.structure, there.z[0], there.p[0]) if good[0] else None

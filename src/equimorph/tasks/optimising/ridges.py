@@ -117,7 +117,7 @@ def _top_of_cliff(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> 
     """Climb the limit load on the higher side of a cliff along the curve, by polynomials."""
     width = WIDEST
     for _ in range(ITERATIONS):
-        values = _along(lmap, locus, spot, (side, width))
+        values = _along(lmap, locus, spot, side, width)
         if values is None:  # the curve ends, or the cliff does
             width *= 0.2
         else:
@@ -136,10 +136,9 @@ def _top_of_cliff(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> 
 
 
 def _along(
-    lmap: LimitLoadMap, locus: Locus, spot: Spot, beside: tuple[float, float]
+    lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float, width: float
 ) -> Float[np.ndarray, " stencil"] | None:
     """Limit loads close to a curve, on one side of it, at steps of a width along it."""
-    side, width = beside
     spots = [spot if step == 0.0 else advance(locus, spot, step * width) for step in STENCIL]
     known = [each for each in spots if each is not None]
     if len(known) < len(spots):

@@ -243,7 +243,7 @@ def _edge_programme(question: _Question, number: int) -> Programme:
 
 
 def _edge(programme: Programme, corner: Corner, end: LocalMinimum) -> _End:
-    state = State(programme.setting.structure, end.spot.z[0], end.spot.p[0])
+    state = State(programme.setting.structure, end.point.z[0], end.point.p[0])
     found = certificate(programme, end)
     return _End(state, float(end.expansion.f.max()), corner.offsets, found, False)
 

@@ -18,6 +18,7 @@ from equimorph.tasks.optimising.tangent_steps import (
 )
 
 ITERATIONS, HALVINGS = 40, 10
+"""Most steps of a descent, and how often a step is halved that does not lower the merit."""
 LONGEST = 0.3
 """Longest step in the metric."""
 STILL = 1e-9
@@ -40,7 +41,7 @@ class LocalMinimum:
 
     Parameters
     ----------
-    spot
+    point
         The point, one lane.
     frames
         Orthonormal tangents there.
@@ -52,18 +53,39 @@ class LocalMinimum:
         Whether the last step was at round-off.
     """
 
-    spot: SetPoints
+    point: SetPoints
     frames: Frames
     expansion: Expansion
     answer: Answer
     converged: bool
 
 
+@dataclass(frozen=True)
+class _Iterate:
+    """Points of all lanes that still move, with tangents and derivatives there."""
+
+    points: SetPoints
+    frames: Frames
+    expansion: Expansion
+
+    @classmethod
+    def at(cls, programme: Programme, points: SetPoints) -> "_Iterate":
+        """Expand the programme at points."""
+        frames, points = tangents_at(programme.setting, points)
+        return cls(points, frames, programme.expanded(points, frames))
+
+    def minimum(self, k: int, answer: Answer, converged: bool) -> LocalMinimum:
+        """Lane `k` as a point from which no step is made."""
+        expansion = Expansion(*(column[k : k + 1] for column in vars(self.expansion).values()))
+        points = self.points.take(np.array([k]))
+        return LocalMinimum(points, self.frames[k : k + 1], expansion, answer, converged)
+
+
 @dataclass
 class _Lane:
     """One start on its way."""
 
-    spot: SetPoints
+    point: SetPoints
     reach: float = LONGEST
     penalty: float = 1.0
     answer: Answer | None = None
@@ -84,26 +106,25 @@ def descend(
         todo = [lane for lane in lanes if lane.done is None and lane.reach > 0.0]
         if not todo:
             break
-        here = join_points([lane.spot for lane in todo])
+        here = join_points([lane.point for lane in todo])
         alone = _first_of_each(programme, here)
         for k in set(range(len(todo))) - set(alone):
             todo[k].reach = 0.0
         todo, here = [todo[k] for k in alone], here.take(np.array(alone))
-        frames, here = tangents_at(programme.setting, here)
-        expansion = programme.expanded(here, frames)
-        _remember(todo, here, expansion)
-        answers = [_answer(expansion, k, lane) for k, lane in enumerate(todo)]
-        _advance(programme, todo, here, (frames, expansion), answers)
+        iterate = _Iterate.at(programme, here)
+        _remember(todo, iterate)
+        answers = [_answer(iterate.expansion, k, lane) for k, lane in enumerate(todo)]
+        _advance(programme, todo, iterate, answers)
     _stop(programme, lanes)
     return [lane.done for lane in lanes if lane.done is not None]
 
 
-def _remember(todo: list[_Lane], here: SetPoints, expansion: Expansion) -> None:
+def _remember(todo: list[_Lane], at: _Iterate) -> None:
     """Keep the best feasible point of each lane."""
     for k, lane in enumerate(todo):
-        value = float(expansion.f[k].max())
-        if value < lane.least and expansion.g[k].max() <= FEASIBLE:
-            lane.best, lane.least = here.take(np.array([k])), value
+        value = float(at.expansion.f[k].max())
+        if value < lane.least and at.expansion.g[k].max() <= FEASIBLE:
+            lane.best, lane.least = at.points.take(np.array([k])), value
 
 
 def _stop(programme: Programme, lanes: list[_Lane]) -> None:
@@ -117,12 +138,11 @@ def _stop(programme: Programme, lanes: list[_Lane]) -> None:
     if not left:
         return
     best = [lane.best for lane in left if lane.best is not None]
-    frames, here = tangents_at(programme.setting, join_points(best))
-    expansion = programme.expanded(here, frames)
+    iterate = _Iterate.at(programme, join_points(best))
     for k, lane in enumerate(left):
-        answer = _answer(expansion, k, lane)
+        answer = _answer(iterate.expansion, k, lane)
         if answer is not None:
-            lane.done = _settled(here, (frames, expansion), k, answer, False)
+            lane.done = iterate.minimum(k, answer, converged=False)
 
 
 def _first_of_each(programme: Programme, here: SetPoints) -> list[int]:
@@ -168,35 +188,29 @@ def _restored(model: Quadratic, reach: float) -> Answer:
 
 
 def _advance(
-    programme: Programme,
-    todo: list[_Lane],
-    here: SetPoints,
-    derivatives: tuple[Frames, Expansion],
-    answers: list[Answer | None],
+    programme: Programme, todo: list[_Lane], at: _Iterate, answers: list[Answer | None]
 ) -> None:
     """Move every lane by its step, shortened until its merit falls."""
-    frames, expansion = derivatives
-    waiting: list[tuple[int, float]] = []
+    steps: dict[int, Answer] = {}
     for k, (lane, answer) in enumerate(zip(todo, answers, strict=True)):
         lane.answer = answer
-        length = float(np.linalg.norm(answer.step)) if answer is not None else 0.0
         if answer is None:
             lane.reach = 0.0
-        elif length < STILL:
-            lane.done = _settled(here, derivatives, k, answer, True)
+        elif np.linalg.norm(answer.step) < STILL:
+            lane.done = at.minimum(k, answer, converged=True)
         else:
-            own = PENALTY * max(float(answer.multipliers.sum()), _steepness(expansion, k))
+            own = PENALTY * max(float(answer.multipliers.sum()), _steepness(at.expansion, k))
             lane.penalty = max(lane.penalty, own)
-            waiting.append((k, 1.0))
+            steps[k] = answer
+    waiting, share = list(steps), 1.0
     for _ in range(HALVINGS):
         if not waiting:
             return
-        waiting = _tried(programme, todo, (here, frames, expansion), answers, waiting)
-    for k, _ in waiting:
-        answer = answers[k]
-        assert answer is not None
-        small = float(np.linalg.norm(answer.step)) < STALLED
-        todo[k].done = _settled(here, derivatives, k, answer, small)
+        waiting = _try_steps(programme, todo, at, {k: steps[k].step for k in waiting}, share)
+        share *= 0.5
+    for k in waiting:
+        small = bool(np.linalg.norm(steps[k].step) < STALLED)
+        todo[k].done = at.minimum(k, steps[k], small)
 
 
 def _steepness(expansion: Expansion, k: int) -> float:
@@ -209,41 +223,29 @@ def _steepness(expansion: Expansion, k: int) -> float:
     return float(steepest / np.maximum(slopes, 1e-6).min())
 
 
-def _tried(
+def _try_steps(
     programme: Programme,
     todo: list[_Lane],
-    ground: tuple[SetPoints, Frames, Expansion],
-    answers: list[Answer | None],
-    waiting: list[tuple[int, float]],
-) -> list[tuple[int, float]]:
-    """Lanes whose merit does not fall after the share of their steps, with half of it."""
-    here, frames, expansion = ground
-    lanes = np.array([k for k, _ in waiting])
-    steps = np.stack([share * answers[k].step for k, share in waiting])  # type: ignore[union-attr]
-    at = here.take(lanes)
-    guess = step_along(programme.setting, at, frames[lanes], steps)
-    there, found = project_onto_set(programme.setting, *guess, at.rows)
+    at: _Iterate,
+    steps: dict[int, Float[np.ndarray, " d"]],
+    share: float,
+) -> list[int]:
+    """Make a share of the steps of some lanes; those whose merit does not fall are returned."""
+    lanes = np.array(list(steps))
+    here, expansion = at.points.take(lanes), at.expansion
+    moves = share * np.stack(list(steps.values()))
+    guess = step_along(programme.setting, here, at.frames[lanes], moves)
+    there, found = project_onto_set(programme.setting, *guess, here.rows)
     value = programme.objective.values(there.z, there.p)
     excess = np.maximum(programme.excess(there.z, there.p), 0.0).sum(axis=1)
     left = []
-    for i, (k, share) in enumerate(waiting):
+    for i, k in enumerate(steps):
         lane = todo[k]
         before = expansion.f[k].max() + lane.penalty * np.maximum(expansion.g[k], 0.0).sum()
         after = value[i] + lane.penalty * excess[i]
         if found[i] and after < before:
-            lane.spot = there.take(np.array([i]))
+            lane.point = there.take(np.array([i]))
             lane.reach = min(LONGEST, 2.0 * lane.reach) if share == 1.0 else lane.reach
         else:
-            left.append((k, 0.5 * share))
+            left.append(k)
     return left
-
-
-def _settled(
-    here: SetPoints, derivatives: tuple[Frames, Expansion], k: int, answer: Answer, converged: bool
-) -> LocalMinimum:
-    frames, e = derivatives
-    own = Expansion(
-        e.f[k : k + 1], e.f_slope[k : k + 1], e.f_bend[k : k + 1], e.g[k : k + 1],
-        e.g_slope[k : k + 1], e.g_bend[k : k + 1], e.known[k : k + 1],
-    )  # fmt: skip
-    return LocalMinimum(here.take(np.array([k])), frames[k : k + 1], own, answer, converged)

@@ -12,6 +12,7 @@ from equimorph.arrays import Flags, Settings, Values
 from equimorph.equilibria import LimitLoad
 from equimorph.errors import InputError
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
+from equimorph.tasks.maps.actuator_map import settings_of
 from equimorph.tasks.optimising.ridges import BESIDE, highest_point, settings_across
 from equimorph.tasks.optimising.two_parameter_search import climb, maximise_least
 
@@ -198,20 +199,19 @@ def _sure(lmap: LimitLoadMap) -> list[Strongest]:
             sides = _sides(lmap, ridge.setting, ridge.across)
         if np.isfinite(sides).any() and np.isfinite(ridge.value):
             kind = f"{curve.kind}, cliff" if ridge.cliff else curve.kind
-            what = (ridge.value, kind, ridge.slope)
-            found.append(_strongest(lmap, ridge.setting, what, sides))
+            found.append(_strongest(lmap, ridge.setting, ridge.value, kind, ridge.slope, sides))
     vertices = _vertices(lmap, lmap.value)
     smooth = vertices[~_near_curves(lmap, vertices)]
     for setting in smooth if found else vertices[:1]:
         top = climb(lmap.rays, setting, _steps(lmap), lmap.grid.box)
         sides = _sides(lmap, top.setting, _steps(lmap) / np.linalg.norm(_steps(lmap)))
-        what = (top.value, "interior" if top.smooth else "edge", float(np.abs(top.slope).max()))
-        found.append(_strongest(lmap, top.setting, what, sides))
+        kind, slope = "interior" if top.smooth else "edge", float(np.abs(top.slope).max())
+        found.append(_strongest(lmap, top.setting, top.value, kind, slope, sides))
     return _distinct(lmap, found)
 
 
 def _level(curve: MapCurve) -> float:
-    """Highest known value at a curve."""
+    """Largest known value at a curve."""
     return float(np.nan_to_num(curve.values[:, 1]).max(initial=0.0))
 
 
@@ -273,13 +273,15 @@ def _sides(
 def _strongest(
     lmap: LimitLoadMap,
     setting: Float[np.ndarray, " 2"],
-    what: tuple[float, str, float],
+    value: float,
+    kind: str,
+    slope: float,
     sides: Float[np.ndarray, "2 distances"],
 ) -> Strongest:
     box = lmap.grid.box
     place = np.clip(setting, box.lower, box.upper)
     at = dict(zip(lmap.grid.names, place.tolist(), strict=True))
-    return Strongest(at, *what, BESIDE, sides, lmap.at(**at))
+    return Strongest(at, value, kind, slope, BESIDE, sides, lmap.at(**at))
 
 
 def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -> StrongestSettings:
@@ -299,7 +301,7 @@ def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -
         around = np.concatenate([around, everywhere[[lowest]]])
     nominal, guaranteed = float(lmap.rays(setting[None])[0]), min(guaranteed, values[lowest])
     sides = _sides(lmap, setting, size / np.linalg.norm(size))
-    found = _strongest(lmap, setting, (nominal, "robust", np.nan), sides)
+    found = _strongest(lmap, setting, nominal, "robust", np.nan, sides)
     best = np.array(list(sure.setting.values()))
     at_risk = float(np.nan_to_num(lmap.rays(best + everywhere), nan=0.0).min())
     price = sure.value - nominal
@@ -321,7 +323,7 @@ def _raised(
     def worst(settings: Settings) -> Values:
         return np.asarray(pieces(settings).min(axis=1))
 
-    value = worst(_lattice(lmap)).reshape(lmap.value.shape)
+    value = worst(settings_of(lmap.grid)[0]).reshape(lmap.value.shape)
     radius, box = _steps(lmap), lmap.grid.box
     ends = []
     for vertex in _vertices(lmap, value)[:ROBUST]:
@@ -330,8 +332,3 @@ def _raised(
         top = climb(worst, raised_to, 0.1 * radius, box)
         ends.append(maximise_least(pieces, top.setting, 0.1 * radius, box))
     return max(ends, key=lambda end: end[1])
-
-
-def _lattice(lmap: LimitLoadMap) -> Settings:
-    axes = lmap.grid.axes()
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)

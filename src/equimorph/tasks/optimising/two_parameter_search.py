@@ -14,13 +14,16 @@ Function = Callable[[Float[np.ndarray, "lanes 2"]], Values]
 
 NINE = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), indexing="ij"), -1).reshape(-1, 2)
 DIRECTIONS = 12
+"""Settings on a circle that are tried at once; as many again at 0.3 of its radius."""
 SMALLEST_RADIUS = 1e-5
 """Radius of the search, in its first one, at which it ends."""
 ROUNDS = 40
+"""Most circles."""
 
 Pieces = Callable[[Float[np.ndarray, "lanes 2"]], Float[np.ndarray, "lanes m"]]
 
 ITERATIONS = 30
+"""Most steps."""
 DIFFERENCE = 1e-4
 """Step of differences, in radii."""
 GENTLE = 1e-3
@@ -60,7 +63,7 @@ def climb(function: Function, start: Pair, radius: Pair, box: Box) -> LocalMaxim
             here, value = np.clip(tried[best], box.lower, box.upper), float(values[best])
         else:
             size *= 0.5
-            done = _parabola(function, (here, value), size * radius, box)
+            done = _parabola(function, here, value, size * radius, box)
             if done is not None:
                 return done
     return LocalMaximum(here, value, np.full(2, np.nan), False)
@@ -72,10 +75,9 @@ def _values(function: Function, settings: Float[np.ndarray, "lanes 2"], box: Box
 
 
 def _parabola(
-    function: Function, here: tuple[Pair, float], radius: Pair, box: Box
+    function: Function, place: Pair, value: float, radius: Pair, box: Box
 ) -> LocalMaximum | None:
     """Top by Newton's method on parabolas, if the ground is smooth and the top inside."""
-    place, value = here
     share = 1.0
     slope = np.full(2, np.nan)
     for _ in range(6):
@@ -116,7 +118,7 @@ def maximise_least(pieces: Pieces, start: Pair, radius: Pair, box: Box) -> tuple
             break
         # the next points come with what is around them: a call costs more than its lanes
         reaches = reach * SHORTER
-        steps = [_step(around, here, (radius, each), box) for each in reaches]
+        steps = [_step(around, here, radius, each, box) for each in reaches]
         tried = [
             (each, step) for each, step in zip(reaches, steps, strict=True) if step is not None
         ]
@@ -149,10 +151,9 @@ def _around(
 
 
 def _step(
-    values: Float[np.ndarray, "5 m"], here: Pair, size: tuple[Pair, float], box: Box
+    values: Float[np.ndarray, "5 m"], here: Pair, radius: Pair, reach: float, box: Box
 ) -> Float[np.ndarray, " 2"] | None:
     """Step, in radii, to the largest least value of the linear models."""
-    radius, reach = size
     slopes = np.stack([values[1] - values[2], values[3] - values[4]], axis=1) / (2.0 * DIFFERENCE)
     steepest = max(float(np.abs(slopes).max()), 1e-12)
     sides = np.array([(box.lower - here) / radius, (here - box.upper) / radius]).ravel()

@@ -1,4 +1,4 @@
-"""Chains of corners drawn to where they cost least, one move of every other corner at a time."""
+"""Corners of a route moved to where its legs cost least, every other corner at a time."""
 
 from dataclasses import dataclass, replace
 
@@ -12,8 +12,6 @@ from equimorph.structures import States
 from equimorph.tasks.planning.network import Demands, connect
 from equimorph.tasks.planning.objectives import Places
 
-Room = tuple[Box, Int[np.ndarray, " d"]]
-"""The box, and which parameters are free in it."""
 Some = Int[np.ndarray, " n"]
 
 FEW = Guards(iterations=8)
@@ -22,6 +20,14 @@ SIZES = (0.12, 0.04, 0.013)
 ROUNDS, POLISHING = 6, 2
 LEAST_GAIN = 2e-6
 """Share of the cost that a move has to gain."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Box in which corners may move, and the places of its parameters among all."""
+
+    box: Box
+    free: Int[np.ndarray, " d"]
 
 
 @dataclass(frozen=True)
@@ -49,46 +55,50 @@ class _Moves:
 
 
 def move_by_chords(corners: States, demands: Demands, room: Room) -> States:
-    """Corners moved as long as that makes their chords cheaper.
+    """Move corners as long as that makes their chords cheaper.
 
     A chord runs through the exact state amid two corners; costs are summed up over its two halves,
     and margins and constraints hold at all of these states. What comes out may be impossible to
     lift: that is for `connect` to say.
     """
-    return _drawn(corners, demands, room, (SIZES, ROUNDS, False))
+    return _move_corners(corners, demands, room, SIZES, ROUNDS, by_lifts=False)
 
 
 def move_by_lifts(corners: States, demands: Demands, room: Room, quick: bool) -> States:
-    """Corners moved as long as that makes the straight lifts between them cheaper.
+    """Move corners as long as that makes the straight lifts between them cheaper.
 
-    `quick` where little is left to do.
+    `quick`: with small steps and few rounds, where little is left to gain.
     """
-    return _drawn(
-        corners, demands, room, (SIZES[1:], POLISHING, True) if quick else (SIZES, ROUNDS, True)
-    )
+    sizes, rounds = (SIZES[1:], POLISHING) if quick else (SIZES, ROUNDS)
+    return _move_corners(corners, demands, room, sizes, rounds, by_lifts=True)
 
 
 def chords(
-    corners: States, ways: tuple[Some, Some], demands: Demands
+    corners: States, first: Some, second: Some, demands: Demands
 ) -> tuple[Bool[np.ndarray, " n"], Values]:
     """Whether chords between some of the corners seem admissible, and what they cost."""
     places = demands.objective.places(corners)
-    return _chords(places[ways[0]], places[ways[1]], demands)
+    return _chords(places[first], places[second], demands)
 
 
-def _drawn(
-    corners: States, demands: Demands, room: Room, how: tuple[tuple[float, ...], int, bool]
+def _move_corners(
+    corners: States,
+    demands: Demands,
+    room: Room,
+    sizes: tuple[float, ...],
+    rounds: int,
+    by_lifts: bool,
 ) -> States:
-    sizes, rounds, lifted = how
+    """Move every other corner in turn, by smaller and smaller steps, while that saves cost."""
     places = demands.objective.places(corners)
     legs = _chords(places[:-1], places[1:], demands)[1]
-    lifts = connect(corners[:-1], corners[1:], demands)[1] if lifted else None
+    lifts = connect(corners[:-1], corners[1:], demands)[1] if by_lifts else None
     chain = _Chain(places, legs, lifts)
     for size in sizes:
         for _ in range(rounds):
             before = chain
             for odd in (1, 2):
-                chain = _moved(chain, (odd, size), demands, room)
+                chain = _moved(chain, odd, size, demands, room)
             if chain is before:
                 break
     return chain.corners.states
@@ -113,9 +123,9 @@ def _chords(
     return good, cost
 
 
-def _moved(chain: _Chain, move: tuple[int, float], demands: Demands, room: Room) -> _Chain:
+def _moved(chain: _Chain, odd: int, size: float, demands: Demands, room: Room) -> _Chain:
     """Chain with every other corner moved, if that makes its two legs cheaper."""
-    tried, new = _candidates(chain.corners.states, move, room)
+    tried, new = _candidates(chain.corners.states, odd, size, room)
     some = np.flatnonzero(demands.admissible(new)) if len(tried) else tried
     if len(some) == 0:
         return chain
@@ -150,12 +160,12 @@ def _joined(first: Places, second: Places) -> Places:
     )
 
 
-def _candidates(corners: States, move: tuple[int, float], room: Room) -> tuple[Some, States]:
+def _candidates(corners: States, odd: int, size: float, room: Room) -> tuple[Some, States]:
     """Equilibria beside every other corner, and which corner each of them is for.
 
     Whether these lie on the branch of the corner is what lifts from its neighbours show.
     """
-    (odd, size), (box, free) = move, room
+    box, free = room.box, room.free
     at = np.arange(odd, len(corners) - 1, 2)
     structure = corners.structure
     steps = size * structure.scales[free] * _directions(len(free))

@@ -1,6 +1,7 @@
 """The stable cells of a set as a network of straight lifts, computed once for all routes."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -13,12 +14,15 @@ from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
-from equimorph.model import Constraint
-from equimorph.structures import State, States
-from equimorph.tasks.planning.objectives import ROUGH, Objective
+from equimorph.model import Constraint, eased
+from equimorph.structures import State, States, Structure
+from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
 from equimorph.tasks.stable_part import cached
+from equimorph.tasks.start import check_margin_demand
 
+EXACT, RESERVES = (1.0, 0.0), ((1.01, 1e-3), (1.05, 1e-2), (1.15, 1e-2))
+"""Factors on the demanded margin, and shares of the smaller margin of the ends added to it."""
 CLOSE = 0.05
 """Largest step in the metric where the stability margin is watched along a lift."""
 BROAD = 0.1
@@ -43,6 +47,30 @@ class Demands:
     constraints: tuple[Constraint, ...] = ()
     margin: float = 0.0
     closely: bool = False
+
+    @classmethod
+    def of(
+        cls, structure: Structure, objective: Wish, within: Sequence[Constraint], margin: float
+    ) -> "Demands":
+        """Check what a caller demands of a route.
+
+        Raises
+        ------
+        InputError
+            For a negative margin, or an objective without meaning.
+        """
+        check_margin_demand(margin)
+        constraints = tuple(eased(each) for each in dict.fromkeys(within))
+        return cls(objective_of(objective, structure), constraints, margin)
+
+    def reserved(self, least: float) -> Iterator["Demands"]:
+        """Demands with growing reserves of margin, for dips between the points that are watched.
+
+        What leaves no room for a reserve is searched without one, too; without a demanded margin
+        that comes first. No reserve exceeds `least`, the smaller margin of start and goal.
+        """
+        for factor, share in (*RESERVES, EXACT) if self.margin > 0.0 else (EXACT, *RESERVES):
+            yield replace(self, margin=min(self.margin * factor + least * share, least))
 
     @property
     def options(self) -> TraceOptions:

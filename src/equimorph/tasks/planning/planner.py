@@ -8,10 +8,10 @@ import numpy as np
 from equimorph.equilibria import way_points
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, eased
+from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State
 from equimorph.tasks.planning.network import Demands, Ends, cheapest_path, explain_no_route
-from equimorph.tasks.planning.objectives import Wish, objective_of
+from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.snap_routes import route_with_snaps
 from equimorph.tasks.planning.straightening import (
     check_ends,
@@ -22,12 +22,6 @@ from equimorph.tasks.planning.straightening import (
 )
 from equimorph.tasks.route import Corners, Route, refusal
 from equimorph.tasks.start import Start, start_state
-
-EXACT, RESERVES = (1.0, 0.0), ((1.01, 1e-3), (1.05, 1e-2), (1.15, 1e-2))
-"""Factors on the demanded margin, and shares of that of the ends that are added to it.
-
-Dips between the points that are watched need a reserve.
-"""
 
 
 def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
@@ -86,14 +80,8 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         If `start` or `goal` is no equilibrium of the set's problem, a way-point lies outside the
         box, or `margin` is negative.
     """
-    if not margin >= 0.0:
-        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
     start = start_state(start)
-    demands = Demands(
-        objective_of(objective, eset.structure),
-        tuple(eased(each) for each in dict.fromkeys((*eset.constraints, *within))),
-        margin,
-    )
+    demands = Demands.of(eset.structure, objective, (*eset.constraints, *within), margin)
     ends = (start, goal)
     check_ends(eset, ends)
     corners = None if via is None else _checked_corners(eset, start, goal, via)
@@ -135,10 +123,8 @@ def _with_reserves(
     eset: EquilibriumSet, ends: Ends, demands: Demands, monitor: Sequence[Descriptor]
 ) -> Route | None:
     """Route, the last one that was refused, or None where no path leads to the goal."""
-    least, route = min(end.margin for end in ends), None
-    for factor, share in (*RESERVES, EXACT) if demands.margin > 0.0 else (EXACT, *RESERVES):
-        reserved = min(demands.margin * factor + least * share, least)
-        tightened = replace(demands, margin=reserved)
+    route = None
+    for tightened in demands.reserved(min(end.margin for end in ends)):
         path = cheapest_path(eset, ends, tightened)
         if path is not None:
             route = route_over_corners(

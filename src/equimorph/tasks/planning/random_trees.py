@@ -76,11 +76,11 @@ class LoadCourse:
         self,
         tree: "Tree",
         near: Numbers,
-        aim: tuple[Float[np.ndarray, "lanes d"], Values],
+        a: Float[np.ndarray, "lanes d"],
+        s: Values,
         reach: float,
     ) -> tuple[Float[np.ndarray, "lanes d"], Values]:
         """Settings at most `reach` from nodes towards others, no further than the next corner."""
-        a, s = aim
         here, own = tree.p[near][:, self.free], tree.s[near]
         half = 0.5 * (self.box.upper - self.box.lower)
         far = np.sqrt((((a - here) / half) ** 2).sum(axis=1) + (s - own) ** 2)
@@ -143,10 +143,16 @@ class Tree:
         return way[::-1]
 
 
-def joined_path(
-    first: Tree, here: int, second: Tree | None, there: int
-) -> tuple[States, Float[np.ndarray, " nodes"]]:
-    """States from the root of a tree to that of another, and their places along the course."""
+@dataclass(frozen=True)
+class TreePath:
+    """States along a path through trees, and their places along the course of the loads."""
+
+    states: States
+    places: Float[np.ndarray, " nodes"]
+
+
+def joined_path(first: Tree, here: int, second: Tree | None, there: int) -> TreePath:
+    """Path from the root of a tree to that of another."""
     way = first.branch(here)
     z, p, s = first.z[way], first.p[way], first.s[way]
     if second is not None:
@@ -155,7 +161,7 @@ def joined_path(
             np.concatenate([one, other[back]])
             for one, other in ((z, second.z), (p, second.p), (s, second.s))
         )
-    return States(first.structure, z, p), s
+    return TreePath(States(first.structure, z, p), s)
 
 
 def constraint_slopes(
@@ -188,13 +194,14 @@ def project_onto_constraints(
     change: Float[np.ndarray, "lanes d"],
     excess: Float[np.ndarray, "lanes constraints"],
     slopes: Float[np.ndarray, "lanes constraints d"],
-    room: tuple[Float[np.ndarray, "lanes d"], Float[np.ndarray, "lanes d"]],
+    low: Float[np.ndarray, "lanes d"],
+    high: Float[np.ndarray, "lanes d"],
     inside: Float[np.ndarray, " constraints"],
 ) -> Float[np.ndarray, "lanes d"]:
     """Changes near the given ones after which no linearised constraint is violated.
 
-    Projections onto one constraint after the other, with the changes kept in their room. Where
-    constraints contradict each other they stay violated, and a lift will tell.
+    Projections onto one constraint after the other, with the changes kept between `low` and `high`.
+    Where constraints contradict each other they stay violated, and a lift decides.
     """
     change = change.copy()
     norms = np.maximum((slopes**2).sum(axis=2), 1e-300)
@@ -203,7 +210,7 @@ def project_onto_constraints(
             over = excess[:, k] + (slopes[:, k] * change).sum(axis=1) + inside[k]
             share = np.maximum(over, 0.0) / norms[:, k]
             change -= share[:, None] * slopes[:, k]
-        change = np.clip(change, *room)
+        change = np.clip(change, low, high)
     return change
 
 

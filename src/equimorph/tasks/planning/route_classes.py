@@ -1,7 +1,7 @@
 """`alternatives`: the best routes that pass the holes of the stable set in different ways."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from heapq import heappop, heappush
 
 import numpy as np
@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Edges
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, eased
+from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.planning.homology import cocycles
 from equimorph.tasks.planning.network import (
@@ -22,8 +22,7 @@ from equimorph.tasks.planning.network import (
     network_of,
     nodes_with_ends,
 )
-from equimorph.tasks.planning.objectives import Wish, objective_of
-from equimorph.tasks.planning.planner import EXACT, RESERVES
+from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.straightening import (
     check_ends,
     route_over_corners,
@@ -87,18 +86,14 @@ def alternatives(
         raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
     if count < 1:
         raise InputError(f"`count` must be at least 1; got {count!r}.")
-    wish = objective_of(objective, eset.structure)
-    obeyed = tuple(eased(each) for each in dict.fromkeys((*eset.constraints, *within)))
-    demands = Demands(wish, obeyed, margin)
+    demands = Demands.of(eset.structure, objective, (*eset.constraints, *within), margin)
     ends = (start, goal)
     check_ends(eset, ends)
     why = violation(ends, demands)
     if why:
         return (refusal(why),)
     best, failed = list[Route](), list[Route]()
-    least = min(end.margin for end in ends)
-    for factor, share in (*RESERVES, EXACT) if margin > 0.0 else (EXACT, *RESERVES):
-        tightened = replace(demands, margin=min(margin * factor + least * share, least))
+    for tightened in demands.reserved(min(end.margin for end in ends)):
         paths = _Classes(eset, ends, tightened).paths(count)
         corners = [straight_corners(eset, path, tightened, same_class=True) for path in paths]
         routes = [route_over_corners(eset, each, demands, monitor) for each in corners]

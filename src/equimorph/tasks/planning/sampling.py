@@ -7,22 +7,25 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Values
-from equimorph.equilibria import check_start, way_points
+from equimorph.equilibria import way_points
 from equimorph.errors import InputError
-from equimorph.model import Box, Constraint, Descriptor, eased, position
+from equimorph.model import Box, Constraint, Descriptor, position
 from equimorph.structures import State, States, Structure
+from equimorph.tasks.planning.corner_moves import Room
 from equimorph.tasks.planning.network import Demands, connect, lift_straight
-from equimorph.tasks.planning.objectives import Wish, objective_of
+from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.random_trees import (
     LoadCourse,
     Tree,
+    TreePath,
     constraint_slopes,
     insets,
     joined_path,
     project_onto_constraints,
 )
-from equimorph.tasks.planning.straightening import relax_corners, straighten
+from equimorph.tasks.planning.straightening import check_margin, relax_corners, straighten
 from equimorph.tasks.route import Corners, Route, refusal, verify_route
+from equimorph.tasks.start import check_equilibrium
 
 RESERVES = (1.0, 1.1)
 CONNECTIONS = 4
@@ -101,11 +104,8 @@ def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyw
         If an end is no equilibrium, lies outside the box or does not fit the loads, names are
         unknown or both actuator and load, or `margin` is negative.
     """
-    if not margin >= 0.0:
-        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
     options = options or SamplingOptions()
-    wish = objective_of(objective, start.structure)
-    demands = Demands(wish, tuple(eased(each) for each in dict.fromkeys(within)), margin)
+    demands = Demands.of(start.structure, objective, within, margin)
     course = _course(start, actuators, loads)
     ends = _checked_ends(start, goal, course)
     for name, state in ends.items():
@@ -121,40 +121,31 @@ def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyw
             return refusal(
                 f"no route was found with {options.lifts} lifts, which is no proof that none exists"
             )
-        last = goal or path[0][-1]
-        route = _drawn(course, path, (start, last), (demands, tightened), monitor)
+        route = _straightened_route(course, path, demands, tightened, monitor)
         if route.arrived:
             break
     return route
 
 
-def _drawn(
+def _straightened_route(
     course: LoadCourse,
-    path: tuple[States, Float[np.ndarray, " nodes"]],
-    ends: tuple[State, State],
-    demands: tuple[Demands, Demands],
+    path: TreePath,
+    demands: Demands,
+    tightened: Demands,
     monitor: Sequence[Descriptor],
 ) -> Route:
-    """Route along a straightened path, by fine lifts where coarse ones step over a corner."""
-    own, tightened = demands
-    rules, route = own.constraints, refusal("")
+    """Route along a straightened path, by fine lifts where coarse ones step over a corner.
+
+    Searched with tightened demands, verified with those of the caller.
+    """
+    rules, route = demands.constraints, refusal("")
+    first, last = path.states[0], path.states[len(path.states) - 1]
     for closely in (False, True) if rules else (False,):
         corners = _corners(course, path, replace(tightened, closely=closely))
-        route = _kept(verify_route(*ends, corners, rules, monitor), own)
+        route = check_margin(verify_route(first, last, corners, rules, monitor), demands)
         if route.arrived:
             break
     return route
-
-
-def _kept(route: Route, demands: Demands) -> Route:
-    if not route.arrived:
-        return route
-    if route.margin < demands.margin:
-        why = f"the stability margin falls to {route.margin:.4g}, below {demands.margin:g}"
-        return refusal(why, route.way_points, route.path)
-    assert route.path is not None
-    cost = demands.objective.along(route.path.states)
-    return replace(route, objective=str(demands.objective), cost=cost)
 
 
 def _course(start: State, actuators: Box, loads: Sequence[Mapping[str, float]]) -> LoadCourse:
@@ -174,10 +165,7 @@ def _checked_ends(start: State, goal: State | None, course: LoadCourse) -> dict[
         raise InputError("`goal` must be given, unless loads move; got none.")
     ends = {"start": start} if goal is None else {"start": start, "goal": goal}
     for name, state in ends.items():
-        try:
-            check_start(state)
-        except InputError as error:
-            raise InputError(str(error).replace("`state`", f"`{name}`")) from None
+        check_equilibrium(name, state)
         if not course.box.contains(state.p[course.free], slack=1e-9):
             raise InputError(f"`{name}` must lie in {course.box}; got {state.parameters}.")
         last = course.corners[-1 if name == "goal" else 0].copy()
@@ -209,7 +197,7 @@ class _Search:
         self.generator = np.random.default_rng(options.seed)
         self.lifts = 0
 
-    def path(self) -> tuple[States, Float[np.ndarray, " nodes"]] | None:
+    def path(self) -> TreePath | None:
         """States from start to goal with their places along the course, or None."""
         if len(self.trees) == 2 and (found := self._join(0, np.zeros(1, int))):
             return found
@@ -232,7 +220,7 @@ class _Search:
         a, s = course.sample(self.options.batch, self.generator)
         near = tree.nearest(course, a, s)
         near, a, s = near[near >= 0], a[near >= 0], s[near >= 0]
-        a, s = course.towards(tree, near, (a, s), self.options.reach)
+        a, s = course.towards(tree, near, a, s, self.options.reach)
         states = States(self.structure, tree.z[near], tree.p[near])
         if self.demands.constraints:
             a = self._pushed(states, tree.s[near], a, s)
@@ -259,15 +247,13 @@ class _Search:
         excess, slopes = constraint_slopes(states, directions, within)
         # loads move by the whole of the last direction, actuators by shares of the others
         excess = excess + slopes[:, :, -1]
-        room = ((course.box.lower - here) / half, (course.box.upper - here) / half)
+        low, high = (course.box.lower - here) / half, (course.box.upper - here) / half
         change = project_onto_constraints(
-            (a - here) / half, excess, slopes[:, :, :-1], room, insets(within)
+            (a - here) / half, excess, slopes[:, :, :-1], low, high, insets(within)
         )
         return np.asarray(here + change * half)
 
-    def _join(
-        self, which: int, new: Int[np.ndarray, " new"]
-    ) -> tuple[States, Float[np.ndarray, " nodes"]] | None:
+    def _join(self, which: int, new: Int[np.ndarray, " new"]) -> TreePath | None:
         """Path through the first of new nodes that a straight lift joins with the other tree."""
         own, other = self.trees[which], self.trees[1 - which]
         mine, theirs = other.candidates(self.course, own, new, CONNECTIONS)
@@ -285,11 +271,9 @@ class _Search:
         return joined_path(self.trees[0], here, self.trees[1], there)
 
 
-def _corners(
-    course: LoadCourse, path: tuple[States, Float[np.ndarray, " nodes"]], demands: Demands
-) -> Corners:
+def _corners(course: LoadCourse, path: TreePath, demands: Demands) -> Corners:
     """Way-points of a path, straightened leg by leg of the loads."""
-    states, s = path
+    states, s = path.states, path.places
     names = [parameter.name for parameter in states.structure.parameters]
     corners: Corners = []
     for leg in range(max(course.legs, 1)):
@@ -297,7 +281,7 @@ def _corners(
         section = states[inside]
         if course.legs == 0:
             section = relax_corners(
-                straighten(section, demands), demands, (course.box, course.free)
+                straighten(section, demands), demands, Room(course.box, course.free)
             )
         else:
             section = straighten(section, demands)

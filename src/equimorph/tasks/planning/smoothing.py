@@ -10,15 +10,15 @@ from jaxtyping import Float
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Spline, names_of
-from equimorph.structures import State
 from equimorph.tasks.route import FINE, Route, distance, refusal, schedule_of
+from equimorph.tolerances import SAME_STATE
 
 Places = Float[np.ndarray, "_ parameters"]
 
-DENSE = 2000
 KNOTS = 120
+"""Points of a rounded polygon, through which the spline runs."""
 HALVINGS = 6
-SAME = 1e-6
+"""How often the roundings are halved before a route is refused."""
 
 
 def smoothed(
@@ -68,7 +68,7 @@ def smoothed(
     why = ""
     for _ in range(HALVINGS):
         curve = _rounded(corners, tolerance) * structure.scales
-        found = _verified(route, states[0], curve, (tuple(within), margin, tuple(monitor)))
+        found = _verified(route, curve, tuple(within), margin, tuple(monitor))
         if found.arrived:
             return found
         why, tolerance = found.why, 0.5 * tolerance
@@ -125,19 +125,21 @@ def _off(curve: Places, corners: Places) -> float:
 
 def _verified(
     route: Route,
-    start: State,
     curve: Places,
-    demands: tuple[tuple[Constraint, ...], float, tuple[Descriptor, ...]],
+    within: tuple[Constraint, ...],
+    margin: float,
+    monitor: tuple[Descriptor, ...],
 ) -> Route:
-    within, margin, monitor = demands
+    """Lift a curve finely from the start of a route; refused if it does not lead to its end."""
+    assert route.path is not None
+    start = route.path.states[0]
     names = names_of(start.structure.parameters)
     moving = np.ptp(curve, axis=0) > 0.0
     samples = {name: curve[:, k] for k, name in enumerate(names) if moving[k]}
     path = lift(start, Spline(**samples), within=within, options=FINE)
     if not path.arrived:
         return refusal(f"it meets a {path.end.kind}", route.way_points, path)
-    assert route.path is not None
-    if distance(path.end.state, route.path.end.state) > SAME:
+    if distance(path.end.state, route.path.end.state) > SAME_STATE:
         return refusal("it leads to another equilibrium", route.way_points, path)
     margins = path.states.margin
     if margins.min() < margin or not (margins > 0.0).all():

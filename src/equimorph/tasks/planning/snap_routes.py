@@ -29,11 +29,12 @@ from equimorph.tasks.planning.straightening import (
 )
 from equimorph.tasks.route import FINE, Corners, Route, distance, refusal, schedule_of
 from equimorph.tasks.stable_part import cached
+from equimorph.tolerances import SAME_STATE
 
 SAMPLES = 9
+"""Points of each fold whose snaps are followed to where they land."""
 BEYOND = 0.02
 """How far beyond the fold the parameters go, in their scales, so that the structure does snap."""
-LANDED = 1e-4
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,14 @@ class Gate:
     source: int
     fold: State
     landing: Landing
+
+
+@dataclass(frozen=True)
+class SnapPath:
+    """States of each stable part of a path, and the numbers of the gates between them."""
+
+    stable: list[States]
+    gates: list[int]
 
 
 def gates_of(eset: EquilibriumSet, demands: Demands) -> list[Gate]:
@@ -86,16 +95,16 @@ def route_with_snaps(
     search = _Search(eset, ends, demands, price)
     tried = 0
     while True:
-        parts = search.parts()
-        if parts is None:
+        path = search.path()
+        if path is None:
             return refusal("not even by snaps does the goal lie on a piece that can be reached")
-        route = _verified(eset, ends, parts, demands, monitor)
+        route = _verified(eset, ends, path, demands, monitor)
         tried += 1
         if route.arrived:
             return replace(route, cost=route.cost + price * len(route.snaps))
-        if not parts[1] or tried > len(search.gates):
+        if not path.gates or tried > len(search.gates):
             return route
-        search.close(parts[1])
+        search.close(path.gates)
 
 
 class _Search:
@@ -128,8 +137,8 @@ class _Search:
         """Do not use gates again."""
         self.closed.update(gates)
 
-    def parts(self) -> tuple[list[States], list[int]] | None:
-        """States of each stable part of the cheapest path, and the gates between them."""
+    def path(self) -> SnapPath | None:
+        """The cheapest path all of whose links can be lifted; None if there is none."""
         allowed = self.network.allowed(self.eset, self.demands)
         broken, lifted = self.network.verdicts(self.demands)
         costs = self.network.costs(self.eset, self.demands.objective)
@@ -171,7 +180,7 @@ class _Search:
             path.append(int(before[path[-1]]))
         return np.array(path[::-1])
 
-    def _divided(self, path: Int[np.ndarray, " n"]) -> tuple[list[States], list[int]]:
+    def _divided(self, path: Int[np.ndarray, " n"]) -> SnapPath:
         """Parts of a path between its snaps."""
         sources = {gate.source for gate in self.gates}
         cuts = [
@@ -180,7 +189,9 @@ class _Search:
             if b >= self.first and a < self.first and a in sources and self._is_snap(a, b)
         ]
         parts = np.split(path, cuts)
-        return [self.states[part] for part in parts], [int(p[0]) - self.first for p in parts[1:]]
+        return SnapPath(
+            [self.states[part] for part in parts], [int(p[0]) - self.first for p in parts[1:]]
+        )
 
     def _is_snap(self, a: int, b: int) -> bool:
         gate = self.gates[b - self.first]
@@ -191,12 +202,12 @@ class _Search:
 def _verified(
     eset: EquilibriumSet,
     ends: Ends,
-    parts: tuple[list[States], list[int]],
+    path: SnapPath,
     demands: Demands,
     monitor: Sequence[Descriptor],
 ) -> Route:
     """Lift every part finely; snaps start from where the lifts meet the folds."""
-    stable, numbers = parts
+    stable, numbers = path.stable, path.gates
     if not numbers:
         return route_over_corners(
             eset, straight_corners(eset, stable[0], demands), demands, monitor
@@ -210,21 +221,21 @@ def _verified(
         if beyond is None:
             return refusal("the parameters beyond a fold lie outside the box")
         corners = [*corners, *_corners(eset, part, demands), beyond]
-        path = lift(here, corners, within=demands.constraints, options=FINE)
+        leg = lift(here, corners, within=demands.constraints, options=FINE)
         way_points += corners
-        if path.end.kind not in ("fold", "branch point"):
-            return refusal(f"a part meant to end in a snap ends otherwise: {path.end.kind}")
-        landing = _landing(path.end.state, gate)
+        if leg.end.kind not in ("fold", "branch point"):
+            return refusal(f"a part meant to end in a snap ends otherwise: {leg.end.kind}")
+        landing = _landing(leg.end.state, gate)
         if landing is None:
             return refusal("a snap does not land where it does from the set")
-        paths.append(path)
+        paths.append(leg)
         snaps.append(landing)
         here, corners = landing.state, [beyond]
     last = [*corners, *_corners(eset, stable[-1], demands)]
-    path = lift(here, last, within=demands.constraints, options=FINE)
-    if not path.arrived or distance(path.end.state, ends[1]) > 1e-6:
-        return refusal(f"the part after the last snap ends otherwise: {path.end.kind}")
-    return _joined([*paths, path], tuple(snaps), [*way_points, *last], demands, monitor)
+    leg = lift(here, last, within=demands.constraints, options=FINE)
+    if not leg.arrived or distance(leg.end.state, ends[1]) > SAME_STATE:
+        return refusal(f"the part after the last snap ends otherwise: {leg.end.kind}")
+    return _joined([*paths, leg], tuple(snaps), [*way_points, *last], demands, monitor)
 
 
 def _corners(eset: EquilibriumSet, part: States, demands: Demands) -> Corners:

@@ -7,16 +7,16 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters
-from equimorph.equilibria import Guards, ParameterLine, TraceOptions, check_start, settle
+from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, position
-from equimorph.structures import State, States
+from equimorph.structures import States
 from equimorph.tasks.planning.corner_moves import Room, chords, move_by_chords, move_by_lifts
 from equimorph.tasks.planning.network import Demands, Ends, connect, shortest_path
 from equimorph.tasks.route import Corners, Route, refusal, verify_route
+from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, inadmissible
 
 MOST_SHORTCUTS = 8000
 """Number of straight lifts that are tried to shorten a path within its class."""
@@ -149,7 +149,7 @@ def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
     near = second - first <= (3 if demands.objective.needs_margins else MERGED)
     first, second = first[near], second[near]
     if not same_class:
-        some = _promising(corners, (first, second), demands)
+        some = _promising(corners, first, second, demands)
         first, second = first[some], second[some]
     linked, cost = connect(corners[first], corners[second], demands)
     if same_class:
@@ -163,12 +163,12 @@ def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
 
 def _promising(
     corners: States,
-    ways: tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]],
+    first: Int[np.ndarray, " pairs"],
+    second: Int[np.ndarray, " pairs"],
     demands: Demands,
 ) -> Int[np.ndarray, " some"]:
     """Legs, and those unions of legs whose chords do not cost clearly more than these."""
-    first, second = ways
-    good, cost = chords(corners, ways, demands)
+    good, cost = chords(corners, first, second, demands)
     leg = second - first == 1
     before = np.concatenate([[0.0], np.cumsum(cost[leg])])
     apart = before[second] - before[first]
@@ -179,13 +179,17 @@ def _promising(
 def check_ends(eset: EquilibriumSet, ends: Ends) -> None:
     """Raise `InputError` unless start and goal are equilibria of the set's problem."""
     for name, state in zip(("start", "goal"), ends, strict=True):
-        _check_belongs(eset, name, state)
+        check_equilibrium(name, state)
+        check_fixed_parameters(name, state, eset)
 
 
-def violation(ends: Ends, demands: Demands) -> str | None:
-    """Why start or goal is no admissible end of a route, if one is not."""
-    faults = (_fault(name, end, demands) for name, end in zip(("start", "goal"), ends, strict=True))
-    return next((fault for fault in faults if fault), None)
+def violation(ends: Ends, demands: Demands) -> str:
+    """Why start or goal is no admissible end of a route; empty if both are."""
+    faults = (
+        inadmissible(name, state, demands.constraints, demands.margin)
+        for name, state in zip(("start", "goal"), ends, strict=True)
+    )
+    return next((fault for fault in faults if fault), "")
 
 
 def verify_way_points(
@@ -215,7 +219,7 @@ def straight_corners(
     """Corners of a straightened path, both ends among them."""
     corners = straighten(path, demands, same_class)
     free = np.array([position(eset.structure.parameters, name) for name in eset.names])
-    return relax_corners(corners, demands, (eset.box, free), same_class)
+    return relax_corners(corners, demands, Room(eset.box, free), same_class)
 
 
 def check_margin(route: Route, demands: Demands) -> Route:
@@ -231,30 +235,3 @@ def check_margin(route: Route, demands: Demands) -> Route:
         route.way_points,
         route.path,
     )
-
-
-def _check_belongs(eset: EquilibriumSet, name: str, state: State) -> None:
-    try:
-        check_start(state)
-    except InputError as error:
-        raise InputError(str(error).replace("`state`", f"`{name}`")) from None
-    here = {free: state[free] for free in eset.names}
-    wanted = eset.parameters_at(here)
-    if not np.allclose(wanted, state.p, rtol=0, atol=1e-9):
-        raise InputError(
-            f"`{name}` must have the fixed parameters of the set ({dict(eset.fixed)}); "
-            f"got {state.parameters}."
-        )
-
-
-def _fault(name: str, state: State, demands: Demands) -> str | None:
-    """Why a state is no admissible end of a route, if it is not."""
-    for constraint in demands.constraints:
-        if not constraint.holds(state.batch)[0]:
-            value = constraint.descriptor(state)
-            return f"the {name} violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
-    if not state.stable:
-        return f"the {name} is unstable (index {state.index})"
-    if state.margin < demands.margin:
-        return f"the {name} has a stability margin of {state.margin:.4g}, below {demands.margin:g}"
-    return None

@@ -16,6 +16,7 @@ from equimorph.structures import State, States
 from equimorph.tasks.reach.query import Answer, query_region
 from equimorph.tasks.reach.regions import BoundaryPiece, Region
 from equimorph.tasks.stable_part import cell_near, stable_piece
+from equimorph.tasks.start import check_stable
 
 FINER = (0.1, 0.03)
 """Accuracies of a set some of whose edges could not be cut."""
@@ -199,8 +200,7 @@ def _stable_piece(
     """Stable cells around a state that obey all constraints."""
     if len(eset.cells) == 0:
         raise InputError("`eset` must have cells; got an empty set.")
-    if not state.stable:
-        raise InputError(f"`state` must be stable; got a state of index {state.index}.")
+    check_stable("state", state)
     for constraint in within:
         if constraint.excess(state.z[None], state.p[None])[0] > 0.0:
             raise InputError(f"`state` must obey {constraint}; got {state}, which does not.")

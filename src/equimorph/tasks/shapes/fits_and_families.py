@@ -63,8 +63,8 @@ def best_fits(
     ]
     ends.sort(key=lambda end: float(end.expansion.f.max()))
     structure = eset.structure
-    z = np.concatenate([np.zeros((0, structure.size)), *(end.spot.z for end in ends)])
-    p = np.concatenate([np.zeros((0, len(structure.parameters))), *(end.spot.p for end in ends)])
+    z = np.concatenate([np.zeros((0, structure.size)), *(end.point.z for end in ends)])
+    p = np.concatenate([np.zeros((0, len(structure.parameters))), *(end.point.p for end in ends)])
     misfit = np.sqrt(np.maximum([float(end.expansion.f.max()) for end in ends], 0.0))
     return States(structure, z, p), misfit
 

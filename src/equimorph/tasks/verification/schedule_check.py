@@ -23,6 +23,7 @@ from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure, from_identity
 from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
+from equimorph.tasks.start import check_margin_demand, inadmissible
 from equimorph.tasks.verification.proof import Proof, prove
 
 NEAR = 0.05
@@ -257,11 +258,10 @@ def verify(
     >>> em.verify([{"F": 0.2}, {"x_l": 1.2}], rest, proof=True).proof.status
     'proved'
     """
-    if not margin >= 0.0:
-        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
+    check_margin_demand(margin)
     begin, rows = _legs(schedule, start, structure)
     constraints = tuple(within)
-    why = _wrong_start(begin, constraints, margin)
+    why = inadmissible("start", begin, constraints, margin)
     if why:
         return Verification("refused", why, begin.batch, np.zeros(1), np.array([begin.margin]))
     done = follow_polyline(begin, rows, constraints, options or FINE)
@@ -345,18 +345,6 @@ def first_state(schedule: Schedule, structure: Structure | None) -> State:
             f"`schedule` must start at an equilibrium; got a residual of {state.residual:.2g}."
         )
     return State(owner, near.z[0], state.p)
-
-
-def _wrong_start(start: State, within: tuple[Constraint, ...], margin: float) -> str:
-    for constraint in within:
-        if not constraint.holds(start.batch)[0]:
-            value = constraint.descriptor(start)
-            return f"the start violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
-    if not start.stable:
-        return f"the start is unstable (index {start.index})"
-    if start.margin < margin:
-        return f"the start has a stability margin of {start.margin:.4g}, below {margin:g}"
-    return ""
 
 
 def _violation(
