@@ -14,7 +14,7 @@ from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.topology import faces_of, keys_of
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.model import Box
-from equimorph.structures import Rod, Spring
+from equimorph.structures import Rod, Spring, State
 from typecheck import unchecked
 
 
@@ -209,3 +209,22 @@ def test_states_that_have_no_such_distance_are_refused(spring_set):
     other = Spring().natural_state(x_l=0.8, k=2.0)
     with pytest.raises(InputError, match="must have the fixed parameters of the set"):
         stability_distance(spring_set, other)
+
+
+def test_a_state_is_of_the_set_if_it_differs_by_round_off_only(spring_set):
+    """By at most 1e-4 in the metric: the root of round-off, by which states move next to folds."""
+    state = upper(spring_set, x_l=0.8, F=0.0)
+    exact = stability_distance(spring_set, state).in_parameters
+
+    def moved(z: float = 0.0, k: float = 0.0) -> State:
+        p = state.p + k * (np.array([each.name for each in spring.parameters]) == "k")
+        return State(spring, state.z + z / np.sqrt(spring.mass), p)
+
+    spring = state.structure
+    for near in (moved(z=1e-9), moved(k=1e-10)):
+        assert stability_distance(spring_set, near).in_parameters == pytest.approx(exact, abs=1e-8)
+    for off in (3e-4, -3e-4, 1e-2):
+        with pytest.raises(InputError, match=r"`state` must be a state of the set; got .*, which"):
+            stability_distance(spring_set, moved(z=off))
+    with pytest.raises(InputError, match="must have the fixed parameters of the set"):
+        stability_distance(spring_set, moved(k=1e-8))

@@ -1,0 +1,64 @@
+"""Boxes and grids: what they hold, and what they refuse."""
+
+import re
+
+import numpy as np
+import pytest
+
+from equimorph.errors import InputError
+from equimorph.model import Box, Grid
+from typecheck import unchecked
+
+
+@pytest.mark.parametrize(
+    ("bounds", "said"),
+    [
+        ((1.0, 1.0), "`a` must have finite lower < upper; got (1.0, 1.0)."),
+        ((2.0, 1.0), "`a` must have finite lower < upper; got (2.0, 1.0)."),
+        ((0.0, np.inf), "`a` must have finite lower < upper; got (0.0, inf)."),
+        ((np.nan, 1.0), "`a` must have finite lower < upper; got (nan, 1.0)."),
+        ((0.0, 1.0, 5), "`a` must be (lower, upper); got (0.0, 1.0, 5)."),
+        ((0.0, "wide"), "`a` must be numbers (lower, upper); got (0.0, 'wide')."),
+        (1.0, "`a` must be (lower, upper); got 1.0."),
+    ],
+)
+def test_bounds_that_span_nothing_are_refused(bounds, said):
+    with unchecked(), pytest.raises(InputError, match=f"^{re.escape(said)}$"):
+        Box(a=bounds)
+
+
+def test_a_box_has_at_least_one_side():
+    with pytest.raises(InputError, match=r"^`Box` must name at least one parameter; got none\.$"):
+        Box()
+
+
+@pytest.mark.parametrize(
+    ("sides", "said"),
+    [
+        ((0.0, 1.0, 0), "`a` must have a whole number of intervals >= 1; got 0."),
+        ((0.0, 1.0, 2.5), "`a` must have a whole number of intervals >= 1; got 2.5."),
+        ((1.0, 1.0, 3), "`a` must have finite lower < upper; got (1.0, 1.0, 3)."),
+        ((0.0, 1.0), "`a` must be (lower, upper, intervals); got (0.0, 1.0)."),
+    ],
+)
+def test_grids_without_whole_intervals_are_refused(sides, said):
+    with unchecked(), pytest.raises(InputError, match=f"^{re.escape(said)}$"):
+        Grid(a=sides)
+
+
+def test_a_box_contains_its_sides_and_what_slack_adds():
+    """Slack counts in widths of each side: 0.1 of 2 and of 4."""
+    box = Box(a=(0, 2), b=(-2, 2))
+    points = np.array([[0.0, -2.0], [2.0, 2.0], [2.19, 2.39], [2.21, 0.0], [1.0, -2.41]])
+    assert box.contains(points).tolist() == [True, True, False, False, False]
+    assert box.contains(points, slack=0.1).tolist() == [True, True, True, False, False]
+    assert bool(box.contains(points[0]))
+
+
+def test_boxes_and_grids_say_what_they_are():
+    grid = Grid(b=(-2, 2, 4), a=(0, 0.5, 1))
+    assert repr(grid.box) == "Box(b=(-2, 2), a=(0, 0.5))"
+    assert (grid.names, grid.intervals) == (("b", "a"), (4, 1))
+    b, a = grid.axes()
+    assert b.tolist() == [-2.0, -1.0, 0.0, 1.0, 2.0]
+    assert a.tolist() == [0.0, 0.5]
