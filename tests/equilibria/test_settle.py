@@ -28,11 +28,6 @@ from oracles.polynomial import (
 ROUND_OFF = 1e-10
 
 
-def columns(*tests):
-    """Tests of critical states as the columns that a condition asks for."""
-    return lambda some: lambda at: np.stack([test(at) for test in tests], axis=1)
-
-
 def held(form, z, p, place):
     """The plane on which one parameter keeps its value."""
     by_p = np.zeros((len(z), 1, p.shape[1]))
@@ -76,6 +71,10 @@ def test_the_fast_way_at_fixed_parameters_equals_the_general_one(frame):
     p = np.tile(end.p, (5, 1))
     hold = held(arch, z, p, 1)
     plain = settle(arch, z, p)
+    whole = settle(arch, z, p, frame=frame)
+    assert np.array_equal(plain.z, whole.z)
+    assert np.array_equal(plain.index, whole.index)
+    assert np.array_equal(plain.first, whole.first)
     general = settle(arch, z, p, free_directions(arch, np.array([1]), 5), [hold], frame=frame)
     assert plain.found.all()
     assert general.found.all()
@@ -117,13 +116,13 @@ def test_cusp_and_swallowtail_are_at_the_origin(swallowtail):
     form = pitchfork_form(1.0)
     z, p = guesses([0.0], [0.0, 0.0])
     directions = free_directions(form, np.array([0, 1]), len(z))
-    vanishing = Vanishing(columns(gap, quadratic), np.arange(len(z)))
+    vanishing = Vanishing(lambda some: (gap, quadratic), np.arange(len(z)))
     found = settle(form, z, p, directions, [vanishing])
     assert found.found.all()
     assert max(np.abs(found.z).max(), np.abs(found.p).max()) < ROUND_OFF
     z, p = guesses([0.0], [0.0, 0.0, 0.0])
     directions = free_directions(swallowtail, np.arange(3), len(z))
-    vanishing = Vanishing(columns(gap, quadratic, cubic), np.arange(len(z)))
+    vanishing = Vanishing(lambda some: (gap, quadratic, cubic), np.arange(len(z)))
     found = settle(swallowtail, z, p, directions, [vanishing])
     assert found.found.all()
     assert max(np.abs(found.z).max(), np.abs(found.p).max()) < 1e-8

@@ -6,9 +6,8 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph.arrays import Values
-from equimorph.equilibria.critical import Critical
+from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.lift import check_start
-from equimorph.equilibria.locus import Test
 from equimorph.equilibria.trace_locus import Watch
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position

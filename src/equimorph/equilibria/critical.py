@@ -1,5 +1,6 @@
 """Nearly singular equilibria: test functions of folds, branch points and cusps; normal forms."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -104,6 +105,10 @@ class Critical:
     def cubic_scale(self) -> Values:
         """Size of the terms that `cubic` is the sum of: what its round-off is relative to."""
         return self._cubic_parts[2]
+
+
+Test = Callable[[Critical], Values]
+"""Scalar of nearly singular states that vanishes where something happens."""
 
 
 def null_border(structure: Structure, z: Lanes, p: Parameters) -> Lanes:

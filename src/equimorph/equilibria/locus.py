@@ -1,19 +1,17 @@
 """Loci: curves of equilibria in several parameters on which scalar tests vanish."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.equilibria.critical import Critical, null_border
+from equimorph.arrays import Lanes, Parameters
+from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.structures import Structure
 
 Point = Float[np.ndarray, " coordinates"]
 Points = Float[np.ndarray, "lanes coordinates"]
-Test = Callable[[Critical], Values]
 
 DIFFERENCE = 1e-5
 """Step of differences of tests, in the metric: it sets the rate of Newton, not the error."""

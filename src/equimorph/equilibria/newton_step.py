@@ -165,7 +165,7 @@ class Points:
     def step(self) -> Step:
         """Newton step onto the set and along it to the conditions."""
         problem = self.problem
-        if problem.width == 0:
+        if problem.width == 0 and not problem.conditions:
             return self._fixed_step()
         onto, along, solution = self.directions()
         size = problem.structure.size
@@ -174,10 +174,10 @@ class Points:
         onto_p = problem.change(onto[:, None, size:])[:, 0]
         move = Move(onto_z, onto_p, along_z, problem.change(along[:, :, size:]))
         found = [condition.linear(at, move) for condition in problem.conditions]
-        amount = _amount(
-            np.concatenate([each.slopes for each in found], axis=1),
-            np.concatenate([each.value for each in found], axis=1),
-        )
+        slopes = np.concatenate([each.slopes for each in found], axis=1)
+        value = np.concatenate([each.value for each in found], axis=1)
+        held = isinstance(problem.frame, Held)
+        amount = _amount(slopes, value, None if held else _gram(problem.structure, along))
         step = onto + np.einsum("lk,lki->li", amount, along)
         null = _unit(at.v) if problem.renews_border else self.b
         sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
@@ -251,16 +251,32 @@ def _dual(
 
     Not a number where the directions are dependent.
     """
-    (_, k, width), n = along.shape, structure.unknowns
-    weight = np.ones(width)
-    weight[:n], weight[n : structure.size] = structure.mass, 0.0
-    gram = (along * weight) @ np.swapaxes(along, 1, 2)
+    gram = _gram(structure, along)
     whole = np.isfinite(gram).all(axis=(1, 2))
     whole[whole] = np.linalg.det(gram[whole]) > 0.0
-    gram[~whole] = np.eye(k)
-    rows = np.linalg.solve(np.linalg.cholesky(gram), along) * weight
+    gram[~whole] = np.eye(along.shape[1])
+    rows = np.linalg.solve(np.linalg.cholesky(gram), along) * _weights(structure, along)
     rows[~whole] = np.nan
     return np.ascontiguousarray(rows)
+
+
+def _gram(
+    structure: Structure, along: Float[np.ndarray, "lanes k bordered"]
+) -> Float[np.ndarray, "lanes k k"]:
+    """Products of directions in the metric."""
+    return np.asarray((along * _weights(structure, along)) @ np.swapaxes(along, 1, 2))
+
+
+def _weights(
+    structure: Structure, along: Float[np.ndarray, "lanes k bordered"]
+) -> Float[np.ndarray, " bordered"]:
+    """Metric of (z, steps along the directions); multipliers do not count."""
+    weights = np.ones(along.shape[2])
+    weights[: structure.unknowns], weights[structure.unknowns : structure.size] = (
+        structure.mass,
+        0.0,
+    )
+    return weights
 
 
 def length(structure: Structure, step: Step, multipliers: float) -> Values:
@@ -275,20 +291,32 @@ def length(structure: Structure, step: Step, multipliers: float) -> Values:
 
 
 def _amount(
-    slopes: Float[np.ndarray, "lanes m k"], value: Float[np.ndarray, "lanes m"]
+    slopes: Float[np.ndarray, "lanes m k"],
+    value: Float[np.ndarray, "lanes m"],
+    gram: Float[np.ndarray, "lanes k k"] | None,
 ) -> Float[np.ndarray, "lanes k"]:
-    """Steps along the set that take scalars to zero: the shortest, or those of least squares."""
+    """Steps along the set that take scalars to zero: the shortest, or those of least squares.
+
+    Lengths are measured by the products of the directions, if these are given.
+    """
     count, m, k = slopes.shape
     amount, whole = np.full((count, k), np.nan), np.isfinite(slopes).all(axis=(1, 2))
     whole &= np.isfinite(value).all(axis=1)
-    plain = np.zeros(count, bool)
-    if m == k:
-        size = np.abs(slopes[whole]).max(axis=(1, 2), initial=0.0)
-        plain[whole] = np.abs(np.linalg.det(slopes[whole])) > SINGULAR * size**k
-        amount[plain] = -np.linalg.solve(slopes[plain], value[plain, :, None])[:, :, 0]
-    rest = whole & ~plain
-    inverse = np.linalg.pinv(slopes[rest], rcond=RANK)
-    amount[rest] = -np.einsum("lkm,lm->lk", inverse, value[rest])
+    if not whole.all():
+        amount[whole] = _amount(slopes[whole], value[whole], None if gram is None else gram[whole])
+        return amount
+    if m > k or k == 0:
+        return np.asarray(-np.einsum("lkm,lm->lk", np.linalg.pinv(slopes, rcond=RANK), value))
+    spread = np.swapaxes(slopes, 1, 2)
+    if m < k and gram is not None:
+        spread = np.linalg.solve(gram, spread)
+    matrix = slopes if m == k else slopes @ spread
+    size = np.abs(matrix).max(axis=(1, 2), initial=0.0)
+    regular = np.abs(np.linalg.det(matrix)) > SINGULAR * size**m
+    share = -np.linalg.solve(matrix[regular], value[regular, :, None])
+    amount[regular] = (share if m == k else spread[regular] @ share)[:, :, 0]
+    rest = np.linalg.pinv(slopes[~regular], rcond=RANK)
+    amount[~regular] = -np.einsum("lkm,lm->lk", rest, value[~regular])
     return amount
 
 

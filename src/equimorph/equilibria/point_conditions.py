@@ -6,7 +6,7 @@ set. There even a largest value over the structure is smooth, whose derivative w
 single unknown has kinks.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -14,12 +14,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters, Scalars
-from equimorph.equilibria.critical import Critical
+from equimorph.equilibria.critical import Critical, Test
 from equimorph.model.descriptor import Evaluate
 
 Directions = Float[np.ndarray, "lanes k parameters"]
-Tests = Callable[[Critical], Scalars]
-"""Several scalars of nearly singular states, one column each."""
 Some = Int[np.ndarray, " some"]
 
 VALUE_DIFFERENCE, TEST_DIFFERENCE = 1e-5, 1e-5
@@ -203,15 +201,15 @@ class Vanishing:
     Parameters
     ----------
     tests
-        Scalars of some of the lanes, by their numbers: they may differ from lane to lane. The
-        states they are asked for are whole rounds of these lanes.
+        The scalars for some of the lanes, by their numbers: they may differ from lane to lane. They
+        are asked for whole rounds of these lanes at once.
     lanes
         Numbers of the lanes.
     difference, one_sided
         As for `Values`.
     """
 
-    tests: Callable[[Some], Tests]
+    tests: Callable[[Some], Sequence[Test]]
     lanes: Some
     difference: float = TEST_DIFFERENCE
     one_sided: bool = False
@@ -223,7 +221,8 @@ class Vanishing:
 
         def scalars(z: Lanes, p: Parameters) -> Scalars:
             b = np.tile(at.b, (len(z) // len(at.b), 1))
-            return own(Critical(at.structure, z, p, b))
+            there = Critical(at.structure, z, p, b)
+            return np.stack([test(there) for test in own], axis=1)
 
         return _differences(scalars, at, move, self.difference, one_sided=self.one_sided)
 
@@ -255,22 +254,26 @@ def _differences(
 ) -> Linear:
     """Values after the step onto the set and differences around it, all in one call."""
     lanes, k = move.along_z.shape[:2]
+    structure = at.structure
+    squared = move.along_z[:, :, : structure.unknowns] ** 2 @ structure.mass
+    squared += ((move.along_p / structure.scales) ** 2).sum(axis=2)
+    h = step / np.sqrt(np.maximum(squared, 1e-300))  # directions may be long where F_z is soft
     sides = (0.0, 1.0) if one_sided else (0.0, 1.0, -1.0)
     shares = [sides[0], *(sign for sign in sides[1:] for _ in range(k))]
     numbers = [0, *(i for _ in sides[1:] for i in range(k))]
     z, p = (
         np.concatenate(
-            [base + share * step * along[:, i] for share, i in zip(shares, numbers, strict=True)]
+            [base + share * along[:, i] for share, i in zip(shares, numbers, strict=True)]
             if k
             else [base]
         )
         for base, along in (
-            (at.z + move.onto_z, move.along_z),
-            (at.p + move.onto_p, move.along_p),
+            (at.z + move.onto_z, h[:, :, None] * move.along_z),
+            (at.p + move.onto_p, h[:, :, None] * move.along_p),
         )
     )
     flat = scalars(z, p)
     found = flat.reshape(-1, lanes, flat.shape[1])
     ahead = found[1 : 1 + k]
     change = ahead - found[0] if one_sided else 0.5 * (ahead - found[1 + k :])
-    return Linear(found[0], np.moveaxis(change, 0, 2) / step)
+    return Linear(found[0], np.moveaxis(change, 0, 2) / h[:, None])

@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import brentq
 
-from equimorph.equilibria.locus import Locus, Point, Spot, Test, advance
+from equimorph.equilibria.critical import Test
+from equimorph.equilibria.locus import Locus, Point, Spot, advance
 from equimorph.equilibria.steps import least_inside
 from equimorph.equilibria.trace_options import TraceOptions
 

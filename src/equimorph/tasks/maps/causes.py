@@ -8,9 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.arrays import Edges, Flags, Settings, Values
-from equimorph.equilibria.critical import Critical
+from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.first_stable import none_passed
-from equimorph.equilibria.locus import Test
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint, Descriptor

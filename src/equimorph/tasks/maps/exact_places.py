@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.locus import Test
+from equimorph.equilibria.critical import Test
 from equimorph.tasks.maps.brackets import PARTS, SHRINKING, Brackets, Samples, sample_distance
 from equimorph.tasks.maps.causes import Cause, Paths
 from equimorph.tasks.maps.singular_states import TestsOf, correct_singular_states

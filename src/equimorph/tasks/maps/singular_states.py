@@ -7,8 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.locus import Test
+from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.structures import Structure
 
 Pairs = Float[np.ndarray, "lanes 2 extended"]

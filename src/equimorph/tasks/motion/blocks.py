@@ -142,7 +142,7 @@ def _block(
     moved = np.concatenate([here.z[None], guess[0]]), np.concatenate([here.p[None], guess[1]])
     way = _from_first(structure, *moved)
     found = correct_onto_targets(structure, guess, free, course.descriptors, targets)
-    good = found.good & (found.first <= SURE * way + EXACT)
+    good = found.found & (found.first <= SURE * way + EXACT)
     z, p = np.concatenate([here.z[None], found.z]), np.concatenate([here.p[None], found.p])
     good &= step_distances(structure, z, p) <= LARGEST
     count = _leading(good)

@@ -5,14 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.equilibria.point_conditions import Values as TargetValues
 from equimorph.equilibria.sensitivity import answers, slopes_along
+from equimorph.equilibria.settle import Guards, Held, Settled, free_directions, settle
 from equimorph.model import Descriptor
 from equimorph.structures import Structure
 
 EXACT = 1e-10
 """Last correction, in the metric and scaled parameters, of a point that counts as found."""
-ITERATIONS, LONGEST = 12, 0.3
+GUARDS = Guards(iterations=12, longest=0.3, converged=EXACT)
 
 
 @dataclass(frozen=True)
@@ -52,60 +54,17 @@ def shortest_change(
     return np.asarray(np.einsum("lkm,lm->lk", np.linalg.pinv(slope), wanted))
 
 
-@dataclass(frozen=True)
-class Corrected:
-    """States at targets, how long the first correction was, and which were found."""
-
-    z: Lanes
-    p: Parameters
-    first: Values
-    good: Flags
-
-
 def correct_onto_targets(
     structure: Structure,
     guess: tuple[Lanes, Parameters],
     free: Int[np.ndarray, " k"],
     descriptors: tuple[Descriptor, ...],
     targets: Float[np.ndarray, "lanes m"],
-) -> Corrected:
-    """Newton for regular states with given descriptors; with actuators to spare, the nearest.
-
-    A step that is wanted along ``w = −F_z⁻¹F`` and the shortest one in the actuators.
-    """
-    z, p = guess[0].copy(), guess[1].copy()
-    first, good, todo = np.full(len(z), np.inf), np.zeros(len(z), bool), np.arange(len(z))
-    for _ in range(ITERATIONS):
-        dz, dp = _correction(structure, (z[todo], p[todo]), free, descriptors, targets[todo])
-        size = _length(structure, dz, dp)
-        alive = np.isfinite(size)
-        first[todo] = np.where(np.isinf(first[todo]), size, first[todo])
-        share = np.where(alive, np.minimum(1.0, LONGEST / np.maximum(size, 1e-300)), 0.0)[:, None]
-        z[todo] += share * np.where(alive[:, None], dz, 0.0)
-        p[todo] += share * np.where(alive[:, None], dp, 0.0)
-        good[todo] = alive & (size < EXACT)
-        todo = todo[alive & (size >= EXACT)]
-        if len(todo) == 0:
-            break
-    return Corrected(z, p, first, good)
-
-
-def _correction(
-    structure: Structure,
-    here: tuple[Lanes, Parameters],
-    free: Int[np.ndarray, " k"],
-    descriptors: tuple[Descriptor, ...],
-    targets: Float[np.ndarray, "lanes m"],
-) -> tuple[Lanes, Parameters]:
-    z, p = here
-    away = structure.solve(z, p, -structure.residual(z, p)[:, None]).x
-    dz, dp = answers(structure, z, p, free)
-    none = np.zeros((len(z), 1, p.shape[1]))
-    along = (np.concatenate([dz, away], axis=1), np.concatenate([dp, none], axis=1))
-    slope = slopes_along(structure, here, along, descriptors)
-    now = np.stack([each.function(z, p) for each in descriptors], axis=1)
-    step = shortest_change(slope[:, :, :-1], targets - now - slope[:, :, -1])
-    return away[:, 0] + np.einsum("lk,lki->li", step, dz), np.einsum("lk,lki->li", step, dp)
+) -> Settled:
+    """Newton for regular states with given descriptors; with actuators to spare, the nearest."""
+    values = TargetValues(tuple(each.function for each in descriptors), targets)
+    directions = free_directions(structure, free, len(targets))
+    return settle(structure, *guess, directions, [values], GUARDS, Held())
 
 
 def _length(structure: Structure, dz: Lanes, dp: Parameters) -> Values:

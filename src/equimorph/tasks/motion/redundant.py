@@ -143,7 +143,7 @@ def _stepped(course: Course, here: _Here, step: float, time: float) -> tuple[_He
     found = correct_onto_targets(course.structure, (z, given), own, course.descriptors, targets)
     whole = np.concatenate([off_z, np.zeros_like(off_z)]), np.concatenate([off_p, 0.0 * off_p])
     error = float(step_distances(course.structure, *whole)[0])
-    good = bool(found.good[0]) and np.isfinite(error)
+    good = bool(found.found[0]) and np.isfinite(error)
     return _Here(found.z, found.p, time, here.held), error if good else np.inf
 
 

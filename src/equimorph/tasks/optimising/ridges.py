@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from equimorph.arrays import Pair
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
-from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.locus import Locus, Spot, Test, advance, settle
+from equimorph.equilibria.critical import Critical, Test, null_border
+from equimorph.equilibria.locus import Locus, Spot, advance, settle
 from equimorph.model import position
 from equimorph.structures import State
 from equimorph.tasks.maps import LimitLoadMap, MapCurve

@@ -114,9 +114,8 @@ def _exact(
     used, own = np.unique(vertex, return_inverse=True)
     rows = points_at_vertices(known.eset, used).rows[own]
     many = np.tile(wanted, (len(edges), 1))
-    z_end, p_end, found = states_with_values(
-        setting, SetPoints(z, p, rows), known.descriptors, many
-    )
+    exact = states_with_values(setting, SetPoints(z, p, rows), known.descriptors, many)
+    z_end, p_end, found = exact.z, exact.p, exact.found
     gaps = (
         np.linalg.norm(embed(setting, *one) - embed(setting, *other), axis=1)
         for one, other in (

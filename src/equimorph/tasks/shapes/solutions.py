@@ -288,7 +288,8 @@ def _solved(
     """Exact solutions of each question in the box and within constraints, each once."""
     structure, eset = known.eset.structure, known.eset
     spots, owner = _guesses(known, wanted)
-    z, p, found = states_with_values(known.setting, spots, known.descriptors, wanted[owner])
+    exact = states_with_values(known.setting, spots, known.descriptors, wanted[owner])
+    z, p, found = exact.z, exact.p, exact.found
     found &= eset.box.contains(p[:, known.setting.free], slack=AT_EDGE)
     found[found] &= structure.resolved(z[found], p[found])
     for constraint in within:
