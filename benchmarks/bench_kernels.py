@@ -8,8 +8,8 @@ import pytest
 
 from equimorph.linalg import solve_bordered
 from equimorph.structures import Rod
-from equimorph.structures.rod.kernels import advance_lanes
-from equimorph.structures.rod.recovery.kernels import largest_lanes
+from equimorph.structures.rod.clamped_field_kernels import largest_lanes
+from equimorph.structures.rod.clamped_kernels import advance_lanes
 
 RESOLUTIONS = [(6, 9), (12, 6), (12, 8), (24, 8)]
 

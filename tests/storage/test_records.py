@@ -9,7 +9,7 @@ import pytest
 import equimorph as em
 from equimorph.storage.owner import Owner
 from equimorph.storage.values import read_value, write_value
-from equimorph.structures.naming import descriptor_named
+from equimorph.structures.quantities import descriptor_named
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 from equimorph.errors import InputError
 from equimorph.structures import Rod, States
-from equimorph.structures.rod import continuation, natural
+from equimorph.structures.rod import natural
 from equimorph.structures.rod.natural import Outcome, natural_arch
 
 SPAN = float(np.sin(1.0))
@@ -34,7 +34,7 @@ def test_which_states_exist_depends_neither_on_mesh_nor_on_steps(monkeypatch):
     """Finer elements and steps a third as long; fold scales within 1e-3, the smallest step's."""
     p = settings(np.linspace(1.6, 2.5, 7), np.linspace(1.2, 2.0, 5))
     coarse = natural_arch(Rod().mechanics, p)
-    monkeypatch.setattr(continuation, "BEND", 0.1)
+    monkeypatch.setattr(natural, "BEND", 0.1)
     fine = natural_arch(Rod(elements=12, degree=8).mechanics, p)
     np.testing.assert_array_equal(coarse.outcome, fine.outcome)
     np.testing.assert_allclose(coarse.scale, fine.scale, atol=1e-3)
@@ -73,7 +73,7 @@ def _free_state(rod, p):
     part = natural.free_part(p)
     x = np.zeros((1, rod.size + 1))
     x[0, -1] = 1.0
-    return np.ascontiguousarray(continuation.follow(rod.mechanics, part, x)[1][:, :-1])
+    return np.ascontiguousarray(natural.follow(rod.mechanics, part, x)[1][:, :-1])
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from equimorph.errors import InputError
 from equimorph.structures import Rod
 from equimorph.structures.rod.discretisation import mesh_with_kinks, reference_element
-from equimorph.structures.rod.loads import load_shape
+from equimorph.structures.rod.profiles import load_shape
 
 DEGREES = [3, 4, 6, 8, 12, 16]
 

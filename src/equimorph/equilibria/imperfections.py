@@ -16,7 +16,7 @@ from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, position
 from equimorph.structures import Structure
-from equimorph.structures.naming import descriptor_named
+from equimorph.structures.quantities import descriptor_named
 
 TWICE = 2.0
 """Ways to a corner that are gone beyond it."""

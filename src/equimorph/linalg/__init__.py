@@ -1,12 +1,21 @@
 """Symmetric indefinite saddle-point matrices in batches of lanes, with their inertia."""
 
 from equimorph.linalg.condensed import CondensedLayout
-from equimorph.linalg.dense import BorderedSolution, multiply, negative_eigenvalues, solve_bordered
+from equimorph.linalg.dense import (
+    Border,
+    BorderedSolution,
+    multiply,
+    negative_eigenvalues,
+    no_border,
+    solve_bordered,
+)
 
 __all__ = [
+    "Border",
     "BorderedSolution",
     "CondensedLayout",
     "multiply",
     "negative_eigenvalues",
+    "no_border",
     "solve_bordered",
 ]

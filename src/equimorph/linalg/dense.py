@@ -8,6 +8,19 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Lanes, Values
 from equimorph.linalg.kernels import count_negative, multiply_lanes
 
+Border = tuple[
+    Float[np.ndarray, "lanes k size"],
+    Float[np.ndarray, "lanes k size"],
+    Float[np.ndarray, "lanes k k"],
+]
+"""Columns, rows and corner around a matrix."""
+
+
+def no_border(lanes: int, size: int) -> Border:
+    """Border of no columns and no rows."""
+    nothing = np.zeros((lanes, 0, size))
+    return nothing, nothing, np.zeros((lanes, 0, 0))
+
 
 @dataclass(frozen=True)
 class BorderedSolution:

@@ -1,6 +1,5 @@
 """Plain data: parameters, boxes, descriptors, constraints, schedules; sinks and journals."""
 
-from equimorph.model.box import Box, Grid
 from equimorph.model.descriptor import Constraint, Descriptor, combined, eased, largest_of
 from equimorph.model.drawing import (
     Actuator,
@@ -20,6 +19,8 @@ from equimorph.model.journal import (
 from equimorph.model.keeping import NOT_KEPT
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.parameter import (
+    Box,
+    Grid,
     Parameter,
     Role,
     names_of,
@@ -27,8 +28,7 @@ from equimorph.model.parameter import (
     position,
 )
 from equimorph.model.progress import Progress, Silent
-from equimorph.model.rates import Rates
-from equimorph.model.schedule import Schedule
+from equimorph.model.schedule import Rates, Schedule
 from equimorph.model.spline import Spline
 
 __all__ = [

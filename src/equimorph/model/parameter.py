@@ -1,4 +1,4 @@
-"""Parameters of a structure."""
+"""Parameters of structures; boxes and grids of their values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -86,3 +86,61 @@ def parameter_vector(
             raise InputError(f"`{parameter.name}` must be given; got no value.")
         vector[i] = parameter.check(value)
     return vector
+
+
+def _bounds(name: str, value: object, count: int) -> tuple[float, ...]:
+    meaning = "(lower, upper)" if count == 2 else "(lower, upper, intervals)"
+    if not isinstance(value, Sequence | np.ndarray) or len(value) != count:
+        raise InputError(f"`{name}` must be {meaning}; got {value!r}.")
+    try:
+        numbers = tuple(float(entry) for entry in value)
+    except (TypeError, ValueError):
+        raise InputError(f"`{name}` must be numbers {meaning}; got {value!r}.") from None
+    if not (np.isfinite(numbers).all() and numbers[0] < numbers[1]):
+        raise InputError(f"`{name}` must have finite lower < upper; got {value!r}.")
+    return numbers
+
+
+class Box:
+    """An axis-parallel box: ``Box(Theta=(0.2, 2.5), Delta=(-2, 2))``."""
+
+    def __init__(self, **bounds: Sequence[float]) -> None:
+        if not bounds:
+            raise InputError("`Box` must name at least one parameter; got none.")
+        pairs = [_bounds(name, value, 2) for name, value in bounds.items()]
+        self.names: tuple[str, ...] = tuple(bounds)
+        self.lower: Float[np.ndarray, " d"] = np.array([pair[0] for pair in pairs])
+        self.upper: Float[np.ndarray, " d"] = np.array([pair[1] for pair in pairs])
+
+    def __repr__(self) -> str:
+        """Return the call that makes this box."""
+        ranges = zip(self.names, self.lower, self.upper, strict=True)
+        return f"Box({', '.join(f'{name}=({low:g}, {high:g})' for name, low, high in ranges)})"
+
+    def contains(
+        self, points: Float[np.ndarray, "*lanes d"], slack: float = 0.0
+    ) -> "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]":
+        """Whether points lie in the box, widened by `slack` times its widths."""
+        room = slack * (self.upper - self.lower)
+        inside = (points >= self.lower - room) & (points <= self.upper + room)
+        return np.asarray(inside.all(axis=-1))
+
+
+class Grid:
+    """A regular grid of settings: ``Grid(Theta=(0.2, 2.5, 93), ...)`` has 93 intervals in Theta."""
+
+    def __init__(self, **ranges: Sequence[float]) -> None:
+        triples = {name: _bounds(name, value, 3) for name, value in ranges.items()}
+        for name, triple in triples.items():
+            if triple[2] < 1 or triple[2] != int(triple[2]):
+                raise InputError(
+                    f"`{name}` must have a whole number of intervals >= 1; got {triple[2]:g}."
+                )
+        self.box = Box(**{name: triple[:2] for name, triple in triples.items()})
+        self.names = self.box.names
+        self.intervals: tuple[int, ...] = tuple(int(triple[2]) for triple in triples.values())
+
+    def axes(self) -> tuple[Float[np.ndarray, " points"], ...]:
+        """Grid lines per parameter, ends included."""
+        sides = zip(self.box.lower, self.box.upper, self.intervals, strict=True)
+        return tuple(np.linspace(low, high, count + 1) for low, high, count in sides)

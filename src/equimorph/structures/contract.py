@@ -12,16 +12,11 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.linalg import BorderedSolution
+from equimorph.linalg import Border, BorderedSolution
 from equimorph.model import Descriptor, Drawing, Parameter, names_of
 from equimorph.structures.approach import straight_arcs
 
 Direction = tuple[Lanes, Parameters]
-Border = tuple[
-    Float[np.ndarray, "lanes k size"],
-    Float[np.ndarray, "lanes k size"],
-    Float[np.ndarray, "lanes k k"],
-]
 Majorant = Callable[[Direction, Direction], Lanes]
 Closing = tuple[Lanes, Values, Values]
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
-from equimorph.linalg import BorderedSolution, solve_bordered
+from equimorph.linalg import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.model import (
     Descriptor,
     Drawing,
@@ -182,16 +182,12 @@ class Spring(Structure):
         z: Lanes,
         p: Parameters,
         rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: tuple[Any, Any, Any] | None = None,
+        border: Border | None = None,
         shift: Values | None = None,
     ) -> BorderedSolution:
         """Solve with E'' − shift, bordered."""
         hessian = self._hessian(z, p) - (0.0 if shift is None else shift)
-        lanes = len(z)
-        if border is None:
-            nothing = np.zeros((lanes, 0, 1))
-            border = (nothing, nothing, np.zeros((lanes, 0, 0)))
-        columns, rows, corner = border
+        columns, rows, corner = no_border(len(z), 1) if border is None else border
         return solve_bordered(hessian[:, None, None], columns, rows, corner, rhs)
 
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:

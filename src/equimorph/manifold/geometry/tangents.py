@@ -9,10 +9,10 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
 from equimorph.equilibria.critical import Critical, null_border
+from equimorph.linalg import Border
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.kernels import square_sides
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.structures.contract import Border
 
 CHUNK = 2048
 DIFFERENCE = 1e-5

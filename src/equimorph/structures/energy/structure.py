@@ -21,10 +21,9 @@ from equimorph.structures.energy.declared import (
     parameters_of,
     unknowns_of,
 )
-from equimorph.structures.energy.derivatives import Derivatives
 from equimorph.structures.energy.drawing import energy_drawing, forces_of, marks_of
 from equimorph.structures.energy.enclosures import can_enclose, enclosed
-from equimorph.structures.energy.tape import Tape, casadi, tape
+from equimorph.structures.energy.tape import Derivatives, Tape, casadi, tape
 
 
 class EnergyStructure(DiscreteStructure):

@@ -9,7 +9,7 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor, position
 from equimorph.structures.frame.fields import FrameFields
-from equimorph.structures.frame.support import AXES
+from equimorph.structures.frame.member import AXES
 
 WRITTEN = (
     *("displacement(joint,axis)", "rotation(joint)", "rotation(member,joint)"),

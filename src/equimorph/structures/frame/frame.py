@@ -13,14 +13,13 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, Drawing, Parameter
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame import descriptors
-from equimorph.structures.frame.accuracy import discretisation_error
-from equimorph.structures.frame.checks import refuse_singular
+from equimorph.structures.frame.checks import discretisation_error, refuse_singular
 from equimorph.structures.frame.drawing import frame_drawing
 from equimorph.structures.frame.fields import FrameFields
+from equimorph.structures.frame.member import support_data
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import Network, network
 from equimorph.structures.frame.patterns import Given, Patterns, patterns
-from equimorph.structures.frame.support import support_data
 from equimorph.structures.frame.symmetry import symmetries
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.unit_system import Quantity, unit_system

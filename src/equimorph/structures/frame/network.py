@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError, suggestion
-from equimorph.structures.frame.member import Member, member_of
-from equimorph.structures.frame.support import AXES, stiffnesses
+from equimorph.structures.frame.member import AXES, Member, member_of, stiffnesses
 from equimorph.structures.unit_system import UnitSystem
 from equimorph.structures.walk import walk_along
 

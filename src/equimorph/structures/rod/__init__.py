@@ -1,14 +1,14 @@
-"""Elastic rods."""
+"""Planar elastic rods."""
 
-from equimorph.structures.rod.general import (
+from equimorph.structures.rod.ends import End
+from equimorph.structures.rod.rod import Rod
+from equimorph.structures.rod.terms import (
     Couple,
     Curvature,
-    End,
     LineLoad,
     PointForce,
     Pressure,
     Tendon,
 )
-from equimorph.structures.rod.rod import Rod
 
 __all__ = ["Couple", "Curvature", "End", "LineLoad", "PointForce", "Pressure", "Rod", "Tendon"]

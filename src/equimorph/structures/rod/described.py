@@ -6,8 +6,8 @@ from typing import Any
 
 from equimorph.model import Descriptor
 from equimorph.structures.rod import descriptors, validity
-from equimorph.structures.rod.general.ends import End
-from equimorph.structures.rod.general.mechanics import GeneralMechanics
+from equimorph.structures.rod.ends import End
+from equimorph.structures.rod.general import GeneralMechanics
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.states import State
 

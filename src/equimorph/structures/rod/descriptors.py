@@ -9,10 +9,9 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
-from equimorph.structures.peaks import peaks, stations
-from equimorph.structures.rod.extrema import extreme_curvatures
-from equimorph.structures.rod.interface import Mechanics
+from equimorph.structures.rod.extrema import extreme_curvatures, peaks, stations
 from equimorph.structures.rod.measured import Measured
+from equimorph.structures.rod.mechanics import Mechanics
 from equimorph.structures.rod.validity import clearance
 
 Extrema = Float[np.ndarray, "lanes extrema"]

@@ -7,8 +7,10 @@ from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces, Support
-from equimorph.structures.rod.general.ends import FREE, HELD, End, Holding
-from equimorph.structures.rod.general.terms import (
+from equimorph.structures.rod.ends import FREE, HELD, End, Holding
+from equimorph.structures.rod.measured import Measured
+from equimorph.structures.rod.profiles import profile
+from equimorph.structures.rod.terms import (
     Couple,
     Curvature,
     LineLoad,
@@ -17,8 +19,6 @@ from equimorph.structures.rod.general.terms import (
     Tendon,
     Term,
 )
-from equimorph.structures.rod.measured import Measured
-from equimorph.structures.rod.profiles import profile
 from equimorph.structures.supports import supports_of_point, unit_vectors
 
 STATIONS = np.linspace(0.05, 0.95, 13)

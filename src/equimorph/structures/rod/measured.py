@@ -4,19 +4,18 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.linalg import BorderedSolution
+from equimorph.linalg import Border, BorderedSolution
 from equimorph.structures.approach import smooth_arcs
 from equimorph.structures.contract import (
     Advance,
-    Border,
     Direction,
     Majorant,
     Structure,
     Symmetry,
 )
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.interface import Mechanics
-from equimorph.structures.units import Units
+from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.units import Units
 
 ARCS = 128
 """Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""

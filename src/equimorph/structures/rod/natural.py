@@ -1,14 +1,139 @@
-"""The natural state of the arch: unloaded, continued from the straight rod."""
+"""Natural states of rods: unloaded, continued from the straight or the stress-free rod."""
 
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Float, Int
+from numpy.polynomial import legendre
 
-from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.structures.rod.continuation import Part, follow, newton
-from equimorph.structures.rod.interface import Mechanics
+from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.structures.rod.discretisation import reference_element
+from equimorph.structures.rod.general import GeneralMechanics
+from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.model import RodModel
+
+FIRST_STEP = 0.25
+SMALLEST_STEP = 1e-8
+ITERATIONS = 7
+CONVERGED = 1e-6
+"""Newton correction after which the error is below 1e-11, on the way."""
+BEND = 0.5
+"""Largest second Newton correction relative to the first: beyond, the step may change branches."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One part of the way, from `start` to `stop`: with λ = 0 and the span free, or prescribed.
+
+    `sharpening` lanes end where the elements no longer resolve them; span: number of the parameter
+    that is the span; multiplier: place of λ in z.
+    """
+
+    start: Parameters
+    stop: Parameters
+    free: bool
+    sharpening: Flags
+    span: int = 3
+    multiplier: int = -2
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Lanes on the way: share t of the part, x = (z, span), and dx/dt where the span is held."""
+
+    t: Values
+    x: Float[np.ndarray, "lanes extended"]
+    slope: Float[np.ndarray, "lanes extended"]
+
+    def __getitem__(self, lanes: np.ndarray) -> "Point":
+        """Some lanes."""
+        return Point(self.t[lanes], self.x[lanes], self.slope[lanes])
+
+    def put(self, lanes: np.ndarray, other: "Point") -> None:
+        """Overwrite some lanes."""
+        self.t[lanes], self.x[lanes], self.slope[lanes] = other.t, other.x, other.slope
+
+
+def follow(
+    rod: Mechanics, part: Part, x: Float[np.ndarray, "lanes extended"]
+) -> tuple[Values, Float[np.ndarray, "lanes extended"]]:
+    """Move x = (z, span) along a part: the share of it that was reached, 1 if all, and x there."""
+    here = newton(rod, part, np.arange(len(x)), np.zeros(len(x)), x)[0]
+    before = Point(here.t.copy(), here.x.copy(), here.slope.copy())
+    step = np.full(len(x), FIRST_STEP)
+    for _ in range(400):
+        active = np.flatnonzero((here.t < 1.0) & (step > SMALLEST_STEP))
+        if len(active) == 0:
+            break
+        old = here[active]
+        target = np.minimum(old.t + step[active], 1.0)
+        guess = old.x if part.free else _predicted(before[active], old, target)
+        new, bend = newton(rod, part, active, target, guess)
+        if not part.free:
+            way, off = (np.abs(new.x - x).max(axis=1) for x in (old.x, guess))
+            bend = np.maximum(bend, off / np.maximum(way, 1e-6))
+        good = bend <= BEND
+        before.put(active[good], old[good])
+        here.put(active[good], new[good])
+        step[active] *= np.clip(np.sqrt(0.5 * BEND / np.maximum(bend, 1e-12)), 0.3, 3.0)
+    return here.t, here.x
+
+
+def _predicted(before: Point, here: Point, t: Values) -> Float[np.ndarray, "lanes extended"]:
+    """Cubic through two points with their slopes; the line where there is one point only."""
+    width = here.t - before.t
+    alone = width == 0.0
+    width = np.where(alone, 1.0, width)[:, None]
+    s = (t[:, None] - before.t[:, None]) / width
+    cubic = before.x + s * s * (3.0 - 2.0 * s) * (here.x - before.x)
+    cubic += width * s * (s - 1.0) * ((s - 1.0) * before.slope + s * here.slope)
+    line = here.x + (t - here.t)[:, None] * here.slope
+    return np.asarray(np.where(alone[:, None], line, cubic))
+
+
+def newton(
+    rod: Mechanics,
+    part: Part,
+    lanes: Int[np.ndarray, " lanes"],
+    t: Values,
+    guess: Float[np.ndarray, "lanes extended"],
+) -> tuple[Point, Values]:
+    """Solve at share t of the part; the point, and the second correction relative to the first.
+
+    Infinite where Newton does not converge, the equilibrium is not stable (the free span also needs
+    dν/dλ < 0), or the elements no longer resolve it.
+    """
+    change = part.stop[lanes] - part.start[lanes]
+    at = part.start[lanes] + t[:, None] * change
+    z, nu = np.ascontiguousarray(guess[:, :-1]), at[:, part.span].copy()
+    velocity, row, corner = change, np.zeros_like(z), np.ones(len(z))
+    if part.free:
+        nu, velocity, corner = guess[:, -1].copy(), np.zeros_like(at), np.zeros(len(z))
+        velocity[:, part.span], row[:, part.multiplier] = 1.0, 1.0
+    first, worst = np.zeros(len(z)), np.zeros(len(z))
+    for k in range(ITERATIONS):
+        at[:, part.span] = nu
+        defect = z[:, part.multiplier] if part.free else np.zeros(len(z))
+        step = rod.advance(z, at, velocity, row, corner, defect)
+        z = z + step.dz
+        nu = nu + step.dt if part.free else nu
+        size = np.abs(step.dz).max(axis=1)
+        first = size if k == 0 else first
+        worst = worst if k == 0 else np.maximum(worst, size)
+        if not (size > CONVERGED).any():
+            break
+    stable = (step.index == 0) & ((step.tangent_t < 0.0) if part.free else True)
+    good = stable & (size <= CONVERGED)
+    if part.sharpening[lanes].any():
+        good &= rod.resolved(z, at) | ~part.sharpening[lanes]
+    bend = np.where(good, worst / np.maximum(first, 1e-6), np.inf)
+    slope = np.zeros_like(guess)
+    if not part.free:  # the last matrix is that of the point, but for a correction below 1e-6
+        slope[:, :-1] = step.tangent_z
+        slope[:, -1] = change[:, part.span]
+    return Point(t, np.concatenate([z, nu[:, None]], axis=1), slope), bend
+
 
 SMALLEST = 1e-3
 """End angles, √(Θ² + Δ²), below which the way leads over larger ones with the same ratio: the rod
@@ -95,3 +220,109 @@ def free_part(stop: Parameters) -> Part:
     """From the straight rod to the end angles, with the span free."""
     still = np.zeros(len(stop), bool)
     return Part(stop * [0.0, 0.0, 0.0, 1.0], stop, free=True, sharpening=still)
+
+
+def natural_rod(rod: GeneralMechanics, p: Parameters) -> Natural:
+    """Unloaded states continued from the stress-free shape, per lane.
+
+    `rod` is in the parameters of `model.raw_names`. The stress-free rod lies with its chord along
+    the line between the supports, or as its only clamped end says. Its ends are then moved to
+    where they belong: with held spans first with λ = 0 and the span free, then the span. A straight
+    rod between pins that are nearer than its length has no natural state: it may buckle either
+    way.
+    """
+    names = rod.model.names
+    start, z = _stress_free(rod, p)
+    span = names.index("nu") if "nu" in names else None
+    out = Natural(z.copy(), np.zeros(len(p), int), np.ones(len(p)), np.ones(len(p)))
+    here = np.arange(len(p))
+    x = np.concatenate([z, start[:, [span or 0]]], axis=1)
+    if span is not None and rod.model.quadratic[0, 0] == 0.0:
+        still = np.zeros(len(p), bool)
+        turn = Part(start, p, free=True, sharpening=still, span=span, multiplier=rod.unknowns)
+        out.scale[:], x = follow(rod, turn, x)
+        out.span[:] = x[:, -1]
+        reached = out.scale >= 1.0
+        out.outcome[~reached] = Outcome.FREE_FOLD
+        here, x, start = here[reached], x[reached], p[reached]
+        start[:, span] = x[:, -1]
+    sharpening = rod.resolved(x[:, :-1], start)
+    last = Part(start, p[here], free=False, sharpening=sharpening, span=span or 0)
+    share, x = follow(rod, last, x)
+    out.span[here] = x[:, -1]
+    out.outcome[here[share < 1.0]] = Outcome.SPAN_FOLD
+    there = np.flatnonzero(share >= 1.0)
+    exact = newton(rod, last, there, np.ones(len(there)), x[there])[0].x[:, :-1]
+    out.z[:] = np.nan
+    out.z[here[there]] = exact
+    return out
+
+
+def _stress_free(rod: GeneralMechanics, p: Parameters) -> tuple[Parameters, Lanes]:
+    """Stress-free shape: the places of its ends as parameters, and its state."""
+    model, lanes, start = rod.model, len(p), p.copy()
+    fine = reference_element(model.fine.along.shape[2] - 1)
+    start[:, _forces(rod)] = 0.0
+    y = np.concatenate([np.zeros((lanes, rod.constraints)), start, np.ones((lanes, 1))], axis=1)
+    kappa = np.einsum("lj,jei->lei", y, model.fine.bending) / model.fine.rigidity
+    lengths = model.mesh.lengths[:, None]
+    theta = lengths * np.einsum("ij,lej->lei", fine.integral, kappa)
+    before = np.cumsum(theta[:, :, -1], axis=1) - theta[:, :, -1]
+    theta += before[:, :, None]
+    weights = lengths * fine.weights
+    chord = np.stack([(weights * f(theta)).sum(axis=(1, 2)) for f in (np.cos, np.sin)], axis=1)
+    turn = _orientation(model, p, theta[:, -1, -1], chord)
+    theta += turn[:, None, None]
+    basis = legendre.legvander(2.0 * model.mesh.reference.nodes - 1.0, fine.degree)
+    local = np.einsum("ki,lei->lek", basis @ fine.to_legendre, theta)
+    nodal = np.concatenate([local[:, :, :-1].reshape(lanes, -1), local[:, -1:, -1]], axis=1)
+    z = np.zeros((lanes, rod.size))
+    z[:, : rod.unknowns] = nodal[:, rod.unknown_nodes]
+    places = {
+        "theta_A": theta[:, 0, 0],
+        "theta_B": theta[:, -1, -1],
+        "nu": (weights * np.cos(theta)).sum(axis=(1, 2)),
+        "rise": (weights * np.sin(theta)).sum(axis=(1, 2)),
+    }
+    if "offset" in model.names:
+        across = model.nodal.along[0, 0, 0], model.nodal.across[0, 0, 0]
+        places["offset"] = across[0] * places["nu"] + across[1] * places["rise"]
+    for i, name in enumerate(model.names):
+        start[:, i] = places.get(name, start[:, i])
+    return start, z
+
+
+def _forces(rod: GeneralMechanics) -> Bool[np.ndarray, " parameters"]:
+    """Which parameters are forces or couples, that a stress-free rod lacks."""
+    model = rod.model
+    couples = model.slope.copy()
+    for e, nodes in enumerate(model.mesh.element_nodes):
+        couples[:, nodes] -= model.element_slope[:, e]
+    some = np.concatenate([model.sine, model.cosine, model.tension, couples], axis=1)
+    large = np.abs(some).max(axis=1) > 1e-12 * max(np.abs(some).max(), 1.0)
+    large |= model.pressure != 0.0
+    return np.asarray(large[model.multipliers : -1])
+
+
+def _orientation(
+    model: RodModel, p: Parameters, turning: Values, chord: Float[np.ndarray, "lanes 2"]
+) -> Values:
+    """Angle of the stress-free shape at end A; `chord` and `turning` are those from angle 0."""
+    value = dict(zip(model.names, p.T, strict=True))
+    if "theta_A" in value and "theta_B" not in value:
+        return np.asarray(value["theta_A"])
+    if "theta_B" in value and "theta_A" not in value:
+        return np.asarray(value["theta_B"] - turning)
+    length = np.maximum(np.hypot(*chord.T), 1e-12)
+    if "nu" in value and "rise" in value:
+        wanted = np.arctan2(value["rise"], value["nu"])
+    elif "theta_A" in value:
+        return np.asarray(0.5 * (value["theta_A"] + value["theta_B"] - turning))
+    elif "offset" in value:  # sin(angle − slide) times the length
+        slide = np.arctan2(-model.nodal.along[0, 0, 0], model.nodal.across[0, 0, 0])
+        wanted = slide + np.arcsin(np.clip(value["offset"] / length, -1.0, 1.0))
+    elif "nu" in value:
+        wanted = np.arccos(np.clip(value["nu"] / length, -1.0, 1.0))
+    else:
+        wanted = np.arcsin(np.clip(value["rise"] / length, -1.0, 1.0))
+    return np.asarray(wanted - np.arctan2(chord[:, 1], chord[:, 0]))

@@ -1,6 +1,7 @@
-"""Profiles along the rod: stiffness, curvature, offsets, as a number, a table or a callable."""
+"""Functions of the arclength: shapes of line loads, profiles of stiffness and curvature."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,114 @@ from jaxtyping import Float
 
 from equimorph.errors import InputError
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.loads import LoadShape, LoadSpec, load_shape
+
+Shape = Callable[[Float[np.ndarray, " points"]], Float[np.ndarray, " points"]]
+LoadSpec = str | Sequence[Sequence[float]] | Float[np.ndarray, "rows 2"] | Shape
+
+NAMED: dict[str, list[list[float]]] = {
+    "uniform": [[0.0, 1.0], [1.0, 1.0]],
+    "left-half": [[0.0, 2.0], [0.5, 2.0], [0.5, 0.0], [1.0, 0.0]],
+}
+_GAUSS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadShape:
+    """A load shape: a name or a table that can be written down, or a callable that cannot.
+
+    A table [[s, Q], ...] is linear between its points; a repeated s is a jump.
+    """
+
+    identity: Any
+    density: Shape
+    kinks: Float[np.ndarray, " kinks"]
+
+    def cumulated(self, mesh: Mesh) -> Float[np.ndarray, "elements order"]:
+        """ρ at the nodes of each element, by a Gauss rule of 24 points between nodes."""
+        t = np.concatenate([[0.0], mesh.reference.nodes])
+        rho = np.empty((mesh.elements, mesh.degree + 1))
+        start = 0.0
+        for e, (left, length) in enumerate(zip(mesh.breaks[:-1], mesh.lengths, strict=True)):
+            widths = np.diff(t) * length
+            points = left + length * t[:-1, None] + 0.5 * widths[:, None] * (_GAUSS + 1.0)
+            values = self.density(points.ravel()).reshape(points.shape)
+            rho[e] = start + np.cumsum(0.5 * widths * (values @ _GAUSS_WEIGHTS))
+            start = rho[e, -1]
+        return rho
+
+
+def load_shape(
+    spec: LoadSpec, kinks: Sequence[float] = (), name: str = "load", symbol: str = "Q"
+) -> LoadShape:
+    """Make a load shape of a name, a table [[s, Q], ...] or a callable Q(s) with its `kinks`.
+
+    `name` and `symbol` are what the messages call it.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a table that does not run from 0 to 1, or values that are not finite.
+    """
+    if isinstance(spec, str):
+        if spec not in NAMED:
+            raise InputError(
+                f"`{name}` must be one of {', '.join(map(repr, NAMED))}, a table "
+                f"[[s, {symbol}], ...] or a callable {symbol}(s); got {spec!r}."
+            )
+        return _from_table(spec, np.array(NAMED[spec]), name, symbol)
+    if callable(spec):
+        return _from_callable(spec, kinks, name, symbol)
+    try:
+        table = np.array(spec, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"`{name}` must be a table of numbers [[s, {symbol}], ...]; got {spec!r}."
+        ) from None
+    return _from_table(table.tolist(), table, name, symbol)
+
+
+def _from_table(
+    identity: Any, table: Float[np.ndarray, "..."], name: str, symbol: str
+) -> LoadShape:
+    if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2:
+        raise InputError(
+            f"`{name}` must be a table of rows [s, {symbol}]; got shape {table.shape}."
+        )
+    if not np.isfinite(table).all():
+        raise InputError(f"`{name}` must be finite; got a table with NaN or infinite entries.")
+    s, q = table[:, 0], table[:, 1]
+    falls = np.flatnonzero(np.diff(s) < 0)
+    if s[0] != 0.0 or s[-1] != 1.0 or len(falls):
+        wrong = s[falls[0] : falls[0] + 2] if len(falls) else s[[0, -1]]
+        raise InputError(
+            f"`{name}` must be a table with s rising from 0 to 1; got s "
+            f"{'falling' if len(falls) else 'rising'} from {wrong[0]:g} to {wrong[1]:g}."
+        )
+    inside = np.unique(s[(s > 0) & (s < 1)])
+
+    def density(points: Float[np.ndarray, " points"]) -> Float[np.ndarray, " points"]:
+        right = np.clip(np.searchsorted(s, points, side="right"), 1, len(s) - 1)
+        width = np.where(s[right] > s[right - 1], s[right] - s[right - 1], 1.0)
+        share = np.clip((points - s[right - 1]) / width, 0.0, 1.0)
+        return np.asarray((1.0 - share) * q[right - 1] + share * q[right])
+
+    return LoadShape(identity, density, inside)
+
+
+def _from_callable(function: Shape, kinks: Sequence[float], name: str, symbol: str) -> LoadShape:
+    at = np.unique(np.asarray(kinks, dtype=float))
+    if not ((at > 0) & (at < 1)).all():
+        raise InputError(f"`kinks` must lie between 0 and 1; got {list(kinks)!r}.")
+
+    def density(points: Float[np.ndarray, " points"]) -> Float[np.ndarray, " points"]:
+        values = np.broadcast_to(np.asarray(function(points), dtype=float), points.shape)
+        if not np.isfinite(values).all():
+            bad = points[~np.isfinite(values)][0]
+            raise InputError(f"`{name}` must be finite; got {symbol}({bad:g}) = {values.min()}.")
+        return values
+
+    return LoadShape(None, density, at)
+
 
 ProfileSpec = float | LoadSpec
 INWARD = 1e-13

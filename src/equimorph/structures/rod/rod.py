@@ -10,21 +10,20 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Parameter, names_of, parameter_vector
 from equimorph.structures.rod import descriptors
+from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.described import Described
+from equimorph.structures.rod.description import Description
 from equimorph.structures.rod.discretisation import mesh_with_kinks
 from equimorph.structures.rod.drawing import Amplitudes, rod_drawing
-from equimorph.structures.rod.general.assembly import Description
-from equimorph.structures.rod.general.ends import End
-from equimorph.structures.rod.general.mechanics import GeneralMechanics
-from equimorph.structures.rod.general.natural import natural_rod
-from equimorph.structures.rod.general.terms import LineLoad
-from equimorph.structures.rod.interface import Mechanics
-from equimorph.structures.rod.loads import LoadShape, LoadSpec, load_shape
-from equimorph.structures.rod.mechanics import ClampedMechanics
-from equimorph.structures.rod.natural import Natural, Outcome, natural_arch
+from equimorph.structures.rod.ends import End
+from equimorph.structures.rod.general import GeneralMechanics
+from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.natural import Natural, Outcome, natural_arch, natural_rod
+from equimorph.structures.rod.profiles import LoadShape, LoadSpec, load_shape
+from equimorph.structures.rod.terms import LineLoad
+from equimorph.structures.rod.units import rod_units
 from equimorph.structures.states import State, States
 from equimorph.structures.unit_system import Quantity, unit_system
-from equimorph.structures.units import rod_units
 
 DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")

@@ -1,8 +1,11 @@
-"""One bar of a truss."""
+"""Bars of a truss, and their energy by strain."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
 
 from equimorph.errors import InputError
 from equimorph.structures.unit_system import Quantity, UnitSystem, check_positive
@@ -72,3 +75,53 @@ def bar_of(given: Any) -> Bar:
         raise InputError(
             f"`bars` must hold Bars (ends, EA, EI, rest) or pairs of joints; got {given!r}."
         ) from None
+
+
+Strain = Literal["engineering", "green"]
+Values = Float[np.ndarray, "lanes bars"]
+
+
+@dataclass(frozen=True)
+class Energies:
+    """W(g, l₀) of bars, g the square of the length, l₀ the rest length.
+
+    Engineering strain ε = l/l₀ − 1, Green strain ε = (g/l₀² − 1)/2; W = ½ EA l₀ ε².
+    """
+
+    green: bool
+    stiffness: Float[np.ndarray, " bars"]
+
+    def value(self, g: Values, l0: Values) -> Values:
+        """W."""
+        strain = 0.5 * (g / l0**2 - 1.0) if self.green else np.sqrt(g) / l0 - 1.0
+        return np.asarray(0.5 * self.stiffness * l0 * strain**2)
+
+    def force(self, g: Values, l0: Values) -> Values:
+        """Force in the bar, dW/dl, positive in tension."""
+        length = np.sqrt(g)
+        if self.green:
+            return np.asarray(0.5 * self.stiffness * length / l0 * (g / l0**2 - 1.0))
+        return np.asarray(self.stiffness * (length / l0 - 1.0))
+
+    def by_rest(self, g: Values, l0: Values) -> Values:
+        """∂W/∂l₀."""
+        share = g / l0**2
+        if self.green:
+            return np.asarray(self.stiffness / 8.0 * (1.0 + 2.0 * share - 3.0 * share**2))
+        return np.asarray(0.5 * self.stiffness * (1.0 - share))
+
+    def second(self, g: Values, l0: Values) -> tuple[Values, Values]:
+        """∂²W/∂g² and ∂²W/∂g∂l₀."""
+        if self.green:
+            mixed = 0.25 * self.stiffness / l0**2 * (1.0 - 3.0 * g / l0**2)
+            return np.asarray(0.25 * self.stiffness / l0**3), np.asarray(mixed)
+        return np.asarray(0.25 * self.stiffness / g**1.5), np.asarray(-0.5 * self.stiffness / l0**2)
+
+    def third(self, g: Values, l0: Values) -> tuple[Values, Values, Values]:
+        """∂³W/∂g³, ∂³W/∂g²∂l₀ and ∂³W/∂g∂l₀²."""
+        nothing = np.zeros_like(g)
+        if self.green:
+            twice = 0.25 * self.stiffness * (12.0 * g / l0**5 - 2.0 / l0**3)
+            return nothing, np.asarray(-0.75 * self.stiffness / l0**4), np.asarray(twice)
+        by_square = -0.375 * self.stiffness / g**2.5
+        return np.asarray(by_square), nothing, np.asarray(self.stiffness / l0**3)

@@ -1,6 +1,6 @@
-"""Mechanics of a truss: energy, forces, stiffness and their derivatives, for batches of lanes."""
+"""Mechanics of a truss in batches of lanes: energy, forces, stiffness, symmetries."""
 
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
@@ -11,12 +11,13 @@ from equimorph.linalg.dense import multiply
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
-from equimorph.structures.contract import Direction
+from equimorph.structures.contract import Direction, Symmetry
 from equimorph.structures.discrete import DiscreteStructure, along_corners
+from equimorph.structures.images import exchanged, images, is_symmetry
 from equimorph.structures.supports import supports_of_point
+from equimorph.structures.truss.bar import Energies
 from equimorph.structures.truss.kernels import linearise_lanes
 from equimorph.structures.truss.network import Network
-from equimorph.structures.truss.strain import Energies
 from equimorph.structures.unit_system import UnitSystem
 
 BarValues = Float[np.ndarray, "lanes bars"]
@@ -229,3 +230,53 @@ class TrussMechanics(DiscreteStructure):
             return vectors
         recede = 0.5 * np.sqrt(0.5) * vectors[..., 1]
         return np.stack([vectors[..., 0] + recede, vectors[..., 2] + recede], axis=-1)
+
+
+def symmetries(truss: TrussMechanics) -> tuple[Symmetry, ...]:
+    """Mirror images that leave bars, supports, loads and actuators as they are, up to signs."""
+    found = []
+    for name, axes, joints in images(truss.network.places):
+        places = _exchanged(truss, axes, joints)
+        if places is None:
+            continue
+        apply = partial(_applied, truss, axes, joints, places)
+        if is_symmetry(truss, apply):
+            found.append(Symmetry(name, apply, *places))
+    return tuple(found)
+
+
+def _exchanged(
+    truss: TrussMechanics, axes: Float[np.ndarray, " space"], joints: Int[np.ndarray, " joints"]
+) -> tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]] | None:
+    """Signs and order of the parameters in the image; None if the image is another truss."""
+    made = truss.network
+    pairs = [frozenset(pair) for pair in made.ends.tolist()]
+    turned = [frozenset(joints[list(pair)].tolist()) for pair in pairs]
+    if set(pairs) != set(turned) or not np.array_equal(made.held[joints], made.held):
+        return None
+    there = [pairs.index(pair) for pair in turned]
+    heres, mapped = [], []
+    for rates, pulls in zip(truss.rates.T, truss.pulls, strict=True):
+        forces = np.zeros(made.held.shape)
+        forces[~made.held] = pulls
+        image, moved = np.zeros_like(forces), np.zeros_like(rates)
+        image[joints], moved[there] = axes * forces, rates
+        heres.append(np.append(forces, rates))
+        mapped.append(np.append(image, moved))
+    return exchanged(heres, mapped)
+
+
+def _applied(
+    truss: TrussMechanics,
+    axes: Float[np.ndarray, " space"],
+    joints: Int[np.ndarray, " joints"],
+    places: tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]],
+    z: Lanes,
+    p: Parameters,
+) -> tuple[Lanes, Parameters]:
+    held, (signs, order) = truss.network.held, places
+    moves = np.zeros((len(z), *held.shape))
+    moves[:, ~held] = z
+    image = np.zeros_like(moves)
+    image[:, joints] = axes * moves
+    return np.ascontiguousarray(image[:, ~held]), np.ascontiguousarray(signs * p[:, order])

@@ -12,12 +12,11 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.natural import corrected
+from equimorph.structures.discrete import corrected
 from equimorph.structures.truss import descriptors
-from equimorph.structures.truss.mechanics import TrussMechanics
+from equimorph.structures.truss.bar import Energies, Strain
+from equimorph.structures.truss.mechanics import TrussMechanics, symmetries
 from equimorph.structures.truss.network import AXES, Network, network
-from equimorph.structures.truss.strain import Energies, Strain
-from equimorph.structures.truss.symmetry import symmetries
 from equimorph.structures.unit_system import Quantity, unit_system
 
 Patterns = Mapping[str, Mapping[str, Any]]

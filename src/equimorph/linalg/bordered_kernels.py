@@ -3,7 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.condensed.kernels import (
+from equimorph.linalg.condensed_kernels import (
     GROUP,
     TIES,
     TILE,

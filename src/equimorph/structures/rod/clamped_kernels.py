@@ -8,7 +8,7 @@ multiple of eight the last block overlaps the one before.
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.condensed.kernels import (
+from equimorph.linalg.condensed_kernels import (
     GROUP,
     TILE,
     add_products,

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equimorph.linalg.compiled import njit
-from equimorph.linalg.condensed.bordered.kernels import (
+from equimorph.linalg.bordered_kernels import (
     count_border,
     reduce_block,
     restore_pair,
@@ -11,7 +10,8 @@ from equimorph.linalg.condensed.bordered.kernels import (
     subtract_products,
     tiles_of,
 )
-from equimorph.linalg.condensed.kernels import TILE, pivot_ratio, work_arrays
+from equimorph.linalg.compiled import njit
+from equimorph.linalg.condensed_kernels import TILE, pivot_ratio, work_arrays
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
 from equimorph.linalg.simd import (
     LANES,
@@ -22,7 +22,7 @@ from equimorph.linalg.simd import (
     where_less,
     work_rows,
 )
-from equimorph.structures.rod.general.kernels import assemble_block
+from equimorph.structures.rod.general_kernels import assemble_block
 
 COLUMNS, SIDES = np.int64(1), np.int64(2)
 """One column borders F_z; step and tangent are solved side by side."""

@@ -10,8 +10,7 @@ from jaxtyping import Float
 
 from equimorph.errors import InputError
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.loads import LoadShape, load_shape
-from equimorph.structures.rod.profiles import at_nodes, inside, profile
+from equimorph.structures.rod.profiles import LoadShape, at_nodes, inside, load_shape, profile
 
 ElementNodes = Float[np.ndarray, "elements order"]
 DOWN = (0.0, -1.0)

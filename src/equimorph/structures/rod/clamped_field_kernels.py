@@ -25,7 +25,7 @@ from equimorph.linalg.simd import (
     where_less,
     work_rows,
 )
-from equimorph.structures.rod.kernels import LAMBDA, MU, Q, read_state
+from equimorph.structures.rod.clamped_kernels import LAMBDA, MU, Q, read_state
 
 FOUR_PI_SQUARED = 4.0 * np.pi**2
 ORDER = np.int64(16)

@@ -6,28 +6,23 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Values
-from equimorph.errors import InputError
-from equimorph.linalg import BorderedSolution, CondensedLayout
-from equimorph.linalg.condensed import PIVOT_GUARD
+from equimorph.linalg import Border, BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import (
     Advance,
-    Border,
     Direction,
     Symmetry,
     solved_advance,
 )
 from equimorph.structures.rod.discretisation import Reference
-from equimorph.structures.rod.general.area import EnclosedArea
-from equimorph.structures.rod.general.fields import Fields
-from equimorph.structures.rod.general.kernels import linearise_lanes, second_lanes
-from equimorph.structures.rod.general.model import RodModel
-from equimorph.structures.rod.general.packed import packed
-from equimorph.structures.rod.general.pressed import lower_triangle
-from equimorph.structures.rod.general.step.kernels import advance_lanes
-from equimorph.structures.rod.general.symmetry import mirrors
-from equimorph.structures.rod.interface import LARGEST_TAIL, Mechanics
+from equimorph.structures.rod.fields import GeneralFields
+from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
+from equimorph.structures.rod.general_step_kernels import advance_lanes
+from equimorph.structures.rod.mechanics import LARGEST_TAIL, Mechanics
+from equimorph.structures.rod.model import RodModel, packed
+from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
+from equimorph.structures.rod.symmetry import mirrors
 
 Points = Float[np.ndarray, "lanes points"]
 
@@ -45,6 +40,7 @@ class GeneralMechanics(Mechanics):
     def __init__(self, model: RodModel) -> None:
         self.model, self.mesh = model, model.mesh
         self.constraints, self.held = model.multipliers, model.held
+        self.parameters = len(model.names)
         start, stop = model.held
         ends = np.array([int(start), model.mesh.elements - int(stop)])
         self.layout = CondensedLayout(np.ascontiguousarray(model.stiffness), ends)
@@ -65,19 +61,6 @@ class GeneralMechanics(Mechanics):
         first = np.int64(self.unknown_nodes.start)
         return self.layout.stiffness, *tables, squared, turned, first
 
-    def _checked(self, *pairs: Direction) -> list[np.ndarray]:
-        """States and directions as contiguous arrays of the right widths, for the kernels."""
-        lanes = len(pairs[0][0])
-        shapes = (lanes, self.size), (lanes, len(self.model.names))
-        for pair in pairs:
-            if (pair[0].shape, pair[1].shape) != shapes:
-                wrong = int(pair[0].shape == shapes[0])
-                raise InputError(
-                    f"`{'zp'[wrong]}` must have shape {shapes[wrong]}; got {pair[wrong].shape}. "
-                    "States belong to the rod, and the resolution, that made them."
-                )
-        return [np.ascontiguousarray(array) for pair in pairs for array in pair]
-
     def scalars(self, z: Lanes, p: Parameters) -> Scalars:
         """Multipliers, parameters and 1."""
         return np.concatenate([z[:, self.unknowns :], p, np.ones((len(z), 1))], axis=1)
@@ -86,7 +69,7 @@ class GeneralMechanics(Mechanics):
 
     def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
         """Angles θ at all nodes, the prescribed ends included."""
-        z, p = self._checked((z, p))
+        z, p = self.checked((z, p))
         return self._angles(z, self.scalars(z, p))
 
     def _angles(self, z: Lanes, y: Scalars) -> Nodal:
@@ -97,8 +80,8 @@ class GeneralMechanics(Mechanics):
         return out
 
     @cached_property
-    def _fields(self) -> Fields:
-        return Fields(self.model)
+    def _fields(self) -> GeneralFields:
+        return GeneralFields(self.model)
 
     @property
     def fine_reference(self) -> Reference:
@@ -211,7 +194,7 @@ class GeneralMechanics(Mechanics):
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp, and the parts of F_z: diagonal, border, trailing block."""
-        z, p, _, dp = self._checked((z, p), (z, dp))
+        z, p, _, dp = self.checked((z, p), (z, dp))
         lanes, nodes, m = len(z), self.layout.nodes, self.constraints
         out = (
             np.empty_like(z),
@@ -255,7 +238,7 @@ class GeneralMechanics(Mechanics):
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
-        arrays = self._checked((z, p), v, w)
+        arrays = self.checked((z, p), v, w)
         out = np.empty_like(arrays[0])
         _, points, softness, _, picks, splits, _, turned, first = self._step_data
         sizes = np.int64(self.mesh.elements), np.int64(self.constraints), first
@@ -282,10 +265,7 @@ class GeneralMechanics(Mechanics):
         diagonal, gradients, trailing = self.linearised(z, p, np.zeros_like(p))[2:]
         if shift is not None:
             diagonal -= shift[:, None] * self.mesh.weights
-        if border is None:
-            nothing = np.zeros((len(z), 0, self.size))
-            border = (nothing, nothing, np.zeros((len(z), 0, 0)))
-        columns, rows, corner = border
+        columns, rows, corner = no_border(len(z), self.size) if border is None else border
         if self._area is not None:
             entries = self._pressed_entries(self._area, z, p, (diagonal, gradients, trailing))
             return self._full_layout.solve(entries, border, rhs)
@@ -326,23 +306,11 @@ class GeneralMechanics(Mechanics):
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
-        """Fused kernel; lanes with an unsafe pivot, and rods under pressure, solve in general."""
+        """One fused kernel; rods under pressure, whose matrix is full, solve in general."""
         if self._area is not None:
             return self._pressed_advance(z, p, dp, row, corner, defect)
-        z, p, row, dp = self._checked((z, p), (row, dp))
-        inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
-        lanes = len(z)
-        dz, tangent_z, index = np.empty(z.shape), np.empty(z.shape), np.empty(lanes, np.int64)
-        dt, tangent_t, residual, determinant, ratio = (np.empty(lanes) for _ in range(5))
-        outputs = [dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio]
-        over_lanes(advance_lanes, (self.layout.ends, *self._step_data), inputs, outputs)
-        out = Advance(dz, dt, tangent_z, tangent_t, residual, index, determinant)
-        if not np.minimum.reduce(ratio, initial=1.0) >= PIVOT_GUARD:
-            unsafe = ~(ratio >= PIVOT_GUARD)
-            again = self.plain_advance(*(x[unsafe] for x in inputs))
-            for name, column in vars(again).items():
-                getattr(out, name)[unsafe] = column
-        return out
+        shared = (self.layout.ends, *self._step_data)
+        return self.fused_advance(advance_lanes, shared, z, p, dp, row, corner, defect)
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random curvatures between the end angles, with random multipliers."""

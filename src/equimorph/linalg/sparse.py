@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.linalg.dense import BorderedSolution, solve_bordered
+from equimorph.linalg.dense import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.lanes import over_lanes
-from equimorph.linalg.sparse.kernels import solve_sparse
+from equimorph.linalg.sparse_kernels import solve_sparse
 
 GROWTH = 1e5
 """Largest growth of diagonal entries, relative to the matrix, of a factorisation that is trusted.
@@ -96,12 +96,7 @@ class SparseLayout:
     def solve(
         self,
         values: Float[np.ndarray, "lanes entries"],
-        border: tuple[
-            Float[np.ndarray, "lanes k size"],
-            Float[np.ndarray, "lanes k size"],
-            Float[np.ndarray, "lanes k k"],
-        ]
-        | None,
+        border: Border | None,
         rhs: Float[np.ndarray, "lanes sides bordered"],
     ) -> BorderedSolution:
         """Solve ``[A Cᵀ; R D] x = rhs`` with border (C, R, D), and count A's inertia.
@@ -111,10 +106,8 @@ class SparseLayout:
         than `GROWTH` (or are no numbers) are solved again by the pivoted dense factorisation.
         """
         lanes = len(values)
-        if border is None:
-            nothing = np.zeros((lanes, 0, self.size))
-            border = (nothing, nothing, np.zeros((lanes, 0, 0)))
-        arrays = [np.ascontiguousarray(a) for a in (values, *border, rhs)]
+        around = no_border(lanes, self.size) if border is None else border
+        arrays = [np.ascontiguousarray(a) for a in (values, *around, rhs)]
         x, (growth, determinant) = np.empty(rhs.shape), np.empty((2, lanes))
         negative = np.empty(lanes, dtype=np.int64)
         how = self.elimination

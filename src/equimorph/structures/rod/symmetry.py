@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.rod.general.model import RodModel
+from equimorph.structures.rod.model import RodModel
 
 Matrix = Float[np.ndarray, "scalars scalars"]
 

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Values
 from equimorph.errors import InputError
-from equimorph.linalg.condensed.bordered.kernels import solve_condensed
+from equimorph.linalg.bordered_kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered
 from equimorph.linalg.lanes import over_lanes
 

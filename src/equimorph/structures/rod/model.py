@@ -1,19 +1,18 @@
-"""The numbers of a general rod: its Lagrangian as constant arrays."""
+"""The Lagrangian of a rod as constant arrays, and as its kernels read them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from equimorph.structures.rod.discretisation import Mesh, reference_element
-from equimorph.structures.rod.general.ends import FREE, HELD, Axis, End, compliance, support_axes
-from equimorph.structures.rod.general.terms import Effects, Term
-from equimorph.structures.rod.loads import LoadShape
-from equimorph.structures.rod.profiles import at_nodes
+from equimorph.structures.rod.ends import FREE, HELD, Axis, End, compliance, support_axes
+from equimorph.structures.rod.profiles import LoadShape, at_nodes
+from equimorph.structures.rod.terms import Effects, Term
+from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
-FOUR_PI_SQUARED = 4.0 * np.pi**2
 Rows = Float[np.ndarray, "scalars elements order"]
 
 
@@ -333,3 +332,42 @@ def _supports(
     if build.ends[0].slide is not None:  # from end B, whose place across the line is given
         origin[:], from_start = np.outer(unit, site), [False, False]
     return reactions, origin, (from_start[0], from_start[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Packed:
+    """Coefficients of those scalars that have any, beside each other for every point.
+
+    Attributes
+    ----------
+    points
+        For the nodes of every element the coefficients of sin θ, of cos θ and of the cables' pull.
+        The multipliers come first in each of the first two groups.
+    slope
+        Coefficients of θ at every node of the rod.
+    picks
+        Which scalars all these belong to, group by group.
+    splits
+        Where the second, third and fourth group begin in `picks`.
+    """
+
+    points: Float[np.ndarray, "points many"]
+    slope: Float[np.ndarray, "nodes few"]
+    picks: Int[np.ndarray, " all"]
+    splits: Int[np.ndarray, "3"]
+
+
+def packed(model: RodModel) -> Packed:
+    """Tables of a rod."""
+    m, tables = model.multipliers, (model.sine, model.cosine, model.tension, model.slope)
+    used: list[Bool[np.ndarray, " scalars"]] = [np.asarray(a.any(axis=1)) for a in tables]
+    for each in used[:2]:
+        each[:m] = True
+    picks = [np.flatnonzero(each) for each in used]
+    groups = [table[pick].T for table, pick in zip(tables, picks, strict=True)]
+    return Packed(
+        np.ascontiguousarray(np.concatenate(groups[:3], axis=1)),
+        np.ascontiguousarray(groups[3]),
+        np.concatenate(picks),
+        np.cumsum([len(pick) for pick in picks[:3]]),
+    )

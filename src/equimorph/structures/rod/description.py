@@ -13,13 +13,12 @@ from equimorph.errors import InputError, suggestion
 from equimorph.model import Parameter
 from equimorph.model.parameter import Role
 from equimorph.structures.rod.discretisation import mesh_with_kinks
-from equimorph.structures.rod.general.ends import End, check_supports, end, support_axes
-from equimorph.structures.rod.general.mechanics import GeneralMechanics
-from equimorph.structures.rod.general.model import Build, RodModel, raw_model
-from equimorph.structures.rod.general.terms import Pressure, Term, term
-from equimorph.structures.rod.loads import LoadShape
-from equimorph.structures.rod.profiles import profile
-from equimorph.structures.units import Units
+from equimorph.structures.rod.ends import End, check_supports, end, support_axes
+from equimorph.structures.rod.general import GeneralMechanics
+from equimorph.structures.rod.model import Build, RodModel, raw_model
+from equimorph.structures.rod.profiles import LoadShape, profile
+from equimorph.structures.rod.terms import Pressure, Term, term
+from equimorph.structures.rod.units import Units
 
 Terms = Mapping[str, Any]
 Matrix = Float[np.ndarray, "scalars others"]

@@ -7,7 +7,7 @@ L = Σ ½ θᵀKθ + Σᵢ (aᵢ sin θᵢ + bᵢ cos θᵢ) − λν with a = �
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, write_lanes
 from equimorph.linalg.simd import LANES, load, sincos, spread, store, work_rows
-from equimorph.structures.rod.kernels import LAMBDA, MU, NU, Q, read_state
+from equimorph.structures.rod.clamped_kernels import LAMBDA, MU, NU, Q, read_state
 
 FIRST, LAST, LIFT = range(3)
 """Columns of the ends: ∂L/∂θ at both prescribed ends, ∂L/∂q."""

@@ -1,1 +1,0 @@
-"""General bordered solves with the condensed factorisation."""

@@ -1,1 +1,0 @@
-"""Residual, matrix and derivatives of the rod."""

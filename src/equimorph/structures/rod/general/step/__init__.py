@@ -1,1 +1,0 @@
-"""Fused Newton step of general rods."""
