@@ -12,6 +12,7 @@ from equimorph.structures.contract import Structure
 Apply = Callable[[Lanes, Parameters], tuple[Lanes, Parameters]]
 Signs = Float[np.ndarray, " space"]
 Joints = Int[np.ndarray, " joints"]
+Ends = Int[np.ndarray, "edges 2"]
 
 SAME = 1e-9
 """Largest difference, relative to what is compared, of equal numbers."""
@@ -40,6 +41,15 @@ def images(places: Float[np.ndarray, "joints space"]) -> Iterator[tuple[str, Sig
         if (apart.min(axis=1) <= near).all() and len(set(there.tolist())) == len(places):
             flipped = "".join(axis for axis, sign in zip("xyz", signs, strict=False) if sign < 0)
             yield NAMES.get(signs, f"image in {flipped}"), np.array(signs, float), there
+
+
+def edges_of_image(ends: Ends, joints: Joints) -> Int[np.ndarray, " edges"] | None:
+    """The edge on which each comes to lie in an image; None if one does not lie on any."""
+    pairs = [frozenset(pair) for pair in ends.tolist()]
+    moved = [frozenset(joints[list(pair)].tolist()) for pair in pairs]
+    if set(moved) != set(pairs):
+        return None
+    return np.array([pairs.index(pair) for pair in moved])
 
 
 def sign_between(a: np.ndarray, b: np.ndarray) -> float | None:

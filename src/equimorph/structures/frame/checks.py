@@ -6,6 +6,7 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.structures.frame.fields import FrameFields
+from equimorph.structures.network import direction_of_mechanism
 
 SINGULAR = 1e-10
 """Eigenvalue at rest, relative to the largest one, that counts as none."""
@@ -36,11 +37,8 @@ def _refuse_mechanism(frame: FrameFields, mode: Float[np.ndarray, " size"]) -> N
     made, p = frame.model.network, np.zeros((1, len(frame.parameters)))
     step = 1e-3 * mode[None] / np.abs(mode).max()
     moves = (frame.displacements(step, p) - frame.displacements(-step, p))[0]
-    at = int(np.argmax(np.abs(moves).max(axis=1)))
     if np.abs(moves).max() > 1e-6:
-        along = moves[at] / np.linalg.norm(moves[at])
-        along = along * np.sign(along[np.argmax(np.abs(along))])
-        direction = ", ".join(f"{x:.3g}" for x in np.round(along, 6) + 0.0)
+        at, direction = direction_of_mechanism(moves)
         what = f"joint {made.joints[at]} can move along ({direction})"
     else:
         ends = frame.turns_of_ends(step, p)[0]

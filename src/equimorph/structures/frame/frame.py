@@ -18,9 +18,10 @@ from equimorph.structures.frame.drawing import frame_drawing
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.member import support_data
 from equimorph.structures.frame.model import FrameModel
-from equimorph.structures.frame.network import Network, network
+from equimorph.structures.frame.network import FrameNetwork, frame_network
 from equimorph.structures.frame.patterns import Given, Patterns, patterns
 from equimorph.structures.frame.symmetry import symmetries
+from equimorph.structures.network import length_limits
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.unit_system import Quantity, unit_system
 
@@ -98,7 +99,7 @@ class Frame(FrameFields):
         if not (isinstance(degree, int) and 3 <= degree <= 16):
             raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
         system = unit_system(units)
-        made = network(joints, members, supports, system)
+        made = frame_network(joints, members, supports, system)
         self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
         found = patterns(made, self._actuators, self._loads)
         self._check_drift(made)
@@ -116,7 +117,7 @@ class Frame(FrameFields):
         self._set_scales()
 
     @staticmethod
-    def _check_drift(made: Network) -> None:
+    def _check_drift(made: FrameNetwork) -> None:
         for axis, stiff in zip("xy", made.supports.T, strict=False):
             if not stiff.any():
                 raise InputError(
@@ -127,11 +128,8 @@ class Frame(FrameFields):
         unit = self.model.system.label(found.unit(k))
         if k >= len(self._actuators):
             return Parameter(name, unit, 1.0, "load", 0.0)
-        rates, rests = found.length[k], self.model.network.lengths
-        limits = -rests[rates != 0.0] / rates[rates != 0.0]
-        lower = float(limits[limits < 0.0].max(initial=-np.inf))
-        upper = float(limits[limits > 0.0].min(initial=np.inf))
-        return Parameter(name, unit, 1.0, "actuator", 0.0, lower, upper)
+        limits = length_limits(self.model.network.lengths, found.length[k])
+        return Parameter(name, unit, 1.0, "actuator", 0.0, *limits)
 
     def _set_scales(self) -> None:
         """Measure parameters by what turns a node by one radian, or bends a member by as much."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.structures.frame.network import Network
+from equimorph.structures.frame.network import FrameNetwork
 from equimorph.structures.frame.patterns import Patterns
 from equimorph.structures.frame.statics import Graph
 from equimorph.structures.rod.discretisation import Mesh
@@ -52,7 +52,7 @@ class FrameModel:
         Units of length and of bending stiffness, in those of the user's `system`.
     """
 
-    network: Network
+    network: FrameNetwork
     patterns: Patterns
     mesh: Mesh
     length: float

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.errors import InputError
-from equimorph.structures.frame.network import WEIGHT, Network, items, numbers
+from equimorph.structures.frame.network import WEIGHT, FrameNetwork
+from equimorph.structures.network import check_parameter_names, items, numbers
 
 Given = Mapping[str, Mapping[str, Any]]
 KINDS = ("curvature", "length", "move", "turn")
@@ -77,7 +78,7 @@ class Patterns:
         return 1.0 / float(max(sizes))
 
 
-def patterns(made: Network, actuators: Given, loads: Given) -> Patterns:
+def patterns(made: FrameNetwork, actuators: Given, loads: Given) -> Patterns:
     """Patterns of all parameters, actuators first.
 
     Raises
@@ -86,7 +87,7 @@ def patterns(made: Network, actuators: Given, loads: Given) -> Patterns:
         For names without meaning or used twice, unknown joints or members, or a parameter that has
         no effect.
     """
-    _check_names([*actuators, *loads])
+    check_parameter_names([*actuators, *loads])
     count, joints, members = len(actuators) + len(loads), len(made.joints), len(made.members)
     both, single = (count, joints, 2), (count, joints)
     found = Patterns(
@@ -101,24 +102,13 @@ def patterns(made: Network, actuators: Given, loads: Given) -> Patterns:
     return found
 
 
-def _check_names(names: list[Any]) -> None:
-    if not names:
-        raise InputError("`loads` or `actuators` must name a parameter; got none.")
-    for i, name in enumerate(names):
-        if not (isinstance(name, str) and name.isidentifier()) or name in names[:i]:
-            raise InputError(
-                "`loads` and `actuators` must have names of their own, of letters, digits and "
-                f"underscores; got {name!r}."
-            )
-
-
 def _number(value: Any, what: str) -> float:
     if not (isinstance(value, int | float) and np.isfinite(value) and value):
         raise InputError(f"`{what}` must be a finite number other than 0; got {value!r}.")
     return float(value)
 
 
-def _fill_actuator(made: Network, into: Patterns, k: int, what: str, given: Any) -> None:
+def _fill_actuator(made: FrameNetwork, into: Patterns, k: int, what: str, given: Any) -> None:
     pairs = list(items(given, what, f"effect ({', '.join(KINDS)})"))
     if not pairs:
         raise InputError(f"`{what}` must have an effect ({', '.join(KINDS)}); got none.")
@@ -132,7 +122,7 @@ def _fill_actuator(made: Network, into: Patterns, k: int, what: str, given: Any)
         for name, value in entries:
             here = f"{where}.{name}"
             if kind == "move":
-                _fill_move(made, into, k, here, (name, value))
+                _fill_move(made, into, k, here, name, value)
             elif kind == "turn":
                 into.turns[k, made.supported(name, "angle")[0]] = _number(value, here)
             else:
@@ -141,8 +131,9 @@ def _fill_actuator(made: Network, into: Patterns, k: int, what: str, given: Any)
                 array[k, member] = _number(value, here) * (sign if kind == "curvature" else 1.0)
 
 
-def _fill_move(made: Network, into: Patterns, k: int, what: str, entry: tuple[Any, Any]) -> None:
-    name, given = entry
+def _fill_move(
+    made: FrameNetwork, into: Patterns, k: int, what: str, name: Any, given: Any
+) -> None:
     vector = numbers(given, [2], what)
     for axis, value in enumerate(vector):
         if value:
@@ -151,7 +142,7 @@ def _fill_move(made: Network, into: Patterns, k: int, what: str, entry: tuple[An
         raise InputError(f"`{what}` must not be zero; got {given!r}.")
 
 
-def _fill_load(made: Network, into: Patterns, k: int, what: str, given: Any) -> None:
+def _fill_load(made: FrameNetwork, into: Patterns, k: int, what: str, given: Any) -> None:
     entries = list(items(given, what, f"joint, member, or {WEIGHT}"))
     for name, value in entries:
         here = f"{what}.{name}"
@@ -177,7 +168,7 @@ def _fill_load(made: Network, into: Patterns, k: int, what: str, given: Any) -> 
     _check_effect(made, into, k, what)
 
 
-def _check_effect(made: Network, into: Patterns, k: int, what: str) -> None:
+def _check_effect(made: FrameNetwork, into: Patterns, k: int, what: str) -> None:
     """Refuse a load that supports alone bear."""
     fast = np.isinf(made.supports)
     forces, couples = into.forces[k], into.couples[k]

@@ -10,7 +10,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.mechanics import FrameMechanics
-from equimorph.structures.images import exchanged, images, is_symmetry
+from equimorph.structures.images import edges_of_image, exchanged, images, is_symmetry
 
 Matrix = Float[np.ndarray, "scalars scalars"]
 
@@ -41,21 +41,20 @@ class _Image:
         return float(self.axes.prod())
 
     @cached_property
-    def _pairs(self) -> list[frozenset[int]]:
-        return [frozenset(pair) for pair in self.frame.model.network.ends.tolist()]
+    def _there(self) -> Int[np.ndarray, " members"] | None:
+        return edges_of_image(self.frame.model.network.ends, self.joints)
 
     @property
     def possible(self) -> bool:
         """Whether members come to lie on members, and supports on equal ones."""
-        turned = {frozenset(self.joints[list(pair)].tolist()) for pair in self._pairs}
         supports = self.frame.model.network.supports
-        return turned == set(self._pairs) and np.array_equal(supports[self.joints], supports)
+        return self._there is not None and np.array_equal(supports[self.joints], supports)
 
-    @cached_property
+    @property
     def there(self) -> Int[np.ndarray, " members"]:
         """The member on which each comes to lie."""
-        turned = (frozenset(self.joints[list(pair)].tolist()) for pair in self._pairs)
-        return np.array([self._pairs.index(pair) for pair in turned])
+        assert self._there is not None
+        return self._there
 
     @cached_property
     def reversed(self) -> Bool[np.ndarray, " members"]:

@@ -13,11 +13,11 @@ from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
 from equimorph.structures.contract import Direction, Symmetry
 from equimorph.structures.discrete import DiscreteStructure, along_corners
-from equimorph.structures.images import exchanged, images, is_symmetry
+from equimorph.structures.images import edges_of_image, exchanged, images, is_symmetry
 from equimorph.structures.supports import supports_of_point
 from equimorph.structures.truss.bar import Energies
 from equimorph.structures.truss.kernels import linearise_lanes
-from equimorph.structures.truss.network import Network
+from equimorph.structures.truss.network import TrussNetwork
 from equimorph.structures.unit_system import UnitSystem
 
 BarValues = Float[np.ndarray, "lanes bars"]
@@ -50,7 +50,7 @@ class TrussMechanics(DiscreteStructure):
 
     def __init__(
         self,
-        network: Network,
+        network: TrussNetwork,
         energies: Energies,
         rates: Float[np.ndarray, "bars parameters"],
         pulls: Float[np.ndarray, "parameters unknowns"],
@@ -250,11 +250,9 @@ def _exchanged(
 ) -> tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]] | None:
     """Signs and order of the parameters in the image; None if the image is another truss."""
     made = truss.network
-    pairs = [frozenset(pair) for pair in made.ends.tolist()]
-    turned = [frozenset(joints[list(pair)].tolist()) for pair in pairs]
-    if set(pairs) != set(turned) or not np.array_equal(made.held[joints], made.held):
+    there = edges_of_image(made.ends, joints)
+    if there is None or not np.array_equal(made.held[joints], made.held):
         return None
-    there = [pairs.index(pair) for pair in turned]
     heres, mapped = [], []
     for rates, pulls in zip(truss.rates.T, truss.pulls, strict=True):
         forces = np.zeros(made.held.shape)

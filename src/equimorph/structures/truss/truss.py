@@ -13,10 +13,15 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.discrete import corrected
+from equimorph.structures.network import (
+    check_parameter_names,
+    direction_of_mechanism,
+    length_limits,
+)
 from equimorph.structures.truss import descriptors
 from equimorph.structures.truss.bar import Energies, Strain
 from equimorph.structures.truss.mechanics import TrussMechanics, symmetries
-from equimorph.structures.truss.network import AXES, Network, network
+from equimorph.structures.truss.network import AXES, TrussNetwork, truss_network
 from equimorph.structures.unit_system import Quantity, unit_system
 
 Patterns = Mapping[str, Mapping[str, Any]]
@@ -92,9 +97,9 @@ class Truss(TrussMechanics):
         if strain not in get_args(Strain):
             raise InputError(f"`strain` must be engineering or green; got {strain!r}.")
         system = unit_system(units)
-        made = network(joints, bars, supports, system)
+        made = truss_network(joints, bars, supports, system)
         self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
-        self._check_names()
+        check_parameter_names([*self._actuators, *self._loads])
         stiffness = np.array([float(bar.EA) for bar in made.bars])
         energies = Energies(strain == "green", stiffness)
         rates = _rates(made, self._actuators)
@@ -115,17 +120,6 @@ class Truss(TrussMechanics):
         )
         self._start = self._equilibrium()
         self._set_scales()
-
-    def _check_names(self) -> None:
-        names = [*self._actuators, *self._loads]
-        if not names:
-            raise InputError("`loads` or `actuators` must name a parameter; got none.")
-        for i, name in enumerate(names):
-            if not (isinstance(name, str) and name.isidentifier()) or name in names[:i]:
-                raise InputError(
-                    "`loads` and `actuators` must have names of their own, of letters, digits and "
-                    f"underscores; got {name!r}."
-                )
 
     @property
     def _rest_load(self) -> Float[np.ndarray, "1 parameters"]:
@@ -174,10 +168,7 @@ class Truss(TrussMechanics):
     def _refuse_mechanism(self, mode: Float[np.ndarray, " unknowns"]) -> None:
         moves = np.zeros(self.network.held.shape)
         moves[~self.network.held] = mode
-        at = int(np.argmax(np.abs(moves).max(axis=1)))
-        along = moves[at] / np.linalg.norm(moves[at])
-        along = along * np.sign(along[np.argmax(np.abs(along))])
-        direction = ", ".join(f"{x:.3g}" for x in np.round(along, 6) + 0.0)
+        at, direction = direction_of_mechanism(moves)
         raise InputError(
             f"`truss` must be no mechanism; joint {self.network.joints[at]} can move along "
             f"({direction}) without force. Add a bar or a support."
@@ -251,7 +242,7 @@ class Truss(TrussMechanics):
         return descriptors.named(self, text)
 
 
-def _rates(made: Network, actuators: Patterns) -> Float[np.ndarray, "bars actuators"]:
+def _rates(made: TrussNetwork, actuators: Patterns) -> Float[np.ndarray, "bars actuators"]:
     rates = np.zeros((len(made.bars), len(actuators)))
     for k, (name, given) in enumerate(actuators.items()):
         fine = isinstance(given, Mapping) and all(
@@ -266,10 +257,9 @@ def _rates(made: Network, actuators: Patterns) -> Float[np.ndarray, "bars actuat
     return rates
 
 
-def _actuator(name: str, made: Network, rates: Float[np.ndarray, " bars"], unit: str) -> Parameter:
+def _actuator(
+    name: str, made: TrussNetwork, rates: Float[np.ndarray, " bars"], unit: str
+) -> Parameter:
     """Actuator that may not take a rest length to zero."""
-    moved = np.flatnonzero(rates)
-    limits = -made.rests[moved] / rates[moved]
-    lower = float(limits[rates[moved] > 0.0].max(initial=-np.inf))
-    upper = float(limits[rates[moved] < 0.0].min(initial=np.inf))
-    return Parameter(name, unit, 1.0, "actuator", 0.0, lower, upper)
+    limits = length_limits(made.rests, rates)
+    return Parameter(name, unit, 1.0, "actuator", 0.0, *limits)

@@ -1,0 +1,269 @@
+"""Networks of named joints and edges between them: what trusses and frames have in common."""
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.errors import InputError, suggestion
+from equimorph.structures.unit_system import UnitSystem
+
+_NAME = re.compile(r"[A-Za-z0-9_]+")
+
+Ends = Int[np.ndarray, "edges 2"]
+Places = Float[np.ndarray, "joints space"]
+
+
+@dataclass(frozen=True, eq=False)
+class Network(ABC):
+    """Joints in their places, and which of them each edge joins."""
+
+    joints: tuple[str, ...]
+    places: Places
+    ends: Ends
+    edge: ClassVar[str]
+    """What one edge is called."""
+    whole: ClassVar[str]
+    """What the network is called."""
+
+    @property
+    @abstractmethod
+    def edge_names(self) -> list[str]:
+        """Names of the edges: the joints at their starts and ends, joined."""
+
+    @cached_property
+    def chords(self) -> Float[np.ndarray, "edges space"]:
+        """Vectors from start to end, as drawn."""
+        return np.asarray(np.diff(self.places[self.ends], axis=1)[:, 0])
+
+    @cached_property
+    def walk(self) -> Int[np.ndarray, " steps"]:
+        """Joints in the order of a walk along all edges, some of them there and back."""
+        return walk_along(self.ends, len(self.joints))
+
+    def joint(self, name: Any) -> int:
+        """Place of a joint in the list."""
+        return position_of_joint(name, self.joints)
+
+    def place_of_edge(self, name: Any) -> tuple[int, float]:
+        """Place of an edge in the list, and −1 if it is named from end to start, else 1."""
+        names = self.edge_names
+        turned = "-".join(reversed(name.split("-"))) if isinstance(name, str) else name
+        for each, sign in ((name, 1.0), (turned, -1.0)):
+            if each in names:
+                return names.index(each), sign
+        raise InputError(
+            f"`{self.edge}` must be one of {', '.join(names)}; got {name!r}."
+            f"{suggestion(str(name), names)}"
+        )
+
+    def check(self) -> None:
+        """Refuse what is no network in one piece.
+
+        Raises
+        ------
+        InputError
+            For no edges, two between the same joints, one without length, joints without edges, or
+            joints apart from the others.
+        """
+        if not self.edge_names:
+            raise InputError(f"`{self.edge}s` must be one at least; got none.")
+        self._check_edges()
+        for i, joint in enumerate(self.joints):
+            if i not in self.ends:
+                raise InputError(
+                    f"`{self.edge}s` must reach every joint; got none at {joint}. Join it, or "
+                    "leave it out."
+                )
+        apart = set(range(len(self.joints))) - set(self.walk.tolist())
+        if apart:
+            names = [self.joints[i] for i in sorted(apart)]
+            raise InputError(
+                f"`{self.edge}s` must join all joints; got {', '.join(names)} apart from "
+                f"{self.joints[0]}. Join them, or make two {self.whole}."
+            )
+
+    def _check_edges(self) -> None:
+        seen: set[frozenset[int]] = set()
+        for name, ends, chord in zip(self.edge_names, self.ends, self.chords, strict=True):
+            pair = frozenset(ends.tolist())
+            if pair in seen:
+                raise InputError(
+                    f"`{self.edge}s` must join each pair of joints once; got {name} again. Put a "
+                    "joint on one of them."
+                )
+            seen.add(pair)
+            if not chord.any():
+                raise InputError(
+                    f"`joints` of {self.edge} {name} must lie apart; got one place for both."
+                )
+
+
+def places_of_joints(
+    given: Any, system: UnitSystem, spaces: Sequence[int], reserved: Sequence[str] = ()
+) -> tuple[tuple[str, ...], Places]:
+    """Names of joints and their places, all of one dimension among `spaces`.
+
+    Raises
+    ------
+    InputError
+        For fewer than two joints, a name that is no word or `reserved`, or a place that is not
+        finite.
+    """
+    table = dict(items(given, "joints", "name"))
+    if len(table) < 2:
+        raise InputError(f"`joints` must be at least two; got {len(table)}.")
+    for name in table:
+        if not (isinstance(name, str) and _NAME.fullmatch(name)) or name in reserved:
+            other = f", other than {', '.join(reserved)}" if reserved else ""
+            raise InputError(
+                f"`joints` must have names of letters, digits and underscores{other}; got {name!r}."
+            )
+    first = next(iter(table.values()))
+    known = isinstance(first, Sequence) and len(first) in spaces
+    space = len(first) if known else spaces[0]
+    places = []
+    for name, place in table.items():
+        what = f"joints.{name}"
+        places.append(numbers(system.numbers(place, "length", what), [space], what))
+    return tuple(table), np.array(places)
+
+
+def ends_of_edges(
+    edges: Iterable[tuple[str, Sequence[str]]], joints: Sequence[str], edge: str
+) -> Ends:
+    """Numbers of the joints that edges, given by name and ends, join.
+
+    Raises
+    ------
+    InputError
+        For an unknown joint.
+    """
+    found = []
+    for name, ends in edges:
+        for end in ends:
+            if end not in joints:
+                raise InputError(
+                    f"`ends` of {edge} {name} must be joints ({', '.join(joints)}); got {end}."
+                )
+        found.append([joints.index(end) for end in ends])
+    return np.array(found, dtype=int).reshape(-1, 2)
+
+
+def supported_joints(given: Any, joints: Sequence[str]) -> Iterable[tuple[int, str, Any]]:
+    """Number and name of each supported joint, and what is said of its support.
+
+    Raises
+    ------
+    InputError
+        For an unknown joint.
+    """
+    for joint, support in items(given, "supports", "joint"):
+        if joint not in joints:
+            raise InputError(f"`supports` must be at joints ({', '.join(joints)}); got {joint}.")
+        yield joints.index(joint), joint, support
+
+
+def position_of_joint(name: Any, joints: Sequence[str]) -> int:
+    """Place of a joint in the list.
+
+    Raises
+    ------
+    InputError
+        For an unknown joint.
+    """
+    if name not in joints:
+        raise InputError(
+            f"`joint` must be one of {', '.join(joints)}; got {name!r}."
+            f"{suggestion(str(name), joints)}"
+        )
+    return joints.index(name)
+
+
+def check_parameter_names(names: Sequence[Any]) -> None:
+    """Refuse names of loads and actuators that are no words, or used twice.
+
+    Raises
+    ------
+    InputError
+        With the name; or if there is none.
+    """
+    if not names:
+        raise InputError("`loads` or `actuators` must name a parameter; got none.")
+    for i, name in enumerate(names):
+        if not (isinstance(name, str) and name.isidentifier()) or name in names[:i]:
+            raise InputError(
+                "`loads` and `actuators` must have names of their own, of letters, digits and "
+                f"underscores; got {name!r}."
+            )
+
+
+def length_limits(
+    rests: Float[np.ndarray, " edges"], rates: Float[np.ndarray, " edges"]
+) -> tuple[float, float]:
+    """Values between which a parameter that changes lengths leaves all of them positive."""
+    moved = rates != 0.0
+    limits = -rests[moved] / rates[moved]
+    lower = float(limits[limits < 0.0].max(initial=-np.inf))
+    return lower, float(limits[limits > 0.0].min(initial=np.inf))
+
+
+def direction_of_mechanism(moves: Float[np.ndarray, "joints space"]) -> tuple[int, str]:
+    """The joint that moves most, and along which unit vector, as text."""
+    at = int(np.argmax(np.abs(moves).max(axis=1)))
+    along = moves[at] / np.linalg.norm(moves[at])
+    along = along * np.sign(along[np.argmax(np.abs(along))])
+    return at, ", ".join(f"{x:.3g}" for x in np.round(along, 6) + 0.0)
+
+
+def items(given: Any, what: str, by: str) -> Iterable[tuple[Any, Any]]:
+    """Pairs of a table, or InputError."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"`{what}` must be a table by {by}; got {given!r}.")
+    return given.items()
+
+
+def numbers(given: Any, counts: Sequence[int], what: str) -> list[float]:
+    """Finite numbers, as many as one of `counts`, or InputError."""
+    try:
+        found = [float(x) for x in given]
+    except (TypeError, ValueError):
+        found = []
+    if len(found) not in counts or not np.isfinite(found).all():
+        many = " or ".join(map(str, counts))
+        raise InputError(f"`{what}` must be {many} finite numbers; got {given!r}.")
+    return found
+
+
+def walk_along(ends: Int[np.ndarray, "edges 2"], joints: int) -> Int[np.ndarray, " steps"]:
+    """Joints in the order of a walk along all edges, some of them there and back.
+
+    It begins at joint 0 and stays in the part of the network that it can reach.
+    """
+    joined: list[list[int]] = [[] for _ in range(joints)]
+    for first, second in ends.tolist():
+        joined[first].append(second)
+        joined[second].append(first)
+    steps, way, useful = [0], [0], 0
+    seen, walked = {0}, set()
+    while way:
+        here = way[-1]
+        there = next((j for j in joined[here] if frozenset((here, j)) not in walked), None)
+        if there is None:
+            way.pop()
+            steps += way[-1:]
+            continue
+        walked.add(frozenset((here, there)))
+        steps.append(there)
+        useful = len(steps)
+        if there in seen:
+            steps.append(here)
+        else:
+            seen.add(there)
+            way.append(there)
+    return np.array(steps[:useful])
