@@ -6,7 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows, Some
+from equimorph.equilibria.point_conditions import Values as TargetValues
+from equimorph.equilibria.settle import (
+    Guards,
+    Held,
+    Settled,
+    embedded_planes,
+    free_directions,
+    settle,
+)
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
@@ -15,17 +24,12 @@ from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Descriptor, position
 
 Values = Float[np.ndarray, "lanes d"]
-Solved = tuple[Lanes, Parameters, Flags, Int[np.ndarray, " lanes"]]
 
-ITERATIONS, QUICK = 20, 8
-LONGEST = 0.3
-"""Length, in the metric and scaled parameters, to which Newton steps are shortened."""
 FORWARD = 1e-6
 """Step of the one-sided differences inside Newton, whose corrections they shrink as much."""
-SHRINKING, FREE = 0.7, 3
-"""Least shrinking of corrections of lanes that go on, and how many are free of it."""
-LAST = 1e-7
-"""Correction after which the next one would be round-off."""
+QUICK = Guards(iterations=8, longest=np.inf, too_long=0.3, converged=1e-7, contraction=0.7, free=3)
+"""Over parameters: a long step means a fold near by, where this does not work."""
+ON_SET = Guards(iterations=20, longest=0.3, converged=1e-7, contraction=0.7, free=3)
 
 Square = Float[np.ndarray, "lanes d d"]
 
@@ -55,93 +59,49 @@ class Scalars:
         return np.stack([scalar.function(z, p) for scalar in self.scalars], axis=1)
 
 
-def solved_over_parameters(
-    scalars: Scalars,
-    guess: tuple[Lanes, Parameters],
-    wanted: Values,
-    tried: Flags,
-) -> Solved:
+def solve_over_parameters(
+    scalars: Scalars, guess: tuple[Lanes, Parameters], wanted: Values, tried: Some
+) -> Settled:
     """States by Newton in those free parameters that are not given: quick, and singular at folds.
 
-    ``dz = −F_z⁻¹(F + F_p dp)`` with the step dp that takes the scalars to their values.
+    Parameters
+    ----------
+    tried
+        Numbers of the lanes for which it is tried.
     """
     setting, structure = scalars.setting, scalars.setting.structure
     given, asked = scalars.places >= 0, np.flatnonzero(scalars.places < 0)
-    unknown = [int(k) for k in setting.free if k not in scalars.places]
-    z, p = guess[0].copy(), guess[1].copy()
+    unknown = np.setdiff1d(setting.free, scalars.places)
+    z, p, wanted = guess[0][tried], guess[1][tried], wanted[tried]
     p[:, scalars.places[given]] = wanted[:, given]
-    good, index = np.zeros(len(z), bool), np.full(len(z), -1)
-    todo, before = np.flatnonzero(tried), np.full(len(z), np.inf)
-    for round_ in range(QUICK):
-        if len(todo) == 0:
-            break
-        own = (z[todo], p[todo])
-        dz, dp, found = _parameter_step(scalars, own, wanted[todo], unknown, asked)
-        u, a = dz[:, : structure.unknowns], dp[:, setting.free] / setting.scales
-        size = np.sqrt(u**2 @ structure.mass + (a**2).sum(axis=1))
-        # a long step means a fold nearby: not for this method
-        alive = np.isfinite(size) & (size < LONGEST) & _goes_on(round_, size, before[todo])
-        before[todo] = size
-        z[todo[alive]] += dz[alive]
-        p[todo[alive]] += dp[alive]
-        done = alive & (size < LAST)
-        good[todo[done]], index[todo[done]] = True, found[done]
-        todo = todo[alive & ~done]
-    return z, p, good, index
+    functions = tuple(scalars.scalars[k].function for k in asked)
+    values = TargetValues(functions, wanted[:, asked], FORWARD, one_sided=True)
+    directions = free_directions(structure, unknown, len(tried))
+    return settle(structure, z, p, directions, [values], QUICK, Held())
 
 
-def _goes_on(
-    round_: int, size: Float[np.ndarray, " lanes"], before: Float[np.ndarray, " lanes"]
-) -> Flags:
-    """Whether corrections shrink, after the first few."""
-    return np.asarray((size <= SHRINKING * before) | (round_ < FREE) | (size < LAST))
+def solve_on_the_set(
+    scalars: Scalars, guess: tuple[Lanes, Parameters], wanted: Values, rows: Rows
+) -> Settled:
+    """States by Newton along and across the set at once: regular at folds."""
+    setting, structure = scalars.setting, scalars.setting.structure
+    functions = tuple(scalar.function for scalar in scalars.scalars)
+    # far from the set its coordinates may have no meaning
+    values = TargetValues(functions, wanted, FORWARD, one_sided=True, reach=ON_SET.longest)
+    directions = free_directions(structure, setting.free, len(wanted))
+    frame = embedded_planes(structure, setting.free, rows)
+    return settle(structure, *guess, directions, [values], ON_SET, frame)
 
 
-def _parameter_step(
-    scalars: Scalars,
-    at: tuple[Lanes, Parameters],
-    wanted: Values,
-    unknown: list[int],
-    asked: Int[np.ndarray, " k"],
-) -> tuple[Lanes, Parameters, Int[np.ndarray, " lanes"]]:
-    structure, (z, p) = scalars.setting.structure, at
-    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
-    tangents, changes = [], []
-    for place in unknown:
-        change = np.zeros_like(p)
-        change[:, place] = structure.scales[place]
-        step = structure.advance(z, p, change, still, one, none)
-        tangents.append(step.tangent_z)
-        changes.append(change)
-    dz = step.dz
+def full_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
+    """Bases of the tangent spaces that project to those of planes R.
 
-    def values(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes k"]:
-        return np.stack([scalars.scalars[k].function(z, p) for k in asked], axis=1)
-
-    here = values(z + dz, p)
-    slopes = np.empty((len(z), len(asked), len(unknown)))
-    for k, (tangent, change) in enumerate(zip(tangents, changes, strict=True)):
-        ahead = values(z + dz + FORWARD * tangent, p + FORWARD * change)
-        slopes[:, :, k] = (ahead - here) / FORWARD
-    amount = solved_where_regular(slopes, wanted[:, asked] - here)
-    dz = dz + sum(amount[:, k : k + 1] * tangent for k, tangent in enumerate(tangents))
-    dp = sum((amount[:, k : k + 1] * change for k, change in enumerate(changes)), np.zeros_like(p))
-    return dz, dp, step.index
-
-
-def full_frames(
-    setting: Setting, z: Lanes, p: Parameters, rows: Rows, first: Lanes
-) -> tuple[Float[np.ndarray, "lanes full"], Frames]:
-    """Newton step orthogonal to planes, and bases of the tangent spaces that project to theirs.
-
-    ``[F_z F_p; R] (x_0, t_1 … t_d) = ((r, 0), (0, e_1) … (0, e_d))`` with r given as `first`.
+    ``[F_z F_p; R] (t_1 … t_d) = (0, e_1) … (0, e_d)``.
     """
     lanes, size, d = len(z), z.shape[1], len(setting.free)
-    rhs = np.zeros((lanes, d + 1, size + d))
-    rhs[:, 0, :size] = first
-    rhs[:, 1:, size:] = np.eye(d)
-    solved = setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
-    return solved[:, 0], np.ascontiguousarray(solved[:, 1:])
+    rhs = np.zeros((lanes, d, size + d))
+    rhs[:, :, size:] = np.eye(d)
+    return setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
 
 
 def orthonormal(setting: Setting, frames: Frames) -> Frames:
@@ -162,67 +122,9 @@ def frames_anywhere(setting: Setting, z: Lanes, p: Parameters) -> Frames:
     rows = np.ascontiguousarray(np.broadcast_to(basis, (len(z), d, width)))
     frames = np.zeros((len(z), d, z.shape[1] + d))
     for _ in range(2):
-        frames = orthonormal(setting, full_frames(setting, z, p, rows, np.zeros_like(z))[1])
+        frames = orthonormal(setting, full_frames(setting, z, p, rows))
         rows = placed_frames(setting, frames)
     return frames
-
-
-def solved_on_the_set(
-    scalars: Scalars, guess: tuple[Lanes, Parameters], wanted: Values, rows: Rows
-) -> Solved:
-    """States by Newton along and across the set at once: regular at folds."""
-    setting, structure = scalars.setting, scalars.setting.structure
-    z, p = (column.copy() for column in guess)
-    good, todo = np.zeros(len(z), bool), np.arange(len(z))
-    before = np.full(len(z), np.inf)
-    for round_ in range(ITERATIONS):
-        if len(todo) == 0:
-            break
-        step = _step(scalars, z[todo], p[todo], rows[todo], wanted[todo])
-        size = np.linalg.norm(placed_frames(setting, step[:, None])[:, 0], axis=1)
-        alive = np.isfinite(size) & _goes_on(round_, size, before[todo])
-        before[todo] = size
-        share = np.minimum(1.0, LONGEST / np.maximum(size, 1e-300))[alive, None]
-        dz, dp = split_step(setting, share * step[alive])
-        z[todo[alive]] += dz
-        p[todo[alive]] += dp
-        done = alive & (size < LAST)
-        good[todo[done]] = True
-        todo = todo[alive & ~done]
-    index = np.full(len(z), -1)
-    index[good] = structure.index(z[good], p[good])
-    return z, p, good, index
-
-
-def _step(
-    scalars: Scalars, z: Lanes, p: Parameters, rows: Rows, wanted: Values
-) -> Float[np.ndarray, "lanes full"]:
-    setting = scalars.setting
-    residual = setting.structure.residual(z, p)
-    across, along = full_frames(setting, z, p, rows, -residual)
-    dz, dp = split_step(setting, across)
-    # far from the set its coordinates may have no meaning
-    near = np.linalg.norm(placed_frames(setting, across[:, None])[:, 0], axis=1) < LONGEST
-    dz, dp = np.where(near[:, None], dz, 0.0), np.where(near[:, None], dp, 0.0)
-    here = scalars(z + dz, p + dp)
-    slopes = np.empty((*wanted.shape, wanted.shape[1]))
-    for k in range(wanted.shape[1]):
-        ahead_z, ahead_p = split_step(setting, FORWARD * along[:, k])
-        ahead = scalars(z + dz + ahead_z, p + dp + ahead_p)
-        slopes[:, :, k] = (ahead - here) / FORWARD
-    amount = solved_where_regular(slopes, wanted - here)
-    return np.asarray(across + np.einsum("lk,lkf->lf", amount, along))
-
-
-def solved_where_regular(
-    slopes: Float[np.ndarray, "lanes k k"], gap: Float[np.ndarray, "lanes k"]
-) -> Float[np.ndarray, "lanes k"]:
-    """Solutions of small linear systems; not numbers where they are singular."""
-    regular = np.isfinite(slopes).all(axis=(1, 2))
-    regular[regular] = np.abs(np.linalg.det(slopes[regular])) > 1e-200
-    amount = np.full(gap.shape, np.nan)
-    amount[regular] = np.linalg.solve(slopes[regular], gap[regular][:, :, None])[:, :, 0]
-    return amount
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,11 +175,18 @@ class Coordinates(Scalars):
             p[:, self.places] = wanted
             z, good, index = exact_states(self.setting.structure, guess[0], p)
             return z, p, good, index
-        z, p, good, index = solved_over_parameters(self, guess, wanted, ~folded)
+        z, p, good = guess[0].copy(), guess[1].copy(), np.zeros(len(wanted), bool)
+        index, regular = np.full(len(wanted), -1), np.flatnonzero(~folded)
+        quick = solve_over_parameters(self, guess, wanted, regular)
+        own = regular[quick.found]
+        z[own], p[own], index[own], good[own] = (
+            column[quick.found] for column in (quick.z, quick.p, quick.index, quick.found)
+        )
         rest = np.flatnonzero(~good)
         start = (guess[0][rest], guess[1][rest])
-        parts = solved_on_the_set(self, start, wanted[rest], planes(rest))
-        z[rest], p[rest], good[rest], index[rest] = parts
+        slow = solve_on_the_set(self, start, wanted[rest], planes(rest))
+        z[rest], p[rest], good[rest] = slow.z, slow.p, slow.found
+        index[rest] = np.where(slow.found, slow.index, -1)
         return z, p, good, index
 
 

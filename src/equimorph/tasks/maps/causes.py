@@ -1,6 +1,7 @@
 """Reasons why a map is not smooth between two settings: states at which two tests vanish."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -14,10 +15,12 @@ from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint, Descriptor
 from equimorph.tasks.maps.brackets import Brackets, Samples
-from equimorph.tasks.maps.singular_states import TestsOf
 
 ELSEWHERE = 0.02
 """Arclength between two extrema from which on they are different ones."""
+
+TestsOf = Callable[[Int[np.ndarray, " some"]], tuple[Test, Test]]
+"""Two tests of some lanes, by their numbers."""
 
 
 class Start(IntEnum):

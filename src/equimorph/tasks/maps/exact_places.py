@@ -7,10 +7,13 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria.critical import Test
+from equimorph.equilibria.point_conditions import Vanishing
+from equimorph.equilibria.settle import Guards, Settled, free_directions, settle
+from equimorph.structures import Structure
 from equimorph.tasks.maps.brackets import PARTS, SHRINKING, Brackets, Samples, sample_distance
-from equimorph.tasks.maps.causes import Cause, Paths
-from equimorph.tasks.maps.singular_states import TestsOf, correct_singular_states
+from equimorph.tasks.maps.causes import Cause, Paths, TestsOf
 
 Flags = Bool[np.ndarray, " pairs"]
 
@@ -24,6 +27,10 @@ SLACK = 1e-3
 """How far outside its bracket, in lengths of it, an exact place may lie."""
 SAME = 1e-7
 """Places closer than this, in units of the parameters' scales, are one."""
+NEARBY = Guards(iterations=10, longest=np.inf, too_long=0.5, converged=1e-9)
+"""The guesses are close: longer corrections, in the metric, lead elsewhere."""
+TEST_DIFFERENCE = 1e-6
+"""Step of differences of tests, in the metric: it sets the rate of Newton, not the error."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +96,8 @@ def _first(
             continue
         free = np.stack([axis[at], np.full(len(at), paths.load)], axis=1)
         tests = partial(_of_some, cause.tests, some)
-        z, p, good = correct_singular_states(structure, start.z, start.p, free, tests)
+        exact = correct_singular_states(structure, start.z, start.p, free, tests)
+        z, p, good = exact.z, exact.p, exact.found
         good &= _within(pairs.take(at), p[:, paths.sheet.places])
         many = int(good.sum())
         kinds = np.full(many, cause.kind, dtype=object)
@@ -141,3 +149,31 @@ def is_sharp(
     now, before = sample_distance(structure, *beside), sample_distance(structure, pairs.a, pairs.b)
     usual = (2.0 * share) ** SHRINKING * before
     return np.asarray(np.isinf(now) | (np.isfinite(before) & (now > usual)))
+
+
+def correct_singular_states(
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    free: Int[np.ndarray, "lanes 2"],
+    tests: TestsOf,
+) -> Settled:
+    """States near guesses at which two tests vanish, in two parameters.
+
+    Newton's method on F = 0 and the tests, in a basis of the kernel of [F_z F_p] that is regular at
+    folds, branch points and cusps.
+
+    Parameters
+    ----------
+    structure
+        The structure.
+    z, p
+        Guesses.
+    free
+        Places of the two parameters that vary, for each lane its own.
+    tests
+        What vanishes on some of the lanes, by their numbers; see
+        `equimorph.equilibria.conditions`.
+    """
+    vanishing = Vanishing(tests, np.arange(len(z)), TEST_DIFFERENCE, one_sided=True)
+    return settle(structure, z, p, free_directions(structure, free, len(z)), [vanishing], NEARBY)
