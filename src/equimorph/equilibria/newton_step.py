@@ -176,8 +176,8 @@ class Points:
         found = [condition.linear(at, move) for condition in problem.conditions]
         slopes = np.concatenate([each.slopes for each in found], axis=1)
         value = np.concatenate([each.value for each in found], axis=1)
-        held = isinstance(problem.frame, Held)
-        amount = _amount(slopes, value, None if held else _gram(problem.structure, along))
+        spare = slopes.shape[1] < slopes.shape[2] and not isinstance(problem.frame, Held)
+        amount = _amount(slopes, value, _gram(problem.structure, along) if spare else None)
         step = onto + np.einsum("lk,lki->li", amount, along)
         null = _unit(at.v) if problem.renews_border else self.b
         sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
@@ -315,8 +315,10 @@ def _amount(
     regular = np.abs(np.linalg.det(matrix)) > SINGULAR * size**m
     share = -np.linalg.solve(matrix[regular], value[regular, :, None])
     amount[regular] = (share if m == k else spread[regular] @ share)[:, :, 0]
-    rest = np.linalg.pinv(slopes[~regular], rcond=RANK)
-    amount[~regular] = -np.einsum("lkm,lm->lk", rest, value[~regular])
+    rest = np.flatnonzero(~regular)
+    if len(rest):
+        inverse = np.linalg.pinv(slopes[rest], rcond=RANK)
+        amount[rest] = -np.einsum("lkm,lm->lk", inverse, value[rest])
     return amount
 
 

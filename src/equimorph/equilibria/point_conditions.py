@@ -258,18 +258,11 @@ def _differences(
     squared = move.along_z[:, :, : structure.unknowns] ** 2 @ structure.mass
     squared += ((move.along_p / structure.scales) ** 2).sum(axis=2)
     h = step / np.sqrt(np.maximum(squared, 1e-300))  # directions may be long where F_z is soft
-    sides = (0.0, 1.0) if one_sided else (0.0, 1.0, -1.0)
-    shares = [sides[0], *(sign for sign in sides[1:] for _ in range(k))]
-    numbers = [0, *(i for _ in sides[1:] for i in range(k))]
     z, p = (
-        np.concatenate(
-            [base + share * along[:, i] for share, i in zip(shares, numbers, strict=True)]
-            if k
-            else [base]
-        )
+        _rounds(base, h.T[:, :, None] * np.swapaxes(along, 0, 1), one_sided=one_sided)
         for base, along in (
-            (at.z + move.onto_z, h[:, :, None] * move.along_z),
-            (at.p + move.onto_p, h[:, :, None] * move.along_p),
+            (at.z + move.onto_z, move.along_z),
+            (at.p + move.onto_p, move.along_p),
         )
     )
     flat = scalars(z, p)
@@ -277,3 +270,19 @@ def _differences(
     ahead = found[1 : 1 + k]
     change = ahead - found[0] if one_sided else 0.5 * (ahead - found[1 + k :])
     return Linear(found[0], np.moveaxis(change, 0, 2) / h[:, None])
+
+
+def _rounds(
+    base: Float[np.ndarray, "lanes width"],
+    steps: Float[np.ndarray, "k lanes width"],
+    *,
+    one_sided: bool,
+) -> Float[np.ndarray, "many width"]:
+    """All lanes at a base, then after each of the steps, then before it."""
+    k = len(steps)
+    out = np.empty((1 + (1 if one_sided else 2) * k, *base.shape))
+    out[0] = base
+    np.add(base, steps, out=out[1 : 1 + k])
+    if not one_sided:
+        np.subtract(base, steps, out=out[1 + k :])
+    return out.reshape(-1, base.shape[1])
