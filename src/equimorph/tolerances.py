@@ -11,6 +11,9 @@ SAME_STATE = 1e-6
 CONVERGED = 1e-10
 """Last Newton correction in the structure's metric: at round-off."""
 
+FEASIBLE = 1e-7
+"""Relative excess over a bound with which a point counts as obeying it."""
+
 # Difference: steps of finite differences.
 CENTRAL_DIFFERENCE = 1e-6
 """Step of central differences, in units of the scales of what varies."""

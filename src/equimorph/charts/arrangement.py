@@ -17,9 +17,12 @@ OldPlaces = Float[np.ndarray, "old_places 2"]
 OldEdges = Int[np.ndarray, "old_edges 2"]
 OldJumps = Int[np.ndarray, " old_edges"]
 
-_CHUNK = 4_000_000  # elements of a temporary table of edges against edges
-_TOUCH = 0.75  # in grid spacings: a little more than rounding moves a vertex, √½
-_ROUNDS = 12
+CHUNK = 4_000_000
+"""Elements of a temporary table of edges against edges."""
+TOUCH = 0.75
+"""Distance at which an edge touches a vertex, in grid spacings: rounding moves one by √½."""
+ROUNDS = 12
+"""Most rounds of cutting: every cut is rounded, which may make new crossings."""
 
 
 def outline(coordinates: OldPlaces, cells: Int[np.ndarray, "cells 3"]) -> tuple[Edges, Jumps]:
@@ -53,7 +56,7 @@ def arrange(places: OldPlaces, edges: OldEdges, jump: OldJumps) -> Drawing:
     Rounded vertices, edges and jumps.
     """
     places, edges, jump = _weld(places, edges, jump)
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS):
         if not len(edges):
             break
         start, along = places[edges[:, 0]], places[edges[:, 1]] - places[edges[:, 0]]
@@ -110,7 +113,7 @@ def winding(
     count = np.empty(len(places), int)
     (xa, ya), (xb, yb) = ends[:, 0].T, ends[:, 1].T
     slope = (xb - xa) / np.where(yb == ya, 1.0, yb - ya)
-    step = max(1, _CHUNK // max(1, len(jump)))
+    step = max(1, CHUNK // max(1, len(jump)))
     for first in range(0, len(places), step):
         block = slice(first, first + step)
         x, y = places[block, :1], places[block, 1:]
@@ -185,7 +188,7 @@ def _cuts(
             reach = end - start[mine]
             at = (reach * along[mine]).sum(axis=1) / length**2
             beside = np.abs(cross(along[mine], reach)) / length
-            touching = (beside < _TOUCH) & _interior(at, along[mine])
+            touching = (beside < TOUCH) & _interior(at, along[mine])
             touching &= (end != start[mine]).any(axis=1)
             touching &= (end != start[mine] + along[mine]).any(axis=1)
             owner.append(mine[touching])
@@ -201,7 +204,7 @@ def _near_pairs(
     low = np.minimum(start, start + along) - 1
     high = np.maximum(start, start + along) + 1
     pairs = []
-    step = max(1, _CHUNK // max(1, len(start)))
+    step = max(1, CHUNK // max(1, len(start)))
     for block in range(0, len(start), step):
         mine = slice(block, block + step)
         meet = ((low[mine, None] <= high) & (low <= high[mine, None])).all(axis=-1)

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
@@ -18,20 +19,30 @@ from equimorph.charts.domain import (
     single_domain,
     single_valued,
 )
-from equimorph.charts.location import SAME, Cells, Found
+from equimorph.charts.location import Cells, Found
 from equimorph.charts.preparation import cut_along_crossings, flip_overturned
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
+from equimorph.tolerances import SAME_STATE
 
 STATUSES = ("inside", "gap", "barrier", "beyond the box", "not single-valued")
 """Where points lie; only those inside have a state."""
-INSIDE, GAP, BARRIER, BEYOND, MANIFOLD = range(len(STATUSES))
 
 DEPENDENT = 1e-7
 """Largest Jacobian, in ranges of the coordinates, of those that depend on each other."""
+
+
+class PointStatus(IntEnum):
+    """Where a point lies: places in `STATUSES`."""
+
+    INSIDE = 0
+    GAP = 1
+    BARRIER = 2
+    BEYOND_THE_BOX = 3
+    NOT_SINGLE_VALUED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +81,7 @@ class Charted:
     @property
     def inside(self) -> Bool[np.ndarray, " points"]:
         """Which points have a state."""
-        return np.asarray(self.code == INSIDE)
+        return np.asarray(self.code == PointStatus.INSIDE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,9 +154,11 @@ class Chart(ABC):
         points = self._checked(coords)
         found = self._found(points)
         count = np.bincount(found.point, minlength=len(points))
-        code = np.where(count == 1, INSIDE, np.where(count > 1, MANIFOLD, GAP))
+        code = np.full(len(points), PointStatus.GAP)
+        code[count == 1] = PointStatus.INSIDE
+        code[count > 1] = PointStatus.NOT_SINGLE_VALUED
         empty = np.flatnonzero(count == 0)
-        code[empty[self._beyond(points[empty])]] = BEYOND
+        code[empty[self._beyond(points[empty])]] = PointStatus.BEYOND_THE_BOX
         return self._answers(found.take(count[found.point] == 1), code)
 
     def coords(self, states: States | State) -> Points:
@@ -181,7 +194,7 @@ class Chart(ABC):
         theirs = embed(setting, batch.z[own], batch.p[own])
         found = embed(setting, here.states.z[own], here.states.p[own])
         gap[own] = np.linalg.norm(found - theirs, axis=1)
-        return np.asarray(gap <= 10.0 * SAME)
+        return np.asarray(gap <= 10.0 * SAME_STATE)
 
     def _found(self, points: Points) -> Found:
         """All states of the chart's cells over points."""

@@ -17,6 +17,7 @@ TOUCHING = 1e-7
 SHARP = 10_000
 """Capacity of the longest facet: lengths are told apart to so many parts."""
 ENDLESS = 2**30
+"""Capacity of links that are never cut."""
 
 
 @dataclass(frozen=True)

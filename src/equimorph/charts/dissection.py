@@ -182,7 +182,7 @@ class _Work:
         free = Walker(cells.corners, places, np.ones_like(alone))
         ways = []
         for path in _paths(cells, side):
-            drawn = _snapped((clear, free), cells, path, self.cusps)
+            drawn = _snapped(clear, free, cells, path, self.cusps)
             ways.append(straightest_path(clear, free, drawn))
         cut = _crossed(self.fabric, ways)
         if cut is None:
@@ -209,19 +209,19 @@ def _paths(cells: Cells, side: Bool[np.ndarray, " own"]) -> list[list[int]]:
 
 
 def _snapped(
-    walkers: tuple[Walker, Walker], cells: Cells, path: list[int], cusps: tuple[int, ...]
+    clear: Walker, free: Walker, cells: Cells, path: list[int], cusps: tuple[int, ...]
 ) -> list[int]:
     """The path, with its ends moved to cusps beside them."""
     out = list(path)
     if path[0] == path[-1]:
         return out
     for _ in range(2):
-        out = _begun(walkers, cells, out, cusps)[::-1]
+        out = _begun(clear, free, cells, out, cusps)[::-1]
     return out
 
 
 def _begun(
-    walkers: tuple[Walker, Walker], cells: Cells, path: list[int], cusps: tuple[int, ...]
+    clear: Walker, free: Walker, cells: Cells, path: list[int], cusps: tuple[int, ...]
 ) -> list[int]:
     """The path from the cusp next to its beginning on, if it sees one of its first vertices."""
     around = np.array([path[0]])
@@ -230,10 +230,10 @@ def _begun(
     near = [cusp for cusp in cusps if cusp in around and cusp != path[0]]
     if not near or path[0] in cusps:
         return path
-    place = walkers[0].places
+    place = clear.places
     cusp = min(near, key=lambda c: float(np.linalg.norm(place[c] - place[path[0]])))
     # next to a cusp all cells lie over others
-    for walker in walkers:
+    for walker in (clear, free):
         for k, vertex in enumerate(path[: len(path) // 2 + 1]):
             if vertex != cusp and walker.way(cusp, vertex) is not None:
                 return [cusp, *path[k:]]

@@ -22,6 +22,7 @@ THIN = 0.05
 """Regions less wide than this share of a cell are gaps between chords and curves."""
 
 FLAT = 0.5
+"""Size of a sheet, in median cells, below which it is a sliver turned over by chords."""
 FEW = 3
 """Sheets smaller than so many typical cells, or of so few cells, are turned over by chords."""
 
@@ -232,7 +233,7 @@ def single_domain(cells: Cells) -> Domain:
         return _of_cells(cells, ~_covered(cells))
     edges, jump = outline(cells.values, cells.corners)
     regions = regions_within(cells.values, edges, jump)
-    return _bounded(cells, (regions.loops(lambda n: n == 1),), (edges,))
+    return _bounded(cells, regions.loops(lambda n: n == 1), edges)
 
 
 def single_valued(cells: Cells) -> bool:
@@ -253,14 +254,14 @@ def overlaps(cells: Cells) -> tuple[Overlap, ...]:
     known = [regions_within(cells.values, *each) for each in drawn]
     found = []
     for k, regions in enumerate(known):
-        domain = _bounded(cells, (regions.loops(lambda n: n > 1),), (drawn[k][0],))
+        domain = _bounded(cells, regions.loops(lambda n: n > 1), drawn[k][0])
         found.append(Overlap("self-overlap", (k,), domain))
     a, b = label[cells.whole.links].T
     joined = set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))
     for i, j in combinations(range(len(own)), 2):
         loops = _common(known[i], known[j])
         kind = "fold" if (i, j) in joined else "sheets"
-        domain = _bounded(cells, (loops,), (drawn[i][0], drawn[j][0]))
+        domain = _bounded(cells, loops, np.concatenate([drawn[i][0], drawn[j][0]]))
         found.append(Overlap(kind, (i, j), domain))
     return tuple(each for each in found if each.domain.loops)
 
@@ -286,12 +287,9 @@ def _common(first: Regions, second: Regions) -> tuple[Loop, ...]:
     )
 
 
-def _bounded(
-    cells: Cells, loops: tuple[tuple[Loop, ...], ...], edges: tuple[Int[np.ndarray, "_ 2"], ...]
-) -> Domain:
+def _bounded(cells: Cells, loops: tuple[Loop, ...], drawn: Int[np.ndarray, "_ 2"]) -> Domain:
     """Domain inside loops, whose edges lie on those of the cells' outlines."""
-    kept = without_slivers(loops[0], typical_extent(cells))
-    drawn = np.concatenate(edges)
+    kept = without_slivers(loops, typical_extent(cells))
     facets, kinds = facet_kinds(cells)
     base = len(cells.eset.points)
     keys = keys_of(facets, base)

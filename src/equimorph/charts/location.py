@@ -13,12 +13,13 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.embedding import embed
-from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.lookup.over import rooted
 from equimorph.structures import States
+from equimorph.tolerances import SAME_STATE
 
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
 
@@ -26,9 +27,8 @@ SINGULAR = (FOLD, CORNER, CROSSING)
 """Kinds of vertices at which the Jacobian is singular."""
 OVERHANG = 0.3
 """How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried."""
-SAME = 1e-6
-"""Distance, in the metric and scaled parameters, below which two states are the same."""
 CHUNK = 4096
+"""Points whose states are found at once."""
 SLACK = 1e-9
 """By how much a state may exceed the box or a constraint."""
 
@@ -184,7 +184,7 @@ class Cells:
             embed(setting, z[some], p[some]) - embed(setting, guess[0][some], guess[1][some]),
             axis=1,
         )
-        good[some] = moved <= 2.0 * self._sizes[hits.cell[some]] + SAME
+        good[some] = moved <= 2.0 * self._sizes[hits.cell[some]] + SAME_STATE
         return z, p, self._allowed(z, p, good, index, hits.cell)
 
     def _allowed(
@@ -282,7 +282,7 @@ class Cells:
         product = place @ np.cos(1.0 + np.arange(place.shape[1]))
         order = np.lexsort((product, hits.point))
         new = np.ones(len(z), bool)
-        new[1:] = np.linalg.norm(np.diff(place[order], axis=0), axis=1) > SAME
+        new[1:] = np.linalg.norm(np.diff(place[order], axis=0), axis=1) > SAME_STATE
         new[1:] |= np.diff(hits.point[order]) > 0
         group = np.empty(len(z), int)
         group[order] = np.cumsum(new)
@@ -311,7 +311,7 @@ def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
     on_box = np.zeros(len(facets), bool)
     for bound in (eset.box.lower, eset.box.upper):
         on_box |= (np.abs(lines - bound) <= SLACK * size).all(axis=1).any(axis=1)
-    capped = np.isin(eset.kinds, (2, CORNER))[facets].all(axis=1)
+    capped = np.isin(eset.kinds, (CAP, CORNER))[facets].all(axis=1)
     met = (eset.kinds == CROSSING)[facets].all(axis=1)
     ended = whole.counts[some] == 1
     if cells.cut is not None:

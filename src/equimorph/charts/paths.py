@@ -21,6 +21,7 @@ from equimorph.structures import State, States
 AT_VERTEX = 1e-6
 """Share of an edge within which a way that crosses it runs through its end."""
 LONGEST = 100_000
+"""Most triangles that a straight way may cross."""
 
 Crossing = tuple[int, int, float]
 """Ends of an edge, and the share of the way from the first to the second where it is crossed."""

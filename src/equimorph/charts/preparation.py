@@ -22,6 +22,7 @@ from equimorph.manifold.queries.cusps import cusps_on_edges
 from equimorph.manifold.queries.levels import part_of
 
 ROUNDS = 6
+"""Most rounds of flips."""
 
 
 def cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Int
 
 from equimorph.arrays import Points
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
-from equimorph.charts.chart import BARRIER, BEYOND, GAP, INSIDE, Chart, Charted, check_cells
+from equimorph.charts.chart import Chart, Charted, PointStatus, check_cells
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.domain import Domain, typical_extent
 from equimorph.charts.location import Cells
@@ -89,12 +89,12 @@ class Reduction(Chart):
         """Preferred states over points; see `Chart.state`."""
         points = self._checked(coords)
         found = self.preference.over(points)
-        code = np.full(len(points), GAP)
-        code[found.point] = INSIDE
+        code = np.full(len(points), PointStatus.GAP)
+        code[found.point] = PointStatus.INSIDE
         beyond = ~self.eset.box.contains(points, slack=1e-12)
-        code[beyond] = BEYOND
-        code[self._on_barrier(points) & ~beyond] = BARRIER
-        return self._answers(found.take(code[found.point] == INSIDE), code)
+        code[beyond] = PointStatus.BEYOND_THE_BOX
+        code[self._on_barrier(points) & ~beyond] = PointStatus.BARRIER
+        return self._answers(found.take(code[found.point] == PointStatus.INSIDE), code)
 
     @cached_property
     def constraint(self) -> Constraint:

@@ -21,9 +21,12 @@ from equimorph.charts.arrangement import arrange, cross, outline, sides, winding
 Counts = Int[np.ndarray, " edges"]
 Flags = Bool[np.ndarray, " edges"]
 
-# Spacing of the grid to which the cuts are rounded, relative to the extent of the set. The
-# coarser ones are for edges so crowded (cells squeezed flat at a cusp) that rounding tangles them.
-_SPACINGS = (1e-9, 1e-7, 1e-5)
+SPACINGS = (1e-9, 1e-7, 1e-5)
+"""Spacings of the grid to which cuts are rounded, relative to the extent of the set.
+
+The coarser ones are for edges so crowded (cells squeezed flat at a cusp) that rounding tangles
+them.
+"""
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ def regions_within(
     if not len(edges):
         return nothing
     origin, extent = coordinates.min(axis=0), np.ptp(coordinates, axis=0)
-    for spacing in _SPACINGS:
+    for spacing in SPACINGS:
         places, pieces, jumps = arrange((coordinates - origin) / (extent * spacing), edges, jump)
         if not len(pieces):
             return nothing

@@ -104,7 +104,7 @@ class Branch:
             return here.parameter_derivative(z, p, self.unknowns.columns[k])
         still = np.zeros_like(z)
         size = abs(self.x[k])
-        return by_data(lambda made, at: made.residual(at, p), self._changed(k), size, (z, still))
+        return by_data(lambda made, at: made.residual(at, p), self._changed(k), size, z, still)
 
     def _slope(self, k: int, moves: Lanes) -> Columns:
         """Derivative of what is predicted by unknown k, with the moves of the states."""
@@ -114,9 +114,9 @@ class Branch:
             return np.concatenate([each.predicted(made, at, p) for each in self.measurements], 1)
 
         if k in self.unknowns.data.values():
-            return by_data(predicted, self._changed(k), abs(self.x[k]), (z, moves))
+            return by_data(predicted, self._changed(k), abs(self.x[k]), z, moves)
         here, dp = self.unknowns.made(self.x), self.unknowns.columns[k]
-        parts = [derivative(each, here, (z, p), moves, dp) for each in self.measurements]
+        parts = [derivative(each, here, z, p, moves, dp) for each in self.measurements]
         return np.concatenate(parts, axis=1)
 
     def _selected(self, table: Columns) -> Residuals:

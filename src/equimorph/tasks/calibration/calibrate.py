@@ -16,7 +16,9 @@ from equimorph.tasks.calibration.measurements import Columns, Measurement
 from equimorph.tasks.calibration.unknowns import Family, Unknowns, Vector, Wanted, unknowns
 
 CONVERGED = 1e-13
+"""Relative change of the unknowns, and of the gradient, at which least squares end."""
 EVALUATIONS = 200
+"""Most trials of a fit."""
 BLIND = 1e-8
 """Ratio of singular values of the scaled Jacobian below which a direction is not determined."""
 LEVEL = 1e-6

@@ -18,6 +18,7 @@ Columns = Float[np.ndarray, "lanes columns"]
 STEP = 1e-3
 """Of differences along a direction of length one: fourth order, so that they err by 1e-12."""
 WEIGHTS = ((1.0, 8.0 / 12.0), (-1.0, -8.0 / 12.0), (2.0, -1.0 / 12.0), (-2.0, 1.0 / 12.0))
+"""Steps and weights of the central difference of fourth order."""
 
 
 @runtime_checkable
@@ -100,16 +101,19 @@ class MeasuredShape:
 
 
 def derivative(
-    measurement: Measurement, structure: Structure, at: tuple[Lanes, Parameters], along: Lanes,
+    measurement: Measurement,
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    dz: Lanes,
     dp: Parameters,
-) -> Columns:  # fmt: skip
+) -> Columns:
     """Derivative of what is measured along directions (dz, dp), by differences of fourth order."""
-    z, p = at
-    squared = along[:, : structure.unknowns] ** 2 @ structure.mass
+    squared = dz[:, : structure.unknowns] ** 2 @ structure.mass
     length = np.sqrt(squared + ((dp / structure.scales) ** 2).sum(axis=1))
     h = (STEP / np.maximum(length, 1e-300))[:, None]
     total = sum(
-        weight * measurement.predicted(structure, z + steps * h * along, p + steps * h * dp)
+        weight * measurement.predicted(structure, z + steps * h * dz, p + steps * h * dp)
         for steps, weight in WEIGHTS
     )
     return np.asarray(total / h)
@@ -119,16 +123,16 @@ def by_data(
     value: Callable[[Structure, Lanes], Float[np.ndarray, "lanes n"]],
     made: Callable[[float], Structure],
     size: float,
-    at: tuple[Lanes, Lanes],
+    z: Lanes,
+    dz: Lanes,
 ) -> Float[np.ndarray, "lanes n"]:
     """Derivative of a value by data of the structure, as unknowns z move along dz with them.
 
     made: structure where the data are changed by an amount; size: of the data. Fourth order.
     """
-    z, along = at
     h = STEP * size
     return np.asarray(
-        sum(weight * value(made(steps * h), z + steps * h * along) for steps, weight in WEIGHTS) / h
+        sum(weight * value(made(steps * h), z + steps * h * dz) for steps, weight in WEIGHTS) / h
     )
 
 

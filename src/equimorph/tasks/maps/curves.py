@@ -128,7 +128,7 @@ def _confirmed(
     low = np.abs(here.setting - wide.a.setting).sum(axis=1) < np.abs(room).sum(axis=1)
     high = np.abs(here.setting - wide.b.setting).sum(axis=1) < np.abs(room).sum(axis=1)
     left, right = wide.a.where(low, left), wide.b.where(high, right)
-    sure = is_sharp(paths, (left, right), wide, BESIDE)
+    sure = is_sharp(paths, left, right, wide, BESIDE)
     sure &= paths.known(left) & paths.known(right)
     rest = Brackets(wide.a, left, wide.edge).with_more(Brackets(right, wide.b, wide.edge))
     again = np.isinf(sample_distance(structure, rest.a, rest.b)) & np.tile(sure, 2)

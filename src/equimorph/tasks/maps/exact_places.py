@@ -132,21 +132,26 @@ def _looks_smooth(paths: Paths, pairs: Brackets, p: Float[np.ndarray, "pairs par
     beside = paths(np.concatenate([p[:, places] - room, p[:, places] + room]))
     left, right = beside.take(np.arange(count)), beside.take(np.arange(count, 2 * count))
     sure = paths.known(left) & paths.known(right) & (share < BESIDE)
-    return np.asarray(sure & ~is_sharp(paths, (left, right), pairs, share))
+    return np.asarray(sure & ~is_sharp(paths, left, right, pairs, share))
 
 
 def is_sharp(
     paths: Paths,
-    beside: tuple[Samples, Samples],
+    left: Samples,
+    right: Samples,
     pairs: Brackets,
     share: float | Float[np.ndarray, " pairs"],
 ) -> Flags:
-    """Whether a map differs more on both sides of places than a smooth one would.
+    """Whether a map differs more between both sides of places than a smooth one would.
 
-    `beside`: so far from the place on each side, as a share of the pair. Kinds may differ, too.
+    `left`, `right`: samples at a distance of `share`, relative to the pair, on each side of the
+    places. Kinds may differ, too.
     """
     structure = paths.sheet.structure
-    now, before = sample_distance(structure, *beside), sample_distance(structure, pairs.a, pairs.b)
+    now, before = (
+        sample_distance(structure, left, right),
+        sample_distance(structure, pairs.a, pairs.b),
+    )
     usual = (2.0 * share) ** SHRINKING * before
     return np.asarray(np.isinf(now) | (np.isfinite(before) & (now > usual)))
 

@@ -27,6 +27,7 @@ LARGEST = 0.05
 SURE = 0.25
 """First correction, relative to the predicted way, of states that are on the same branch."""
 BLOCK = 64
+"""Most targets of a block."""
 CLOSEST = 1e-3
 """Share of a leg below which it is not halved any more."""
 
@@ -138,7 +139,7 @@ def _block(
     structure, free = course.structure, course.free
     p, targets = course.split(course.at(ahead))
     p[:, free] = here.p[free]
-    guess = _predicted(course, here, course.at(np.array([time])), (p, targets))
+    guess = _predicted(course, here, course.at(np.array([time])), p, targets)
     moved = np.concatenate([here.z[None], guess[0]]), np.concatenate([here.p[None], guess[1]])
     way = _from_first(structure, *moved)
     found = correct_onto_targets(structure, guess, free, course.descriptors, targets)
@@ -164,10 +165,11 @@ def _predicted(
     course: Course,
     here: State,
     now: Float[np.ndarray, "1 columns"],
-    ahead: tuple[Float[np.ndarray, "n parameters"], Float[np.ndarray, "n m"]],
+    p: Float[np.ndarray, "n parameters"],
+    targets: Float[np.ndarray, "n m"],
 ) -> tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n parameters"]]:
     """States ahead by the tangent space: loads as given, actuators by the targets."""
-    structure, free, (p, targets) = course.structure, course.free, ahead
+    structure, free = course.structure, course.free
     loads = np.setdiff1d(np.flatnonzero((p != here.p).any(axis=0)), free)
     both = np.concatenate([free, loads])
     tangents = linearise(structure, here.z[None], here.p[None], both, course.descriptors)

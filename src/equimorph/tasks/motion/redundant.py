@@ -26,6 +26,7 @@ from equimorph.tasks.motion.local_coordinates import (
 TOLERANCE = 1e-8
 """Error of a step, in the metric and scaled parameters."""
 LARGEST = 0.05
+"""Longest step, in the metric and scaled parameters."""
 FIRST = 0.05
 """Share of a leg that is tried first."""
 CLOSEST = 1e-11
@@ -45,7 +46,9 @@ STAGES = (
     (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
     (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
 )
+"""Weights of the stages: one row for each, the last of order five."""
 ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+"""Weights of the difference between orders five and four."""
 
 Limits = dict[int, tuple[float, float]]
 """Bounds of actuators, by their places."""
@@ -101,7 +104,8 @@ def _joined(course: Course, track: list[_Here]) -> Stretch:
 
 def _velocity(
     course: Course,
-    place: tuple[Float[np.ndarray, "1 size"], Float[np.ndarray, "1 parameters"]],
+    z: Float[np.ndarray, "1 size"],
+    p: Float[np.ndarray, "1 parameters"],
     time: float,
     held: frozenset[int],
 ) -> tuple[Float[np.ndarray, "1 size"], Float[np.ndarray, "1 parameters"]]:
@@ -111,7 +115,7 @@ def _velocity(
     rate = course.rate(time)
     own = np.array([k for k in course.free if k not in held], int)
     loads = np.setdiff1d(np.flatnonzero(rate[:count] != 0.0), course.free)
-    tangents = linearise(structure, *place, np.concatenate([own, loads]), course.descriptors)
+    tangents = linearise(structure, z, p, np.concatenate([own, loads]), course.descriptors)
     given = rate[loads] / structure.scales[loads]
     wanted = rate[count:] - tangents.slope[0, :, len(own) :] @ given
     moves = np.concatenate(
@@ -134,7 +138,7 @@ def _stepped(course: Course, here: _Here, step: float, time: float) -> tuple[_He
         at = min(here.time + step * sum(stage), inner)
         if not (np.isfinite(z).all() and np.isfinite(p).all()):
             return here, np.inf
-        rates.append(_velocity(course, (z, p), at, here.held))
+        rates.append(_velocity(course, z, p, at, here.held))
     off_z = step * sum(w * r[0] for w, r in zip(ERRORS, rates, strict=True))
     off_p = step * sum(w * r[1] for w, r in zip(ERRORS, rates, strict=True))
     given, targets = course.split(course.at(np.array([time])))
@@ -184,7 +188,7 @@ def _held(course: Course, here: _Here, limits: Limits) -> frozenset[int]:
         return frozenset()
     held: frozenset[int] = frozenset()
     for _ in range(len(at)):
-        rates = _velocity(course, (here.z, here.p), here.time, held)[1][0]
+        rates = _velocity(course, here.z, here.p, here.time, held)[1][0]
         out = {place for place, side in at.items() if place not in held and rates[place] * side > 0}
         if not out or len(course.free) - len(held | out) < len(course.descriptors):
             break

@@ -30,6 +30,7 @@ DIVISIONS = {1: 8, 2: 5, 3: 3}
 MOST = 600
 """Cells in which feasible states are searched, the most promising first."""
 ROUNDS = 20
+"""Newton steps towards states that obey all constraints."""
 LONGEST = 0.3
 """Longest step in the metric."""
 MET = 1e-8

@@ -22,6 +22,7 @@ from equimorph.tasks.maps.brackets import grid_edges
 SAME = 1e-5
 """Distance in the metric below which two states are the same."""
 OVER = 1e-9
+"""Relative excess over a bound that counts as none."""
 
 BarrierKind = Literal["stability", "preference"]
 

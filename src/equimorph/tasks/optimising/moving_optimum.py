@@ -33,6 +33,7 @@ from equimorph.tasks.optimising.tangent_steps import (
 )
 from equimorph.tasks.route import schedule_of
 from equimorph.tasks.start import Start, check_stable, start_state
+from equimorph.tolerances import FEASIBLE
 
 FIRST, LARGEST = 0.02, 0.1
 """Share of a leg of the first step, and of the longest."""
@@ -54,8 +55,6 @@ FLAT = -1e-6
 """Least curvature of a minimum."""
 NUDGE = 1e-3
 """Steps aside, in the metric and scaled actuators, from which optima beyond a jump are searched."""
-FEASIBLE = 1e-7
-"""Relative excess over a bound that counts as none."""
 
 Goal = Callable[[Float[np.ndarray, " columns"]], Objective]
 """Objective at given parameters and targets."""

@@ -45,13 +45,12 @@ from equimorph.tasks.start import (
     check_margin_demand,
     inadmissible,
 )
+from equimorph.tolerances import FEASIBLE
 
 CANDIDATES = 8
 """Local minima over the vertices from which optima are searched."""
 SAME = 1e-5
 """Distance in the metric and scaled parameters below which two optima are one."""
-VIOLATED = 1e-7
-"""Relative excess over a bound with which a point is no optimum."""
 STEP_BACK = 1e-3
 """Way back from the stability boundary, in the metric, at which a route to it ends."""
 
@@ -197,7 +196,7 @@ def optimise(  # the knobs of the public face, all by keyword
     sign = 1.0 if sense == "min" else -1.0
     constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
     goal = Objective(objective, sign)
-    fault = "" if start is None else inadmissible("start", start, constraints, margin, VIOLATED)
+    fault = "" if start is None else inadmissible("start", start, constraints, margin, FEASIBLE)
     if fault:
         return _refused(fault, sense, eset)
     programme = Programme.over(eset, goal, (*constraints, stability(eset.structure, margin)))
@@ -309,10 +308,10 @@ def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum
     for end in sorted(ends, key=lambda each: float(each.expansion.f.max())):
         stable = programme.setting.structure.index(end.point.z, end.point.p)[0] == 0
         on_edge = any(
-            is_stability(c) and abs(e) < VIOLATED
+            is_stability(c) and abs(e) < FEASIBLE
             for c, e in zip(programme.all, end.expansion.g[0], strict=True)
         )
-        if end.expansion.g.max() > VIOLATED or not (stable or on_edge):
+        if end.expansion.g.max() > FEASIBLE or not (stable or on_edge):
             continue
         u = end.point.z[0, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
         place = np.concatenate([u, end.point.p[0] / setting.structure.scales])
@@ -355,7 +354,7 @@ def _before_the_edge(programme: Programme, end: LocalMinimum) -> State | None:
 
     Inside all bounds that are active there, so that none is violated on the way back.
     """
-    active = np.flatnonzero(np.abs(end.expansion.g[0]) < VIOLATED)
+    active = np.flatnonzero(np.abs(end.expansion.g[0]) < FEASIBLE)
     if not any(is_stability(programme.all[k]) for k in active):
         return None
     slopes = end.expansion.g_slope[0, active]

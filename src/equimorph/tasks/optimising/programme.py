@@ -22,9 +22,11 @@ from equimorph.tasks.optimising.tangent_steps import (
 Branches = tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]]
 
 SWEEPS = 5
+"""Inverse iterations towards the eigenvalue nearest to zero."""
 SHIFT = -1e-7
 """Of the inverse iteration: at folds the matrix is regular with it."""
 STABLE = "stable"
+"""Name of the descriptor whose sign is stability."""
 
 DIFFERENCE = 1e-5
 """Step of first derivatives along the tangent space, in the metric."""

@@ -16,6 +16,7 @@ SAME = 1e-5
 NEGATIVE = 1e-9
 """Size of a negative multiplier that counts as zero."""
 SINGULAR = 1e-14
+"""Determinant of a KKT matrix that counts as zero."""
 MOST = 14
 """Functions and constraints that are tried, those that bind first."""
 

@@ -15,12 +15,15 @@ from equimorph.structures import State
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
 
 ITERATIONS = 20
+"""Steps along a curve towards its highest point."""
 LONGEST, LEVEL = 0.05, 1e-12
 """Longest step along a curve; slope of the load at which its top is reached."""
 STILL = 1e-9
+"""Length of a step that is the last."""
 CLOSE = 1e-6
 """Distance from a curve, in scales, at which its sides are looked at."""
 ALIKE = 1e-7
+"""Difference of limit loads on a curve and beside it up to which the map is continuous there."""
 WIDEST, NARROW = 0.02, 1e-4
 """Distances along a cliff between the values of the first and the last polynomial."""
 STENCIL, SURE = np.arange(-3.0, 4.0), 3e-5

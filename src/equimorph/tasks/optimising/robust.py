@@ -17,13 +17,13 @@ from equimorph.tasks.optimising.optimum import Optimum, Sense, optimise
 from equimorph.tasks.optimising.programme import Objective, Programme, stability
 from equimorph.tasks.optimising.sqp import LocalMinimum, descend
 from equimorph.tasks.optimising.tangent_steps import SetPoints, tangent_plane_at
+from equimorph.tolerances import FEASIBLE
 
 Branches = Float[np.ndarray, "lanes m"]
 
 ROOMS = (1.1, 1.02, 1.005)
 """Shares of the box around which it is stable in the first searches; values at the very edge have
 no slopes."""
-FEASIBLE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from equimorph.tasks.optimising.tangent_steps import (
     step_along,
     tangents_at,
 )
+from equimorph.tolerances import FEASIBLE
 
 ITERATIONS, HALVINGS = 40, 10
 """Most steps of a descent, and how often a step is halved that does not lower the merit."""
@@ -27,8 +28,6 @@ STALLED = 1e-6
 """Length of a step below which a merit that no longer falls is round-off."""
 MERGED = 0.01
 """Distance in the metric and scaled parameters below which two lanes are one."""
-FEASIBLE = 1e-7
-"""Relative excess over a bound that counts as none."""
 PENALTY = 2.0
 """Of a violated constraint, relative to its multiplier."""
 FLAT = 1e-4

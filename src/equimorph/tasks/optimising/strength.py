@@ -17,6 +17,7 @@ from equimorph.tasks.optimising.ridges import BESIDE, highest_point, settings_ac
 from equimorph.tasks.optimising.two_parameter_search import climb, maximise_least
 
 CANDIDATES = 4
+"""Local maxima over the vertices from which interior optima are searched."""
 ROBUST = 2
 """Local maxima of the worst case over the vertices from which robust optima are searched."""
 EXCHANGES = 5

@@ -13,6 +13,7 @@ from equimorph.tasks.optimising.quadratic import Quadratic, solve
 Function = Callable[[Float[np.ndarray, "lanes 2"]], Values]
 
 NINE = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), indexing="ij"), -1).reshape(-1, 2)
+"""Settings around and in the middle of a square, for parabolas."""
 DIRECTIONS = 12
 """Settings on a circle that are tried at once; as many again at 0.3 of its radius."""
 SMALLEST_RADIUS = 1e-5

@@ -18,6 +18,7 @@ FEW = Guards(iterations=8)
 SIZES = (0.12, 0.04, 0.013)
 """Moves of corners, in scaled parameters, that are tried one after the other."""
 ROUNDS, POLISHING = 6, 2
+"""Rounds of moves of one size: from a rough path, and where little is left to gain."""
 LEAST_GAIN = 2e-6
 """Share of the cost that a move has to gain."""
 

@@ -28,6 +28,7 @@ CLOSE = 0.05
 BROAD = 0.1
 """The same where the cost is summed up from step to step."""
 MATCH = 1e-5
+"""Distance in the metric within which a lift leads to the state that is meant."""
 
 CRITICAL = (1, 4, 7)
 """Kinds of vertices at which stability ends: on folds, and where sheets cross."""

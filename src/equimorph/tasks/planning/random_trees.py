@@ -19,6 +19,7 @@ Slopes = Float[np.ndarray, "lanes constraints directions"]
 STEP = 1e-5
 """Step of the central differences along the set, in the units of the directions."""
 SWEEPS = 12
+"""Rounds of projections onto all constraints in turn."""
 INSIDE = 0.02
 """How far inside a bound settings are pushed, as a share of it."""
 

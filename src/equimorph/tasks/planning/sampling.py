@@ -28,6 +28,7 @@ from equimorph.tasks.route import Corners, Route, refusal, verify_route
 from equimorph.tasks.start import check_equilibrium
 
 RESERVES = (1.0, 1.1)
+"""Factors on the demanded margin that are tried in turn."""
 CONNECTIONS = 4
 """Nodes of the other tree that are tried for each new one."""
 

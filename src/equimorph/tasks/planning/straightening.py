@@ -27,6 +27,7 @@ CORNER = 1e-3
 LEGS = 12
 """Legs longer than this part of the way in the parameters are divided before corners move."""
 MOST_CORNERS = 32
+"""Most corners of a path whose legs are divided."""
 MERGED = 8
 """Legs that may become one."""
 GAIN = 1e-4

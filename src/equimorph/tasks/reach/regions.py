@@ -18,6 +18,7 @@ from equimorph.structures import States
 
 Kind = Literal["snap-through", "singular Jacobian", "actuator limit", "constraint", "open"]
 ON_BOX = 1e-9
+"""Distance from a side of the box, in its widths, within which a facet lies on it."""
 
 
 @dataclass(frozen=True, eq=False)

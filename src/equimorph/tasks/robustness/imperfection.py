@@ -18,6 +18,7 @@ LAWS = {
     0.5: "one-half power: an asymmetric branch point",
     2.0 / 3.0: "two-thirds power: a symmetric branch point",
 }
+"""Laws [Koiter1945]_ by their exponents."""
 WITHIN = 0.03
 """By how much a fitted exponent may miss that of a law."""
 
@@ -110,7 +111,7 @@ def imperfection_law(
         raise InputError(f"`sizes` must be three or more numbers > 0 that fall; got {sizes!r}.")
     perfect = limit_load(start, load, within=within)
     signed = np.concatenate([tried, -tried])
-    loads = np.array([_limit(start, load, (place, size), within) for size in signed])
+    loads = np.array([_limit(start, load, place, size, within) for size in signed])
     falls = (loads - perfect.value).reshape(2, -1)
     limited = np.isfinite(falls).all(axis=1)
     if not limited.any():
@@ -137,11 +138,8 @@ def _unit(start: State, place: int, exponent: float) -> float:
     return float(start.structure.scales[place] ** exponent)
 
 
-def _limit(
-    start: State, load: str, imperfection: tuple[int, float], within: Sequence[Constraint]
-) -> float:
+def _limit(start: State, load: str, place: int, size: float, within: Sequence[Constraint]) -> float:
     """Limit load with an imperfection; not a number where there is none."""
-    place, size = imperfection
     parameter = start.structure.parameters[place]
     path = lift(start, {parameter.name: float(start.p[place] + size * parameter.scale)})
     if not path.arrived:

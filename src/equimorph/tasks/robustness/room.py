@@ -23,6 +23,7 @@ Shape = Literal["box", "ellipsoid"]
 RANDOM = 64
 """Random directions beside axes and corners."""
 MOST_CORNERS = 64
+"""Corners of the box up to which all are tried; of more, so many at random."""
 ROUNDS, AROUND = 10, 12
 """Rounds in which the worst directions of each state are searched around, and how many each."""
 
@@ -130,7 +131,7 @@ def stable_room(  # all but two by keyword
     check_starts(batch)
     if (batch.index != 0).any():
         raise InputError("`states` must be stable; got unstable ones.")
-    rays = _Rays(batch, (places, widths), shape, tuple(within), most)
+    rays = _Rays(batch, places, widths, shape, tuple(within), most)
     generator = np.random.default_rng(seed)
     rays.try_all(_directions(len(widths), generator))
     spread = 0.5
@@ -156,13 +157,14 @@ class _Rays:
     def __init__(
         self,
         states: States,
-        widths: tuple[Int[np.ndarray, " d"], Float[np.ndarray, " d"]],
+        places: Int[np.ndarray, " d"],
+        widths: Float[np.ndarray, " d"],
         shape: Shape,
         within: tuple[Constraint, ...],
         most: float,
     ) -> None:
         self.states, self.within, self.shape, self.most = states, within, shape, most
-        self.places, self.widths = widths
+        self.places, self.widths = places, widths
         count = len(states)
         self.scale = np.full(count, most)
         self.direction = np.zeros((count, len(self.widths)))

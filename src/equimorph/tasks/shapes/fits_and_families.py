@@ -16,10 +16,10 @@ from equimorph.tasks.optimising.sqp import descend
 from equimorph.tasks.optimising.tangent_steps import SetPoints, points_at_vertices
 from equimorph.tasks.shapes.correction import states_with_values
 from equimorph.tasks.shapes.prediction import Predictor
+from equimorph.tolerances import FEASIBLE
 
 STARTS = 12
 """Local minima over the vertices from which fits are searched."""
-VIOLATED = 1e-7
 
 NEAR = 1.0
 """Farthest way from the prediction, in lengths of the edge, of a state that belongs to it."""
@@ -59,7 +59,7 @@ def best_fits(
     ends = [
         end
         for end in descend(programme, points_at_vertices(eset, starts))
-        if end.expansion.g.max(initial=-1.0) <= VIOLATED
+        if end.expansion.g.max(initial=-1.0) <= FEASIBLE
     ]
     ends.sort(key=lambda end: float(end.expansion.f.max()))
     structure = eset.structure

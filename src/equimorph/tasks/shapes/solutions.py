@@ -23,9 +23,8 @@ from equimorph.tasks.shapes.correction import states_with_values
 from equimorph.tasks.shapes.fits_and_families import best_fits, solution_family
 from equimorph.tasks.shapes.prediction import Predictor, predictor
 from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
+from equimorph.tolerances import SAME_STATE
 
-SAME = 1e-6
-"""Distance, in the metric and scaled parameters, below which two solutions are the same."""
 AT_EDGE = 1e-9
 """By how much a solution may exceed the box or a constraint."""
 EXACT = 1e-8
@@ -228,8 +227,7 @@ def solve_shapes(
     answers = []
     for values, (states, misfit) in zip(wanted, groups, strict=True):
         routes = [] if start is None else [plan(eset, start, s, within=within) for s in states]
-        question = (known, values, constraints)
-        answers.append(_answer(question, states, misfit, (rank, routes)))
+        answers.append(_answer(known, values, constraints, states, misfit, rank, routes))
     return tuple(answers)
 
 
@@ -255,14 +253,15 @@ def _numbers(
 
 
 def _answer(
-    question: tuple[Predictor, Float[np.ndarray, " k"], tuple[Constraint, ...]],
+    known: Predictor,
+    wanted: Float[np.ndarray, " k"],
+    within: tuple[Constraint, ...],
     states: States,
     misfit: Values,
-    order_by: tuple[Rank, list[Route]],
+    rank: Rank,
+    routes: list[Route],
 ) -> Shapes:
-    """Solutions in order."""
-    known, wanted, within = question
-    rank, routes = order_by
+    """Solutions of one question in order."""
     index = states.index if len(states) else np.zeros(0, int)
     own = np.zeros(len(states))
     if len(states) and rank == "route":
@@ -287,8 +286,8 @@ def _solved(
 ) -> list[tuple[States, Values]]:
     """Exact solutions of each question in the box and within constraints, each once."""
     structure, eset = known.eset.structure, known.eset
-    spots, owner = _guesses(known, wanted)
-    exact = states_with_values(known.setting, spots, known.descriptors, wanted[owner])
+    guesses, owner = _guesses(known, wanted)
+    exact = states_with_values(known.setting, guesses, known.descriptors, wanted[owner])
     z, p, found = exact.z, exact.p, exact.found
     found &= eset.box.contains(p[:, known.setting.free], slack=AT_EDGE)
     found[found] &= structure.resolved(z[found], p[found])
@@ -352,7 +351,7 @@ def _distinct(states: States) -> Int[np.ndarray, " distinct"]:
     place = np.concatenate([u, states.p / structure.scales], axis=1)
     kept: list[int] = []
     for i, own in enumerate(place):
-        if not kept or np.linalg.norm(place[kept] - own, axis=1).min() > SAME:
+        if not kept or np.linalg.norm(place[kept] - own, axis=1).min() > SAME_STATE:
             kept.append(i)
     return np.array(kept, dtype=int)
 

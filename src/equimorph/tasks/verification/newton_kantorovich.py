@@ -22,6 +22,7 @@ DIFFERENCE = 1e-4
 SWEEPS = 5
 """Power iterations towards the best weights."""
 LEAST_WEIGHT = 1e-3
+"""Least weight relative to the largest: no unknown may count for nothing."""
 ROOM = 4.0
 """Reach of the boxes beside the chord, in units of the defect."""
 ROUNDING = 1e-13
@@ -34,6 +35,7 @@ Tensor = Float[np.ndarray, "lanes size entries entries"]
 MOST_ENTRIES = 80
 """Unknowns, multipliers and parameters up to which all second derivatives are formed."""
 CORNERS = 4
+"""Random corners of each box at which second derivatives are sampled."""
 SAFETY = 2.0
 """Factor on the largest change of a second derivative seen in the box."""
 
@@ -89,7 +91,7 @@ def segment_bounds(first: States, last: States, wanted: float = 0.0) -> Bounds:
     inverse, index = _inverse(structure, middle, np.zeros(len(first)))
     near = _majorant(structure, middle, (half[0] + 1e-6, half[1]))
     weights = _weights(inverse, near, half)
-    defects, bend = _defect(structure, (first, last), (inverse, matrix), near, half)
+    defects, bend = _defect(first, last, inverse, matrix, near, half)
     defect = _norm(defects.max(axis=1) + bend, weights)
     reach = ROOM * defect + 1e-9
     bound = _majorant(structure, middle, (half[0] + reach[:, None] * weights, half[1]))
@@ -107,7 +109,7 @@ def segment_bounds(first: States, last: States, wanted: float = 0.0) -> Bounds:
     at_ends = 2.0 * ends / np.maximum(1.0 - turn, 1e-300)[:, None]
     tube = half[0] + np.where(proved, error, 0.0)[:, None] * weights, half[1]
     least = np.minimum(first.margin, last.margin)
-    margin = _margins(middle, matrix, (bound, tube), (least, wanted))
+    margin = _margins(middle, matrix, bound, tube, least, wanted)
     return Bounds(proved, error, unique, at_ends, index, weights, np.where(proved, margin, 0.0))
 
 
@@ -165,17 +167,17 @@ def _weights(inverse: Matrices, bound: Majorant, half: Direction) -> Lanes:
 
 
 def _defect(
-    structure: Structure,
-    ends: tuple[States, States],
-    linear: tuple[Matrices, Matrices],
+    first: States,
+    last: States,
+    inverse: Matrices,
+    matrix: Matrices,
     bound: Majorant,
     half: Direction,
 ) -> tuple[Float[np.ndarray, "lanes 2 size"], Lanes]:
     """|A⁻¹F| at both ends with an allowance for rounding, and how much more it is between."""
-    inverse, matrix = linear
     rows = []
-    for end in ends:
-        residual = structure.residual(end.z, end.p)
+    for end in (first, last):
+        residual = end.structure.residual(end.z, end.p)
         rounding = ROUNDING * (np.abs(matrix) @ np.abs(end.z)[:, :, None])[:, :, 0]
         moved = (inverse @ residual[:, :, None])[:, :, 0]
         rows.append(np.abs(moved) + _applied(inverse, rounding))
@@ -185,33 +187,37 @@ def _defect(
 
 
 def _margins(
-    middle: States, matrix: Matrices, around: tuple[Majorant, Direction], most: tuple[Values, float]
+    middle: States,
+    matrix: Matrices,
+    bound: Majorant,
+    tube: Direction,
+    least: Values,
+    wanted: float,
 ) -> Values:
     """Largest tried σ for which F_z − σ·mass keeps index 0 in the tubes.
 
     Tried are shares of the least margin of the ends; where the wanted margin lies between the best
     share and that, the wanted one itself.
     """
-    least, wanted = most
     kept = np.zeros(len(middle))
     for share in SHARES:
         shift = np.where(least > 0.0, share * least, 0.0)
-        good = _keeps(middle, matrix, around, shift) & (kept == 0.0)
+        good = _keeps(middle, matrix, bound, tube, shift) & (kept == 0.0)
         kept = np.where(good, shift, kept)
         if (kept > 0.0).all():
             break
     near = (kept < wanted) & (least > wanted)
     if near.any():
-        good = _keeps(middle, matrix, around, np.where(near, wanted, 0.0)) & near
+        good = _keeps(middle, matrix, bound, tube, np.where(near, wanted, 0.0)) & near
         kept = np.where(good, wanted, kept)
     return kept
 
 
 def _keeps(
-    middle: States, matrix: Matrices, around: tuple[Majorant, Direction], shift: Values
+    middle: States, matrix: Matrices, bound: Majorant, tube: Direction, shift: Values
 ) -> Flags:
     """Whether segments keep more than a margin in their tubes."""
-    (bound, tube), structure = around, middle.structure
+    structure = middle.structure
     still, mass = np.zeros_like(tube[1]), np.zeros(structure.size)
     mass[: structure.unknowns] = structure.mass
     inverse, index = _inverse(structure, middle, shift)

@@ -11,7 +11,9 @@ from equimorph.structures import States, Structure
 from equimorph.tasks.verification.newton_kantorovich import Bounds, can_be_sampled, segment_bounds
 
 MOST_BISECTIONS = 12
+"""Bisections of a segment before it counts as unproved."""
 LARGEST_SAGITTA = 0.25
+"""Distance of the exact middle from the chord, relative to its length, that counts as a bend."""
 ENTRIES_AT_ONCE = 400_000
 """Entries of the inverse matrices that are held at a time."""
 
@@ -81,7 +83,7 @@ def prove(states: States, margin: float = 0.0) -> Proof:
         if divided is None:
             break
         states, new = divided
-        bounds = _renewed(bounds, states, (bad, new), margin)
+        bounds = _renewed(bounds, states, bad, new, margin)
     bad = np.flatnonzero(_wrong(bounds, margin))
     if len(bad) == 0:
         return _concluded(states, bounds, kind)
@@ -161,11 +163,11 @@ def _bisected(
 def _renewed(
     bounds: Bounds,
     states: States,
-    segments: tuple[Int[np.ndarray, " bad"], Int[np.ndarray, " bad"]],
+    bad: Int[np.ndarray, " bad"],
+    new: Int[np.ndarray, " bad"],
     margin: float,
 ) -> Bounds:
     """Bounds of all segments: those of the halves are computed."""
-    bad, new = segments
     halves = np.sort(np.concatenate([new - 1, new]))
     fresh = _all_bounds(states[halves], states[halves + 1], margin)
     kept = np.setdiff1d(np.arange(len(bounds.proved)), bad)

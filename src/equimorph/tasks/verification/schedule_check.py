@@ -25,14 +25,13 @@ from equimorph.structures import State, States, Structure, from_identity
 from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
 from equimorph.tasks.start import check_margin_demand, inadmissible
 from equimorph.tasks.verification.proof import Proof, prove
+from equimorph.tolerances import SAME_STATE
 
 NEAR = 0.05
 """Distance in the metric up to which a start that was written with few digits is corrected."""
 
 Rows = Float[np.ndarray, "rows parameters"]
 
-SAME = 1e-6
-"""Distance in the metric within which a lifted state is the one that Newton found."""
 AT_GOAL = 1e-9
 """Share of a leg that may be missing: steps that end at the goal but for round-off count."""
 
@@ -106,7 +105,7 @@ def _lifted(
 def _true(lifts: Lifts, goals: States) -> int:
     """Number of legs, from the first on, whose lifts arrive at the goal."""
     gap = (lifts.states.z - goals.z)[:, : goals.structure.unknowns] ** 2 @ goals.structure.mass
-    bad = np.flatnonzero(~_there(lifts) | (np.sqrt(gap) > SAME))
+    bad = np.flatnonzero(~_there(lifts) | (np.sqrt(gap) > SAME_STATE))
     return int(bad[0]) if len(bad) else len(goals)
 
 
