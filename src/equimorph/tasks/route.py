@@ -11,6 +11,7 @@ from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure
+from equimorph.tasks.distances import distance
 from equimorph.tolerances import SAME_STATE
 
 FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=20000)
@@ -123,12 +124,6 @@ def describe_obstacle(end: Event, names: Sequence[str]) -> str:
         "constraint": f"the constraint {end.detail}",
     }.get(end.kind, f"a numerical failure ({end.detail})")
     return f"{what}, at {describe_place(end.state, names)}"
-
-
-def distance(a: State, b: State) -> float:
-    """Distance of two configurations in the structure's metric."""
-    n = a.structure.unknowns
-    return float(np.sqrt((a.z[:n] - b.z[:n]) ** 2 @ a.structure.mass))
 
 
 def _identity(structure: Structure) -> dict[str, Any] | None:

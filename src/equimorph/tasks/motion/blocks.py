@@ -10,6 +10,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import Event, Leg, Path, TraceOptions, lift
 from equimorph.model import Constraint, Descriptor, names_of
 from equimorph.structures import State, States, Structure
+from equimorph.tasks.distances import path_lengths
 from equimorph.tasks.motion.course import Course
 from equimorph.tasks.motion.local_coordinates import (
     EXACT,
@@ -57,8 +58,7 @@ def path_by_blocks(
 
 def stable_path(states: States, times: np.ndarray, end: Event) -> Path:
     """Path through stable states, with how it ended."""
-    steps = step_distances(states.structure, states.z, states.p)
-    length = np.concatenate([[0.0], np.cumsum(steps)])
+    length = path_lengths(states)
     return Path(states, times, length, np.zeros(len(states), int), (end,))
 
 

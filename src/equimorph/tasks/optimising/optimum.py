@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from equimorph.equilibria import settle
 from equimorph.errors import InputError
@@ -13,6 +13,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import local_minima
 from equimorph.model import Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
+from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.feasible_starts import (
     FeasibleStarts,
@@ -303,22 +304,19 @@ def _best_vertices(
 
 def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum]:
     """Different feasible ends, the best first."""
-    setting, kept = programme.setting, []
-    places: list[Float[np.ndarray, " coordinates"]] = []
+    structure, feasible = programme.setting.structure, list[LocalMinimum]()
     for end in sorted(ends, key=lambda each: float(each.expansion.f.max())):
-        stable = programme.setting.structure.index(end.point.z, end.point.p)[0] == 0
+        stable = structure.index(end.point.z, end.point.p)[0] == 0
         on_edge = any(
             is_stability(c) and abs(e) < FEASIBLE
             for c, e in zip(programme.all, end.expansion.g[0], strict=True)
         )
-        if end.expansion.g.max() > FEASIBLE or not (stable or on_edge):
-            continue
-        u = end.point.z[0, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
-        place = np.concatenate([u, end.point.p[0] / setting.structure.scales])
-        if all(np.linalg.norm(place - other) > SAME for other in places):
-            places.append(place)
-            kept.append(end)
-    return kept
+        if end.expansion.g.max() <= FEASIBLE and (stable or on_edge):
+            feasible.append(end)
+    if not feasible:
+        return []
+    points = join_points([end.point for end in feasible])
+    return [feasible[k] for k in distinct(States(structure, points.z, points.p), SAME)]
 
 
 def _optimum(programme: Programme, end: LocalMinimum) -> Optimum:

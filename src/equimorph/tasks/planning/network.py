@@ -8,8 +8,9 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria.gradient_flow import metric_length
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
@@ -98,7 +99,9 @@ class Demands:
 def connect(source: States, target: States, demands: Demands) -> tuple[Flags, Values]:
     """Whether straight lifts lead from states to states, admissible all the way; their costs."""
     z, linked, cost = lift_straight(source, target.p, demands)
-    linked &= distances(source.structure.mass, z - target.z) < MATCH
+    linked &= (
+        metric_length(source.structure, (z - target.z)[:, : source.structure.unknowns]) < MATCH
+    )
     return linked, cost
 
 
@@ -117,11 +120,6 @@ def lift_straight(source: States, p: Parameters, demands: Demands) -> tuple[Lane
         z[moving], there[moving] = outcome.z, arrived
         cost[moving] = _costs(source[moving], line, outcome, demands.objective)
     return z, there, cost
-
-
-def distances(mass: Float[np.ndarray, " n"], dz: Lanes) -> Values:
-    """Length of changes of the unknowns in the metric."""
-    return np.asarray(np.sqrt(dz[:, : len(mass)] ** 2 @ mass))
 
 
 def _keeps_margin(line: ParameterLine, outcome: Traces, demands: Demands) -> Flags:
@@ -160,6 +158,13 @@ def shortest_path(
     graph = coo_array((weights, pairs.T), shape=(count, count)).tocsr()
     start, goal = ends
     _, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
+    return walk_back(before, start, goal)
+
+
+def walk_back(
+    before: Int[np.ndarray, " nodes"], start: int, goal: int
+) -> Int[np.ndarray, " n"] | None:
+    """Path to a goal by the predecessors of all nodes; None if it was not reached."""
     if before[goal] < 0:
         return None
     path = [goal]
@@ -219,6 +224,19 @@ class Network:
             known.setdefault(key, np.zeros(len(self.pairs), bool))
         return self._broken[key], self._lifted[key]
 
+    def lift_links(self, used: Some, states: States, demands: Demands) -> bool:
+        """Lift those of the used links that were not lifted before; whether all lead on.
+
+        What was found is remembered for later searches.
+        """
+        broken, lifted = self.verdicts(demands)
+        fresh = used[~lifted[used] & ~broken[used]]
+        if len(fresh):
+            first, second = self.pairs[fresh].T
+            good, _ = connect(states[first], states[second], demands)
+            lifted[fresh[good]], broken[fresh[~good]] = True, True
+        return not broken[used].any()
+
 
 def network_of(eset: EquilibriumSet) -> Network:
     """The network of a set, made on first use and kept as long as the set."""
@@ -232,33 +250,28 @@ def cheapest_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States 
     Links are lifted only when a path uses them; what was found is remembered.
     """
     network = network_of(eset)
-    allowed = network.allowed(eset, demands)
-    broken, lifted = network.verdicts(demands)
+    allowed = network.allowed(eset, demands)[network.pairs].all(axis=1)
+    broken, _ = network.verdicts(demands)
     costs = network.costs(eset, demands.objective)
-    states = nodes_with_ends(eset, ends)
-    count, inner = len(states), np.flatnonzero(allowed[network.pairs].all(axis=1) & ~broken)
-    own, own_costs = end_links(eset, ends, demands)
+    states, (own, own_costs) = nodes_with_ends(eset, ends), end_links(eset, ends, demands)
+    count = len(states)
     while True:
+        inner = np.flatnonzero(allowed & ~broken)
         pairs = np.concatenate([network.pairs[inner], own])
         weights = np.concatenate([costs[inner], own_costs])
         path = shortest_path(count, pairs, weights, (count - 2, count - 1))
         if path is None:
             return None
-        used = inner[_on_path(network.pairs[inner], path, count)]
-        fresh = used[~lifted[used]]
-        if len(fresh) == 0:
+        if network.lift_links(inner[on_paths(network.pairs[inner], [path])], states, demands):
             return states[path]
-        first, second = network.pairs[fresh].T
-        good, _ = connect(states[first], states[second], demands)
-        lifted[fresh[good]], broken[fresh[~good]] = True, True
-        inner = inner[~broken[inner]]
 
 
-def _on_path(pairs: Pairs, path: Int[np.ndarray, " n"], count: int) -> Flags:
-    """Which pairs are consecutive on a path."""
-    steps = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
-    code = np.array([count, 1])
-    return np.isin(np.sort(pairs, axis=1) @ code, steps @ code)
+def on_paths(pairs: Pairs, paths: list[Int[np.ndarray, " n"]]) -> Flags:
+    """Which pairs of nodes follow each other on some path."""
+    steps = [np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1) for path in paths]
+    joined = np.concatenate([np.zeros((0, 2), int), *steps])
+    code = np.array([1 + max(pairs.max(initial=0), joined.max(initial=0)), 1])
+    return np.isin(np.sort(pairs, axis=1) @ code, joined @ code)
 
 
 def nodes_with_ends(eset: EquilibriumSet, ends: Ends) -> States:

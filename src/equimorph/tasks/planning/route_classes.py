@@ -16,11 +16,11 @@ from equimorph.tasks.planning.homology import cocycles
 from equimorph.tasks.planning.network import (
     Demands,
     Ends,
-    connect,
     end_links,
     explain_no_route,
     network_of,
     nodes_with_ends,
+    on_paths,
 )
 from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.straightening import (
@@ -123,7 +123,7 @@ class _Classes:
         self.states = nodes_with_ends(eset, ends)
         network = network_of(eset)
         allowed = network.allowed(eset, demands)
-        self.broken, self.lifted = network.verdicts(demands)
+        self.network, (self.broken, _) = network, network.verdicts(demands)
         self.inner = np.flatnonzero(allowed[network.pairs].all(axis=1))
         pairs = np.sort(network.pairs[self.inner], axis=1)
         triangles = np.sort(network.cells[allowed[network.cells].all(axis=1)], axis=1)
@@ -138,28 +138,12 @@ class _Classes:
 
     def paths(self, count: int) -> list[States]:
         """States along the best paths of so many classes, all of whose links can be lifted."""
+        pairs = self.network.pairs[self.inner]
         while True:
-            found = self._search(count)
-            if not self._lift([path for _, path in found]):
-                return [self.states[path] for _, path in found]
-
-    def _lift(self, paths: list[Int[np.ndarray, " n"]]) -> bool:
-        """Lift links on paths that were not lifted before; whether some of them are broken."""
-        nodes = len(self.states)
-        code = np.array([nodes, 1])
-        steps = [np.sort(np.stack([p[:-1], p[1:]], axis=1), axis=1) @ code for p in paths]
-        if not steps:
-            return False
-        pairs = self.graph.pairs[: len(self.inner)]
-        used = np.flatnonzero(np.isin(pairs @ code, np.concatenate(steps)))
-        fresh = used[~self.lifted[self.inner[used]] & ~self.broken[self.inner[used]]]
-        if len(fresh) == 0:
-            return False
-        first, second = pairs[fresh].T
-        good, _ = connect(self.states[first], self.states[second], self.demands)
-        self.lifted[self.inner[fresh[good]]] = True
-        self.broken[self.inner[fresh[~good]]] = True
-        return bool((~good).any())
+            paths = [path for _, path in self._search(count)]
+            used = self.inner[on_paths(pairs, paths)]
+            if self.network.lift_links(used, self.states, self.demands):
+                return [self.states[path] for path in paths]
 
     def _search(self, count: int) -> list[tuple[Class, Int[np.ndarray, " n"]]]:
         """Dijkstra's algorithm on (vertex, class)."""

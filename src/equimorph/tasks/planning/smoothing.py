@@ -10,7 +10,8 @@ from jaxtyping import Float
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Spline, names_of
-from equimorph.tasks.route import FINE, Route, distance, refusal, schedule_of
+from equimorph.tasks.distances import distance
+from equimorph.tasks.route import FINE, Route, refusal, schedule_of
 from equimorph.tolerances import SAME_STATE
 
 Places = Float[np.ndarray, "_ parameters"]

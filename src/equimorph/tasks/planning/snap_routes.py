@@ -13,21 +13,23 @@ from equimorph.equilibria import Landing, Path, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, snap_graph
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
+from equimorph.tasks.distances import distance
 from equimorph.tasks.planning.network import (
     Demands,
     Ends,
-    connect,
     end_links,
     neighbours,
     network_of,
     nodes_with_ends,
+    on_paths,
+    walk_back,
 )
 from equimorph.tasks.planning.straightening import (
     route_over_corners,
     straight_corners,
     way_points_of,
 )
-from equimorph.tasks.route import FINE, Corners, Route, distance, refusal, schedule_of
+from equimorph.tasks.route import FINE, Corners, Route, refusal, schedule_of
 from equimorph.tasks.stable_part import cached
 from equimorph.tolerances import SAME_STATE
 
@@ -139,25 +141,19 @@ class _Search:
 
     def path(self) -> SnapPath | None:
         """The cheapest path all of whose links can be lifted; None if there is none."""
-        allowed = self.network.allowed(self.eset, self.demands)
-        broken, lifted = self.network.verdicts(self.demands)
-        costs = self.network.costs(self.eset, self.demands.objective)
+        network = self.network
+        allowed = network.allowed(self.eset, self.demands)[network.pairs].all(axis=1)
+        broken, _ = network.verdicts(self.demands)
+        costs = network.costs(self.eset, self.demands.objective)
         while True:
-            inner = np.flatnonzero(allowed[self.network.pairs].all(axis=1) & ~broken)
-            both = np.concatenate([self.network.pairs[inner], self.own])
-            weights = np.concatenate([costs[inner], self.own_costs])
-            path = self._cheapest(both, weights)
+            inner = np.flatnonzero(allowed & ~broken)
+            both = np.concatenate([network.pairs[inner], self.own])
+            path = self._cheapest(both, np.concatenate([costs[inner], self.own_costs]))
             if path is None:
                 return None
-            steps = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
-            code = np.array([len(self.states), 1])
-            used = inner[np.isin(np.sort(self.network.pairs[inner], axis=1) @ code, steps @ code)]
-            fresh = used[~lifted[used]]
-            if len(fresh) == 0:
+            used = inner[on_paths(network.pairs[inner], [path])]
+            if network.lift_links(used, self.states, self.demands):
                 return self._divided(path)
-            one, two = self.network.pairs[fresh].T
-            good, _ = connect(self.states[one], self.states[two], self.demands)
-            lifted[fresh[good]], broken[fresh[~good]] = True, True
 
     def _cheapest(
         self, both: Int[np.ndarray, "links 2"], weights: Float[np.ndarray, " links"]
@@ -173,12 +169,7 @@ class _Search:
         graph = coo_array((np.maximum(costs, 1e-300), (rows, columns)), shape=shape).tocsr()
         start, goal = self.first - 2, self.first - 1
         _, before = dijkstra(graph, indices=start, return_predecessors=True)
-        if before[goal] < 0:
-            return None
-        path = [goal]
-        while path[-1] != start:
-            path.append(int(before[path[-1]]))
-        return np.array(path[::-1])
+        return walk_back(before, start, goal)
 
     def _divided(self, path: Int[np.ndarray, " n"]) -> SnapPath:
         """Parts of a path between its snaps."""

@@ -15,6 +15,7 @@ from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.queries.nearest import local_minima
 from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
+from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.programme import stability
 from equimorph.tasks.optimising.tangent_steps import SetPoints, points_at_vertices
 from equimorph.tasks.planning import plan
@@ -300,7 +301,7 @@ def _solved(
     groups = []
     for first, last in pairwise(bounds):
         own = states[first:last]
-        own = own[_distinct(own)]
+        own = own[distinct(own, SAME_STATE)]
         groups.append((own, np.zeros(len(own))))
     if wanted.shape[1] < len(eset.names):
         # the shortest way to a family may leave the box
@@ -340,20 +341,8 @@ def _fitted(
 ) -> tuple[States, Values]:
     """Different fits of least squares."""
     states, misfit = best_fits(known, wanted, within)
-    kept = _distinct(states)
+    kept = distinct(states, SAME_STATE)
     return states[kept], misfit[kept]
-
-
-def _distinct(states: States) -> Int[np.ndarray, " distinct"]:
-    """First of each group of states that are the same."""
-    structure = states.structure
-    u = states.z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    place = np.concatenate([u, states.p / structure.scales], axis=1)
-    kept: list[int] = []
-    for i, own in enumerate(place):
-        if not kept or np.linalg.norm(place[kept] - own, axis=1).min() > SAME_STATE:
-            kept.append(i)
-    return np.array(kept, dtype=int)
 
 
 def _closest(known: Predictor, wanted: Float[np.ndarray, " k"]) -> tuple[State, dict[str, float]]:

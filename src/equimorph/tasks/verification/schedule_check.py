@@ -22,6 +22,7 @@ from equimorph.equilibria import (
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure, from_identity
+from equimorph.tasks.distances import path_lengths
 from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
 from equimorph.tasks.start import check_margin_demand, inadmissible
 from equimorph.tasks.verification.proof import Proof, prove
@@ -200,7 +201,7 @@ class Verification:
         states, at = self.states, float(self.at[-1])
         lost = "arrived" if self.verified else "constraint"
         end = self.violation or Event(lost, states[-1], at, detail=self.why)
-        return Path(states, self.at, _lengths(states), np.zeros(len(states), int), (end,))
+        return Path(states, self.at, path_lengths(states), np.zeros(len(states), int), (end,))
 
 
 def verify(
@@ -376,14 +377,5 @@ def _table(
     """Schedule of all states."""
     at = done.at.copy()
     at[done.corners] = np.arange(len(done.corners))
-    path = Path(done.states, at, _lengths(done.states), np.zeros(len(at), int), (done.end,))
+    path = Path(done.states, at, path_lengths(done.states), np.zeros(len(at), int), (done.end,))
     return schedule_of(path, margins, tuple(dict.fromkeys(descriptors)))
-
-
-def _lengths(states: States) -> Float[np.ndarray, " points"]:
-    """Length of the way to each state, in the metric and scaled parameters."""
-    structure = states.structure
-    dz = np.diff(states.z[:, : structure.unknowns], axis=0)
-    dp = np.diff(states.p, axis=0) / structure.scales
-    steps = np.sqrt(dz**2 @ structure.mass + (dp**2).sum(axis=1))
-    return np.concatenate([[0.0], np.cumsum(steps)])

@@ -1,0 +1,37 @@
+"""Distances of states in the structure's metric, along paths and between candidates."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Values
+from equimorph.equilibria.settle import distances
+from equimorph.structures import State, States
+
+
+def distance(a: State, b: State) -> float:
+    """Distance of two configurations in the structure's metric."""
+    n = a.structure.unknowns
+    return float(np.sqrt((a.z[:n] - b.z[:n]) ** 2 @ a.structure.mass))
+
+
+def step_lengths(states: States) -> Float[np.ndarray, " steps"]:
+    """Distances of successive states in the metric and scaled parameters."""
+    ahead, behind = (states.z[1:], states.p[1:]), (states.z[:-1], states.p[:-1])
+    return distances(states.structure, ahead, behind)
+
+
+def path_lengths(states: States) -> Values:
+    """Length of the path up to each state, in the metric and scaled parameters."""
+    return np.concatenate([[0.0], np.cumsum(step_lengths(states))])
+
+
+def distinct(states: States, tolerance: float) -> Int[np.ndarray, " distinct"]:
+    """Numbers of the states that lie further than a tolerance from all earlier ones of these."""
+    structure = states.structure
+    u = states.z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    places = np.concatenate([u, states.p / structure.scales], axis=1)
+    kept: list[int] = []
+    for k, place in enumerate(places):
+        if not kept or np.linalg.norm(places[kept] - place, axis=1).min() > tolerance:
+            kept.append(k)
+    return np.array(kept, dtype=int)
