@@ -19,6 +19,45 @@ def test_shares_of_a_batch_make_up_the_whole():
     np.testing.assert_array_equal(out, 2.0 * x)
 
 
+@pytest.mark.parametrize("lanes", range(10))
+def test_a_few_lanes_are_filled_up_to_a_whole_vector(lanes: int):
+    """Kernels see eight lanes or more, and copies of the last one where there are fewer."""
+    seen = []
+
+    def kernel(x, out):
+        seen.append(x.copy())
+        _double(x, out)
+
+    x, out = np.arange(1.0, lanes + 1.0), np.zeros(lanes)
+    over_lanes(kernel, (), [x], [out])
+    np.testing.assert_array_equal(out, 2.0 * x)
+    if 0 < lanes < 8:
+        assert seen[0].tolist() == [*x, *[lanes] * (8 - lanes)]
+
+
+def test_shares_begin_at_whole_vectors_and_none_is_small():
+    """Eight lanes a vector; a share of fewer than 256 lanes costs more than it saves."""
+    shares = []
+    x, out = np.arange(1037.0), np.zeros(1037)
+
+    def kernel(x, out):
+        shares.append((int(x[0]), len(x)))
+        _double(x, out)
+
+    over_lanes(kernel, (), [x], [out])
+    assert sum(count for _, count in shares) == 1037
+    assert all(start % 8 == 0 for start, _ in shares)
+    assert min(count for _, count in shares) >= 256
+
+
+def test_a_thread_of_the_pool_shares_out_nothing_more():
+    """It would wait for threads that wait for it."""
+    counts = []
+    (held,) = in_background([lambda: counts.append(threads())])
+    held.result()
+    assert counts == [1]
+
+
 def test_a_batch_does_not_wait_for_threads_that_are_busy():
     """All threads of the pool are held up: the caller does their shares itself."""
     go = threading.Event()
@@ -54,3 +93,23 @@ def test_what_a_task_raises_reaches_the_caller():
     assert next(results) == 0
     with pytest.raises(ValueError, match="no"):
         next(results)
+
+
+def test_tasks_that_have_not_begun_are_dropped_after_an_error():
+    """All threads but one are held up, and the one fails: what waits for a thread never runs."""
+    go, begun = threading.Event(), []
+    held = in_background([go.wait for _ in range(threads() - 1)])
+
+    def fails() -> None:
+        raise ValueError("no")
+
+    def waits() -> None:
+        go.wait(5.0)
+
+    results = results_of([fails, waits, *[lambda: begun.append(1)] * 3])
+    with pytest.raises(ValueError, match="no"):
+        next(results)
+    go.set()
+    for each in [*held, *in_background([int] * threads())]:
+        each.result()
+    assert begun == []

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from equimorph.model import Descriptor
+from equimorph.errors import InputError, suggestion
+from equimorph.model import Descriptor, eased
 from equimorph.structures import Rod, Spring, from_identity
+from typecheck import unchecked
 
 ARCH = Rod()
 WRITTEN = [
@@ -73,3 +75,37 @@ def test_places_that_people_write_keep_their_names():
     assert ARCH.height(1 / 3).name == "height(1/3)"
     assert ARCH.height(0.5).name == "height(0.5)"
     assert ARCH.height(5 / 6).name == "height(5/6)"
+
+
+def test_a_constraint_holds_on_its_bound_and_by_its_ease_beyond():
+    states = Spring().natural_state(x_l=0.5).batch
+    force = Descriptor("force", "1", lambda z, p: p[:, 1] + 2.0)
+    for constraint in (force <= 2.0, force >= 2.0):
+        assert constraint.holds(states).all()
+        assert eased(constraint).excess(states.z, states.p) == pytest.approx(-2e-9, rel=1e-6)
+    assert not (force <= 1.9).holds(states).any()
+    assert not (force >= 2.1).holds(states).any()
+
+
+def test_the_ease_of_a_constraint_is_relative_to_bounds_above_one():
+    force = Spring().height
+    assert [eased(force <= bound).ease for bound in (-50.0, 0.0, 0.5, 3.0)] == [
+        pytest.approx(each) for each in (5e-8, 1e-9, 1e-9, 3e-9)
+    ]
+
+
+@pytest.mark.parametrize("bound", [np.nan, np.inf, "wide", None])
+def test_a_bound_is_a_finite_number(bound):
+    with (
+        unchecked(),
+        pytest.raises(InputError, match="`height` must be compared with a finite number; got"),
+    ):
+        Spring().height <= bound  # noqa: B015
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"), [("BOX", "box"), ("theta", "Theta"), ("intervalls", "intervals")]
+)
+def test_suggestions_overlook_capitals(written: str, meant: str):
+    assert suggestion(written, ["box", "Theta", "intervals"]) == f" Did you mean {meant}?"
+    assert suggestion("x_l", ["box", "Theta", "intervals"]) == ""
