@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from equimorph.plotting.badges import number_way_points
+from equimorph.plotting.labels import number_way_points
 
 
 def test_a_badge_keeps_off_curves_and_stays_in_the_frame():

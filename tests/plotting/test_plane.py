@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from equimorph import plotting
 from equimorph.charts.regions import count_regions
 from equimorph.errors import InputError
-from equimorph.plotting.contour_labels import label_contours
+from equimorph.plotting.labels import label_contours
 from equimorph.tasks import Route
 from equimorph.tasks.planning import smoothed
 

@@ -7,10 +7,10 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
+from equimorph.plotting.depth import view_of
 from equimorph.plotting.scene import Curve, Scene
 from equimorph.plotting.shading import Paint
 from equimorph.plotting.style import attach_canvas
-from equimorph.plotting.view import view_of
 
 RED, GREEN = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 SQUARE = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], float)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from equimorph.plotting.symbols import (
+from equimorph.plotting.labels import (
     constraint_label,
     descriptor_label,
     parameter_label,

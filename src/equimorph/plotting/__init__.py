@@ -1,25 +1,21 @@
 """Figures and films of results; nothing else in the package draws."""
 
-from equimorph.plotting.alternatives import alternative_routes
 from equimorph.plotting.calibration import calibration
 from equimorph.plotting.charts import chart_domain, parameterisation
-from equimorph.plotting.curvature_map import curvature_map
 from equimorph.plotting.diagram import diagram
 from equimorph.plotting.film import film
 from equimorph.plotting.followed import followed
 from equimorph.plotting.landscape import landscape
 from equimorph.plotting.level_plane import level_plane
-from equimorph.plotting.load_map import load_map
+from equimorph.plotting.maps import curvature_map, load_map
 from equimorph.plotting.margins import margins
-from equimorph.plotting.plane import parameter_plane
-from equimorph.plotting.portraits import portraits
+from equimorph.plotting.plane import parameter_plane, solutions
 from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
 from equimorph.plotting.robustness import imperfection_laws, room, sensitivities, trials
-from equimorph.plotting.route_panels import route_panels
+from equimorph.plotting.route_panels import alternative_routes, route_panels
 from equimorph.plotting.schedule_strips import schedule_strips
-from equimorph.plotting.shapes import shapes
+from equimorph.plotting.shapes import portraits, shapes
 from equimorph.plotting.snaps import snap_panels
-from equimorph.plotting.solutions import solutions
 from equimorph.plotting.strongest import beside_strongest, strongest_settings
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface

@@ -9,8 +9,8 @@ from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.errors import InputError
 from equimorph.plotting import style
-from equimorph.plotting.outlines import framed
-from equimorph.plotting.symbols import with_unit
+from equimorph.plotting.labels import with_unit
+from equimorph.plotting.shapes import framed
 from equimorph.tasks import Calibration, MeasuredShape
 
 _ROOM = 0.06

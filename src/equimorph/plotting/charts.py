@@ -17,8 +17,8 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.plotting import style
+from equimorph.plotting.labels import descriptor_label, parameter_label
 from equimorph.plotting.surface import surface
-from equimorph.plotting.symbols import descriptor_label, parameter_label
 
 _FILL = "#bdd3e8"
 _TWICE: dict[str, Any] = {"facecolor": "#ececec", "edgecolor": "#8c8c8c", "hatch": "xxxx"}

@@ -13,7 +13,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.topology import pieces
 from equimorph.model import Descriptor
 from equimorph.plotting import style
-from equimorph.plotting.symbols import constraint_label, descriptor_label, parameter_label
+from equimorph.plotting.labels import constraint_label, descriptor_label, parameter_label
 
 # Stable pieces stand out by width and a full line, so that no colour is needed.
 _STABLE: dict[str, Any] = {"linewidths": 1.8, "linestyles": "solid", "zorder": 3}

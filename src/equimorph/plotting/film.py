@@ -21,9 +21,9 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import position
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along, track
+from equimorph.plotting.labels import symbol
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane, shade_regions
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes
-from equimorph.plotting.symbols import symbol
 from equimorph.structures import States
 from equimorph.tasks import Route
 

@@ -9,7 +9,7 @@ from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.model import Descriptor
 from equimorph.plotting import style
-from equimorph.plotting.symbols import descriptor_label, parameter_label
+from equimorph.plotting.labels import descriptor_label, parameter_label
 from equimorph.tasks import FollowedOptimum
 
 _ROOM = (0.6, 0.38, 0.1, 0.1)

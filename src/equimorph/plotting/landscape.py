@@ -15,8 +15,8 @@ from mpl_toolkits.axes_grid1 import make_axes_locatable
 from equimorph.manifold.geometry.topology import chains
 from equimorph.model import Descriptor
 from equimorph.plotting import style
-from equimorph.plotting.map_panel import GROUND, new_map_axes, value_colours, write_legend
-from equimorph.plotting.symbols import descriptor_label, parameter_label
+from equimorph.plotting.labels import descriptor_label, parameter_label
+from equimorph.plotting.maps import GROUND, new_map_axes, value_colours, write_legend
 from equimorph.structures import Structure
 from equimorph.tasks import Landscape
 

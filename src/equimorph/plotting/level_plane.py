@@ -16,9 +16,8 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.model import Descriptor
 from equimorph.plotting import style
-from equimorph.plotting.contour_labels import roomiest
 from equimorph.plotting.curves import fold_pieces, path_of, states_along
-from equimorph.plotting.symbols import descriptor_label
+from equimorph.plotting.labels import descriptor_label, roomiest
 from equimorph.structures import State, States
 from equimorph.tasks import Route
 

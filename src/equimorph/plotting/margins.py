@@ -9,7 +9,7 @@ from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.plotting import style
 from equimorph.plotting.curves import corner_steps, path_of, snap_steps
-from equimorph.plotting.symbols import descriptor_label
+from equimorph.plotting.labels import descriptor_label
 from equimorph.tasks import Route
 
 _CURVATURE = "max_curvature"

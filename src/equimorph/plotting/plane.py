@@ -1,4 +1,4 @@
-"""The plane of free parameters: how many equilibria where, the folds between, and the route."""
+"""The plane of free parameters: how many equilibria where, the folds, routes and states on it."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -21,7 +21,6 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, divided_by
 from equimorph.model import Constraint
 from equimorph.plotting import style
-from equimorph.plotting.badges import number_way_points
 from equimorph.plotting.curves import (
     boundary_pieces,
     crossing_pieces,
@@ -33,7 +32,13 @@ from equimorph.plotting.curves import (
     track,
     way_points,
 )
-from equimorph.plotting.symbols import constraint_label, parameter_label
+from equimorph.plotting.labels import (
+    constraint_label,
+    number_points,
+    number_way_points,
+    parameter_label,
+)
+from equimorph.structures import States
 from equimorph.tasks import Route
 
 _STABILITY_BOUNDARY: dict[str, Any] = {"color": style.INK, "linewidth": 1.4, "zorder": 4}
@@ -305,3 +310,42 @@ def _count_bar(ax: Axes, largest: int, what: str) -> None:
     bar.set_ticks(list(range(largest + 1)), labels=[str(k) for k in range(largest + 1)])
     bar.ax.tick_params(length=0)
     bar.set_label(f"number of {what}")
+
+
+_STABLE: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": style.ROUTE_COLOUR, "mec": "white"}
+_UNSTABLE: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": "white", "mec": style.ROUTE_COLOUR}
+
+
+def solutions(eset: EquilibriumSet, states: States, ax: Axes | None = None) -> Axes:
+    """Mark states on the plane of the free parameters, filled where stable.
+
+    Parameters
+    ----------
+    eset
+        Equilibrium set over two free parameters.
+    states
+        Equilibria of the set; they are numbered from 1 in their order.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        If the set has not two free parameters.
+    """
+    if len(eset.names) != 2:
+        raise InputError(f"`eset` must have two free parameters; got {', '.join(eset.names)}.")
+    ax = parameter_plane(eset, ax=ax)
+    if not len(states):
+        return ax
+    places = track(eset, states)
+    with style.house_style():
+        for stable, look in ((True, _STABLE), (False, _UNSTABLE)):
+            mine = places[(states.index == 0) == stable]
+            ax.plot(*mine.T, linestyle="none", zorder=7, mew=0.8, **look)
+        number_points(ax, places)
+    return ax

@@ -16,10 +16,9 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from equimorph.charts.regions import count_regions
 from equimorph.errors import InputError
 from equimorph.plotting import style
-from equimorph.plotting.badges import number_way_points
-from equimorph.plotting.numbered import numbered_shapes
+from equimorph.plotting.labels import descriptor_label, number_way_points, parameter_label
+from equimorph.plotting.shapes import numbered_shapes
 from equimorph.plotting.surface import surface
-from equimorph.plotting.symbols import descriptor_label, parameter_label
 from equimorph.tasks import Reach, Tracking
 
 _HEIGHT = 148 * style.MILLIMETRE

@@ -10,8 +10,8 @@ from matplotlib.patches import Ellipse, Patch, Rectangle
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.plotting import style
+from equimorph.plotting.labels import parameter_label, symbol
 from equimorph.plotting.plane import parameter_plane
-from equimorph.plotting.symbols import parameter_label, symbol
 from equimorph.structures import State, Structure
 from equimorph.tasks import ImperfectionLaw, Room, Sensitivity, Trials
 

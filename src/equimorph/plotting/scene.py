@@ -16,9 +16,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.transforms import IdentityTransform
 from scipy import ndimage
 
-from equimorph.plotting.depth import DepthBuffer, depth_buffer
+from equimorph.plotting.depth import DepthBuffer, View, depth_buffer, view_of
 from equimorph.plotting.shading import Paint, paint
-from equimorph.plotting.view import View, view_of
 
 _SAMPLES = 3  # pixels of the depth buffer per pixel of the picture, in each direction
 # Points along a curve, one a pixel, that vote whether a place on it is seen: single ones err.

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.plotting import style
-from equimorph.plotting.symbols import symbol, with_unit
+from equimorph.plotting.labels import symbol, with_unit
 
 _STRIP, _BETWEEN, _GROUPS = 0.26, 0.05, 0.1  # inches
 _LEFT, _BOTTOM, _RIGHT, _TOP = 0.5, 0.38, 0.95, 0.1

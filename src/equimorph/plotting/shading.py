@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.plotting.depth import DepthBuffer, slopes
-from equimorph.plotting.view import View
+from equimorph.plotting.depth import DepthBuffer, View, slopes
 
 Corners = Float[np.ndarray, "cells 3 3"]
 

@@ -1,4 +1,7 @@
-"""Shapes of a structure along a path or a route."""
+"""Shapes of a structure: along a path, of single states, and numbered ones."""
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -7,13 +10,67 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from mpl_toolkits.axes_grid1 import make_axes_locatable
+from mpl_toolkits.mplot3d import proj3d
 
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along
-from equimorph.plotting.outlines import framed
+from equimorph.plotting.labels import BOX, with_unit
+from equimorph.plotting.surroundings import Surroundings, frame_shapes, limits
+from equimorph.structures import States
 from equimorph.tasks import Route
+
+_MARGINS = (0.54, 0.36, 0.14, 0.06)  # inches around the frame: left, bottom, right, top
+
+Outlines = Float[np.ndarray, "states points 2"]
+
+
+def framed(states: States, ax: Axes | None, *, room: float, below: float = 0.0) -> Axes:
+    """Axes with the surroundings of states and limits around all their outlines.
+
+    Parameters
+    ----------
+    states
+        At least one.
+    ax
+        Where to draw; None makes a figure one column wide.
+    room
+        Empty border, as a share of the width of the outlines.
+    below
+        Inches of a new figure that stay free for what comes below the axes.
+    """
+    around = Surroundings(states)
+    if ax is None:
+        height = _height(around, room) + below
+        ax = style.new_axes(style.SINGLE_COLUMN, height, _MARGINS)
+    frame_shapes(ax, around, room)
+    unit = states.structure.length_unit
+    ax.set_xlabel(with_unit("$x$", unit))
+    ax.set_ylabel(with_unit("$y$", unit))
+    ax.xaxis.set_major_locator(style.few_ticks())
+    ax.yaxis.set_major_locator(style.few_ticks())
+    around.draw_still(ax)
+    return ax
+
+
+def _height(around: Surroundings, room: float) -> float:
+    """Height of a figure one column wide whose drawing keeps its aspect without empty bands."""
+    low, high = limits(around, room)
+    width, height = high - low
+    left, bottom, right, top = _MARGINS
+    drawing = (style.SINGLE_COLUMN - left - right) * float(height / width)
+    return bottom + top + min(drawing, 1.4 * style.SINGLE_COLUMN)
+
+
+def farthest_apart(outlines: Outlines) -> list[int]:
+    """Where each outline is farthest from its nearest neighbour at the same share of its way."""
+    if len(outlines) == 1:
+        return [outlines.shape[1] // 2]
+    gaps = np.linalg.norm(outlines[:, None] - outlines[None], axis=3)
+    gaps[np.arange(len(outlines)), np.arange(len(outlines))] = np.inf
+    return [int(at) for at in gaps.min(axis=1).argmax(axis=1)]
+
 
 _ROOM = 0.085
 _BAR = 0.5  # inches for the colour bar and the labels above it
@@ -80,4 +137,96 @@ def _name_ends(
         ax.annotate(
             name, place, (0, 4 * side), textcoords="offset points", ha="center",
             va="bottom" if side > 0 else "top", weight="bold", path_effects=style.RIM, zorder=8,
+        )  # fmt: skip
+
+
+_PORTRAIT_ROOM = 0.1
+_DASHES = ("solid", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
+
+
+def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None) -> Axes:
+    """Shapes of states, each with its label where it is farthest from the others.
+
+    Parameters
+    ----------
+    states
+        At least one.
+    labels
+        One for each; numbers from 1 if there are none.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        Without states, or for another number of labels.
+    """
+    names = list(labels) or [str(k) for k in range(1, len(states) + 1)]
+    if not len(states) or len(names) != len(states):
+        raise InputError(
+            f"`labels` must be one for each of one or more states; got {len(names)} for "
+            f"{len(states)}."
+        )
+    outlines = states.shape()
+    with style.house_style():
+        ax = framed(states, ax, room=_PORTRAIT_ROOM)
+        colours = style.progress_map()(np.linspace(0.0, 0.8, len(states)))
+        for k, (outline, at) in enumerate(zip(outlines, farthest_apart(outlines), strict=True)):
+            look = {"color": colours[k], "linestyle": _DASHES[k % len(_DASHES)]}
+            ax.plot(*outline.T, linewidth=1.6, zorder=3, **look)
+            above = outline[at, 1] >= np.median(outlines[:, at, 1])
+            ax.annotate(
+                names[k], tuple(outline[at].tolist()), (0, 3 if above else -3), ha="center",
+                va="bottom" if above else "top", textcoords="offset points", zorder=8,
+                path_effects=style.RIM,
+            )  # fmt: skip
+    return ax
+
+
+_SAME = 1e-6
+_NUMBERED_ROOM = 0.09
+_AWAY = 11.0  # from a point to its number, in typographic points
+
+
+def numbered_shapes(ax: Axes, states: States) -> None:
+    """Shapes of states, each numbered where it is farthest from the others; equal ones once."""
+    around = Surroundings(states)
+    outlines = around.outlines
+    frame_shapes(ax, around, _NUMBERED_ROOM)
+    around.draw_still(ax)
+    different = [
+        k
+        for k, outline in enumerate(outlines)
+        if not any(np.abs(outline - other).max() < _SAME for other in outlines[:k])
+    ]
+    colours = style.progress_map()(np.linspace(0.0, 1.0, len(states)))
+    shown = outlines[different]
+    for k, outline, at in zip(different, shown, farthest_apart(shown), strict=True):
+        ax.plot(*outline.T, color=colours[k], linewidth=1.3, zorder=2)
+        up = bool(outline[at, 1] >= np.median(shown[:, at, 1]))
+        text = ax.annotate(
+            str(k + 1), tuple(outline[at].tolist()), (0, 2.5 if up else -2.5),
+            textcoords="offset points", ha="center", va="bottom" if up else "top",
+            color=colours[k], weight="bold", zorder=4,
+        )  # fmt: skip
+        text.set_path_effects(style.RIM)
+    unit = states.structure.length_unit
+    ax.set_xlabel(with_unit("$x$", unit))
+    ax.set_ylabel(with_unit("$y$", unit))
+
+
+def number_in_space(ax: Any, places: Float[np.ndarray, "_ 3"]) -> None:
+    """Number places in three-dimensional axes, away from their middle as it is seen."""
+    x, y, _ = proj3d.proj_transform(*places.T, ax.get_proj())
+    seen = np.stack([np.asarray(x), np.asarray(y)], axis=1)
+    outward = seen - seen.mean(axis=0)
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-12)
+    for number, (there, way) in enumerate(zip(seen, outward, strict=True), start=1):
+        ax.annotate(
+            str(number), tuple(there), tuple(_AWAY * way), textcoords="offset points", size=6.5,
+            ha="center", va="center", zorder=8, bbox=BOX,
         )  # fmt: skip

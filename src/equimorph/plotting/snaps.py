@@ -16,9 +16,8 @@ from equimorph.errors import InputError
 from equimorph.manifold import Snap, SnapGraph
 from equimorph.model import Descriptor
 from equimorph.plotting import style
-from equimorph.plotting.badges import number_points
+from equimorph.plotting.labels import descriptor_label, number_points
 from equimorph.plotting.plane import draw_folds, frame_plane, shade_regions
-from equimorph.plotting.symbols import descriptor_label
 
 _HEIGHT = 2.75  # inches
 _GAP = 0.06

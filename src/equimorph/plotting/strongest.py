@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from equimorph.plotting import style
-from equimorph.plotting.badges import number_points
-from equimorph.plotting.load_map import load_map
-from equimorph.plotting.symbols import parameter_label
+from equimorph.plotting.labels import number_points, parameter_label
+from equimorph.plotting.maps import load_map
 from equimorph.tasks import LimitLoadMap, Strongest, StrongestSettings
 
 _SURE: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": style.ROUTE_COLOUR, "mec": "white"}

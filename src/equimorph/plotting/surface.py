@@ -24,9 +24,9 @@ from equimorph.plotting.curves import (
     states_along,
     track,
 )
+from equimorph.plotting.labels import constraint_label, descriptor_label, parameter_label
 from equimorph.plotting.scene import Curve, Scene
 from equimorph.plotting.shading import Paint, corner_normals
-from equimorph.plotting.symbols import constraint_label, descriptor_label, parameter_label
 from equimorph.tasks import Route, Tracking
 
 Points = Float[np.ndarray, "vertices 3"]

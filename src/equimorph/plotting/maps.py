@@ -1,4 +1,4 @@
-"""The parts that figures of maps share: filled faces, contours, marked settings, curves, legend."""
+"""Maps of limit loads and of curvature, and their parts: faces, contours, marks, legend."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,9 +18,14 @@ from matplotlib.tri import Triangulation
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.plotting import style
-from equimorph.plotting.contour_labels import label_contours
+from equimorph.plotting.labels import (
+    constraint_label,
+    descriptor_label,
+    label_contours,
+    parameter_label,
+    symbol,
+)
 from equimorph.plotting.map_faces import Faces, corners, faces
-from equimorph.plotting.symbols import parameter_label
 from equimorph.tasks import CurvatureMap, LimitLoadMap
 
 ActuatorMap = LimitLoadMap | CurvatureMap
@@ -221,3 +226,84 @@ def write_legend(ax: Axes, entries: list[Line2D | Patch], *, room: bool) -> None
         handles=entries, loc="upper center", bbox_to_anchor=(0.5, below), ncols=_LEGEND_COLUMNS,
         borderaxespad=0.0, borderpad=0.0,
     )  # fmt: skip
+
+
+_DASHED, _CHAIN, _DOTTED = (0, (6, 1.5)), (0, (4, 1.5, 1, 1.5)), (0, (1, 1.2))
+_LOOKS = {
+    "cusp": CurveLook("jump: two folds merge", True, {"linewidth": 1.5}),
+    "grazing": CurveLook("jump: grazing", True, {"linewidth": 1.5, "linestyle": _DASHED}),
+    "jump": CurveLook("jump", True, {"linewidth": 0.9, "linestyle": _DASHED}),
+    "branch point": CurveLook("branch point", True, {"linewidth": 1.3, "linestyle": _CHAIN}),
+    "exchange": CurveLook("stability / constraint", True, {"linewidth": 0.8}),
+    "place": CurveLook("two extrema tie", False, {"linewidth": 1.0, "linestyle": _DOTTED}),
+    "kink": CurveLook("kink", False, {"linewidth": 0.7, "linestyle": (0, (2, 1.5))}),
+    "edge": CurveLook("", True, {"linewidth": 0.6}),
+}
+
+
+def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
+    """Limit loads over two actuators, with the curves on which they jump or bend.
+
+    Cells that a jump crosses are cut along it; nothing is interpolated across. Contours are drawn
+    where the map is smooth. Dots mark settings at which a constraint is met before stability is
+    lost; settings without a limit load are hatched.
+
+    Parameters
+    ----------
+    lmap
+        The map.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+    """
+    panel = Panel(
+        looks=_LOOKS,
+        bar=f"limit load {parameter_label(lmap.structure, lmap.load)}",
+        marked=lmap.where("constraint"),
+        mark_label=f"{constraint_label(lmap.within)} first",
+        ground_label="undefined",
+        from_zero=True,
+    )
+    return draw_map(lmap, panel, ax)
+
+
+_DASHED, _DOTTED = (0, (6, 1.5)), (0, (1, 1.2))
+_CURVATURE_LOOKS = {
+    "fold": CurveLook("barrier: fold", True, {"linewidth": 1.5}),
+    "jump": CurveLook("barrier", True, {"linewidth": 1.5, "linestyle": _DASHED}),
+    "snap": CurveLook("edge of snapping", True, {"linewidth": 0.8, "linestyle": (0, (3, 1.5))}),
+    "gap": CurveLook("edge of a gap", True, {"linewidth": 0.8}),
+    "place": CurveLook("two extrema tie", False, {"linewidth": 1.0, "linestyle": _DOTTED}),
+    "edge": CurveLook("", True, {"linewidth": 0.6}),
+}
+
+
+def curvature_map(cmap: CurvatureMap, ax: Axes | None = None) -> Axes:
+    """Largest curvature, or another descriptor, of the first stable state at a load.
+
+    Cells that a barrier crosses are cut along it; nothing is interpolated across. Dots mark
+    settings whose real loading would snap on the way; settings without a state are hatched.
+
+    Parameters
+    ----------
+    cmap
+        The map.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+    """
+    panel = Panel(
+        looks=_CURVATURE_LOOKS,
+        bar=f"{descriptor_label(cmap.descriptor)} at {symbol(cmap.load)} = {cmap.at:g}",
+        marked=cmap.snaps,
+        mark_label="snaps on the way",
+        ground_label="no stable state",
+        from_zero=False,
+    )
+    return draw_map(cmap, panel, ax)
