@@ -10,7 +10,7 @@ from jaxtyping import Bool, Int
 from equimorph.arrays import Points
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
-from equimorph.charts.location import Cells, Found
+from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.paths import AtlasPath, path_over_cells
 from equimorph.charts.preparation import crossing_facets, first_copies
 from equimorph.errors import InputError
@@ -20,7 +20,7 @@ from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of,
 from equimorph.structures import State, States
 
 SAME = 1e-5
-"""Distance, in the metric and scaled parameters, within which a state is the one of a chart."""
+"""Distance, in the metric and scaled parameters, within which a state belongs to a chart."""
 ON_CURVE = 1e-6
 """Distance from a transition, in ranges of the parameters, within which points lie on it."""
 
@@ -76,7 +76,7 @@ class Transition:
     coords
         Their coordinates in each of both charts; equal rows belong together.
     facets
-        How the states hang together: along a polyline, or as triangles.
+        Connectivity of the states: along a polyline, or as triangles.
     """
 
     charts: tuple[int, int]
@@ -170,7 +170,7 @@ class Atlas:
 
     @cached_property
     def whole(self) -> Adjacency:
-        """How the cells hang together."""
+        """Which cells share facets."""
         return adjacency(self.eset.cells)
 
     @cached_property
@@ -190,7 +190,7 @@ class Atlas:
         values = self.eset.coordinates
         out = []
         for i, j in np.unique(pairs, axis=0).tolist():
-            for kind, flags in (("cut", ~folded), ("fold", folded)):
+            for kind, flags in ((EdgeKind.CUT, ~folded), (EdgeKind.FOLD, folded)):
                 own = facets[(pairs == (i, j)).all(axis=1) & flags]
                 for piece in pieces(own):
                     used = piece if piece.ndim == 1 else np.unique(piece)
@@ -224,7 +224,7 @@ class Atlas:
                 local = np.arange(len(used)) if piece.ndim == 1 else np.searchsorted(used, piece)
                 at = self.eset.coordinates[used]
                 both = (at, at.copy())
-                out.append(Transition(pair, "crossing", self.eset.points[used], both, local))
+                out.append(Transition(pair, EdgeKind.CROSSING, self.eset.points[used], both, local))
         return out
 
     def locate(self, states: States | State) -> tuple[Int[np.ndarray, " n"], Points]:
@@ -253,7 +253,7 @@ class Atlas:
         return cell
 
     def path(self, start: State, goal: State) -> AtlasPath:
-        """Continuous way between two states, from chart to chart.
+        """Continuous path between two states, from chart to chart.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Where neighbouring points do not have neighbouring preferred states, or none at all."""
+"""Barriers, across which the preferred state jumps, and gaps, where there is none."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Points
-from equimorph.charts.domain import Domain, Edge, kinds_along, without_slivers
-from equimorph.charts.location import Cells, facet_kinds
+from equimorph.charts.domain import Domain, kinds_along, without_slivers
+from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.preference import Preference
 from equimorph.charts.regions import regions_within
 from equimorph.manifold.geometry.topology import flags_of, pieces
@@ -87,9 +87,9 @@ def barriers_of(cells: Cells, preference: Preference) -> tuple[Barrier, ...]:
         The choice.
     """
     facets, kinds = facet_kinds(cells)
-    kinds = np.where(kinds == "cut", "tie", kinds)
+    kinds = np.where(kinds == EdgeKind.CUT, EdgeKind.TIE, kinds)
     ended = flags_of(facets, cells.whole.facets[cells.whole.counts == 1]) & ~np.isin(
-        kinds, ("box", "hole")
+        kinds, (EdgeKind.BOX, EdgeKind.HOLE)
     )
     facets, kinds = facets[ended], kinds[ended]
     used = np.unique(facets)
@@ -178,12 +178,12 @@ def _each_once(found: list[Barrier], cells: Cells) -> tuple[Barrier, ...]:
     The other side of a sheet's end is where the preference changes on another sheet; of a tie both
     sides are cut, and the one counts on which the descriptor is greater that tells sheets apart.
     """
-    ends = [barrier for barrier in found if barrier.kind != "tie"]
+    ends = [barrier for barrier in found if barrier.kind != EdgeKind.TIE]
     elevation = cells.eset.structure.elevation
     size = cells.eset.box.upper - cells.eset.box.lower
     kept = [barrier for barrier in ends if _extent(barrier, size) > SHORT]
     for barrier in found:
-        if barrier.kind != "tie" or _extent(barrier, size) <= SHORT:
+        if barrier.kind != EdgeKind.TIE or _extent(barrier, size) <= SHORT:
             continue
         steps = np.linalg.norm(np.diff(barrier.points / size, axis=0), axis=1)
         step = float(np.median(steps)) if len(steps) else 1e-6
@@ -222,10 +222,5 @@ def gaps_of(domain: Domain, box: Box, cell: Float[np.ndarray, " d"]) -> Domain:
     regions = regions_within(np.concatenate(loops), edges, jump)
     kept = without_slivers(regions.loops(lambda n: n > 0), cell)
     ends = np.concatenate([np.stack([loop[:-1], loop[1:]], axis=1) for loop in loops])
-    kinds = np.concatenate([np.full(4, "box", dtype=object), *domain.loop_kinds])
+    kinds = np.concatenate([np.full(4, EdgeKind.BOX, dtype=object), *domain.loop_kinds])
     return Domain(names, kept, tuple(kinds_along(loop, ends, kinds) for loop in kept))
-
-
-def gap_edges(gaps: Domain) -> tuple[Edge, ...]:
-    """Edges of gaps inside the box."""
-    return tuple(edge for edge in gaps.edges if edge.kind != "box")

@@ -19,7 +19,7 @@ from equimorph.charts.domain import (
     single_domain,
     single_valued,
 )
-from equimorph.charts.location import Cells, Found
+from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.preparation import cut_along_crossings, flip_overturned
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
@@ -222,7 +222,7 @@ class Chart(ABC):
                 beyond |= (column < low) | (column > high)
         if not self.coordinates.projecting:
             rest = np.flatnonzero(~beyond)
-            beyond[rest] = self.domain.nearest_kind(points[rest]) == "box"
+            beyond[rest] = self.domain.nearest_kind(points[rest]) == EdgeKind.BOX
         return beyond
 
     def _answers(self, found: Found, code: Int[np.ndarray, " points"]) -> Charted:

@@ -1,4 +1,4 @@
-"""Cells that lie over each other, and the groups of them that must not share a chart."""
+"""Cells that overlap in the parameters, and groups of them that must not share a chart."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from equimorph.manifold.lookup.cell_index import CellIndex
 TOUCHING = 1e-7
 """Depth of an overlap, in sizes of cells, up to which cells only touch."""
 SHARP = 10_000
-"""Capacity of the longest facet: lengths are told apart to so many parts."""
+"""Capacity of the longest facet: the resolution of lengths in the integer flow problem."""
 ENDLESS = 2**30
 """Capacity of links that are never cut."""
 

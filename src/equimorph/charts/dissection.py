@@ -27,7 +27,7 @@ RINGS = 3
 SAME = 1e-9
 """Difference of shares of an edge up to which two crossings are one."""
 MOST = 40
-"""Cuts after which what still overlaps is left to the eye."""
+"""Most cuts; what still overlaps then is left, and `Atlas` shows it."""
 
 
 def dissect(eset: EquilibriumSet) -> Atlas:
@@ -211,7 +211,7 @@ def _paths(cells: Cells, side: Bool[np.ndarray, " own"]) -> list[list[int]]:
 def _snapped(
     clear: Walker, free: Walker, cells: Cells, path: list[int], cusps: tuple[int, ...]
 ) -> list[int]:
-    """The path, with its ends moved to cusps beside them."""
+    """The path, with its ends moved to cusps next to them."""
     out = list(path)
     if path[0] == path[-1]:
         return out

@@ -1,4 +1,4 @@
-"""Regions of coordinates: with one state, with several, and what their outlines lie on."""
+"""Regions of coordinates with one state or several, and what bounds them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from equimorph.arrays import Points
 from equimorph.charts.arrangement import cross, outline, winding
-from equimorph.charts.location import Cells, facet_kinds
+from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.regions import Regions, regions_within
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import keys_of, labels, pieces
@@ -24,7 +24,7 @@ THIN = 0.05
 FLAT = 0.5
 """Size of a sheet, in median cells, below which it is a sliver turned over by chords."""
 FEW = 3
-"""Sheets smaller than so many typical cells, or of so few cells, are turned over by chords."""
+"""Number of cells up to which a sheet counts as a sliver."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +296,7 @@ def _bounded(cells: Cells, loops: tuple[Loop, ...], drawn: Int[np.ndarray, "_ 2"
     order = np.argsort(keys)
     own = keys_of(drawn, base)
     at = order[np.minimum(np.searchsorted(keys, own, sorter=order), len(keys) - 1)]
-    of_drawn = np.where(keys[at] == own, kinds[at], "singular")
+    of_drawn = np.where(keys[at] == own, kinds[at], EdgeKind.SINGULAR)
     ends = cells.values[drawn]
     along = tuple(kinds_along(loop, ends, of_drawn) for loop in kept)
     return Domain(cells.coordinates.names, kept, along)

@@ -1,6 +1,7 @@
 """The states of some cells of a set that have given coordinates."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +32,23 @@ CHUNK = 4096
 """Points whose states are found at once."""
 SLACK = 1e-9
 """By how much a state may exceed the box or a constraint."""
+
+
+class EdgeKind(StrEnum):
+    """What a piece of the boundary of a chart, or a barrier, lies on; equal to its text."""
+
+    FOLD = "fold"
+    CROSSING = "crossing"
+    CAP = "cap"
+    BOX = "box"
+    CUT = "cut"
+    HOLE = "hole"
+    SINGULAR = "singular"
+    TIE = "tie"
+
+    def __repr__(self) -> str:
+        """Return the text in quotes, as that of any other word."""
+        return repr(self.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +101,7 @@ class Cells:
 
     @cached_property
     def whole(self) -> Adjacency:
-        """How the cells hang together."""
+        """Which cells share facets."""
         return adjacency(self.corners)
 
     @cached_property
@@ -322,7 +340,7 @@ def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
     kinds = np.select(
         [flags_of(facets, np.concatenate(folds)), ended & on_box & outer, ended & met & outer,
          ended & capped & outer, ended & cut, ended],
-        ["fold", "box", "crossing", "cap", "cut", "hole"],
-        "singular",
+        [EdgeKind.FOLD, EdgeKind.BOX, EdgeKind.CROSSING, EdgeKind.CAP, EdgeKind.CUT, EdgeKind.HOLE],
+        EdgeKind.SINGULAR,
     )  # fmt: skip
     return facets, kinds

@@ -30,7 +30,7 @@ Way = list[int | Crossing]
 
 @dataclass(frozen=True, eq=False)
 class AtlasPath:
-    """A continuous way on a set, from chart to chart.
+    """A continuous path on a set, from chart to chart.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def path_over_cells(
     start: tuple[State, int],
     goal: tuple[State, int],
 ) -> AtlasPath | None:
-    """Short way between states, each with its cell; None if the set does not join them.
+    """Short path between states, each with its cell; None if the set does not connect them.
 
     Shortest over edges, in the metric; over two parameters then pulled straight between folds.
     """

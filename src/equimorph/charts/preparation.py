@@ -101,7 +101,7 @@ def flip_overturned(
     places: Float[np.ndarray, "V 2"],
     fixed: Int[np.ndarray, "n 2"],
 ) -> Int[np.ndarray, "C 3"]:
-    """Triangles with the same vertices, fewer of which overlap their neighbours in the plane.
+    """Flip edges so that fewer triangles overlap their neighbours in the plane.
 
     Next to cusps and curved folds chords may lie beyond the fold. The edge that such a triangle
     shares with the neighbour that it lies over is exchanged for the other diagonal of both.

@@ -190,7 +190,7 @@ def _distance_from(eset: EquilibriumSet, stratum: int) -> Callable[[Found], Scor
 
 
 def quasi_static(parameter: str) -> Rule:
-    """Prefer what loading from the natural state reaches without any critical point.
+    """Prefer the state that loading from the natural state reaches without any critical point.
 
     Beyond the first fold, branch point or constraint there is a gap: the rule of limit-load maps.
 

@@ -41,7 +41,7 @@ Measured = Mapping[Descriptor | str, float]
 
 @dataclass(frozen=True)
 class Resolving:
-    """The measurement that tells the best candidate from the others most clearly.
+    """The measurement that best distinguishes the first candidate from the others.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Resolving:
 
 @dataclass(frozen=True)
 class StateEstimate:
-    """Answer to "on which branch is the structure, and under which load".
+    """The branch and the load of a measured structure, with candidates and their weights.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class StateEstimate:
     states
         Candidates: the best fit of each branch that stands a chance, best first.
     chi2
-        Sum of the squares of what is left of each value, in its standard errors.
+        Sum of the squared residuals, each in its standard error.
     weight
         Chance of each, if all were as likely before: ``exp(−χ²/2)``, normalised.
     margin
@@ -79,8 +79,8 @@ class StateEstimate:
     stratum
         Piece of the set that each lies on, −1 if not known.
     inside
-        Whether each is a minimum; else it lies on a fold or a side of the box, and the fit would
-        become better beyond.
+        Whether each is a minimum of χ²; otherwise it lies on a fold or a side of the box, beyond
+        which the fit improves.
     standard_errors
         Of each free parameter of the set, by name, for each candidate.
     next_measurement
@@ -124,11 +124,11 @@ def estimate_state(
     confidence: float = 0.95,
     unstable: bool = False,
 ) -> StateEstimate:
-    """Tell from measured values with errors where on a set a structure is, and how surely.
+    """Estimate the state of a structure on a set from measured values with errors.
 
     Weighted least squares on the set from every vertex that fits better than its neighbours; on
     the stability boundary where a fit would cross it. Free parameters of the set are what is to be
-    found out (the load, say); what is known of them counts as a measured value.
+    found (the load, say); prior knowledge of them is passed as a measured value.
 
     Parameters
     ----------
@@ -142,13 +142,13 @@ def estimate_state(
         Descriptors that might be measured next, with their standard errors; coordinates of the
         shape if None.
     confidence
-        Weight from which on the best candidate counts as known.
+        Weight of the best candidate above which it counts as known.
     unstable
         Whether unstable equilibria are candidates, too.
 
     Returns
     -------
-    Candidates with χ² and weights. No fit, and no unique one, are answers.
+    Candidates with χ² and weights; also when no state fits, or several do.
 
     Raises
     ------

@@ -22,7 +22,7 @@ Corners = list[dict[str, float]]
 
 @dataclass(frozen=True)
 class Route:
-    """Answer to "how do I get from here to there without a snap".
+    """A verified route between two states, or the reason why there is none.
 
     status: "arrived", or "refused" with the reason in `why`. A route that arrived was lifted again
     at a finer step: `path`, its smallest stability `margin`, its `length` in the structure's metric

@@ -91,7 +91,7 @@ class Branch:
         return jacobian
 
     def _changed(self, k: int) -> Callable[[float], Structure]:
-        """Structures beside that of the accepted unknowns, by a change of unknown k."""
+        """Structures near that of the accepted unknowns, by the change of unknown k."""
         unit = np.zeros_like(self.x)
         unit[k] = 1.0
         return lambda amount: self.unknowns.made(self.x + amount * unit)

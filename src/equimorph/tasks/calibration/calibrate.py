@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -25,6 +26,9 @@ LEVEL = 1e-6
 """Cosine between residuals and the fit's directions up to which a fit is at its minimum."""
 NOTHING = 1e-9
 """Residuals that are round-off."""
+
+
+Status = Literal["fitted", "undetermined", "branch ends", "limit", "not converged"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,7 @@ class Calibration:
         Equilibria at the fitted parameters, one per measured state.
     """
 
-    status: str
+    status: Status
     why: str
     names: tuple[str, ...]
     values: Vector
@@ -193,7 +197,7 @@ def _judged(free: Unknowns, branch: Branch, *, known: bool) -> Calibration:
     )
 
 
-def _verdict(branch: Branch, residuals: Residuals, scaled: Jacobian) -> tuple[str, str]:
+def _verdict(branch: Branch, residuals: Residuals, scaled: Jacobian) -> tuple[Status, str]:
     """Whether the fit is at a minimum; if not, what kept it from there."""
     size = float(np.linalg.norm(residuals))
     slope = np.abs(scaled.T @ residuals).max(initial=0.0)
@@ -201,14 +205,14 @@ def _verdict(branch: Branch, residuals: Residuals, scaled: Jacobian) -> tuple[st
         return "fitted", ""
     kind, why = branch.failure
     if kind == "limit":
-        return kind, f"least squares leads on, but {why}"
+        return "limit", f"least squares leads on, but {why}"
     if kind:
         return "branch ends", f"least squares leads on, but {why}"
     return "not converged", f"{EVALUATIONS} evaluations did not suffice"
 
 
 def _blind(names: Sequence[str], direction: Vector) -> str:
-    """Name the combination of unknowns of which the measurements say nothing."""
+    """Name the combination of unknowns that the measurements do not determine."""
     share = direction / np.abs(direction).max()
     parts = [f"{x:+.3g} {name}" for name, x in zip(names, share, strict=True) if abs(x) > 1e-6]
     return f"the measurements do not depend on {' '.join(parts)}"

@@ -120,7 +120,7 @@ def survey(
     stage
         Name of the computation for progress reports.
     progress
-        Told how far the computation is.
+        Receives reports on the progress.
     near_curves
         Paths with other step control for the places on edges; by default the same.
     """

@@ -12,7 +12,7 @@ from equimorph.structures import Structure
 RATIO = 2.0
 """Difference over an edge relative to the smaller of its neighbours' in line that is suspicious."""
 PARTS = 8
-"""Pairs are divided into so many parts at once: tracing one ray takes as long as tracing some."""
+"""Parts into which a pair is divided at once: a batch of rays takes hardly longer than one."""
 SHRINKING = 0.6
 """A smooth map's differences shrink with the interval h like h; those like h^0.6 are sharp."""
 NEGLIGIBLE = 1e-3
@@ -161,7 +161,7 @@ def narrow(structure: Structure, sampler: Sampler, pairs: Brackets, times: int) 
 
 
 def _between(sampler: Sampler, pairs: Brackets) -> Samples:
-    """Samples at all dividing points of pairs; beside them where there is no answer."""
+    """Samples at all dividing points of pairs, or next to them where a path is lost."""
     a, b = pairs.a, pairs.b
     share = np.repeat(np.arange(1, PARTS) / PARTS, len(pairs))
     start, length = (np.tile(each, (PARTS - 1, 1)) for each in (a.setting, b.setting - a.setting))

@@ -115,7 +115,7 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     options
         Step control.
     progress
-        Told how far the computation is.
+        Receives reports on the progress.
 
     Returns
     -------

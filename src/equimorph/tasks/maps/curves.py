@@ -1,4 +1,4 @@
-"""Curves on which a map is not smooth: of which kind they are, and exactly where."""
+"""Curves on which a map is not smooth: their kinds and exact places."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -103,8 +103,8 @@ def explain(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
 
     Returns
     -------
-    Places with narrow brackets around them; pairs without a cause; what is left of the others on
-    both sides, where its ends differ in kind.
+    Places with narrow brackets around them; pairs without a cause; remainders of the explained
+    pairs on both sides whose ends differ in kind.
     """
     found = candidates(paths, pairs)
     moving = np.argmax(np.abs(pairs.b.setting - pairs.a.setting), axis=1)

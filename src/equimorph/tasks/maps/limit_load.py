@@ -114,7 +114,7 @@ def limit_load_map(
     options
         Step control.
     progress
-        Told how far the computation is.
+        Receives reports on the progress.
 
     Returns
     -------

@@ -6,18 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import Event, Leg, Path, TraceOptions, lift
+from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint, Descriptor, names_of
-from equimorph.structures import State, States, Structure
-from equimorph.tasks.distances import path_lengths
+from equimorph.structures import State, States
+from equimorph.tasks.distances import path_lengths, step_lengths
 from equimorph.tasks.motion.course import Course
 from equimorph.tasks.motion.local_coordinates import (
     EXACT,
     correct_onto_targets,
     linearise,
     shortest_change,
-    step_distances,
 )
 
 DENSE = 12
@@ -140,12 +139,12 @@ def _block(
     p, targets = course.split(course.at(ahead))
     p[:, free] = here.p[free]
     guess = _predicted(course, here, course.at(np.array([time])), p, targets)
-    moved = np.concatenate([here.z[None], guess[0]]), np.concatenate([here.p[None], guess[1]])
-    way = _from_first(structure, *moved)
-    found = correct_onto_targets(structure, guess, free, course.descriptors, targets)
+    begin = np.repeat(here.z[None], len(p), axis=0), np.repeat(here.p[None], len(p), axis=0)
+    way = distances(structure, guess, begin)
+    found = correct_onto_targets(structure, *guess, free, course.descriptors, targets)
     good = found.found & (found.first <= SURE * way + EXACT)
     z, p = np.concatenate([here.z[None], found.z]), np.concatenate([here.p[None], found.p])
-    good &= step_distances(structure, z, p) <= LARGEST
+    good &= step_lengths(States(structure, z, p)) <= LARGEST
     count = _leading(good)
     states = States(structure, found.z[:count], found.p[:count])
     if count:
@@ -179,13 +178,3 @@ def _predicted(
     step = shortest_change(np.repeat(tangents.slope[:, :, :k], count, axis=0), wanted)
     step = np.concatenate([step, moved], axis=1)
     return here.z + step @ tangents.dz[0], here.p + step @ tangents.dp[0]
-
-
-def _from_first(
-    structure: Structure,
-    z: Lanes,
-    p: Parameters,
-) -> Float[np.ndarray, " others"]:
-    """Distances of states from the first one."""
-    u = (z[1:] - z[0])[:, : structure.unknowns] ** 2 @ structure.mass
-    return np.asarray(np.sqrt(u + (((p[1:] - p[0]) / structure.scales) ** 2).sum(axis=1)))

@@ -15,8 +15,6 @@ from equimorph.structures import State, Structure, value_of
 
 RATE = 1e-4
 """Share of a leg over which the rates of curves are measured."""
-CLOSED = 1e-9
-"""Relative distance of targets that are the same."""
 
 Times = Float[np.ndarray, " n"]
 Prescribed = Float[np.ndarray, "n columns"]
@@ -108,14 +106,6 @@ class Course:
         """Parameters and targets."""
         count = len(self.structure.parameters)
         return columns[:, :count].copy(), columns[:, count:]
-
-    def loop(self) -> tuple[int, int] | None:
-        """First and last of the corners with the same targets and loads as the last one."""
-        columns = np.delete(self.corners, self.free, axis=1)
-        size = 1.0 + np.abs(columns).max(axis=0)
-        same = (np.abs(columns - columns[-1]) <= CLOSED * size).all(axis=1)
-        first = int(np.flatnonzero(same)[0])
-        return (first, self.legs) if first < self.legs else None
 
 
 def actuator_bounds(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria.point_conditions import Values as TargetValues
 from equimorph.equilibria.sensitivity import answers, slopes_along
 from equimorph.equilibria.settle import Guards, Held, Settled, free_directions, settle
@@ -56,7 +56,8 @@ def shortest_change(
 
 def correct_onto_targets(
     structure: Structure,
-    guess: tuple[Lanes, Parameters],
+    z: Lanes,
+    p: Parameters,
     free: Int[np.ndarray, " k"],
     descriptors: tuple[Descriptor, ...],
     targets: Float[np.ndarray, "lanes m"],
@@ -64,15 +65,4 @@ def correct_onto_targets(
     """Newton for regular states with given descriptors; with actuators to spare, the nearest."""
     values = TargetValues(tuple(each.function for each in descriptors), targets)
     directions = free_directions(structure, free, len(targets))
-    return settle(structure, *guess, directions, [values], GUARDS, Held())
-
-
-def _length(structure: Structure, dz: Lanes, dp: Parameters) -> Values:
-    """Length of changes in the metric and scaled parameters."""
-    u = dz[:, : structure.unknowns] ** 2 @ structure.mass
-    return np.asarray(np.sqrt(u + ((dp / structure.scales) ** 2).sum(axis=1)))
-
-
-def step_distances(structure: Structure, z: Lanes, p: Parameters) -> Float[np.ndarray, " between"]:
-    """Distances of successive states in the metric and scaled parameters."""
-    return _length(structure, np.diff(z, axis=0), np.diff(p, axis=0))
+    return settle(structure, z, p, directions, [values], GUARDS, Held())

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.equilibria import Event
+from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint
 from equimorph.structures import State, States
 from equimorph.tasks.motion.blocks import Stretch
@@ -20,7 +21,6 @@ from equimorph.tasks.motion.local_coordinates import (
     correct_onto_targets,
     linearise,
     shortest_change,
-    step_distances,
 )
 
 TOLERANCE = 1e-8
@@ -139,14 +139,15 @@ def _stepped(course: Course, here: _Here, step: float, time: float) -> tuple[_He
         if not (np.isfinite(z).all() and np.isfinite(p).all()):
             return here, np.inf
         rates.append(_velocity(course, z, p, at, here.held))
-    off_z = step * sum(w * r[0] for w, r in zip(ERRORS, rates, strict=True))
-    off_p = step * sum(w * r[1] for w, r in zip(ERRORS, rates, strict=True))
+    weighted = list(zip(ERRORS, rates, strict=True))
+    off_z = step * sum((w * r[0] for w, r in weighted), np.zeros_like(z))
+    off_p = step * sum((w * r[1] for w, r in weighted), np.zeros_like(p))
     given, targets = course.split(course.at(np.array([time])))
     given[:, course.free] = p[:, course.free]
     own = np.array([k for k in course.free if k not in here.held], int)
-    found = correct_onto_targets(course.structure, (z, given), own, course.descriptors, targets)
-    whole = np.concatenate([off_z, np.zeros_like(off_z)]), np.concatenate([off_p, 0.0 * off_p])
-    error = float(step_distances(course.structure, *whole)[0])
+    found = correct_onto_targets(course.structure, z, given, own, course.descriptors, targets)
+    still = np.zeros_like(off_z), np.zeros_like(off_p)
+    error = float(distances(course.structure, (off_z, off_p), still)[0])
     good = bool(found.found[0]) and np.isfinite(error)
     return _Here(found.z, found.p, time, here.held), error if good else np.inf
 
@@ -163,8 +164,7 @@ def _fault(
     if not error <= TOLERANCE:
         return "error"
     structure = course.structure
-    pair = np.concatenate([here.z, there.z]), np.concatenate([here.p, there.p])
-    if step_distances(structure, *pair)[0] > LARGEST:
+    if distances(structure, (there.z, there.p), (here.z, here.p))[0] > LARGEST:
         return "long"
     if structure.index(there.z, there.p)[0] != 0:
         return "unstable"

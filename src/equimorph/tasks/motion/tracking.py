@@ -31,7 +31,7 @@ CRITICAL = ("critical", "branch point", "index")
 
 @dataclass(frozen=True)
 class Tracking:
-    """Answer to "can the structure follow this motion".
+    """A motion along targets of descriptors, or where and why it ends.
 
     Parameters
     ----------
@@ -49,8 +49,8 @@ class Tracking:
     schedule
         Parameters along the whole motion; None if it was refused.
     compromise
-        Beyond the failure, if asked for: the stable states with the least sum of squares of what
-        is left of the targets, half of which are its values.
+        Beyond the failure, if asked for: the stable states with the least half sum of squared
+        misses of the targets.
     """
 
     status: Literal["arrived", "refused"]
@@ -148,8 +148,8 @@ def track(  # the knobs of the public face, all by keyword
     monitor
         Further descriptors for the schedule.
     beyond
-        Whether to follow the best compromise where the targets are beyond reach; the same
-        descriptors on all legs.
+        Whether to follow the least-squares compromise from where the targets cannot be met; all
+        legs must prescribe the same descriptors.
 
     Returns
     -------

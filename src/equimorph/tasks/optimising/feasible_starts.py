@@ -1,7 +1,7 @@
-"""Starts inside regions that are thinner than the cells: between the vertices, none of which obeys.
+"""Feasible starts in regions thinner than the cells, where no vertex obeys all constraints.
 
-Values of the constraints are interpolated in the cells; where they may be obeyed, points are led to
-states that obey them, by Newton's method on what is violated.
+Values of the constraints are interpolated in the cells. Where they may be obeyed, Newton's method
+on the violated ones leads to states that obey all.
 """
 
 from dataclasses import dataclass
@@ -64,7 +64,7 @@ def feasible_points_in_cells(
     constraints: tuple[Constraint, ...],
     cells: Cells,
 ) -> SetPoints:
-    """Feasible states in cells without feasible corners, of which none nearby is better.
+    """Feasible states in cells without feasible corners, each better than its neighbours.
 
     Parameters
     ----------

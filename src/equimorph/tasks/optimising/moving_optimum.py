@@ -335,7 +335,7 @@ def _goes_on(here: _Found, there: _Found, guess: SetPoints) -> bool:
 
 
 def _beyond(problem: MovingProblem, here: _Found, ahead: float) -> _Found | None:
-    """Optimum on the other side of a jump, by descents from beside the last one."""
+    """Optimum beyond a jump, found by descents from points next to the last one."""
     frames, d = here.end.frames, len(problem.course.free)
     setting = problem.programme(ahead).setting
     given = problem.course.split(problem.course.at(np.array([ahead])))[0]

@@ -85,7 +85,7 @@ class Optimum:
 
 @dataclass(frozen=True, eq=False)
 class Optima:
-    """Answer to "which stable state is best".
+    """The best stable states of a set, with certificates.
 
     Parameters
     ----------

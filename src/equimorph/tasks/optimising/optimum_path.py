@@ -38,7 +38,7 @@ class Jump:
 
 @dataclass(frozen=True, eq=False)
 class FollowedOptimum:
-    """Answer to "how does the best state move".
+    """An optimum while loads and targets vary, with its jumps.
 
     Parameters
     ----------

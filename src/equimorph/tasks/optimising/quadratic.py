@@ -82,7 +82,7 @@ def solve(problem: Quadratic, reach: float) -> Answer | None:
 def _binding(
     value: Float[np.ndarray, " n"], slope: Float[np.ndarray, "n d"], reach: float
 ) -> Int[np.ndarray, " some"]:
-    """Rows that may be active within reach, the most pressing first."""
+    """Rows that may become active within reach, the most violated first."""
     size = np.linalg.norm(slope, axis=1)
     able = np.isfinite(value) & (value + 2.0 * reach * size + 1e-12 >= 0.0)
     some = np.flatnonzero(able)
@@ -101,7 +101,7 @@ def _different(
 
 
 def _first(problem: Quadratic, size: int, more: int) -> Answer | None:
-    """KKT point with so many functions and constraints active, if it is the solution."""
+    """KKT point with `size` functions and `more` constraints active, if it is the solution."""
     (m, d), k = problem.a.shape, len(problem.g)
     own = np.array(list(combinations(range(m), size)), int).reshape(comb(m, size), size)
     rows = np.array(list(combinations(range(k), more)), int).reshape(comb(k, more), more)

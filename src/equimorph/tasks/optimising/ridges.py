@@ -47,7 +47,7 @@ class Ridge:
     value
         Limit load on the curve, or on the higher side of a cliff.
     slope
-        Slope of that along the curve, per unit of length: what is left of zero.
+        Slope of the load along the curve, per unit of length; zero at an exact optimum.
     across
         Direction across the curve in the plane of settings, of unit length in scales.
     cliff
@@ -152,9 +152,9 @@ def _along(
 
 
 def _top_of(values: Float[np.ndarray, " stencil"]) -> tuple[float, float]:
-    """Where a polynomial through values is largest, in widths, and how large its last terms are.
+    """Where a polynomial through values is largest, in widths, and how large its last term is.
 
-    As a share of its bend: what is left out moves the top by less than that.
+    The terms are relative to the quadratic one: truncation moves the maximum by less than that.
     """
     powers = np.linalg.solve(np.vander(STENCIL, increasing=True), values)
     polynomial = np.polynomial.Polynomial(powers)

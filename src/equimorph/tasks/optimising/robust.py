@@ -28,7 +28,7 @@ no slopes."""
 
 @dataclass(frozen=True, eq=False)
 class RobustOptimum:
-    """Answer to "which stable state is best, whatever the imperfections".
+    """The stable state with the best guaranteed value under imperfections.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class RobustOptimum:
 
     @property
     def price(self) -> float:
-        """What is lost against the nominal optimum if there is no imperfection."""
+        """Loss against the nominal optimum if there is no imperfection."""
         return np.nan if self.nominal is None else abs(self.value - self.nominal.value)
 
     @property

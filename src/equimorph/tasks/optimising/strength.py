@@ -1,4 +1,4 @@
-"""`strongest`: actuator settings with the largest limit load, for sure settings and robust ones."""
+"""`strongest`: actuator settings with the largest limit load, nominal and robust."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -80,7 +80,7 @@ class Strongest:
 
 @dataclass(frozen=True, eq=False)
 class StrongestSettings:
-    """Answer to "which setting carries most".
+    """Actuator settings with the largest limit load, nominal or robust.
 
     Parameters
     ----------
@@ -89,17 +89,17 @@ class StrongestSettings:
     all
         Local optima, the best first.
     offsets
-        Imperfections against which the answer is safe; empty for a sure setting.
+        Imperfections that the answer allows for; empty for a nominal optimum.
     guaranteed
         Of a robust optimum: the smallest limit load over the imperfections, which was made as large
-        as possible. Else that of the best setting: its value.
+        as possible. Otherwise the value of the best setting.
     price
-        Of a robust optimum: what is lost against the best sure setting if there is no imperfection.
+        Of a robust optimum: loss against the best nominal setting if there is no imperfection.
     at_risk
-        Of a robust optimum: the smallest limit load over the imperfections at the best sure
+        Of a robust optimum: the smallest limit load over the imperfections at the best nominal
         setting.
     nominal
-        The best sure setting.
+        The best nominal setting.
     """
 
     status: Literal["found", "refused"]
@@ -125,7 +125,7 @@ class StrongestSettings:
 
     @property
     def margin(self) -> float:
-        """How far the guaranteed load lies above the worst case of the best sure setting."""
+        """Guaranteed load less the worst case of the best nominal setting."""
         return self.guaranteed - self.at_risk
 
 

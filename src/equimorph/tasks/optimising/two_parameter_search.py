@@ -37,7 +37,7 @@ SHORTER = 0.3 ** np.arange(4.0)
 
 @dataclass(frozen=True)
 class LocalMaximum:
-    """A local maximum: where, its value, what is left of the slope, whether it is smooth there."""
+    """A local maximum: setting, value, remaining slope, whether the function is smooth there."""
 
     setting: Pair
     value: float
@@ -144,7 +144,7 @@ def maximise_least(pieces: Pieces, start: Pair, radius: Pair, box: Box) -> tuple
 def _around(
     pieces: Pieces, places: Float[np.ndarray, "lanes 2"], radius: Pair, box: Box
 ) -> Float[np.ndarray, "lanes 5 m"]:
-    """Values at places and beside them, for differences; not a number counts as zero."""
+    """Values at places and around them, for central differences; not a number counts as zero."""
     ways = DIFFERENCE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
     many = np.clip(places[:, None] + ways * radius, box.lower, box.upper)
     values = np.nan_to_num(pieces(many.reshape(-1, 2)), nan=0.0)

@@ -58,9 +58,9 @@ class _Moves:
 def move_by_chords(corners: States, demands: Demands, room: Room) -> States:
     """Move corners as long as that makes their chords cheaper.
 
-    A chord runs through the exact state amid two corners; costs are summed up over its two halves,
-    and margins and constraints hold at all of these states. What comes out may be impossible to
-    lift: that is for `connect` to say.
+    A chord runs through the exact state halfway between two corners; costs are summed over its two
+    halves, and margins and constraints hold at all of these states. Whether the result can be
+    lifted is decided by `connect`.
     """
     return _move_corners(corners, demands, room, SIZES, ROUNDS, by_lifts=False)
 
@@ -108,7 +108,7 @@ def _move_corners(
 def _chords(
     first: Places, second: Places, demands: Demands
 ) -> tuple[Bool[np.ndarray, " n"], Values]:
-    """Whether the states amid two admissible ones are so, too, and the cost by way of them."""
+    """Whether the states halfway between pairs are admissible, and the cost through them."""
     a, b = first.states, second.states
     p = 0.5 * (a.p + b.p)
     halfway = settle(a.structure, 0.5 * (a.z + b.z), p, guards=FEW)
@@ -181,7 +181,7 @@ def _candidates(corners: States, odd: int, size: float, room: Room) -> tuple[Som
 
 
 def _directions(d: int) -> Float[np.ndarray, "directions d"]:
-    """Both ways along every parameter, and amid each two of them."""
+    """Both directions along every parameter, and diagonals of every two."""
     units = np.eye(d)
     first, second = np.triu_indices(d, 1)
     amid = [units[first] + sign * units[second] for sign in (1.0, -1.0)]

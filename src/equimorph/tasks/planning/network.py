@@ -39,7 +39,7 @@ Pairs = Int[np.ndarray, "links 2"]
 
 @dataclass(frozen=True)
 class Demands:
-    """What a route has to obey, and what it should have least of.
+    """What a route has to obey, and what it minimises.
 
     `closely`: whether every lift is as fine as the final one; else it may step over the corner of a
     keep-out region.
@@ -313,7 +313,7 @@ def neighbours(
 
 
 def explain_no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:
-    """Tell whether instability alone or the other demands part start and goal."""
+    """Say whether instability alone or the other demands separate start and goal."""
     network, free = network_of(eset), Demands(demands.objective)
     allowed = network.allowed(eset, free)
     own, _ = end_links(eset, ends, free)

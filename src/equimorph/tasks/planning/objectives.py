@@ -1,4 +1,4 @@
-"""What a route should have least of: length, travel, work, time, nearness to instability."""
+"""What a route minimises: length, travel, work, time, nearness to instability."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ NAMES: tuple[Name, ...] = get_args(Name)
 LEAST_MARGIN = 1e-6
 """Margin below which clearance counts no further."""
 EXACT, NEAR, ROUGH = 1e-11, 1e-4, 1e-2
-"""Relative errors of margins: of what is told, where ways are compared, and on a mesh."""
+"""Relative errors of margins: in results, where paths are compared, and on a mesh."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ class Objective:
     """A weighted sum of what is spent along a curve of equilibria.
 
     Terms: "length" in the metric (configuration and scaled parameters); "travel", the length of the
-    way of the parameters, in their scales; "work", ``Σᵢ ∫|∂L/∂aᵢ daᵢ|``, what actuators spend that
-    get nothing back; "clearance", ``∫ ds/margin``, large near instability; `Rates`, the time that
+    path of the scaled parameters; "work", ``Σᵢ ∫|∂L/∂aᵢ daᵢ|``, of actuators that recover no
+    energy; "clearance", ``∫ ds/margin``, large near instability; `Rates`, the time that
     limited rates take.
 
     Parameters
@@ -114,7 +114,7 @@ class Objective:
 
 
 def objective_of(wish: Wish, structure: Structure) -> Objective:
-    """Check what a caller wishes for.
+    """Check the objective that a caller passes.
 
     Raises
     ------

@@ -137,7 +137,7 @@ class _Classes:
         )
 
     def paths(self, count: int) -> list[States]:
-        """States along the best paths of so many classes, all of whose links can be lifted."""
+        """States along the best paths of up to `count` classes; all their links can be lifted."""
         pairs = self.network.pairs[self.inner]
         while True:
             paths = [path for _, path in self._search(count)]

@@ -97,7 +97,7 @@ def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyw
 
     Returns
     -------
-    A verified route. A refusal after so many lifts is no proof that there is none.
+    A verified route. A refusal does not prove that no route exists.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class Gate:
     Parameters
     ----------
     source
-        Stable vertex beside the fold.
+        Stable vertex next to the fold.
     fold
         The fold, as it lies in the set.
     landing

@@ -21,7 +21,7 @@ from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, ina
 MOST_SHORTCUTS = 8000
 """Number of straight lifts that are tried to shorten a path within its class."""
 STATIONS, STATIONS_WITH_MARGINS = 28, 16
-"""States of a path any two of which are tried otherwise; margins all along cost more than lifts."""
+"""Otherwise, states of a path between which short cuts are tried; fewer where margins count."""
 CORNER = 1e-3
 """Share of the cost that a further corner has to save."""
 LEGS = 12
@@ -57,7 +57,7 @@ def straighten(states: States, demands: Demands, same_class: bool = False) -> St
 def _pairs(
     count: int, most: int | None
 ) -> tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]]:
-    """Neighbours on a path of so many states, and pairs of all, or of `most` of its states."""
+    """Pairs of neighbours on a path, and pairs of all, or of `most`, of its states."""
     if most is None:
         first, second = np.triu_indices(count, 1)
         stride = 1 + len(first) // MOST_SHORTCUTS

@@ -23,7 +23,7 @@ from equimorph.tasks.shapes.solutions import solve_shape
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Answer to "can it take this shape from here; if not, what stops it".
+    """Whether target values can be reached from a state; if not, what prevents it.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def _check(home: Region, targets: Mapping[Descriptor, float]) -> None:
 def jacobian_of(
     structure: Structure, names: Sequence[str], descriptors: Sequence[Descriptor]
 ) -> Descriptor:
-    """det ∂S/∂p along the set, per scales of the parameters: zero where they do not steer."""
+    """det ∂S/∂p along the set, per scales of the parameters: zero where control is lost."""
     free = np.array([position(structure.parameters, name) for name in names])
 
     def value(z: Lanes, p: Parameters) -> Values:

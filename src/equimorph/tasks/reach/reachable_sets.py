@@ -24,7 +24,7 @@ FINER = (0.1, 0.03)
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Answer to "what can the structure do from here".
+    """Reachable or attainable set of a stable state, with its boundary by kinds.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Reach:
     start
         The state.
     descriptors
-        What is steered.
+        Descriptors that the parameters control.
     regions
         Regions of the stable piece of the start; the first is that of the start, whose image is
         the reachable (or attainable) set.
@@ -96,10 +96,10 @@ def reachable(
     within: Sequence[Constraint] = (),
     accuracy: float | None = None,
 ) -> Reach:
-    """Find all values of descriptors that continuous steering reaches from a state.
+    """Find all values of descriptors that a continuous motion reaches from a state.
 
     The stable piece of the set around the state is cut, at exact states, along constraints and
-    along ``det J_S = 0``, where the free parameters do not steer the descriptors. On each region
+    along ``det J_S = 0``, where the free parameters do not control the descriptors. On each region
     the descriptors are local coordinates; its image may cover values more than once.
 
     Parameters
@@ -166,7 +166,7 @@ def attainable(
     """Find all states that a stable motion of the parameters reaches from a state.
 
     Like `reachable`, but not cut along ``det J_S = 0``: the parameters may also move where they do
-    not steer the descriptors.
+    not control the descriptors.
 
     Parameters
     ----------

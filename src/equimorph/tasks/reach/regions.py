@@ -58,7 +58,7 @@ class Region:
     eset
         The region as a set of its own; its boundary consists of exact states.
     descriptors
-        What is steered.
+        Descriptors that the parameters control.
     side
         Sign of det J_S on it; 0 where the set was not cut along det J_S = 0.
     singular

@@ -1,7 +1,8 @@
-"""How a limit load falls with an imperfection: smoothly, or with a fractional power."""
+"""How a limit load falls with an imperfection: smoothly or with a fractional power."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -43,7 +44,7 @@ class ImperfectionLaw:
         Imperfections that were tried, with their signs, and limit loads.
     """
 
-    status: str
+    status: Literal["fitted", "refused"]
     why: str
     law: str
     exponent: float

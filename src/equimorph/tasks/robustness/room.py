@@ -21,7 +21,7 @@ Directions = Float[np.ndarray, "directions d"]
 Shape = Literal["box", "ellipsoid"]
 
 RANDOM = 64
-"""Random directions beside axes and corners."""
+"""Random directions besides axes and corners."""
 MOST_CORNERS = 64
 """Corners of the box up to which all are tried; of more, so many at random."""
 ROUNDS, AROUND = 10, 12
@@ -30,7 +30,7 @@ ROUNDS, AROUND = 10, 12
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """How far parameters may stray from states, in all directions at once.
+    """The largest box or ellipsoid of parameters around states that stays stable.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """The least change of parameters that makes a state snap, and where it lands."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from equimorph.structures import State, States
 
 @dataclass(frozen=True, eq=False)
 class LeastSnap:
-    """How little it takes to lose a state, and what comes instead.
+    """The least change of parameters that makes a state snap, and where the snap lands.
 
     Parameters
     ----------
@@ -25,7 +26,7 @@ class LeastSnap:
         Where it lands; see `Landing`.
     """
 
-    status: str
+    status: Literal["found", "refused"]
     why: str
     distance: StabilityDistance
     change: dict[str, float]

@@ -20,7 +20,7 @@ CONFIDENT = 1.96
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """What became of a schedule under random imperfections.
+    """Outcomes of a schedule under random imperfections.
 
     Parameters
     ----------

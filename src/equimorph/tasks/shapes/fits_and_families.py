@@ -14,8 +14,7 @@ from equimorph.structures import States
 from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
 from equimorph.tasks.optimising.tangent_steps import SetPoints, points_at_vertices
-from equimorph.tasks.shapes.correction import states_with_values
-from equimorph.tasks.shapes.prediction import Predictor
+from equimorph.tasks.shapes.prediction import Predictor, states_with_values
 from equimorph.tolerances import FEASIBLE
 
 STARTS = 12

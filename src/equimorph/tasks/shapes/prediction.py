@@ -1,4 +1,4 @@
-"""Where on a set descriptors may take given values: linear interpolation over cells."""
+"""Where on a set descriptors take given values: predictions over cells, Newton's correction."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,6 +6,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.equilibria.point_conditions import Values
+from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.setting import Setting
@@ -18,6 +20,9 @@ CLOSE = 0.5
 """Distance of two predictions, in sizes of their cell, below which one of them will do."""
 OVERHANG = 0.5
 """How far beyond a cell, in barycentric coordinates, its linear prediction is still tried."""
+
+GUARDS = Guards(iterations=30, longest=0.3, converged=1e-7)
+"""The last correction is 1e-7, so that Newton's method leaves an error at round-off."""
 
 
 def predictor(eset: EquilibriumSet, descriptors: tuple[Descriptor, ...]) -> "Predictor":
@@ -143,3 +148,30 @@ class Predictor:
     def misfits(self, wanted: Float[np.ndarray, " k"]) -> Float[np.ndarray, " V"]:
         """Root of the sum of squares of what vertices miss, in ranges over the set."""
         return np.asarray(np.sqrt((((self.values - wanted) / self.spread) ** 2).sum(axis=1)))
+
+
+def states_with_values(
+    setting: Setting,
+    at: SetPoints,
+    descriptors: tuple[Descriptor, ...],
+    wanted: Float[np.ndarray, "lanes k"],
+) -> Settled:
+    """Solve F(z; p) = 0 and S(z, p) = S* from guesses near a set.
+
+    Folds are regular points. With fewer descriptors than free parameters the steps along the set
+    are the shortest ones.
+
+    Parameters
+    ----------
+    setting
+        Structure and free parameters.
+    at
+        Guesses, with bases of spaces near the tangent spaces.
+    wanted
+        S* for each lane; at most d descriptors.
+    """
+    structure, free = setting.structure, setting.free
+    directions = free_directions(structure, free, len(at))
+    values = Values(tuple(each.function for each in descriptors), wanted)
+    frame = embedded_planes(structure, free, at.rows)
+    return settle(structure, at.z, at.p, directions, [values], GUARDS, frame)

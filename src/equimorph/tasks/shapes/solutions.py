@@ -20,9 +20,8 @@ from equimorph.tasks.optimising.programme import stability
 from equimorph.tasks.optimising.tangent_steps import SetPoints, points_at_vertices
 from equimorph.tasks.planning import plan
 from equimorph.tasks.route import Route
-from equimorph.tasks.shapes.correction import states_with_values
 from equimorph.tasks.shapes.fits_and_families import best_fits, solution_family
-from equimorph.tasks.shapes.prediction import Predictor, predictor
+from equimorph.tasks.shapes.prediction import Predictor, predictor, states_with_values
 from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
 from equimorph.tolerances import SAME_STATE
 
@@ -38,7 +37,7 @@ Rank = Literal["route", "energy", "margin"]
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Answer to "at which settings does the structure take this shape".
+    """Equilibria at which descriptors take target values.
 
     Parameters
     ----------
@@ -52,9 +51,9 @@ class Shapes:
     index
         Negative eigenvalues of each; 0 is stable.
     misfit
-        What each leaves of the targets: root of the sum of squares, in ranges over the set.
+        Misfit of each: root of the sum of squares of its misses, in ranges over the set.
     routes
-        Way to each from the start, or why there is none; empty without a start.
+        Route to each from the start, or why there is none; empty without a start.
     closest, miss
         Vertex of the set whose descriptors come nearest to the targets, and how far it is from
         them; see `nearest` for the exact state.
@@ -100,7 +99,7 @@ class Shapes:
 
     @property
     def schedule(self) -> Schedule | None:
-        """Way to the best solution that can be reached from the start, if there is a start."""
+        """Schedule to the best solution that can be reached from the start, if there is a start."""
         return next((route.schedule for route in self.routes if route.arrived), None)
 
     @cached_property
@@ -148,7 +147,7 @@ def solve_shape(
 
     Cells over which the linear interpolation of the descriptors comes near the targets predict
     states, which Newton corrects along the set; folds are no obstacle. A solution that no cell
-    predicts would need two in one cell: refine the set there. With more descriptors than free
+    predicts shares its cell with another one: refine the set there. With more descriptors than free
     parameters the fits of least squares are found, with fewer the family of solutions.
 
     Parameters
@@ -167,7 +166,7 @@ def solve_shape(
 
     Returns
     -------
-    The solutions. None is an answer: refused, with what comes nearest.
+    The solutions; refused, with the nearest vertex, if there is none.
 
     Raises
     ------

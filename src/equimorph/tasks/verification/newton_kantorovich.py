@@ -24,7 +24,7 @@ SWEEPS = 5
 LEAST_WEIGHT = 1e-3
 """Least weight relative to the largest: no unknown may count for nothing."""
 ROOM = 4.0
-"""Reach of the boxes beside the chord, in units of the defect."""
+"""Half width of the boxes around the chord, in units of the defect."""
 ROUNDING = 1e-13
 """Relative error assumed for every entry of F, and more than it ever is."""
 SHARES = (0.95, 0.9, 0.8, 0.6, 0.4, 0.2)
@@ -196,8 +196,8 @@ def _margins(
 ) -> Values:
     """Largest tried σ for which F_z − σ·mass keeps index 0 in the tubes.
 
-    Tried are shares of the least margin of the ends; where the wanted margin lies between the best
-    share and that, the wanted one itself.
+    Fractions of the smaller margin of the ends are tried; where the demanded margin lies between
+    the best fraction and the smaller margin, also the demanded one.
     """
     kept = np.zeros(len(middle))
     for share in SHARES:

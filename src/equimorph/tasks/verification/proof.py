@@ -138,7 +138,7 @@ def _keeps(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
 def _bisected(
     states: States, bad: Int[np.ndarray, " bad"]
 ) -> tuple[States, Int[np.ndarray, " bad"]] | None:
-    """States with exact ones amid the bad segments, and their places; None if there are none.
+    """States with exact ones in the middle of the bad segments, and where these stand; else None.
 
     A curve that leaves its chord by a quarter of its length, or an unstable state, cannot be meant.
     """
