@@ -9,6 +9,7 @@ from equimorph.arrays import Values
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.lift import check_start
 from equimorph.equilibria.trace_locus import Watch
+from equimorph.equilibria.trace_options import EventKind
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position
 from equimorph.structures import State, Structure
@@ -76,7 +77,7 @@ def grazing(structure: Structure, constraint: Constraint, name: str) -> Test:
 def branchings(structure: Structure, free: Int[np.ndarray, " k"]) -> list[Watch]:
     """Watches for branch points of the paths along each free parameter."""
     names = [structure.parameters[place].name for place in free]
-    return [Watch("branch point", branching(structure, name), name) for name in names]
+    return [Watch(EventKind.BRANCH_POINT, branching(structure, name), name) for name in names]
 
 
 def limits(
@@ -84,7 +85,7 @@ def limits(
 ) -> list[Watch]:
     """Watches that end a curve: the box, the limits of the parameters' meaning, constraints."""
     check_start(state, within)
-    watches = [Watch("constraint", bound(c), str(c), ends=True) for c in within]
+    watches = [Watch(EventKind.CONSTRAINT, bound(c), str(c), ends=True) for c in within]
     for place in free:
         parameter = state.structure.parameters[place]
         low, high = parameter.lower, parameter.upper
@@ -100,7 +101,8 @@ def limits(
         for side, sign in ((low, -1.0), (high, 1.0)):
             if np.isfinite(side):
                 test = _beyond(int(place), float(side), sign, parameter.scale)
-                watches.append(Watch("box", test, f"{parameter.name} = {side:g}", ends=True))
+                detail = f"{parameter.name} = {side:g}"
+                watches.append(Watch(EventKind.BOX, test, detail, ends=True))
     return watches
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Values
 from equimorph.equilibria.conditions import (
     bound,
     branching,
@@ -20,16 +21,15 @@ from equimorph.equilibria.conditions import (
 )
 from equimorph.equilibria.critical import normal_form
 from equimorph.equilibria.lift import Event
-from equimorph.equilibria.locus import Locus, Spot, settle
+from equimorph.equilibria.locus import Locus, Spots, nearest
 from equimorph.equilibria.trace_locus import (
     Landmark,
     Side,
     Watch,
-    follow_side,
-    negative_others,
+    trace_locus,
     watched,
 )
-from equimorph.equilibria.trace_options import TraceOptions
+from equimorph.equilibria.trace_options import EventKind, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position
 from equimorph.structures import State, States
@@ -103,43 +103,35 @@ def both_ways(
         If the state is not on the locus.
     """
     options = options or TraceOptions(largest_step=0.2)
-    x = locus.joined(state.z, state.p)
-    start = settle(locus, x)
-    if start is None or np.sqrt((start.x - x) ** 2 @ locus.weights) > NEAR:
+    x = locus.joined(state.z[None], state.p[None])
+    start, found = nearest(locus, x)
+    if not found[0] or locus.lengths(start.x - x)[0] > NEAR:
         raise InputError(
             f"`state` must lie on a {kind} curve in {_names(locus)}; no such state was found "
             f"within {NEAR:g} of it."
         )
-    start = _oriented(locus, start)
-    forward = follow_side(locus, start, watches, options)
-    if forward.end.kind == "closed":
-        backward = Side([start], [0.0], [], forward.end)
-    else:
-        back = Spot(start.x, np.vstack([-start.basis[:1], start.basis[1:]]), start.b)
-        backward = follow_side(locus, back, watches, options)
-        if backward.end.kind == "closed":
-            forward = Side([start], [0.0], [], backward.end)
-    return _curve(kind, locus, _at_start(locus, start, watches), (backward, forward))
+    start = start.turned(_sign(locus, start))
+    sides = trace_locus(locus, start, watches, options)
+    return _curve(kind, locus, _at_start(locus, start, watches), sides)
 
 
 def _names(locus: Locus) -> str:
     return ", ".join(locus.structure.parameters[place].name for place in locus.free)
 
 
-def _oriented(locus: Locus, spot: Spot) -> Spot:
-    """Towards a growing first parameter (or second, if the first does not change)."""
-    change = spot.tangent[locus.structure.size :]
+def _sign(locus: Locus, spot: Spots) -> Values:
+    """Sign towards a growing first parameter (or second, if the first does not change)."""
+    change = spot.tangent[0, locus.structure.size :]
     moving = np.flatnonzero(np.abs(change) > 1e-6)
-    sign = np.sign(change[moving[0]]) if len(moving) else 1.0
-    return Spot(spot.x, np.vstack([sign * spot.basis[:1], spot.basis[1:]]), spot.b)
+    return np.sign(change[moving[:1]]) if len(moving) else np.ones(1)
 
 
-def _at_start(locus: Locus, start: Spot, watches: list[Watch]) -> list[Landmark]:
+def _at_start(locus: Locus, start: Spots, watches: list[Watch]) -> list[Landmark]:
     """Special points at the start itself."""
-    values, slopes = watched(locus, start, watches, np.zeros(len(watches)))
+    values, slopes = watched(locus, start, watches, np.zeros((1, len(watches))))
     return [
         Landmark(watch.kind, start, 0.0, watch.detail)
-        for watch, value, slope in zip(watches, values, slopes, strict=True)
+        for watch, value, slope in zip(watches, values[0], slopes[0], strict=True)
         if not watch.ends and value == 0.0 and abs(slope) > 1e-6
     ]
 
@@ -148,31 +140,32 @@ def _curve(
     kind: str, locus: Locus, here: list[Landmark], sides: tuple[Side, Side]
 ) -> CriticalCurve:
     backward, forward = sides
+    assert backward.end is not None, "sides are followed to their ends"
+    assert forward.end is not None, "sides are followed to their ends"
     back = [Landmark(m.kind, m.spot, -m.length, m.detail) for m in backward.landmarks[::-1]]
-    closed = forward.end.kind == "closed"
-    first = forward.end if closed else backward.end
+    first = forward.end if forward.closed else backward.end
     ends = (Landmark(first.kind, first.spot, -backward.lengths[-1], first.detail), forward.end)
     spots = [*backward.spots[:0:-1], *forward.spots]
     lengths = np.concatenate([-np.array(backward.lengths[:0:-1]), forward.lengths])
-    z, p = locus.split(np.array([spot.x for spot in spots]))
+    z, p = locus.split(np.concatenate([spot.x for spot in spots]))
     return CriticalCurve(
         kind,
         tuple(locus.structure.parameters[place].name for place in locus.free),
         States(locus.structure, z, p),
         lengths,
-        np.array([negative_others(locus, spot) for spot in spots]),
+        np.array([*backward.index[:0:-1], *forward.index]),
         tuple(_event(locus, mark) for mark in (*back, *here, *forward.landmarks)),
         (_event(locus, ends[0]), _event(locus, ends[1])),
     )
 
 
 def _event(locus: Locus, mark: Landmark) -> Event:
-    z, p = locus.split(mark.spot.x[None])
+    z, p = locus.split(mark.spot.x)
     detail, critical = mark.detail, None
-    if mark.kind == "cusp":
-        cubic = locus.critical(mark.spot.x[None], mark.spot.b).cubic[0]
+    if mark.kind == EventKind.CUSP:
+        cubic = locus.critical(mark.spot.x, mark.spot.b).cubic[0]
         detail = "standard" if cubic > 0.0 else "dual"
-    if mark.kind == "branch point":
+    if mark.kind == EventKind.BRANCH_POINT:
         dp = np.zeros_like(p)
         dp[0, position(locus.structure.parameters, detail)] = 1.0
         critical = normal_form(locus.structure, z, p, dp).kinds[0]
@@ -216,7 +209,7 @@ def fold_curve(
     """
     structure = state.structure
     free = places(structure, parameters, 2 + len(on))
-    watches = [Watch("cusp", quadratic), *branchings(structure, free)]
+    watches = [Watch(EventKind.CUSP, quadratic), *branchings(structure, free)]
     locus = Locus(structure, state.p, free, (gap, *map(bound, on)))
     return both_ways("fold", locus, state, [*watches, *limits(state, free, box, within)], options)
 
@@ -257,7 +250,7 @@ def branch_curve(
     if along not in parameters:
         raise InputError(f"`along` must be one of the parameters that vary; got {along!r}.")
     locus = Locus(structure, state.p, free, (gap, branching(structure, along)), unfolded)
-    watches = [Watch("degenerate", cubic, "the criticality changes")] if unfolded else []
+    watches = [Watch(EventKind.DEGENERATE, cubic, "the criticality changes")] if unfolded else []
     watches += limits(state, free, box, within)
     return both_ways("branch point", locus, state, watches, options)
 
@@ -291,7 +284,7 @@ def cusp_curve(
     """
     structure = state.structure
     free = places(structure, parameters, 3)
-    watches = [Watch("swallowtail", cubic), *branchings(structure, free)]
+    watches = [Watch(EventKind.SWALLOWTAIL, cubic), *branchings(structure, free)]
     locus = Locus(structure, state.p, free, (gap, quadratic))
     return both_ways("cusp", locus, state, [*watches, *limits(state, free, box, within)], options)
 

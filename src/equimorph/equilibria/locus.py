@@ -6,18 +6,30 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Flags, Lanes, Parameters, Scalars, Some, Values
 from equimorph.equilibria.critical import Critical, Test, null_border
+from equimorph.equilibria.newton_step import Planes, Tangents
+from equimorph.equilibria.point_conditions import Condition, Move, Plane, Vanishing
+from equimorph.equilibria.settle import Guards, Settled, free_directions, settle
 from equimorph.structures import Structure
 
-Point = Float[np.ndarray, " coordinates"]
 Points = Float[np.ndarray, "lanes coordinates"]
+Bases = Float[np.ndarray, "lanes d coordinates"]
 
-DIFFERENCE = 1e-5
-"""Step of differences of tests, in the metric: it sets the rate of Newton, not the error."""
 ACCEPTED = 1e-9
-"""Size of the last correction; the next would be below round-off."""
+"""Length of the last correction; the next would be below round-off."""
 ITERATIONS = 12
+FIRST_SHARE, CONTRACTION = 0.25, 0.5
+"""Longest first correction as a share of the step, and of each later one as a share of the one
+before: more could lead to another curve."""
+LEAST_COSINE = 0.9
+"""Of the angle between the tangents at both ends of a step."""
+SPREADING = 4.0
+"""Growth of corrections at which the search for the nearest point ends."""
+MULTIPLIERS = 1e-2
+"""Weight of squared multipliers in the length of corrections: they are not in the metric."""
+DEPENDENT = 1e-6
+"""Length of a direction, without what others share, relative to it, that counts as none."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +37,8 @@ class Locus:
     """F(z; p) = 0 and `tests` = 0 in z and the parameters at places `free` (one more than tests).
 
     `unfolded` adds an unknown β with F + βb = 0: it stands for a parameter that breaks a symmetry
-    and stays zero along branch points that persist by symmetry.
+    and stays zero along branch points that persist by symmetry. Coordinates are (z, free
+    parameters, β).
     """
 
     structure: Structure
@@ -42,16 +55,16 @@ class Locus:
         return len(self.free) + int(self.unfolded)
 
     @cached_property
-    def weights(self) -> Point:
+    def weights(self) -> Float[np.ndarray, " coordinates"]:
         """Metric of (z, free parameters, β); multipliers do not count."""
         structure = self.structure
         multipliers = np.zeros(structure.constraints)
         scaled = 1.0 / structure.scales[self.free] ** 2
         return np.concatenate([structure.mass, multipliers, scaled, np.ones(int(self.unfolded))])
 
-    def joined(self, z: Float[np.ndarray, " size"], p: Float[np.ndarray, " parameters"]) -> Point:
-        """Coordinates of a state."""
-        return np.concatenate([z, p[self.free], np.zeros(int(self.unfolded))])
+    def joined(self, z: Lanes, p: Parameters) -> Points:
+        """Coordinates of states."""
+        return np.concatenate([z, p[:, self.free], np.zeros((len(z), int(self.unfolded)))], axis=1)
 
     def split(self, x: Points) -> tuple[Lanes, Parameters]:
         """z and all parameters."""
@@ -60,166 +73,198 @@ class Locus:
         p[:, self.free] = x[:, size : size + len(self.free)]
         return np.ascontiguousarray(x[:, :size]), p
 
-    def critical(self, x: Points, b: Float[np.ndarray, " size"]) -> Critical:
-        """Test functions at points."""
-        z, p = self.split(x)
-        return Critical(self.structure, z, p, np.tile(b, (len(x), 1)))
+    def critical(self, x: Points, b: Lanes) -> Critical:
+        """Test functions at points, one border for each."""
+        return Critical(self.structure, *self.split(x), b)
 
-    def frame(
-        self, x: Point, b: Float[np.ndarray, " size"], rows: Float[np.ndarray, "d coordinates"]
-    ) -> tuple[Point, Float[np.ndarray, "d coordinates"]]:
-        """Newton correction onto the set with rows·dx = 0, and the kernel dual to the rows."""
-        structure, d = self.structure, self.dimension
-        z, p = self.split(x[None])
-        columns, k = np.zeros((1, d, structure.size)), len(self.free)
-        unit = np.eye(p.shape[1])[self.free]
-        columns[0, :k] = structure.parameter_derivative(
-            np.tile(z, (k, 1)), np.tile(p, (k, 1)), unit
-        )
-        residual = structure.residual(z, p)[0]
-        if self.unfolded:
-            columns[0, -1] = b
-            residual = residual + x[-1] * b
-        rhs = np.zeros((1, d + 1, structure.size + d))
-        rhs[0, 0, : structure.size] = -residual
-        rhs[0, 1:, structure.size :] = np.eye(d)
-        inner, corner = rows[None, :, : structure.size], rows[None, :, structure.size :]
-        solved = structure.solve(z, p, rhs, (columns, np.ascontiguousarray(inner), corner)).x[0]
-        return solved[0], solved[1:]
-
-    def slopes(
-        self, x: Point, directions: Float[np.ndarray, "d coordinates"], tests: tuple[Test, ...],
-        b: Float[np.ndarray, " size"],
-    ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m d"]]:  # fmt: skip
-        """Values of tests and their derivatives along directions, by central differences."""
-        d = len(directions)
-        lengths = np.sqrt(directions**2 @ self.weights)
-        shifts = DIFFERENCE * directions / np.maximum(lengths, 1e-300)[:, None]
-        critical = self.critical(np.concatenate([x[None], x + shifts, x - shifts]), b)
-        values = np.array([test(critical) for test in tests]).reshape(len(tests), 2 * d + 1)
-        change = values[:, 1 : d + 1] - values[:, d + 1 :]
-        return values[:, 0], change * lengths / (2.0 * DIFFERENCE)
+    def lengths(self, steps: Points) -> Values:
+        """Lengths of steps in the metric."""
+        return np.asarray(np.sqrt(steps**2 @ self.weights))
 
 
 @dataclass(frozen=True)
-class Spot:
-    """A point of a locus, an orthonormal kernel of [F_z F_p] with the tangent first, a border."""
+class Spots:
+    """Points of loci, one a lane: coordinates, orthonormal kernels of [F_z F_p], borders.
 
-    x: Point
-    basis: Float[np.ndarray, "d coordinates"]
-    b: Float[np.ndarray, " size"]
+    The first direction of a kernel is the unit tangent of the curve.
+    """
+
+    x: Points
+    basis: Bases
+    b: Lanes
 
     @property
-    def tangent(self) -> Point:
-        """Unit tangent of the curve."""
-        return np.asarray(self.basis[0])
+    def tangent(self) -> Points:
+        """Unit tangents."""
+        return np.ascontiguousarray(self.basis[:, 0])
+
+    def take(self, lanes: Some | Flags) -> "Spots":
+        """Return some of the lanes."""
+        return Spots(self.x[lanes], self.basis[lanes], self.b[lanes])
+
+    def turned(self, sign: Values) -> "Spots":
+        """The same with tangents times a sign of each lane."""
+        basis = self.basis.copy()
+        basis[:, 0] *= sign[:, None]
+        return Spots(self.x, basis, self.b)
 
 
-def settle(locus: Locus, x: Point) -> Spot | None:
-    """Nearest point of the locus, by Newton with the least correction; None if there is none."""
-    size, d = locus.structure.size, locus.dimension
-    z, p = locus.split(x[None])
-    b = null_border(locus.structure, z, p)[0]
-    waves = np.cos(np.outer(np.arange(1, d + 1), 1.7 * np.arange(size + d)) + 0.4)
-    last = np.inf
-    for _ in range(ITERATIONS):
-        # any rows that see the kernel will do; then the kernel itself
-        kernel = orthonormal(locus, locus.frame(x, b, waves)[1])
-        if kernel is None:
-            return None
-        d0, kernel = locus.frame(x, b, kernel * locus.weights)
-        values, slopes = locus.slopes(x + d0, kernel, locus.tests, b)
-        if not (np.isfinite(slopes).all() and np.isfinite(d0).all()):
-            return None
-        step = d0 + np.linalg.lstsq(slopes, -values, rcond=None)[0] @ kernel
-        x, size_now = x + step, _size(locus, step)
-        if size_now <= ACCEPTED:
-            null = np.linalg.svd(slopes)[2][-1]
-            return _spot(locus, x, np.vstack([null @ kernel, kernel]), b)
-        if size_now > max(0.5, 4.0 * last):
-            return None
-        last = size_now
-        b = _border(locus, x, b)
-    return None
+def nearest(locus: Locus, x: Points) -> tuple[Spots, Flags]:
+    """Points of the locus near guesses, by Newton with the least corrections; which were found."""
+    z, p = locus.split(x)
+    b = null_border(locus.structure, z, p)
+    guards = Guards(ITERATIONS, converged=ACCEPTED, contraction=SPREADING, free=1,
+                    multipliers=MULTIPLIERS)  # fmt: skip
+    frame = Tangents(locus.unfolded)
+    found = _settle(locus, x, (_vanishing(locus.tests, len(x)),), guards, frame)
+    return _spots(locus, found, found.found, b)
 
 
 def advance(
     locus: Locus,
-    spot: Spot,
-    length: float,
-    bend: Point | None = None,
+    spots: Spots,
+    lengths: Values,
+    guess: Points | None = None,
     meets: Test | None = None,
-) -> Spot | None:
-    """Point of the locus at `length` along the tangent of `spot`, by Newton; None if it fails.
+    following: float = 0.0,
+) -> tuple[Spots, Flags]:
+    """Points of the locus at `lengths` along the tangents of `spots`, by Newton; which were found.
 
-    `bend` is an estimate of dT/ds. The first correction must stay below a quarter of the length,
-    the following ones must shrink, and the tangents stay within acos 0.9. With a test that the
-    point `meets` (is a root of), the length is a guess.
+    They are corrected from guesses, or from the tangents. The first correction must stay below a
+    quarter of the length, the following ones must shrink, and the tangents stay within acos 0.9.
+    With a test that the points `meet` (are roots of), the lengths are guesses. Corrections below
+    `following` are not taken: points are as exact, but tangents belong to the points before.
     """
-    rows = spot.basis * locus.weights
-    x = spot.x + length * spot.tangent
-    if bend is not None:
-        x = x + 0.5 * length**2 * bend
-    limit = 0.25 * abs(length) + ACCEPTED
+    ahead = spots.x + lengths[:, None] * spots.tangent
+    x = ahead if guess is None else guess
+    guards = Guards(ITERATIONS, converged=ACCEPTED, following=following, contraction=CONTRACTION,
+                    free=1, multipliers=MULTIPLIERS)  # fmt: skip
+    rows = spots.basis * locus.weights
     tests = locus.tests if meets is None else (*locus.tests, meets)
-    ahead = np.eye(locus.dimension)[:1]
-    for _ in range(ITERATIONS):
-        d0, kernel = locus.frame(x, spot.b, rows)
-        values, slopes = locus.slopes(x + d0, kernel, tests, spot.b)
-        matrix, rest = slopes, -values
-        if meets is None:
-            matrix = np.vstack([slopes, ahead])
-            rest = np.append(rest, length - rows[0] @ (x - spot.x))
-        if not (np.isfinite(matrix).all() and np.isfinite(rest).all()):
-            return None
-        step = d0 + np.linalg.lstsq(matrix, rest, rcond=None)[0] @ kernel
-        size = _size(locus, step)
-        if not size <= limit:
-            return None
-        x = x + step
-        if size <= ACCEPTED:
-            null = np.linalg.svd(slopes[: len(locus.tests)])[2][-1]
-            tangent = np.sign(null[0]) * null @ kernel
-            found = _spot(locus, x, np.vstack([tangent, kernel]), spot.b)
-            turned = found is None or found.tangent @ rows[0] < 0.9
-            return None if turned else found
-        limit = max(0.5 * size, ACCEPTED)
-    return None
+    conditions: list[Condition] = [_vanishing(tests, len(x))] if tests else []
+    if meets is None:
+        by_z, by_p = _rows(locus, rows[:, :1])
+        conditions.append(Plane(*locus.split(ahead), by_z, by_p))
+    by_beta = np.ascontiguousarray(rows[:, :, -1]) if locus.unfolded else None
+    frame = Planes(*_rows(locus, rows), by_beta, spots.b)
+    found = _settle(locus, x, tuple(conditions), guards, frame)
+    near = found.first <= FIRST_SHARE * np.abs(lengths) + ACCEPTED
+    there, regular = _spots(locus, found, found.found & near, spots.b, rows[:, 0])
+    cosine = np.einsum("li,li->l", there.tangent, rows[:, 0])
+    return there, regular & (cosine >= LEAST_COSINE)
 
 
-def _spot(
-    locus: Locus,
-    x: Point,
-    vectors: Float[np.ndarray, "some coordinates"],
-    b: Float[np.ndarray, " size"],
-) -> Spot | None:
-    """Spot with the first vector as tangent and the border renewed."""
-    basis = orthonormal(locus, vectors, locus.dimension)
-    return None if basis is None else Spot(x, basis, _border(locus, x, b))
+def onto_set(locus: Locus, x: Points, spots: Spots) -> Points:
+    """Points of the equilibrium set above guesses, moved across the kernels of spots near by."""
+    rows = spots.basis * locus.weights
+    by_z, by_p = _rows(locus, rows)
+    by_beta = np.ascontiguousarray(rows[:, :, -1]) if locus.unfolded else None
+    plane = Plane(*locus.split(x), by_z, by_p)
+    guards = Guards(iterations=3, converged=ACCEPTED)
+    found = _settle(locus, x, (plane,), guards, Planes(by_z, by_p, by_beta, spots.b))
+    return _coordinates(locus, found)
 
 
-def _border(locus: Locus, x: Point, b: Float[np.ndarray, " size"]) -> Float[np.ndarray, " size"]:
-    """Unit null vector; the old border where F_z is regular and has none."""
-    v = locus.critical(x[None], b).v[0]
-    return np.asarray(v / np.linalg.norm(v)) if np.isfinite(v).all() else b
+def _rows(locus: Locus, rows: Bases) -> tuple[np.ndarray, np.ndarray]:
+    """Rows in coordinates, as rows for changes of z and of all parameters."""
+    size, k = locus.structure.size, len(locus.free)
+    by_p = np.zeros((*rows.shape[:2], len(locus.base)))
+    by_p[:, :, locus.free] = rows[:, :, size : size + k]
+    return np.ascontiguousarray(rows[:, :, :size]), by_p
+
+
+def _vanishing(tests: tuple[Test, ...], lanes: int) -> Vanishing:
+    def columns(at: Critical) -> Scalars:
+        return np.stack([test(at) for test in tests], axis=1)
+
+    return Vanishing(lambda some: columns, np.arange(lanes))
+
+
+def _settle(
+    locus: Locus, x: Points, conditions: tuple[Condition, ...], guards: Guards,
+    frame: Tangents | Planes,
+) -> Settled:  # fmt: skip
+    z, p = locus.split(x)
+    directions = free_directions(locus.structure, locus.free, len(x))
+    return settle(locus.structure, z, p, directions, conditions, guards, frame)
+
+
+def _coordinates(locus: Locus, found: Settled) -> Points:
+    x = locus.joined(found.z, found.p)
+    if locus.unfolded:
+        x[:, -1] = found.unfolding
+    return x
+
+
+def _spots(
+    locus: Locus, found: Settled, good: Flags, b: Lanes, ahead: Points | None = None
+) -> tuple[Spots, Flags]:
+    """Spots at good points, with the borders renewed, and which of them are regular.
+
+    Tangents have positive products with the rows `ahead`, if these are given.
+    """
+    size, k = locus.structure.size, len(locus.free)
+    x, kernel = _coordinates(locus, found), found.frames.copy()
+    kernel[:, :, size : size + k] *= locus.structure.scales[locus.free]
+    basis, border, regular = np.zeros_like(kernel), b.copy(), np.zeros(len(x), bool)
+    at = np.flatnonzero(good)
+    if len(at):
+        own = kernel[at]
+        tangent = _tangents(locus, x[at], own, b[at])
+        if ahead is not None:
+            tangent *= np.sign(np.einsum("li,li->l", tangent, ahead[at]))[:, None]
+        own = np.concatenate([tangent[:, None], own], axis=1)
+        basis[at], regular[at] = orthonormal(locus, own)
+        v = locus.critical(x[at], b[at]).v
+        v = v / np.linalg.norm(v, axis=1, keepdims=True)
+        # a regular F_z has no null vector: the old border stays
+        border[at] = np.where(np.isfinite(v).all(axis=1)[:, None], v, b[at])
+    return Spots(x, basis, border), regular
+
+
+def _tangents(locus: Locus, x: Points, kernel: Bases, b: Lanes) -> Points:
+    """Directions of kernels along which the tests stay zero."""
+    slopes = test_slopes(locus, x, kernel, locus.tests, b)[1]
+    null = np.ones((len(x), 1)) if slopes.shape[1] == 0 else _null(slopes)
+    return np.asarray(np.einsum("ld,ldi->li", null, kernel))
+
+
+def _null(slopes: Float[np.ndarray, "lanes k d"]) -> Float[np.ndarray, "lanes d"]:
+    whole = np.isfinite(slopes).all(axis=(1, 2))
+    null = np.full((len(slopes), slopes.shape[2]), np.nan)
+    null[whole] = np.linalg.svd(slopes[whole])[2][:, -1]
+    return null
+
+
+def test_slopes(
+    locus: Locus, x: Points, directions: Bases, tests: tuple[Test, ...], b: Lanes
+) -> tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m d"]]:
+    """Values of tests and their derivatives along directions, by central differences."""
+    if not tests:
+        return np.zeros((len(x), 0)), np.zeros((len(x), 0, directions.shape[1]))
+    size, k = locus.structure.size, len(locus.free)
+    z, p = locus.split(x)
+    along_p = np.zeros((*directions.shape[:2], len(locus.base)))
+    along_p[:, :, locus.free] = directions[:, :, size : size + k]
+    along_z = np.ascontiguousarray(directions[:, :, :size])
+    move = Move(np.zeros_like(z), np.zeros_like(p), along_z, along_p)
+    found = _vanishing(tests, len(x)).linear(Critical(locus.structure, z, p, b), move)
+    return found.value, found.slopes
 
 
 def orthonormal(
-    locus: Locus, vectors: Float[np.ndarray, "some coordinates"], count: int | None = None
-) -> Float[np.ndarray, "d coordinates"] | None:
-    """Orthonormal basis in the metric, the first vector's direction first; None if degenerate."""
-    basis: list[Point] = []
-    for vector in vectors:
-        rest, whole = vector, np.sqrt(vector**2 @ locus.weights)
-        for other in (*basis, *basis):  # twice is enough for round-off
-            rest = rest - (other * locus.weights @ rest) * other
-        norm = np.sqrt(rest**2 @ locus.weights)
-        if norm > 1e-6 * whole:
-            basis.append(rest / norm)
-    wanted = len(vectors) if count is None else count
-    return np.array(basis[:wanted]) if len(basis) >= wanted else None
-
-
-def _size(locus: Locus, step: Point) -> float:
-    multipliers = step[locus.structure.unknowns : locus.structure.size]
-    return float(np.sqrt(step**2 @ locus.weights + 1e-2 * multipliers @ multipliers))
+    locus: Locus, vectors: Float[np.ndarray, "lanes some coordinates"]
+) -> tuple[Bases, Flags]:
+    """Orthonormal bases in the metric, the first vector's direction first; which are whole."""
+    lanes, d = len(vectors), locus.dimension
+    basis, count = np.zeros((lanes, d, vectors.shape[2])), np.zeros(lanes, int)
+    for vector in np.moveaxis(vectors, 1, 0):
+        rest = vector
+        for _ in range(2):  # twice is enough for round-off
+            share = np.einsum("ldi,li->ld", basis * locus.weights, rest)
+            rest = rest - np.einsum("ld,ldi->li", share, basis)
+        norm, whole = locus.lengths(rest), locus.lengths(vector)
+        new = np.flatnonzero((norm > DEPENDENT * whole) & (count < d))
+        basis[new, count[new]] = rest[new] / norm[new, None]
+        count[new] += 1
+    return basis, count == d

@@ -49,14 +49,27 @@ class Planes:
     ----------
     by_z, by_p
         k rows for each lane, whose products with (dz, dp) are the coordinates.
+    by_beta
+        Their products with β, if F + βb = 0 is solved with this unknown, too.
+    border
+        b, if it is given: then it is kept.
     """
 
     by_z: Float[np.ndarray, "lanes k size"]
     by_p: Float[np.ndarray, "lanes k parameters"]
+    by_beta: Float[np.ndarray, "lanes k"] | None = None
+    border: Lanes | None = None
+
+    @property
+    def unfolded(self) -> bool:
+        """Whether β is one more unknown."""
+        return self.by_beta is not None
 
     def take(self, some: Some) -> "Planes":
         """Return the planes of some of the lanes."""
-        return Planes(self.by_z[some], self.by_p[some])
+        beta = None if self.by_beta is None else self.by_beta[some]
+        border = None if self.border is None else self.border[some]
+        return Planes(self.by_z[some], self.by_p[some], beta, border)
 
 
 @dataclass(frozen=True)
@@ -83,7 +96,7 @@ class Problem:
     @property
     def unfolded(self) -> bool:
         """Whether β is one more unknown."""
-        return isinstance(self.frame, Tangents) and self.frame.unfolded
+        return not isinstance(self.frame, Held) and self.frame.unfolded
 
     @property
     def width(self) -> int:
@@ -98,9 +111,7 @@ class Problem:
     @property
     def renews_border(self) -> bool:
         """Whether the border follows the null vector."""
-        return self.critical and not (
-            isinstance(self.frame, Tangents) and self.frame.border is not None
-        )
+        return self.critical and (isinstance(self.frame, Held) or self.frame.border is None)
 
     def take(self, some: Some) -> "Problem":
         """Return the problem of some of the lanes."""
@@ -230,13 +241,14 @@ def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
     if k == 0:
         return here
     frame = problem.frame
-    if isinstance(frame, Tangents) and frame.border is not None:
+    if not isinstance(frame, Held) and frame.border is not None:
         here = replace(here, b=frame.border)
     elif problem.critical:
         here = replace(here, b=null_border(structure, z, p))
     if isinstance(frame, Planes):
         by_a = np.einsum("lmp,lkp->lmk", frame.by_p, problem.directions)
-        return replace(here, rows=np.concatenate([frame.by_z, by_a], axis=2))
+        by_beta = [] if frame.by_beta is None else [frame.by_beta[:, :, None]]
+        return replace(here, rows=np.concatenate([frame.by_z, by_a, *by_beta], axis=2))
     if isinstance(frame, Tangents):  # any rows that see the tangent space will do, then its own
         waves = np.cos(np.outer(np.arange(1, k + 1), 1.7 * np.arange(size + k)) + 0.4)
         along = replace(here, rows=np.tile(waves, (lanes, 1, 1))).directions()[1]

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.locus import Locus, settle
+from equimorph.equilibria.locus import Locus, nearest
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import roots
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -105,13 +105,13 @@ def _between(
     store, setting = fabric.vertices, fabric.setting
     tests = (lambda at: at.g, lambda at: at.quadratic)
     locus = Locus(setting.structure, store.p[edge[0]], setting.free, tests)
-    x = np.stack([locus.joined(store.z[end], store.p[end]) for end in edge])
+    x = locus.joined(store.z[edge], store.p[edge])
     length = np.linalg.norm(store.place[edge[1]] - store.place[edge[0]])
-    for start in (x.mean(axis=0), *x):
-        spot = settle(locus, start)
-        if spot is None:
+    for start in (x.mean(axis=0, keepdims=True), x[:1], x[1:]):
+        spot, found = nearest(locus, start)
+        if not found[0]:
             continue
-        z, p = locus.split(spot.x[None])
+        z, p = locus.split(spot.x)
         away = np.linalg.norm(embed(setting, z, p) - store.place[edge], axis=1)
         if away.max() <= REACH * length and lower_index(setting, z, p)[0] == low:
             return z[0], p[0]

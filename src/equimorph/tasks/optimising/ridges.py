@@ -9,7 +9,7 @@ from jaxtyping import Float
 from equimorph.arrays import Pair
 from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical, Test, null_border
-from equimorph.equilibria.locus import Locus, Spot, advance, settle
+from equimorph.equilibria.locus import Locus, Spots, advance, nearest
 from equimorph.model import position
 from equimorph.structures import State
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
@@ -76,24 +76,30 @@ def highest_point(lmap: LimitLoadMap, curve: MapCurve) -> Ridge | None:
     free = np.array([position(structure.parameters, name) for name in names])
     z, p = curve.states.z[number], curve.states.p[number]
     locus = Locus(structure, p, free, tests, False, singular=curve.kind != "grazing")
-    spot = settle(locus, np.concatenate([z, p[free]]))
-    if spot is None:
+    spot, found = nearest(locus, locus.joined(z[None], p[None]))
+    if not found[0]:
         return None
     beside = _beside(lmap, spot)
-    if spot.x[-1] >= beside.max() - ALIKE:
+    if spot.x[0, -1] >= beside.max() - ALIKE:
         return _top_of_ridge(lmap, locus, spot)
     return _top_of_cliff(lmap, locus, spot, 1.0 if beside[1] > beside[0] else -1.0)
 
 
-def _beside(lmap: LimitLoadMap, spot: Spot) -> Float[np.ndarray, " 2"]:
+def _beside(lmap: LimitLoadMap, spot: Spots) -> Float[np.ndarray, " 2"]:
     """Limit loads close to a curve on both sides."""
     step = CLOSE * normal_of(lmap, spot)
-    place = spot.x[-3:-1]
+    place = spot.x[0, -3:-1]
     values = lmap.rays(np.stack([place - step, place + step]))
     return np.asarray(np.nan_to_num(values, nan=-np.inf))
 
 
-def _top_of_ridge(lmap: LimitLoadMap, locus: Locus, spot: Spot | None) -> Ridge | None:
+def _moved(locus: Locus, spot: Spots, step: float) -> Spots | None:
+    """Point of a curve at a step along it; None if it is not found."""
+    there, found = advance(locus, spot, np.array([step]))
+    return there if found[0] else None
+
+
+def _top_of_ridge(lmap: LimitLoadMap, locus: Locus, spot: Spots | None) -> Ridge | None:
     """Make the load stationary along the curve, by Newton's method on its slope."""
     for _ in range(ITERATIONS):
         if spot is None:
@@ -101,7 +107,7 @@ def _top_of_ridge(lmap: LimitLoadMap, locus: Locus, spot: Spot | None) -> Ridge 
         slope = _rise(spot)
         if abs(slope) < LEVEL:
             break
-        ahead = advance(locus, spot, SLOPE)
+        ahead = _moved(locus, spot, SLOPE)
         if ahead is None:
             return None
         change = (_rise(ahead) - slope) / SLOPE
@@ -109,14 +115,14 @@ def _top_of_ridge(lmap: LimitLoadMap, locus: Locus, spot: Spot | None) -> Ridge 
         step = float(np.clip(step, -LONGEST, LONGEST))
         if abs(step) < STILL:
             break
-        spot = advance(locus, spot, step)
+        spot = _moved(locus, spot, step)
     if spot is None:
         return None
-    value, slope = float(spot.x[-1]), abs(_rise(spot))
-    return Ridge(spot.x[-3:-1], value, slope, normal_of(lmap, spot), False)
+    value, slope = float(spot.x[0, -1]), abs(_rise(spot))
+    return Ridge(spot.x[0, -3:-1], value, slope, normal_of(lmap, spot), False)
 
 
-def _top_of_cliff(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> Ridge | None:
+def _top_of_cliff(lmap: LimitLoadMap, locus: Locus, spot: Spots, side: float) -> Ridge | None:
     """Climb the limit load on the higher side of a cliff along the curve, by polynomials."""
     width = WIDEST
     for _ in range(ITERATIONS):
@@ -125,7 +131,7 @@ def _top_of_cliff(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> 
             width *= 0.2
         else:
             top, unsure = _top_of(values)
-            ahead = advance(locus, spot, top * width) if top != 0.0 else spot
+            ahead = _moved(locus, spot, top * width) if top != 0.0 else spot
             if ahead is None:
                 return None
             spot = ahead
@@ -139,14 +145,14 @@ def _top_of_cliff(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> 
 
 
 def _along(
-    lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float, width: float
+    lmap: LimitLoadMap, locus: Locus, spot: Spots, side: float, width: float
 ) -> Float[np.ndarray, " stencil"] | None:
     """Limit loads close to a curve, on one side of it, at steps of a width along it."""
-    spots = [spot if step == 0.0 else advance(locus, spot, step * width) for step in STENCIL]
+    spots = [spot if step == 0.0 else _moved(locus, spot, step * width) for step in STENCIL]
     known = [each for each in spots if each is not None]
     if len(known) < len(spots):
         return None
-    places = [each.x[-3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
+    places = [each.x[0, -3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
     values = lmap.rays(np.array(places))
     return values if np.isfinite(values).all() else None
 
@@ -164,14 +170,14 @@ def _top_of(values: Float[np.ndarray, " stencil"]) -> tuple[float, float]:
     return float(tried[polynomial(tried).argmax()]), float(abs(powers[-1] / powers[2]))
 
 
-def _cliff_at(lmap: LimitLoadMap, locus: Locus, spot: Spot, side: float) -> Ridge | None:
+def _cliff_at(lmap: LimitLoadMap, locus: Locus, spot: Spots, side: float) -> Ridge | None:
     """Value, slope and sides of a cliff at a point of its curve."""
-    setting, across = spot.x[-3:-1], normal_of(lmap, spot)
-    ends = [advance(locus, spot, step) for step in (-NARROW, NARROW)]
+    setting, across = spot.x[0, -3:-1], normal_of(lmap, spot)
+    ends = [_moved(locus, spot, step) for step in (-NARROW, NARROW)]
     known = [each for each in ends if each is not None]
     if len(known) < len(ends):
         return None
-    along = [each.x[-3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
+    along = [each.x[0, -3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
     near = setting + side * CLOSE * np.array([[1.0], [2.0]]) * across
     values = lmap.rays(np.concatenate([near, along, settings_across(setting, across)]))
     one, two, left, right = values[:4].tolist()
@@ -185,15 +191,15 @@ def settings_across(setting: Pair, across: Pair) -> Float[np.ndarray, "settings 
     return np.concatenate([setting - steps, setting + steps])
 
 
-def _aligned(lmap: LimitLoadMap, spot: Spot, other: Spot) -> Pair:
+def _aligned(lmap: LimitLoadMap, spot: Spots, other: Spots) -> Pair:
     """Direction across the curve that points to the same side as at another of its points."""
     own, theirs = normal_of(lmap, spot), normal_of(lmap, other)
     return np.asarray(own * (1.0 if own @ theirs > 0.0 else -1.0))
 
 
-def _rise(spot: Spot) -> float:
+def _rise(spot: Spots) -> float:
     """Slope of the load, the last coordinate, along the curve."""
-    return float(spot.tangent[-1])
+    return float(spot.tangent[0, -1])
 
 
 def _tests(lmap: LimitLoadMap, kind: str, state: State) -> tuple[Test, ...] | None:
@@ -219,12 +225,12 @@ def _vanishing(tests: Sequence[Test], state: State) -> list[int]:
     return [k for k, test in enumerate(tests) if abs(float(test(at)[0])) < MET]
 
 
-def normal_of(lmap: LimitLoadMap, spot: Spot) -> Float[np.ndarray, " 2"]:
+def normal_of(lmap: LimitLoadMap, spot: Spots) -> Float[np.ndarray, " 2"]:
     """Direction across a curve in the plane of settings, of unit length in their scales."""
     structure = lmap.structure
     scales = np.array(
         [structure.scales[position(structure.parameters, name)] for name in lmap.grid.names]
     )
-    along = spot.tangent[-3:-1] / scales
+    along = spot.tangent[0, -3:-1] / scales
     across = np.array([-along[1], along[0]])
     return np.asarray(scales * across / np.linalg.norm(across))
