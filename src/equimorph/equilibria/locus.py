@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Scalars, Some, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.equilibria.newton_step import Planes, Tangents
 from equimorph.equilibria.point_conditions import Condition, Move, Plane, Vanishing
@@ -174,10 +174,7 @@ def _rows(locus: Locus, rows: Bases) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _vanishing(tests: tuple[Test, ...], lanes: int) -> Vanishing:
-    def columns(at: Critical) -> Scalars:
-        return np.stack([test(at) for test in tests], axis=1)
-
-    return Vanishing(lambda some: columns, np.arange(lanes))
+    return Vanishing(lambda some: tests, np.arange(lanes))
 
 
 def _settle(
