@@ -6,6 +6,11 @@ A tolerance that only one algorithm uses stands beside that algorithm.
 # Identity: two things nearer than this are the same.
 SAME_STATE = 1e-6
 """Distance of two states in the structure's metric."""
+SAME_NUMBER = 1e-9
+"""Difference of two numbers, relative to the largest of those that are compared."""
+
+SINGULAR = 1e-10
+"""Eigenvalue of a stiffness matrix, relative to the largest one, that counts as zero."""
 
 # Convergence: an iteration has ended.
 CONVERGED = 1e-10

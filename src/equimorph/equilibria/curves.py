@@ -167,8 +167,8 @@ class NewtonHomotopy:
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent by the general bordered solve."""
         residual = self.structure.residual(z, self.p) - (1.0 - t)[:, None] * self.defect
-        closing = (row, corner, defect)
-        return bordered_advance(self.structure, z, self.p, residual, self.defect, closing)
+        given = (self.structure, z, self.p, residual, self.defect)
+        return bordered_advance(*given, row, corner, defect)
 
 
 def squared_length(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> Values:

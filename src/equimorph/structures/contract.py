@@ -18,7 +18,6 @@ from equimorph.structures.approach import straight_arcs
 
 Direction = tuple[Lanes, Parameters]
 Majorant = Callable[[Direction, Direction], Lanes]
-Closing = tuple[Lanes, Values, Values]
 
 
 @dataclass(frozen=True)
@@ -213,7 +212,7 @@ class Structure(ABC):
         """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
         residual = self.residual(z, p)
         column = self.parameter_derivative(z, p, dp)
-        return bordered_advance(self, z, p, residual, column, (row, corner, defect))
+        return bordered_advance(self, z, p, residual, column, row, corner, defect)
 
 
 def bordered_advance(
@@ -222,22 +221,25 @@ def bordered_advance(
     p: Parameters,
     residual: Lanes,
     column: Lanes,
-    closing: Closing,
+    row: Lanes,
+    corner: Values,
+    defect: Values,
 ) -> Advance:
     """`Advance` for any residual and column, by the structure's general bordered solve."""
     solve = partial(structure.solve, z, p)
-    return solved_advance(solve, residual, column, closing, structure.constraints)
+    return advance_by(solve, residual, column, row, corner, defect, structure.constraints)
 
 
-def solved_advance(
+def advance_by(
     solve: Callable[[Float[np.ndarray, "lanes 2 bordered"], Border], BorderedSolution],
     residual: Lanes,
     column: Lanes,
-    closing: Closing,
+    row: Lanes,
+    corner: Values,
+    defect: Values,
     constraints: int,
 ) -> Advance:
     """`Advance` by a solver of the bordered system that knows its matrix."""
-    row, corner, defect = closing
     rhs = np.zeros((len(row), 2, row.shape[1] + 1))
     rhs[:, 0, :-1], rhs[:, 0, -1], rhs[:, 1, -1] = -residual, -defect, 1.0
     border = (column[:, None], row[:, None], corner[:, None, None])

@@ -13,15 +13,17 @@ from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import parameter_vector
-from equimorph.structures.contract import Advance, Structure, solved_advance
+from equimorph.structures.contract import Advance, Structure, advance_by
 from equimorph.structures.states import State
 
 STEPS = 12
 """Steps of the continuation from the parameters where the natural state is given."""
 ITERATIONS = 12
+"""Newton iterations at each of them."""
 SETTLED = 1e-9
-"""Correction, relative to the unknowns, that counts as none."""
+"""Newton correction, relative to the unknowns, at which the iteration ends."""
 BALANCED = 1e-13
+"""Largest residual of a guess that is an equilibrium already: round-off."""
 
 
 def continued(
@@ -64,9 +66,9 @@ def corrected(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Fla
 
 
 BLOCK = 512
-"""Lanes that take a Newton step together: the entries of their matrices stay in the cache."""
+"""Lanes in one Newton step: the entries of their matrices then stay in the cache."""
 NEAR = 0.1
-"""Correction, relative to the unknowns, that a natural state may need: values may be rounded."""
+"""Largest correction of a natural state, relative to the unknowns: given values may be rounded."""
 
 
 class DiscreteStructure(Structure):
@@ -127,7 +129,7 @@ class DiscreteStructure(Structure):
         def solve(rhs: Float[np.ndarray, "lanes 2 bordered"], border: Border) -> BorderedSolution:
             return self.layout.solve(entries, border, rhs)
 
-        return solved_advance(solve, residual, column, (row, corner, defect), self.constraints)
+        return advance_by(solve, residual, column, row, corner, defect, self.constraints)
 
     # --- the natural state ----------------------------------------------------------------------
 

@@ -8,14 +8,13 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Structure
+from equimorph.tolerances import SAME_NUMBER
 
 Apply = Callable[[Lanes, Parameters], tuple[Lanes, Parameters]]
 Signs = Float[np.ndarray, " space"]
 Joints = Int[np.ndarray, " joints"]
 Ends = Int[np.ndarray, "edges 2"]
 
-SAME = 1e-9
-"""Largest difference, relative to what is compared, of equal numbers."""
 NAMES: dict[tuple[int, ...], str] = {
     (-1, 1): "mirror",
     (1, -1): "reflection",
@@ -31,7 +30,7 @@ def images(places: Float[np.ndarray, "joints space"]) -> Iterator[tuple[str, Sig
     Name, signs of the axes, and the joint in the place of whose image each joint comes to be.
     """
     middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
-    near = SAME * np.ptp(places, axis=0).max()
+    near = SAME_NUMBER * np.ptp(places, axis=0).max()
     for signs in product((1, -1), repeat=places.shape[1]):
         if min(signs) == 1:
             continue
@@ -54,7 +53,7 @@ def edges_of_image(ends: Ends, joints: Joints) -> Int[np.ndarray, " edges"] | No
 
 def sign_between(a: np.ndarray, b: np.ndarray) -> float | None:
     """1 if two arrays are equal, −1 if one is minus the other, else None."""
-    near = SAME * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
+    near = SAME_NUMBER * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
     for sign in (1.0, -1.0):
         if np.abs(a - sign * b).max(initial=0.0) <= near:
             return sign
@@ -99,4 +98,4 @@ def is_symmetry(structure: Structure, apply: Apply) -> bool:
     here = (structure.residual(z, p) * dz).sum(axis=1)
     image = (structure.residual(there, at) * moved).sum(axis=1)
     size = np.abs(structure.residual(z, p) * dz).sum(axis=1)
-    return bool((np.abs(here - image) <= SAME * size).all())
+    return bool((np.abs(here - image) <= SAME_NUMBER * size).all())

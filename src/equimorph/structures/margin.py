@@ -11,6 +11,7 @@ from equimorph.linalg.lanes import in_background, threads
 from equimorph.structures.contract import Structure
 
 RELATIVE = 1e-11
+"""Relative change of an eigenvalue at which an iteration ends."""
 NEAR = 1e-3
 """Distance of a shift below the eigenvalue, as a share of the second one, once that is known."""
 SWEEPS, CHUNK, SHARE = 8, 256, 1024
@@ -63,7 +64,7 @@ def _by_pairs(
     todo, vectors = np.arange(len(z)), np.tile(_first_pair(structure), (len(z), 1, 1))
     shift, known = np.zeros(len(z)), np.full(len(z), np.inf)
     for sweep in range(SWEEPS):
-        vectors, first, second, stable = _swept(structure, (z[todo], p[todo]), shift, vectors)
+        vectors, first, second, stable = _swept(structure, z[todo], p[todo], shift, vectors)
         change = np.abs(known - first)
         # one more sweep would shrink what is left so much
         left = ((first - shift) / np.maximum(second - shift, NEAR * np.abs(second))) ** 2
@@ -89,7 +90,8 @@ def _first_pair(structure: Structure) -> Float[np.ndarray, "2 unknowns"]:
 
 def _swept(
     structure: Structure,
-    lanes: tuple[Lanes, Parameters],
+    z: Lanes,
+    p: Parameters,
     shift: Values,
     vectors: Pairs,
 ) -> tuple[Pairs, Values, Values, Flags]:
@@ -101,7 +103,7 @@ def _swept(
     n, mass = structure.unknowns, structure.mass
     rhs = np.zeros((len(shift), 2, structure.size))
     np.multiply(vectors, mass, out=rhs[:, :, :n])
-    solution = structure.solve(*lanes, rhs, shift=shift)
+    solution = structure.solve(z, p, rhs, shift=shift)
     solved = solution.x[:, :, :n]
     # Ritz values of the inverse: eigenvalues of Xᵀ M (K⁻¹ M X), 2 × 2
     a, b, c = _products(rhs[:, :, :n], solved)

@@ -7,9 +7,8 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.network import direction_of_mechanism
-
-SINGULAR = 1e-10
-"""Eigenvalue at rest, relative to the largest one, that counts as none."""
+from equimorph.structures.rod.discretisation import error_by_refinement
+from equimorph.tolerances import SINGULAR
 
 
 def refuse_singular(frame: FrameFields) -> None:
@@ -61,14 +60,6 @@ def _refuse_stress(frame: FrameFields, forces: Float[np.ndarray, " multipliers"]
     )
 
 
-REFINING = 6
-"""Newton iterations on the finer frame, started from the interpolated state."""
-SOLVED = 1e-6
-"""Last correction from which one more Newton step would be below round-off."""
-SAFETY = 2.0
-"""The change to a finer frame is an error less a much smaller one."""
-
-
 def discretisation_error(frame: FrameFields, finer: FrameFields, z: Lanes, p: Parameters) -> Values:
     """Twice the largest change of displacements, turns of ends and max |κ| on a finer frame.
 
@@ -81,13 +72,15 @@ def discretisation_error(frame: FrameFields, finer: FrameFields, z: Lanes, p: Pa
     nodes = np.zeros((len(z), len(fine.place)))
     nodes[:, fine.member_nodes] = turns
     start = np.concatenate([nodes[:, fine.place >= 0], z[:, frame.unknowns :]], axis=1)
-    last = np.full_like(start, np.inf)
-    for _ in range(REFINING):
-        last = finer.solve(start, p, -finer.residual(start, p)[:, None]).x[:, 0]
-        start = start + last
-    change = np.zeros(len(z))
-    for name in ("displacements", "turns_of_ends", "largest_curvatures"):
-        difference = getattr(finer, name)(start, p) - getattr(frame, name)(z, p)
-        change = np.maximum(change, np.abs(difference).max(axis=tuple(range(1, difference.ndim))))
-    solved = np.abs(last).max(axis=1) < SOLVED
-    return np.asarray(np.where(solved, SAFETY * change, np.inf))
+
+    def correction(at: Lanes) -> Lanes:
+        return np.asarray(finer.solve(at, p, -finer.residual(at, p)[:, None]).x[:, 0])
+
+    def change(at: Lanes) -> Values:
+        largest = np.zeros(len(z))
+        for name in ("displacements", "turns_of_ends", "largest_curvatures"):
+            apart = np.abs(getattr(finer, name)(at, p) - getattr(frame, name)(z, p))
+            largest = np.maximum(largest, apart.max(axis=tuple(range(1, apart.ndim))))
+        return largest
+
+    return error_by_refinement(start, correction, change)

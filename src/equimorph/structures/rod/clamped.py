@@ -24,6 +24,7 @@ from equimorph.structures.rod.profiles import LoadShape
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
 PARAMETERS = 4
+"""Number of parameters: Θ, Δ, q, ν."""
 MORE = 1.0 + 1e-12
 """Covers the round-off of the bounds of second derivatives."""
 
@@ -137,8 +138,9 @@ class ClampedMechanics(Mechanics):
     def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant:
         """Bound of |D²F| over boxes; see `ClampedBound`."""
         weights, theta = self.mesh.weights, self.nodal_angles(z, p)
-        forces = z[:, -1:] * weights - p[:, 2:3] * self.loads, z[:, -2:-1] * weights
-        return clamped_bound(theta, forces, reach, weights, self.loads)
+        across = z[:, -1:] * weights - p[:, 2:3] * self.loads
+        along = z[:, -2:-1] * weights
+        return clamped_bound(theta, across, along, reach, weights, self.loads)
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""
@@ -262,13 +264,17 @@ def spread_to_ends(reach: Lanes, ends: Parameters) -> Nodal:
 
 def clamped_bound(
     theta: Nodal,
-    forces: tuple[Nodal, Nodal],
+    across: Nodal,
+    along: Nodal,
     reach: Direction,
     weights: Float[np.ndarray, " nodes"],
     loads: Float[np.ndarray, " nodes"],
 ) -> ClampedBound:
-    """`ClampedBound` over boxes around angles θ and forces (a, b), which reach so far."""
-    a, b = forces
+    """`ClampedBound` over boxes around angles θ and forces a (across) and b (along).
+
+    `reach` is half the width of each box.
+    """
+    a, b = across, along
     turn = spread_to_ends(*reach)
     more_a = reach[0][:, -1:] * weights + reach[1][:, 2:3] * np.abs(loads)
     more_b = reach[0][:, -2:-1] * weights

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
+from equimorph.structures.rod.discretisation import error_by_refinement
 from equimorph.structures.rod.extrema import extreme_curvatures, peaks, stations
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.mechanics import Mechanics
@@ -20,12 +21,6 @@ WRITTEN = (
     *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy", "clearance(s)"),
     *("support_force(lambda)", "support_force(mu)", "end_moment(0)", "end_moment(1)"),
 )
-REFINING = 6
-"""Newton iterations on the finer rod, started from the interpolated state."""
-SOLVED = 1e-6
-"""Last correction from which one more Newton step would be below round-off."""
-SAFETY = 2.0
-"""The change to a finer rod is an error less a much smaller one, taken at some places only."""
 SAMPLES = np.linspace(0.0, 1.0, 25)
 _SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
 
@@ -179,11 +174,13 @@ def discretisation_error(rod: Mechanics, finer: Mechanics, z: Lanes, p: Paramete
     fine = np.concatenate([rod.nodal_angles(z, p) @ matrix.T, z[:, rod.unknowns :]], axis=1)
     still = np.zeros((len(z), finer.size))
     one, none = np.ones(len(z)), np.zeros(len(z))
-    for _ in range(REFINING):
-        last = finer.advance(fine, p, np.zeros_like(p), still, one, none).dz
-        fine = fine + last
-    change = np.abs(finer.largest_curvature(fine, p)[0] - rod.largest_curvature(z, p)[0])
-    fields = np.abs(finer.fields(fine, p, SAMPLES) - rod.fields(z, p, SAMPLES))
-    change = np.maximum(change, fields[:, :, [1, 3]].max(axis=(1, 2)))
-    solved = np.abs(last).max(axis=1) < SOLVED
-    return np.asarray(np.where(solved, SAFETY * change, np.inf))
+
+    def correction(at: Lanes) -> Lanes:
+        return finer.advance(at, p, np.zeros_like(p), still, one, none).dz
+
+    def change(at: Lanes) -> Values:
+        largest = np.abs(finer.largest_curvature(at, p)[0] - rod.largest_curvature(z, p)[0])
+        fields = np.abs(finer.fields(at, p, SAMPLES) - rod.fields(z, p, SAMPLES))
+        return np.asarray(np.maximum(largest, fields[:, :, [1, 3]].max(axis=(1, 2))))
+
+    return error_by_refinement(fine, correction, change)

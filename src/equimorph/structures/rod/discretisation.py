@@ -1,5 +1,6 @@
 """Gauss–Lobatto elements along the rod: nodes, weights, stiffness, spectral integration."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -7,6 +8,15 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import legendre
+
+from equimorph.arrays import Lanes, Values
+
+REFINING = 6
+"""Newton iterations on a finer mesh, started from the interpolated state."""
+SOLVED = 1e-6
+"""Last correction from which one more Newton step would be below round-off."""
+SAFETY = 2.0
+"""The change to a finer mesh is an error less a much smaller one, taken at some places only."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,3 +172,30 @@ def mesh_with_kinks(kinks: Float[np.ndarray, " kinks"], elements: int, degree: i
         count = max(1, int(np.ceil((stop - start) * elements - 1e-9)))
         breaks.append(np.linspace(start, stop, count + 1)[1:])
     return Mesh(np.concatenate(breaks), reference_element(degree))
+
+
+def error_by_refinement(
+    start: Lanes, correction: Callable[[Lanes], Lanes], change: Callable[[Lanes], Values]
+) -> Values:
+    """Estimate discretisation errors by solving again on a finer mesh.
+
+    Parameters
+    ----------
+    start
+        States, interpolated to the finer mesh.
+    correction
+        Newton correction of states of the finer mesh.
+    change
+        Largest change of the results from the given states to those of the finer mesh.
+
+    Returns
+    -------
+    Twice the change. Infinite where the finer mesh has no equilibrium beside the state, as may
+    happen at a fold.
+    """
+    last = np.full_like(start, np.inf)
+    for _ in range(REFINING):
+        last = correction(start)
+        start = start + last
+    solved = np.abs(last).max(axis=1) < SOLVED
+    return np.asarray(np.where(solved, SAFETY * change(start), np.inf))

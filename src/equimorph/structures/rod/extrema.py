@@ -17,6 +17,7 @@ HALF = 4
 INTERVALS = 16
 """Equal intervals of each piece."""
 NEWTON = 5
+"""Newton iterations towards the maximum of a polynomial."""
 
 
 def stations(breaks: Float[np.ndarray, " ends"]) -> Float[np.ndarray, " samples"]:

@@ -17,6 +17,7 @@ from equimorph.structures.rod.pressure import EnclosedArea
 from equimorph.structures.rod.profiles import LoadShape
 
 LOAD_DEGREE = 16
+"""Degree of the polynomials by which the load is represented inside an element."""
 NEGLIGIBLE = 1e-13
 """Legendre coefficients of ρ that are smaller, relative to the largest |ρ|, are round-off."""
 

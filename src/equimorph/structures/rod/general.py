@@ -13,7 +13,7 @@ from equimorph.structures.contract import (
     Advance,
     Direction,
     Symmetry,
-    solved_advance,
+    advance_by,
 )
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
@@ -267,7 +267,7 @@ class GeneralMechanics(Mechanics):
             diagonal -= shift[:, None] * self.mesh.weights
         columns, rows, corner = no_border(len(z), self.size) if border is None else border
         if self._area is not None:
-            entries = self._pressed_entries(self._area, z, p, (diagonal, gradients, trailing))
+            entries = self._pressed_entries(self._area, z, p, diagonal, gradients, trailing)
             return self._full_layout.solve(entries, border, rhs)
         parts = (diagonal, gradients, columns, rows, corner, rhs)
         return self.layout.solve(*parts, trailing=trailing)
@@ -278,30 +278,34 @@ class GeneralMechanics(Mechanics):
         return SparseLayout(*np.tril_indices(self.size), self.size, self.constraints)
 
     def _pressed_entries(
-        self, area: EnclosedArea, z: Lanes, p: Parameters, parts: tuple[np.ndarray, ...]
+        self,
+        area: EnclosedArea,
+        z: Lanes,
+        p: Parameters,
+        diagonal: Nodal,
+        border: Float[np.ndarray, "lanes m nodes"],
+        trailing: Float[np.ndarray, "lanes m m"],
     ) -> Float[np.ndarray, "lanes entries"]:
-        """Entries of F_z of a rod under pressure; parts: diagonal, border, trailing block."""
-        diagonal, border, trailing = parts
+        """Entries of F_z of a rod under pressure."""
         inner = self.unknown_nodes
         theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
         own = (diagonal - pull * area.curvature(theta))[:, inner]
         angles, matrices = theta[:, inner], (self.layout.assembled, area.matrix)
         stiff, swept = (matrix[inner, inner] for matrix in matrices)
-        return lower_triangle(angles, pull, (stiff, swept), (own, border[:, :, inner], trailing))
+        return lower_triangle(angles, pull, stiff, swept, own, border[:, :, inner], trailing)
 
     def _pressed_advance(self, *given: np.ndarray) -> Advance:
         """`advance` with all parts of the linearisation computed once."""
         z, p, dp, *closing = given
         assert self._area is not None
-        residual, column, *parts = self.linearised(z, p, dp)
-        diagonal, border, trailing = parts
-        entries = self._pressed_entries(self._area, z, p, (diagonal, border, trailing))
+        residual, column, diagonal, border, trailing = self.linearised(z, p, dp)
+        entries = self._pressed_entries(self._area, z, p, diagonal, border, trailing)
 
         def solve(rhs: Float[np.ndarray, "lanes 2 bordered"], border: Border) -> BorderedSolution:
             return self._full_layout.solve(entries, border, rhs)
 
         row, corner, defect = closing
-        return solved_advance(solve, residual, column, (row, corner, defect), self.constraints)
+        return advance_by(solve, residual, column, row, corner, defect, self.constraints)
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values

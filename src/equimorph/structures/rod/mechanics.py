@@ -17,7 +17,7 @@ from equimorph.structures.contract import (
     Direction,
     Majorant,
     Symmetry,
-    solved_advance,
+    advance_by,
 )
 from equimorph.structures.rod.discretisation import Mesh
 
@@ -165,7 +165,7 @@ class Mechanics(ABC):
         """`advance` by the general bordered solve."""
         residual, column = self.residual(z, p), self.parameter_derivative(z, p, dp)
         solve = partial(self.solve, z, p)
-        return solved_advance(solve, residual, column, (row, corner, defect), self.constraints)
+        return advance_by(solve, residual, column, row, corner, defect, self.constraints)
 
     @abstractmethod
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:

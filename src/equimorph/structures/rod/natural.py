@@ -14,8 +14,11 @@ from equimorph.structures.rod.mechanics import Mechanics
 from equimorph.structures.rod.model import RodModel
 
 FIRST_STEP = 0.25
+"""First step of the continuation, as a share of the whole way."""
 SMALLEST_STEP = 1e-8
+"""Smallest step: below it the continuation has met a fold."""
 ITERATIONS = 7
+"""Newton iterations of one step."""
 CONVERGED = 1e-6
 """Newton correction after which the error is below 1e-11, on the way."""
 BEND = 0.5

@@ -92,8 +92,11 @@ BLOCK = 128
 def lower_triangle(
     theta: Angles,
     pull: Float[np.ndarray, "lanes 1"],
-    matrices: tuple[Square, Square],
-    parts: tuple[np.ndarray, np.ndarray, np.ndarray],
+    stiffness: Square,
+    area: Square,
+    diagonal: Angles,
+    border: Float[np.ndarray, "lanes m unknowns"],
+    trailing: Float[np.ndarray, "lanes m m"],
 ) -> Entries:
     """Entries of F_z, row by row: ``K_ij − p W_ij sin(θ_j − θ_i)``, then the multipliers' rows.
 
@@ -103,17 +106,18 @@ def lower_triangle(
         Unknown angles.
     pull
         Pressure p.
-    matrices
-        Stiffness K and W of the enclosed area.
-    parts
-        What the diagonal has besides, the multipliers' gradients, and their own block.
+    stiffness, area
+        K, and W of the enclosed area.
+    diagonal
+        What the diagonal has besides.
+    border, trailing
+        Gradients of the multipliers' constraints, and the multipliers' own block.
     """
-    diagonal, border, trailing = parts
     (lanes, n), m = theta.shape, border.shape[1]
     entries = np.empty((lanes, (n + m) * (n + m + 1) // 2))
     for start in range(0, lanes, BLOCK):
         some = slice(start, start + BLOCK)
-        entries[some, : n * (n + 1) // 2] = _angles(theta[some], pull[some], matrices).T
+        entries[some, : n * (n + 1) // 2] = _angles(theta[some], pull[some], stiffness, area).T
     entries[:, _row_ends(0, n)] += diagonal
     for k, stop in enumerate(_row_ends(n, n + m)):
         first = stop - n - k
@@ -123,10 +127,9 @@ def lower_triangle(
 
 
 def _angles(
-    theta: Angles, pull: Float[np.ndarray, "lanes 1"], matrices: tuple[Square, Square]
+    theta: Angles, pull: Float[np.ndarray, "lanes 1"], stiff: Square, area: Square
 ) -> Float[np.ndarray, "entries lanes"]:
     """Rows of the angles, lanes last, so that every operation runs along memory."""
-    stiff, area = matrices
     sine, cosine = np.ascontiguousarray(np.sin(theta).T), np.ascontiguousarray(np.cos(theta).T)
     pressed_sine, pressed_cosine = (-pull[:, 0] * field for field in (sine, cosine))
     out = np.empty((len(stiff) * (len(stiff) + 1) // 2, len(theta)))

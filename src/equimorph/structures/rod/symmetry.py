@@ -9,11 +9,10 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.rod.model import RodModel
+from equimorph.tolerances import SAME_NUMBER
 
 Matrix = Float[np.ndarray, "scalars scalars"]
 
-SAME = 1e-9
-"""Largest difference, relative to the largest entry, of equal coefficients."""
 CANDIDATES = (("mirror", True, -1.0), ("reflection", False, -1.0), ("half turn", True, 1.0))
 """θ(s) → −θ(1 − s): left and right; θ → −θ: up and down; θ(s) → θ(1 − s): both."""
 
@@ -59,7 +58,7 @@ def _features(model: RodModel, *, reverse: bool, sign: float) -> Float[np.ndarra
 
 def _equal(a: np.ndarray, b: np.ndarray) -> bool:
     largest = max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
-    return bool(np.abs(a - b).max(initial=0.0) <= SAME * largest)
+    return bool(np.abs(a - b).max(initial=0.0) <= SAME_NUMBER * largest)
 
 
 def _scalar_map(model: RodModel, *, reverse: bool, sign: float) -> Matrix | None:
@@ -102,7 +101,7 @@ def _row_of_map(
         rest = here[j] - own * image[k]
         if j >= m > 0:
             row[:m] = np.linalg.lstsq(image[:m].T, rest, rcond=None)[0]
-            row[:m][np.abs(row[:m]) < SAME] = 0.0
+            row[:m][np.abs(row[:m]) < SAME_NUMBER] = 0.0
         if _equal(here[j], row @ image):
             return row
     return None

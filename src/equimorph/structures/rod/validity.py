@@ -18,7 +18,9 @@ from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.profiles import at_nodes, profile
 
 SAMPLES = 129
+"""Arclengths at which distances are compared first."""
 POLISHING = 4
+"""Newton iterations towards the closest points."""
 
 Curve = Float[np.ndarray, "lanes samples 4"]
 

@@ -239,7 +239,7 @@ def symmetries(truss: TrussMechanics) -> tuple[Symmetry, ...]:
         places = _exchanged(truss, axes, joints)
         if places is None:
             continue
-        apply = partial(_applied, truss, axes, joints, places)
+        apply = partial(_image, truss, axes, joints, *places)
         if is_symmetry(truss, apply):
             found.append(Symmetry(name, apply, *places))
     return tuple(found)
@@ -264,15 +264,16 @@ def _exchanged(
     return exchanged(heres, mapped)
 
 
-def _applied(
+def _image(
     truss: TrussMechanics,
     axes: Float[np.ndarray, " space"],
     joints: Int[np.ndarray, " joints"],
-    places: tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]],
+    signs: Float[np.ndarray, " parameters"],
+    order: Int[np.ndarray, " parameters"],
     z: Lanes,
     p: Parameters,
 ) -> tuple[Lanes, Parameters]:
-    held, (signs, order) = truss.network.held, places
+    held = truss.network.held
     moves = np.zeros((len(z), *held.shape))
     moves[:, ~held] = z
     image = np.zeros_like(moves)

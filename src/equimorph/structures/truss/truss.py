@@ -23,12 +23,12 @@ from equimorph.structures.truss.bar import Energies, Strain
 from equimorph.structures.truss.mechanics import TrussMechanics, symmetries
 from equimorph.structures.truss.network import AXES, TrussNetwork, truss_network
 from equimorph.structures.unit_system import Quantity, unit_system
+from equimorph.tolerances import SINGULAR
 
 Patterns = Mapping[str, Mapping[str, Any]]
 
 TINY = 1e-300
-SINGULAR = 1e-10
-"""Stiffness of a move, relative to the largest one, that counts as none."""
+"""In place of zero in denominators."""
 
 
 class Truss(TrussMechanics):
