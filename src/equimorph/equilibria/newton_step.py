@@ -185,11 +185,13 @@ class Points:
         onto_p = problem.change(onto[:, None, size:])[:, 0]
         move = Move(onto_z, onto_p, along_z, problem.change(along[:, :, size:]))
         found = [condition.linear(at, move) for condition in problem.conditions]
-        slopes = np.concatenate([each.slopes for each in found], axis=1)
-        value = np.concatenate([each.value for each in found], axis=1)
-        spare = slopes.shape[1] < slopes.shape[2] and not isinstance(problem.frame, Held)
-        amount = _amount(slopes, value, _gram(problem.structure, along) if spare else None)
-        step = onto + np.einsum("lk,lki->li", amount, along)
+        step = onto
+        if found:
+            slopes = np.concatenate([each.slopes for each in found], axis=1)
+            value = np.concatenate([each.value for each in found], axis=1)
+            spare = slopes.shape[1] < slopes.shape[2] and not isinstance(problem.frame, Held)
+            amount = _amount(slopes, value, _gram(problem.structure, along) if spare else None)
+            step = onto + np.einsum("lk,lki->li", amount, along)
         null = _unit(at.v) if problem.renews_border else self.b
         sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
         index = solution.negative - problem.structure.constraints

@@ -18,9 +18,14 @@ from equimorph.manifold.complex.marked_complex import (
     held,
 )
 from equimorph.manifold.complex.vertices import Vertices, free_vertices, vertices_of
-from equimorph.manifold.geometry.corrections import Corrected, corrected_amid
-from equimorph.manifold.geometry.crossing_points import corrected_crossings
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
+from equimorph.manifold.geometry.exact_points import (
+    Aim,
+    Corrected,
+    Pinned,
+    corrected,
+    corrected_amid,
+    lower_index,
+)
 from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import Cubics, Ends, split_step
@@ -276,8 +281,10 @@ def _on_curves(
         np.tile(span, (len(place), 1, 1)),
         place,
         rows,
+        bool(mark & ON_CROSSING),
+        plane if len(span) == d else None,
     )
-    return (corrected_crossings if mark & ON_CROSSING else corrected)(aim, *states, length)
+    return corrected(aim, *states, length)
 
 
 def _counted(

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.geometry.corrections import Corrected
-from equimorph.manifold.geometry.crossing_frames import crossing_frames
+from equimorph.manifold.geometry.crossings import crossing_frames
 from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.exact_points import Corrected
 from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import (

@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.manifold.geometry.crossing_points import pin_crossings
-from equimorph.manifold.geometry.exact_points import Pinned
+from equimorph.manifold.geometry.exact_points import Pinned, pin_crossings
 from equimorph.manifold.geometry.points import AMID, CAP, CORNER, CROSSING, FOLD
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import distinct

@@ -12,9 +12,7 @@ from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.steps import Front, step_along
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.manifold.geometry.crossing_points import reduction
-from equimorph.manifold.geometry.embedding import embed
-from equimorph.manifold.geometry.exact_points import Aim
+from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polished
@@ -136,13 +134,9 @@ def _tangents(
     """Unit tangents of the four half-branches at crossings: isotropic vectors of the Hessian."""
     setting = pairing.setting
     structure = setting.structure
-    span = line.velocity[:, setting.free] / setting.scales
-    length = np.linalg.norm(span, axis=1)
-    place = embed(setting, z, p)
-    aim = Aim(
-        setting, False, False, (span / length[:, None])[:, None], place, place[:, None][:, :0]
-    )
-    known = reduction(aim, z, p, null_border(structure, z, p))
+    length = np.linalg.norm(line.velocity[:, setting.free] / setting.scales, axis=1)
+    directions = (line.velocity / length[:, None])[:, None]
+    known = reduction(structure, z, p, null_border(structure, z, p), directions)
     values, vectors = np.linalg.eigh(known.hessian)
     low, high = np.sqrt(np.maximum(-values[:, :1], 0.0)), np.sqrt(np.maximum(values[:, 1:], 0.0))
     pair = [high * vectors[:, :, 0] + sign * low * vectors[:, :, 1] for sign in (1.0, -1.0)]

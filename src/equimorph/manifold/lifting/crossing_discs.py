@@ -12,9 +12,14 @@ from jaxtyping import Float
 from scipy.optimize import brentq
 
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.manifold.geometry.crossing_points import corrected_crossings, pin_crossings
 from equimorph.manifold.geometry.embedding import embed
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, lower_index
+from equimorph.manifold.geometry.exact_points import (
+    Aim,
+    Pinned,
+    corrected,
+    lower_index,
+    pin_crossings,
+)
 from equimorph.manifold.geometry.points import CROSSING
 from equimorph.manifold.lifting.disc_plans import Plan, chord_of, planes
 from equimorph.manifold.lifting.pairing import Pairing
@@ -171,9 +176,10 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     found: list[Pinned] = []
 
     def test(share: float) -> float:
-        aim = Aim(setting, False, False, span, (place[0] + share * way)[None], rows)
+        middle = (place[0] + share * way)[None]
+        aim = Aim(setting, False, False, span, middle, rows, crossing=True)
         guess_z, guess_p = ((1.0 - share) * each[:1] + share * each[1:] for each in (z, p))
-        pinned = corrected_crossings(aim, guess_z, guess_p, np.array([length]))
+        pinned = corrected(aim, guess_z, guess_p, np.array([length]))
         if not pinned.found[0]:
             raise _NoCrossingError
         found.append(pinned)

@@ -12,7 +12,6 @@ from equimorph.arrays import Flags
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.manifold.geometry.crossing_points import corrected_crossings
 from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
 from equimorph.manifold.geometry.points import BETWEEN, CAP, CROSSING
@@ -210,8 +209,9 @@ def _pinned(
     span = ends[:, 1] - ends[:, 0]
     span /= np.linalg.norm(span, axis=1, keepdims=True)
     place, fold = embed(setting, *states), kind == EventCode.FOLD
-    aim = Aim(setting, fold, False, span[:, None], place, place[:, None][:, :0])
-    pinned = (corrected if fold else corrected_crossings)(aim, *states, np.zeros(len(place)))
+    rows = place[:, None][:, :0]
+    aim = Aim(setting, fold, False, span[:, None], place, rows, crossing=not fold)
+    pinned = corrected(aim, *states, np.zeros(len(place)))
     if fold:
         moved = np.linalg.norm(embed(setting, pinned.z, pinned.p) - place, axis=1)
         pinned = replace(pinned, found=pinned.found & (moved < NOISE))

@@ -15,9 +15,8 @@ from numpy.polynomial import chebyshev
 
 from equimorph.arrays import Cells, Flags, Lanes, Values
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.manifold.geometry.crossing_points import corrected_crossings
 from equimorph.manifold.geometry.embedding import embed
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, lower_index
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import adjacency, keys_of, rows_of
 from equimorph.manifold.lookup.cell_index import Hits
@@ -136,9 +135,10 @@ class NearCrossings:
             off - np.einsum("lk,lkd->ld", along, span)
         ) * self.setting.scales
         middle = embed(self.setting, z, start)
-        aim = Aim(self.setting, False, False, span, middle, middle[:, None][:, :0])
+        rows = middle[:, None][:, :0]
+        aim = Aim(self.setting, False, False, span, middle, rows, crossing=True)
         around = np.ptp(embed_many(self.setting, self.points, own), axis=1).max(axis=1, initial=0.0)
-        return corrected_crossings(aim, z, start, around)
+        return corrected(aim, z, start, around)
 
     def centres(self, close: Int[np.ndarray, "m 2"], p: Parameters) -> Centres:
         """Crossing points closer than `NEAR` to points, each once."""

@@ -110,6 +110,7 @@ def _moved(
     span = np.tile(np.delete(np.eye(d), keep, axis=0), (len(chosen), 1, 1))
     fold, cap = bool(mark & ON_FOLD), bool(mark & ON_CAP)
     aim = Aim(setting, fold, cap, span, embed(setting, z, p), rows)
+    aim = aim if keep else replace(aim, tangents=store.rows[chosen])
     pinned = corrected(aim, z, p, np.linalg.norm(step, axis=1))
     free, found = pinned.p[:, setting.free], pinned.found
     found &= ((free >= fabric.box[0]) & (free <= fabric.box[1])).all(axis=1)
