@@ -12,9 +12,9 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, names_of
 from equimorph.structures import States, Structure
 from equimorph.study import Outcome, Problem, read_problem, run_study
-from equimorph.study.kinds.map import MapTask
 from equimorph.study.lookup import Extent
 from equimorph.study.memory import amount, estimated_memory
+from equimorph.study.question import Question
 from equimorph.tasks import unloaded_base
 
 
@@ -95,17 +95,18 @@ def _extents(problem: Problem) -> list[str]:
             f"{name} = {value:g}" for name, value in values.items() if name not in wanted.box.names
         ]
         lines.append(_extent(structure, wanted, fixed))
-    for asked in problem.tasks:
-        if isinstance(asked.task, MapTask):
-            own = _extent(structure, problem.extents[asked.key], _values_of_map(asked.task))
-            lines.append(f"Map {asked.name}: {own}")
+    for question in problem.questions:
+        own = question.kind.extent(question)
+        if own is not None:
+            words = _extent(structure, own, _values_of_map(question))
+            lines.append(f"{question.title}: {words}")
     return lines
 
 
-def _values_of_map(task: MapTask) -> list[str]:
+def _values_of_map(question: Question) -> list[str]:
     """Where its load begins, and the parameters that keep their values."""
-    structure, grid, load = task.structure, task.grid, task.section.load
-    base = unloaded_base(structure, grid, load, task.section.fixed).tolist()
+    structure, grid, load = question.structure, question["grid"], question["load"]
+    base = unloaded_base(structure, grid, load, question["fixed"] or {}).tolist()
     start = dict(zip(names_of(structure.parameters), base, strict=True))
     load_range = f"{load} from {start.pop(load):g} on"
     others = (f"{name} = {value:g}" for name, value in start.items() if name not in grid.names)
@@ -136,7 +137,7 @@ def _show(outcome: Outcome, screen: Console) -> None:
         screen.print(f"Equilibria at {where}:", soft_wrap=True)
         screen.print(_table(heights, states))
     for each in outcome.answers:
-        screen.print(each.asked.kind.verdict(each.asked.task, each.answer), soft_wrap=True)
+        screen.print(each.question.kind.verdict(each.question, each.answer), soft_wrap=True)
 
 
 def _set_line(eset: EquilibriumSet, *, reused: bool) -> str:

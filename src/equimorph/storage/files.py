@@ -2,14 +2,19 @@
 
 import fcntl
 import hashlib
+import json
 import os
 import socket
 import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from equimorph.errors import InputError
+
+FINGERPRINT = 32
+"""Hexadecimal digits of a fingerprint."""
 
 
 @contextmanager
@@ -81,6 +86,18 @@ def read_text(path: Path) -> str:
 def checksum(content: bytes) -> str:
     """SHA-256 of a file's content."""
     return hashlib.sha256(content).hexdigest()
+
+
+def fingerprint(content: Any) -> str:
+    """Fingerprint of plain data; the order of keys does not count.
+
+    Examples
+    --------
+    >>> fingerprint({"a": 1, "b": 2}) == fingerprint({"b": 2, "a": 1})
+    True
+    """
+    text = json.dumps(content, sort_keys=True).encode()
+    return hashlib.sha256(text).hexdigest()[:FINGERPRINT]
 
 
 @contextmanager

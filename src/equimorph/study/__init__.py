@@ -1,8 +1,7 @@
 """Studies: a problem file in, results and a report out."""
 
 from equimorph.study.memory import check_memory
-from equimorph.study.outcome import Answered, Outcome
-from equimorph.study.prepare import Problem, prepare
+from equimorph.study.prepare import Answered, Outcome, Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
 from equimorph.study.run import read_problem, run_study
 

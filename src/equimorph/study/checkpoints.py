@@ -12,10 +12,9 @@ from typing import Any, TypeVar, cast
 from equimorph.errors import InputError
 from equimorph.model import Journal
 from equimorph.storage import open_journal
-from equimorph.storage.files import checksum, move_whole
+from equimorph.storage.files import checksum, fingerprint, move_whole
 from equimorph.storage.records import content_of, load_record
 from equimorph.structures import Structure
-from equimorph.study.fingerprint import fingerprint
 from equimorph.study.folder import ResultsFolder, writable
 
 Answer = TypeVar("Answer")

@@ -6,9 +6,9 @@ from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Progress
 from equimorph.study.folder import ResultsFolder
-from equimorph.study.kinds.kind import Figure, still
 from equimorph.study.names import DIAGRAM, PLANE, STABLE_PLANE, SURFACE
-from equimorph.study.outcome import Outcome
+from equimorph.study.prepare import Outcome
+from equimorph.study.question import Figure, still
 
 
 def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) -> None:
@@ -33,11 +33,10 @@ def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) ->
 
 
 def _figures(outcome: Outcome) -> list[Figure]:
-    eset, ground = outcome.equilibrium_set, outcome.problem.ground
+    eset = outcome.equilibrium_set
     figures = [] if eset is None else _figures_of_set(outcome, eset)
     for each in outcome.answers:
-        asked = each.asked
-        figures += asked.kind.figures(ground, eset, asked.task, each.answer)
+        figures += each.question.kind.figures(each.question, eset, each.answer)
     return figures
 
 

@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from equimorph.errors import InputError
-from equimorph.storage.files import checksum, locked, move_whole
-from equimorph.study.fingerprint import FINGERPRINT, fingerprint
+from equimorph.storage.files import FINGERPRINT, checksum, fingerprint, locked, move_whole
 from equimorph.study.problem import Study
 
 MANIFEST = "equimorph.json"

@@ -2,17 +2,16 @@
 
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
-from equimorph.manifold import INTERVALS
-from equimorph.model import Box, Constraint, Descriptor, parameter_vector, position
+from equimorph.model import Box, Constraint, Descriptor, position
 from equimorph.structures import Structure
-from equimorph.study.expressions import parse_comparison
-from equimorph.study.sections.extent import SetSection, StateSection
+from equimorph.study.fields import parse_comparison
 
 LARGEST_ANGLE = 20.0
 """Radians; ends turned further against each other need curvatures above 40 everywhere."""
@@ -26,6 +25,8 @@ class Extent:
     fixed: Mapping[str, float]
     constraints: tuple[Constraint, ...]
     intervals: tuple[int, ...]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Whatever else the computation of a set takes."""
 
 
 @dataclass(frozen=True)
@@ -46,23 +47,6 @@ class Ground:
         """Box of the set, which there is where a question needs it."""
         assert self.extent is not None
         return self.extent.box
-
-
-def extent_of_set(structure: Structure, wanted: SetSection) -> Extent:
-    """Look up the names of the section on the set.
-
-    Raises
-    ------
-    InputError
-        For names that the structure does not have, or values without meaning.
-    """
-    with at_key("set.box"):
-        box = Box(**{name: (bounds[0], bounds[1]) for name, bounds in wanted.box.items()})
-        for name, corner in zip(box.names * 2, [*box.lower, *box.upper], strict=True):
-            check_value(structure, name, corner)
-    _check_fixed(structure, box, wanted.fixed)
-    constraints = _bounds(structure, wanted.within)
-    return Extent(box, wanted.fixed, constraints, _intervals(wanted))
 
 
 @contextmanager
@@ -112,6 +96,13 @@ def check_value(structure: Structure, name: str, value: float) -> None:
         )
 
 
+def check_values(structure: Structure, values: Mapping[str, float], key: str) -> None:
+    """Refuse names that are no parameters, and values without meaning; `key` for the message."""
+    with at_key(key):
+        for name, value in values.items():
+            check_value(structure, name, value)
+
+
 def check_parameters(structure: Structure, names: Iterable[str], key: str) -> None:
     """Refuse names that are no parameters; `key` for the message."""
     for name in names:
@@ -128,14 +119,6 @@ def constraints_of(structure: Structure, texts: Sequence[str], key: str) -> tupl
     return tuple(constraints)
 
 
-def check_state(ground: Ground, section: StateSection, key: str) -> None:
-    """Refuse a point outside the box, and descriptors to choose by that there are not."""
-    check_point(ground.box, section.at, f"{key}.at")
-    for text in (section.highest, section.lowest, *(section.near or ())):
-        if text is not None:
-            descriptor_at(ground.structure, text, key)
-
-
 def descriptor_at(structure: Structure, text: str, key: str) -> Descriptor:
     """Look up a descriptor; `InputError` names the key if it means nothing."""
     with at_key(key):
@@ -147,33 +130,3 @@ def descriptors_of(
 ) -> dict[Descriptor, float]:
     """Look up the descriptors of values."""
     return {descriptor_at(structure, text, key): value for text, value in values.items()}
-
-
-def _check_fixed(structure: Structure, box: Box, fixed: Mapping[str, float]) -> None:
-    both = sorted(set(box.names) & set(fixed))
-    if both:
-        raise InputError(f"`set.fixed` must not name what `set.box` frees; got {', '.join(both)}.")
-    with at_key("set.fixed"):
-        for name, value in fixed.items():
-            check_value(structure, name, value)
-        middle = dict(zip(box.names, 0.5 * (box.lower + box.upper), strict=True))
-        vector = parameter_vector(structure.parameters, {**middle, **fixed})
-    assert np.isfinite(vector).all()
-
-
-def _intervals(wanted: SetSection) -> tuple[int, ...]:
-    """Intervals of the grid; what a study leaves out takes the library's default."""
-    return tuple(wanted.intervals or INTERVALS[len(wanted.box)])
-
-
-def _bounds(structure: Structure, texts: Sequence[str]) -> tuple[Constraint, ...]:
-    """Constraints of the set; structures with equilibria without end need a bound."""
-    constraints = constraints_of(structure, texts, "set.within")
-    bounded = {each.descriptor.name for each in constraints if each.sense == "<="}
-    needed = structure.endless_in
-    if needed and needed not in bounded:
-        raise InputError(
-            f"`set.within` must bound the {needed} of this structure, which has equilibria without "
-            f'end; got {", ".join(texts) or "nothing"}. Add "{needed} <= 20".'
-        )
-    return constraints

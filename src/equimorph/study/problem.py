@@ -6,32 +6,17 @@ both. Types are strict and unknown keys are refused.
 """
 
 from pathlib import Path
+from typing import Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, create_model, model_validator
 
 from equimorph.errors import InputError
 from equimorph.study.complaint import complaint
-from equimorph.study.sections.best import FollowSection, LandscapeSection, OptimumSection
-from equimorph.study.sections.extent import PointSection, SetSection
-from equimorph.study.sections.fields import Section, TaskSection, requirement
-from equimorph.study.sections.maps import MapSection, StrongestSection
-from equimorph.study.sections.robustness import (
-    ImperfectionSection,
-    RoomSection,
-    SensitivitySection,
-    SnapGraphSection,
-    SnapSection,
-)
-from equimorph.study.sections.routes import RouteSection, SampledRouteSection
-from equimorph.study.sections.structures import StructureSection
-from equimorph.study.sections.tasks import (
-    CalibrationSection,
-    EstimateSection,
-    ReachSection,
-    ShapeSection,
-    TrackSection,
-)
-from equimorph.study.sections.ways import FOLDER, TrialsSection, VerifySection
+from equimorph.study.data_files import FOLDER
+from equimorph.study.extent import PointSection, SetSection
+from equimorph.study.fields import Section, requirement
+from equimorph.study.kinds import KINDS
+from equimorph.study.structures import StructureSection
 from equimorph.study.syntax import parse_toml
 
 
@@ -40,34 +25,13 @@ class Study(Section):
 
     title: str | None = None
     structure: StructureSection
-    equilibrium_set: SetSection | None = Field(default=None, alias="set")
+    equilibrium_set: Any = None
     equilibria: list[PointSection] = Field(default_factory=list)
-    routes: list[RouteSection] = Field(default_factory=list, alias="route")
-    shapes: list[ShapeSection] = Field(default_factory=list, alias="shape")
-    optima: list[OptimumSection] = Field(default_factory=list, alias="optimum")
-    landscapes: list[LandscapeSection] = Field(default_factory=list, alias="landscape")
-    tracks: list[TrackSection] = Field(default_factory=list, alias="track")
-    followed: list[FollowSection] = Field(default_factory=list, alias="follow")
-    sampled: list[SampledRouteSection] = Field(default_factory=list, alias="sampled_route")
-    reaches: list[ReachSection] = Field(default_factory=list, alias="reach")
-    checks: list[VerifySection] = Field(default_factory=list, alias="verify")
-    sensitivities: list[SensitivitySection] = Field(default_factory=list, alias="sensitivity")
-    imperfections: list[ImperfectionSection] = Field(default_factory=list, alias="imperfection")
-    rooms: list[RoomSection] = Field(default_factory=list, alias="room")
-    snaps: list[SnapSection] = Field(default_factory=list, alias="snap")
-    snap_graphs: list[SnapGraphSection] = Field(default_factory=list, alias="snap_graph")
-    trials: list[TrialsSection] = Field(default_factory=list, alias="trials")
-    estimates: list[EstimateSection] = Field(default_factory=list, alias="estimate")
-    calibrations: list[CalibrationSection] = Field(default_factory=list, alias="calibration")
-    maps: list[MapSection] = Field(default_factory=list, alias="map")
-    strongest: list[StrongestSection] = Field(default_factory=list, alias="strongest")
 
     @property
-    def tasks(self) -> dict[str, list[TaskSection]]:
-        """Questions by the name of their tables."""
-        fields = type(self).model_fields.items()
-        tables = {each.alias: getattr(self, name) for name, each in fields if each.alias}
-        return {alias: given for alias, given in tables.items() if isinstance(given, list)}
+    def tasks(self) -> dict[str, list[Any]]:
+        """Questions by the names of their tables."""
+        return {kind.table: getattr(self, kind.table) for kind in KINDS}
 
     @model_validator(mode="after")
     def _names_differ(self) -> "Study":
@@ -79,9 +43,10 @@ class Study(Section):
     @model_validator(mode="after")
     def _files_differ(self) -> "Study":
         owners: dict[str, str] = {}
-        for table, sections in self.tasks.items():
-            for each in sections:
-                for stem in each.stems(table):
+        for kind in KINDS:
+            table = kind.table
+            for each in self.tasks[table]:
+                for stem in kind.stems(each):
                     if stem in owners:
                         raise requirement(
                             f"give its {table} {each.name} a name without the files of the "
@@ -92,9 +57,9 @@ class Study(Section):
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> "Study":
-        asked = [section for sections in self.tasks.values() for section in sections]
+        asked = [(kind, each) for kind in KINDS for each in self.tasks[kind.table]]
         if self.equilibrium_set is None:
-            if self.equilibria or any(section.needs_set for section in asked):
+            if self.equilibria or any(kind.needs_set(each) for kind, each in asked):
                 raise requirement("have a [set] to which its equilibria and questions belong")
             if not asked:
                 raise requirement(
@@ -102,6 +67,15 @@ class Study(Section):
                     "none, like [[map]], [[strongest]], [[calibration]] and [[sampled_route]]"
                 )
         return self
+
+
+_tables: dict[str, Any] = {
+    kind.table: (list[kind.section], Field(default_factory=list))  # type: ignore[name-defined]
+    for kind in KINDS
+}
+_tables["equilibrium_set"] = (SetSection | None, Field(default=None, alias="set"))
+STUDY: type[Study] = create_model("Study", __base__=Study, **_tables)
+"""A study with a table for each kind of question."""
 
 
 def read_study_text(path: Path) -> str:
@@ -138,6 +112,6 @@ def parse_study(text: str, name: str, folder: Path | None = None) -> Study:
     """
     content = parse_toml(text, name)
     try:
-        return Study.model_validate(content, context={FOLDER: folder or Path()})
+        return STUDY.model_validate(content, context={FOLDER: folder or Path()})
     except ValidationError as error:
-        raise complaint(error, Study, name) from error
+        raise complaint(error, STUDY, name) from error

@@ -12,9 +12,7 @@ from equimorph.model import Descriptor
 from equimorph.structures import States
 from equimorph.study import html
 from equimorph.study.names import DIAGRAM, PLANE, STABLE_PLANE, SURFACE
-from equimorph.study.outcome import Outcome
-from equimorph.study.prepare import Problem
-from equimorph.study.tables import EXPLANATION, table_of_states
+from equimorph.study.prepare import Outcome, Problem
 
 
 def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
@@ -33,7 +31,7 @@ def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
     """
     body = [f"<h1>{escape(title)}</h1>", _question(outcome.problem)]
     for each in outcome.answers:
-        body += each.asked.kind.report(each.asked.task, each.answer, folder)
+        body += each.question.kind.report(each.question, each.answer, folder)
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):
         body += _equilibria(point, states, _shown_descriptors(outcome.problem))
     if outcome.equilibrium_set is not None:
@@ -69,8 +67,8 @@ def _equilibria(
     return [
         heading,
         f"<p>{len(states)} found, {len(states.stable)} of them stable.</p>",
-        table_of_states(states[order], descriptors),
-        EXPLANATION,
+        html.table_of_states(states[order], descriptors),
+        html.EXPLANATION,
     ]
 
 

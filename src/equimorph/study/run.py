@@ -16,13 +16,12 @@ from equimorph.structures import States
 from equimorph.study.checkpoints import Checkpoints
 from equimorph.study.figures import draw_figures
 from equimorph.study.folder import ResultsFolder, open_results_folder
-from equimorph.study.kinds.kind import Asked
 from equimorph.study.lookup import Extent, Ground, at_key
 from equimorph.study.memory import MemoryWatch, check_memory
 from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, route_name
-from equimorph.study.outcome import Answered, Outcome
-from equimorph.study.prepare import Problem, prepare
+from equimorph.study.prepare import Answered, Outcome, Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
+from equimorph.study.question import Question
 from equimorph.study.report import report
 from equimorph.tasks import Route
 
@@ -119,11 +118,12 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
         with _timed(seconds, "equilibria"):
             points = tuple(_equilibria(study, eset, at, checkpoints) for at in problem.points)
     answers = []
-    for done, asked in enumerate(problem.tasks):
-        progress.report("questions", done, len(problem.tasks))
-        with _timed(seconds, f"{asked.kind.table} {asked.name}"):
-            answers.append(_answered(study, ground, eset, asked, checkpoints, progress))
-    progress.report("questions", len(problem.tasks), len(problem.tasks))
+    count = len(problem.questions)
+    for done, question in enumerate(problem.questions):
+        progress.report("questions", done, count)
+        with _timed(seconds, f"{question.kind.table} {question.name}"):
+            answers.append(_answered(study, question, eset, checkpoints, progress))
+    progress.report("questions", count, count)
     checkpoints.forget_others()
     return Outcome(study, problem, eset, points, tuple(answers), reused, seconds)
 
@@ -146,6 +146,7 @@ def _equilibrium_set(
                 fixed=extent.fixed,
                 within=extent.constraints,
                 intervals=extent.intervals,
+                **extent.options,
                 progress=progress,
                 journal=journal,
             )
@@ -160,22 +161,18 @@ def _equilibria(
     return checkpoints.answer(question, lambda: eset.at(**point))
 
 
-def _answered(  # all that an answer depends on
+def _answered(
     study: Study,
-    ground: Ground,
+    question: Question,
     eset: EquilibriumSet | None,
-    asked: Asked,
     checkpoints: Checkpoints,
     progress: Progress,
 ) -> Answered:
-    kind, section = asked.kind, asked.section
+    kind, section = question.kind, question.section
     words = section.model_dump(mode="json", exclude={"name"})
-    question = {**_question(study, of_set=section.needs_set), kind.table: words}
-
-    def compute() -> Any:
-        return kind.answer(ground, eset, asked.task, progress)
-
-    return Answered(asked, checkpoints.answer(question, compute))
+    asked = {**_question(study, of_set=kind.needs_set(section)), kind.table: words}
+    answer = checkpoints.answer(asked, lambda: question.answer(eset, progress))
+    return Answered(question, answer)
 
 
 def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
@@ -183,7 +180,7 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
     with folder.adding() as staging:
         (staging / INPUT_COPY).write_text(text, encoding="utf-8")
         for each in outcome.answers:
-            each.asked.kind.write_tables(each.asked.task, each.answer, staging)
+            each.question.kind.write_tables(each.question, each.answer, staging)
         if not folder.holds([RESULTS]):
             _write_results(outcome, staging / RESULTS)
 
@@ -195,9 +192,9 @@ def _write_results(outcome: Outcome, path: Path) -> None:
         routes |= {route_name(name, k): each for k, each in enumerate(found, 1)}
     answers: dict[str, dict[str, Any]] = {}
     for each in outcome.answers:
-        kind = each.asked.kind
-        if kind.table not in ("route", "map"):
-            answers.setdefault(kind.table, {})[each.name] = each.answer
+        table = each.question.kind.table
+        if table not in ("route", "map"):
+            answers.setdefault(table, {})[each.name] = each.answer
     write_results(
         path,
         outcome.equilibrium_set,

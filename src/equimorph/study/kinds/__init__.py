@@ -1,46 +1,27 @@
-"""Kinds of questions that a study may ask, in the order in which they are answered."""
+"""Kinds of questions that a study may ask: every `Kind` that a module of this folder defines."""
 
+import pkgutil
+from importlib import import_module
 from typing import Any
 
-from equimorph.study.kinds.calibration import CalibrationKind
-from equimorph.study.kinds.estimate import EstimateKind
-from equimorph.study.kinds.follow import FollowKind
-from equimorph.study.kinds.imperfection import ImperfectionKind
-from equimorph.study.kinds.kind import Kind
-from equimorph.study.kinds.landscape import LandscapeKind
-from equimorph.study.kinds.map import MapKind
-from equimorph.study.kinds.optimum import OptimumKind
-from equimorph.study.kinds.reach import ReachKind
-from equimorph.study.kinds.room import RoomKind
-from equimorph.study.kinds.route import RouteKind
-from equimorph.study.kinds.sampled_route import SampledRouteKind
-from equimorph.study.kinds.sensitivity import SensitivityKind
-from equimorph.study.kinds.shape import ShapeKind
-from equimorph.study.kinds.snap import SnapKind
-from equimorph.study.kinds.snap_graph import SnapGraphKind
-from equimorph.study.kinds.strongest import StrongestKind
-from equimorph.study.kinds.track import TrackKind
-from equimorph.study.kinds.trials import TrialsKind
-from equimorph.study.kinds.verify import VerifyKind
+from equimorph.study.question import Kind
 
-KINDS: tuple[Kind[Any, Any, Any], ...] = (
-    RouteKind(),
-    ShapeKind(),
-    OptimumKind(),
-    LandscapeKind(),
-    TrackKind(),
-    FollowKind(),
-    SampledRouteKind(),
-    ReachKind(),
-    VerifyKind(),
-    SensitivityKind(),
-    ImperfectionKind(),
-    RoomKind(),
-    SnapKind(),
-    SnapGraphKind(),
-    TrialsKind(),
-    EstimateKind(),
-    CalibrationKind(),
-    MapKind(),
-    StrongestKind(),
+ORDER = (
+    *("route", "shape", "optimum", "robust_optimum", "landscape", "track", "follow"),
+    *("sampled_route", "reach", "verify", "sensitivity", "imperfection", "room", "snap"),
+    *("snap_graph", "trials", "estimate", "calibration", "map", "strongest", "chart", "reduction"),
 )
+"""In which kinds are answered and told; others follow by their names."""
+
+
+def _found() -> tuple[Kind[Any], ...]:
+    modules = [import_module(f"{__name__}.{each.name}") for each in pkgutil.iter_modules(__path__)]
+    kinds = [
+        each() for module in modules for each in vars(module).values()
+        if isinstance(each, type) and issubclass(each, Kind) and each.__module__ == module.__name__
+    ]  # fmt: skip
+    places = {table: place for place, table in enumerate(ORDER)}
+    return tuple(sorted(kinds, key=lambda kind: (places.get(kind.table, len(ORDER)), kind.table)))
+
+
+KINDS = _found()

@@ -1,58 +1,62 @@
 """Calibration: ``[[calibration]]``."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import partial
 from html import escape
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Progress, parameter_vector
+from equimorph.model import parameter_vector
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study import html
-from equimorph.study.kinds.found import heading
-from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.kinds.shape_data import Measured, measured_shapes
-from equimorph.study.lookup import Ground, at_key
-from equimorph.study.names import task_files
-from equimorph.study.sections.tasks import CalibrationSection
-from equimorph.tasks import Calibration, Family, MeasuredShape, calibrate
+from equimorph.study.answers import heading, write_rows
+from equimorph.study.data_files import DataFile
+from equimorph.study.fields import Point, Positive
+from equimorph.study.lookup import at_key
+from equimorph.study.measured_points import Measured, measured_shapes
+from equimorph.study.question import Arguments, Figure, Kind, Question, still
+from equimorph.tasks import Calibration, Family, calibrate
 from equimorph.tasks.calibration.unknowns import Kind as UnknownKind
 
 
 @dataclass(frozen=True)
-class CalibrationTask:
-    """What was measured and what is unknown, with the names looked up."""
+class Data:
+    """What was measured, and what is unknown."""
 
-    key: str
-    section: CalibrationSection
     measured: Measured
     unknown: Mapping[str | tuple[str, ...], UnknownKind]
     family: Family | None
 
-    @property
-    def shape(self) -> MeasuredShape:
-        """The measured points."""
-        return self.measured.shape
 
-
-class CalibrationKind(Kind[CalibrationSection, CalibrationTask, Calibration]):
+class CalibrationKind(Kind[Calibration]):
     """Parameters or data of the structure, fitted to measured shapes."""
 
     table = "calibration"
+    tasks = (calibrate,)
+    left_out = ("start", "unknown", "measured", "family")
+    own = MappingProxyType(
+        {
+            "data": (DataFile, ...),
+            "unknown": (Annotated[dict[str, UnknownKind], Field(min_length=1)], ...),
+            "at": (Point, Field(default_factory=dict)),
+            "sigma": (Positive | None, None),
+        }
+    )
 
-    def prepared(self, ground: Ground, section: CalibrationSection, key: str) -> CalibrationTask:
+    def look_up_more(self, question: Question) -> Data:
         """Look up columns, parameters and data."""
-        structure = ground.structure
+        structure, section, key = question.structure, question.section, question.key
         measured = measured_shapes(structure, section, key)
         names = {each.name for each in structure.parameters}
         unknown: dict[str | tuple[str, ...], UnknownKind] = {}
@@ -71,57 +75,58 @@ class CalibrationKind(Kind[CalibrationSection, CalibrationTask, Calibration]):
             )
         with at_key(f"{key}.unknown"):
             family = _family(structure, [text for text, kind in unknown.items() if kind == "data"])
-        return CalibrationTask(key, section, measured, unknown, family)
+        return Data(measured, unknown, family)
 
-    def answer(
-        self, ground: Ground, eset: EquilibriumSet | None, task: CalibrationTask, sink: Progress
-    ) -> Calibration:
+    def answer(self, question: Question, arguments: Arguments) -> Calibration:
         """Load the natural states as the measured ones, and fit from there."""
-        with at_key(task.key):
-            start = _loaded(ground.structure, task.measured)
-            return calibrate(start, task.unknown, [task.shape], family=task.family)
+        data: Data = question.extra
+        start = _loaded(question.structure, data.measured)
+        return calibrate(start, data.unknown, [data.measured.shape], family=data.family)
 
-    def write_tables(self, task: CalibrationTask, answer: Calibration, folder: Path) -> None:
+    def write_tables(self, question: Question, answer: Calibration, folder: Path) -> None:
         """Write the unknowns with their covariances; measured and fitted points side by side."""
         head = ["unknown", "value", "deviation", *[f"covariance with {x}" for x in answer.names]]
         columns = zip(
             answer.names, answer.values, answer.deviations, answer.covariance, strict=True
         )
         rows = [[name, *map(_entry, [x, error, *row])] for name, x, error, row in columns]
-        _write(folder / f"{_files(task)}.csv", [head, *rows])
-        points = np.asarray(task.shape.points, dtype=float)
-        fitted = answer.states.shape(np.asarray(task.shape.s, dtype=float))
+        write_rows(folder / f"{question.files}.csv", [head, *rows])
+        points = np.asarray(question.extra.measured.shape.points, dtype=float)
+        fitted = answer.states.shape(np.asarray(question.extra.measured.shape.s, dtype=float))
         rows = [["state", "s", "x", "y", "fitted x", "fitted y"]]
         for state, (given, found) in enumerate(zip(points, fitted, strict=True), 1):
-            for s, here, there in zip(task.shape.s or (), given, found, strict=True):
+            for s, here, there in zip(
+                question.extra.measured.shape.s or (), given, found, strict=True
+            ):
                 if np.isfinite(here).any():
                     rows.append([str(state), *map(_entry, [s, *here, *there])])
-        _write(folder / f"{_files(task)}-points.csv", rows)
+        write_rows(folder / f"{question.files}-points.csv", rows)
 
     def figures(
-        self,
-        ground: Ground,
-        eset: EquilibriumSet | None,
-        task: CalibrationTask,
-        answer: Calibration,
+        self, question: Question, eset: EquilibriumSet | None, answer: Calibration
     ) -> Sequence[Figure]:
         """Measured points over the fitted shapes, and what is left over."""
-        return [still(_files(task), partial(plotting.calibration, answer, task.shape))]
+        return [
+            still(
+                question.files, partial(plotting.calibration, answer, question.extra.measured.shape)
+            )
+        ]
 
-    def report(self, task: CalibrationTask, answer: Calibration, folder: Path) -> list[str]:
+    def report(self, question: Question, answer: Calibration, folder: Path) -> list[str]:
         """Values with deviations and correlations."""
-        files, data = _files(task), task.section.data.file
-        states = len(task.measured.parameters)
+        files, data = question.files, question.section.data.file
+        states = len(question.extra.measured.parameters)
         words = (
             html.refused(f"{answer.status}: {answer.why}.")
             if not answer.fitted
-            else f'<p class="verdict"><strong>Fitted</strong> to {task.measured.count} coordinates '
+            else '<p class="verdict"><strong>Fitted</strong> to '
+            f"{question.extra.measured.count} coordinates "
             f"of {states} measured {'state' if states == 1 else 'states'} ({escape(data)}). "
-            f"{_scatter(task, answer)}</p>"
+            f"{_scatter(question, answer)}</p>"
         )
         caption = "Measured points over the fitted shapes; below, fitted less measured coordinates."
         return [
-            heading(self.table, task.section.name),
+            heading(question),
             words,
             _table(answer),
             f'<div class="figures">{html.still(folder, files, caption)}</div>',
@@ -129,9 +134,9 @@ class CalibrationKind(Kind[CalibrationSection, CalibrationTask, Calibration]):
             f'<a href="{files}-points.csv">{files}-points.csv</a> (measured and fitted).</p>',
         ]
 
-    def verdict(self, task: CalibrationTask, answer: Calibration) -> str:
+    def verdict(self, question: Question, answer: Calibration) -> str:
         """Values with their deviations, or why there are none."""
-        head = f"Calibration {task.section.name}"
+        head = f"{question.title}"
         if not answer.fitted:
             return f"{head}: [bold red]{answer.status}[/]. {plain(answer.why)}"
         triples = zip(answer.names, answer.values, answer.deviations, strict=True)
@@ -142,17 +147,8 @@ class CalibrationKind(Kind[CalibrationSection, CalibrationTask, Calibration]):
         return f"{head}: [bold green]fitted[/], {values}."
 
 
-def _files(task: CalibrationTask) -> str:
-    return task_files(CalibrationKind.table, task.section.name)
-
-
 def _entry(value: float) -> str:
     return repr(float(value)) if np.isfinite(value) else ""
-
-
-def _write(path: Path, rows: Sequence[Sequence[str]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 def _family(structure: Structure, paths: Sequence[str | tuple[str, ...]]) -> Family | None:
@@ -223,9 +219,9 @@ def _loaded(structure: Structure, measured: Measured) -> States:
     return lifts.states
 
 
-def _scatter(task: CalibrationTask, answer: Calibration) -> str:
+def _scatter(question: Question, answer: Calibration) -> str:
     """How far the points are from the fit."""
-    if task.shape.sigma is not None:
+    if question.extra.measured.shape.sigma is not None:
         return f"χ² = {html.number(answer.chi_squared)} at {answer.freedom} degrees of freedom."
     spread = float(np.sqrt(np.mean(answer.residuals**2)))
     unit = answer.states.structure.length_unit

@@ -1,27 +1,21 @@
 """Optima that move: ``[[follow]]``."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from rich.markup import escape as plain
 
 from equimorph import plotting
-from equimorph.equilibria import Leg
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.storage import write_schedule
 from equimorph.study import html
-from equimorph.study.choose import choose_state
-from equimorph.study.kinds.found import heading
-from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.kinds.legs import Legs, legs_of, limits_of
-from equimorph.study.lookup import Ground, at_key, check_state, constraints_of, descriptor_at
-from equimorph.study.names import schedule_table, task_files
-from equimorph.study.sections.best import FollowSection
+from equimorph.study.answers import heading
+from equimorph.study.names import schedule_table
+from equimorph.study.question import Figure, Kind, Question, still
 from equimorph.tasks import Certificate, FollowedOptimum, follow_optimum
 
 MOST_ROWS = 12
@@ -30,116 +24,78 @@ ROUNDING = 1e-9
 """Margin on the stability boundary, where it is zero."""
 
 
-@dataclass(frozen=True)
-class FollowTask:
-    """An optimum that is to be followed, with its names looked up."""
-
-    key: str
-    section: FollowSection
-    objective: Descriptor
-    legs: Legs
-    actuators: Mapping[str, tuple[float, float]]
-    constraints: tuple[Constraint, ...]
-
-    @property
-    def files(self) -> str:
-        """Beginning of the names of its files."""
-        return task_files(FollowKind.table, self.section.name)
-
-
-class FollowKind(Kind[FollowSection, FollowTask, FollowedOptimum]):
+class FollowKind(Kind[FollowedOptimum]):
     """How the best state moves while loads and targets do, and where it jumps."""
 
     table = "follow"
+    tasks = (follow_optimum,)
+    names = MappingProxyType({"to": "targets"})
+    within_set = True
 
-    def prepared(self, ground: Ground, section: FollowSection, key: str) -> FollowTask:
-        """Look up objective, start, legs, actuators and constraints."""
-        check_state(ground, section.start, f"{key}.start")
-        structure = ground.structure
-        return FollowTask(
-            key,
-            section,
-            descriptor_at(structure, section.objective, f"{key}.objective"),
-            legs_of(structure, section.targets, f"{key}.targets"),
-            limits_of(ground, section.actuators, f"{key}.actuators"),
-            constraints_of(structure, section.within, f"{key}.within"),
-        )
-
-    def answer(
-        self, ground: Ground, eset: EquilibriumSet | None, task: FollowTask, sink: Progress
-    ) -> FollowedOptimum:
-        """Follow it, within the constraints of the set, too."""
-        assert eset is not None
-        section = task.section
-        start = choose_state(eset, section.start, f"{task.key}.start")
-        legs: list[Leg] = [dict(leg) for leg in task.legs]
-        with at_key(task.key):
-            return follow_optimum(
-                start,
-                task.objective,
-                legs,
-                actuators=task.actuators,
-                within=[*eset.constraints, *task.constraints],
-                sense=section.sense,
-                margin=section.margin,
-            )
-
-    def write_tables(self, task: FollowTask, answer: FollowedOptimum, folder: Path) -> None:
+    def write_tables(self, question: Question, answer: FollowedOptimum, folder: Path) -> None:
         """Write the schedule."""
         if answer.schedule is not None:
-            write_schedule(answer.schedule, folder / schedule_table(task.files))
+            write_schedule(answer.schedule, folder / schedule_table(question.files))
 
     def figures(
-        self, ground: Ground, eset: EquilibriumSet | None, task: FollowTask, answer: FollowedOptimum
+        self, question: Question, eset: EquilibriumSet | None, answer: FollowedOptimum
     ) -> Sequence[Figure]:
         """Objective and actuators along the legs."""
         if not len(answer.states):
             return []
-        draw = partial(plotting.followed, answer, task.objective, tuple(task.actuators))
-        return [still(task.files, draw)]
+        draw = partial(
+            plotting.followed, answer, question["objective"], tuple(question["actuators"])
+        )
+        return [still(question.files, draw)]
 
-    def report(self, task: FollowTask, answer: FollowedOptimum, folder: Path) -> list[str]:
+    def report(self, question: Question, answer: FollowedOptimum, folder: Path) -> list[str]:
         """Verdict, jumps, and optima along the way."""
-        head = heading(self.table, task.section.name)
-        legs = len(task.legs)
+        head = heading(question)
+        legs = len(question["to"])
         if not len(answer.states):
             return [head, html.refused(answer.why)]
         first = f"After {html.number(answer.at[-1])} of {legs} legs: {answer.why}."
         words = (
-            f'<p class="verdict"><strong>Arrived.</strong> {escape(_ends(task, answer))}</p>'
+            f'<p class="verdict"><strong>Arrived.</strong> {escape(_ends(question, answer))}</p>'
             if answer.arrived
             else html.refused(first)
         )
         caption = "Objective and actuators along the legs; dotted where the optimum jumps."
-        pictures = html.pictures(folder, {}, {f"{task.files}.png": caption})
+        pictures = html.pictures(folder, {}, {f"{question.files}.png": caption})
         links = (
-            [html.schedule_links(schedule_table(task.files))] if answer.schedule is not None else []
+            [html.schedule_links(schedule_table(question.files))]
+            if answer.schedule is not None
+            else []
         )
-        return [head, words, *links, pictures, *_jumps(task, answer), _table(task, answer)]
+        return [head, words, *links, pictures, *_jumps(question, answer), _table(question, answer)]
 
-    def verdict(self, task: FollowTask, answer: FollowedOptimum) -> str:
+    def verdict(self, question: Question, answer: FollowedOptimum) -> str:
         """Say how far it could be followed."""
-        head = f"Follow {task.section.name}"
+        head = f"{question.title}"
         if not answer.arrived:
-            done = f" after {answer.at[-1]:.4g} of {len(task.legs)} legs" if len(answer.at) else ""
+            done = (
+                f" after {answer.at[-1]:.4g} of {len(question['to'])} legs"
+                if len(answer.at)
+                else ""
+            )
             return f"{head}: [bold red]refused[/]{done}. {plain(answer.why)}"
-        return f"{head}: [bold green]arrived[/]. {plain(_ends(task, answer))}"
+        return f"{head}: [bold green]arrived[/]. {plain(_ends(question, answer))}"
 
 
-def _ends(task: FollowTask, found: FollowedOptimum) -> str:
+def _ends(question: Question, found: FollowedOptimum) -> str:
     jumps = {0: "It does not jump.", 1: "It jumps once."}
     return (
-        f"{task.objective.name} from {html.number(found.values[0], 6)} to "
+        f"{question['objective'].name} from {html.number(found.values[0], 6)} to "
         f"{html.number(found.values[-1], 6)}. "
         f"{jumps.get(len(found.jumps), f'It jumps {len(found.jumps)} times.')}"
     )
 
 
-def _jumps(task: FollowTask, found: FollowedOptimum) -> list[str]:
+def _jumps(question: Question, found: FollowedOptimum) -> list[str]:
     """Table of both sides of every jump."""
     if not found.jumps:
         return []
-    names = list(task.actuators)
+    names = list(question["actuators"])
     rows = [
         [
             html.number(jump.at, 6),
@@ -152,7 +108,7 @@ def _jumps(task: FollowTask, found: FollowedOptimum) -> list[str]:
         ]
         for jump in found.jumps
     ]
-    value = escape(task.objective.name)
+    value = escape(question["objective"].name)
     return [html.table(["jump at leg", f"{value} before", "after", *map(escape, names)], rows)]
 
 
@@ -161,9 +117,9 @@ def _limits(certificate: Certificate) -> list[str]:
     return [each for each in certificate.active if not each.startswith("stable ")]
 
 
-def _table(task: FollowTask, found: FollowedOptimum) -> str:
+def _table(question: Question, found: FollowedOptimum) -> str:
     """Optima along the way, some of many."""
-    names = list(task.actuators)
+    names = list(question["actuators"])
     shown = np.unique(np.linspace(0, len(found.states) - 1, MOST_ROWS).round().astype(int))
     states = found.states
     margins = states.margin
@@ -177,5 +133,5 @@ def _table(task: FollowTask, found: FollowedOptimum) -> str:
         ]
         for k in shown.tolist()
     ]
-    titles = ["leg", *names, task.objective.name, "margin", "where"]
+    titles = ["leg", *names, question["objective"].name, "margin", "where"]
     return html.table([escape(title) for title in titles], rows)

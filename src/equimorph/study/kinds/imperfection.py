@@ -4,69 +4,65 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated
 
+from pydantic import Field
 from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Progress
 from equimorph.study import html
-from equimorph.study.kinds.found import heading
-from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.kinds.of_state import OfState, of_state
-from equimorph.study.lookup import Ground, at_key
-from equimorph.study.names import task_files
-from equimorph.study.sections.robustness import ImperfectionSection
+from equimorph.study.answers import (
+    heading,
+)
+from equimorph.study.lookup import (
+    check_parameters,
+)
+from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.tasks import ImperfectionLaw, imperfection_law
 
-ImperfectionTask = OfState[ImperfectionSection]
 
-
-class ImperfectionKind(Kind[ImperfectionSection, ImperfectionTask, Mapping[str, ImperfectionLaw]]):
+class ImperfectionKind(Kind[Mapping[str, ImperfectionLaw]]):
     """How a limit load changes with imperfections."""
 
     table = "imperfection"
+    tasks = (imperfection_law,)
+    names = MappingProxyType({"start": "state"})
+    left_out = ("imperfection",)
+    own = MappingProxyType({"imperfections": (Annotated[list[str], Field(min_length=1)], ...)})
 
-    def prepared(self, ground: Ground, section: ImperfectionSection, key: str) -> ImperfectionTask:
-        """Look up state, load, imperfections and constraints."""
-        task = of_state(
-            ground, section, key, load=[section.load], imperfections=section.imperfections
-        )
-        if section.load in section.imperfections:
-            raise InputError(f"`{key}.imperfections` must not name the load; got {section.load}.")
-        return task
+    def look_up_more(self, question: Question) -> None:
+        """Refuse imperfections that are no parameters, or the load itself."""
+        names, key = question.section.imperfections, f"{question.key}.imperfections"
+        check_parameters(question.structure, names, key)
+        if question["load"] in names:
+            raise InputError(f"`{key}` must not name the load; got {question['load']}.")
 
-    def answer(
-        self, ground: Ground, eset: EquilibriumSet | None, task: ImperfectionTask, sink: Progress
-    ) -> Mapping[str, ImperfectionLaw]:
+    def answer(self, question: Question, arguments: Arguments) -> Mapping[str, ImperfectionLaw]:
         """Fit a law to each imperfection."""
-        section, state = task.section, task.state(eset)
-        with at_key(task.key):
-            return {
-                name: imperfection_law(state, section.load, name, within=task.constraints)
-                for name in section.imperfections
-            }
+        given = arguments.of(imperfection_law)
+        return {
+            name: imperfection_law(**given, imperfection=name)
+            for name in question.section.imperfections
+        }
 
     def figures(
-        self,
-        ground: Ground,
-        eset: EquilibriumSet | None,
-        task: ImperfectionTask,
-        answer: Mapping[str, ImperfectionLaw],
+        self, question: Question, eset: EquilibriumSet | None, answer: Mapping[str, ImperfectionLaw]
     ) -> Sequence[Figure]:
         """Return the powers on logarithmic axes, if any was found."""
         known = {name: law for name, law in answer.items() if law.status == "fitted"}
         if not known:
             return []
-        draw = partial(plotting.imperfection_laws, ground.structure, known, task.section.load)
-        return [still(task_files(self.table, task.section.name), draw)]
+        draw = partial(plotting.imperfection_laws, question.structure, known, question.section.load)
+        return [still(question.files, draw)]
 
     def report(
-        self, task: ImperfectionTask, answer: Mapping[str, ImperfectionLaw], folder: Path
+        self, question: Question, answer: Mapping[str, ImperfectionLaw], folder: Path
     ) -> list[str]:
         """A table: one row for each imperfection."""
-        files = task_files(self.table, task.section.name)
+        files = question.files
         rows = [
             [
                 escape(name),
@@ -80,16 +76,16 @@ class ImperfectionKind(Kind[ImperfectionSection, ImperfectionTask, Mapping[str, 
         caption = "Changes of the limit load with imperfections, and the fitted powers."
         head = ["imperfection ε", "limit load", "coefficient", "fitted exponent", "law"]
         return [
-            heading(self.table, task.section.name),
+            heading(question),
             html.table(head, rows),
             html.pictures(folder, {}, {f"{files}.png": caption}),
         ]
 
-    def verdict(self, task: ImperfectionTask, answer: Mapping[str, ImperfectionLaw]) -> str:
+    def verdict(self, question: Question, answer: Mapping[str, ImperfectionLaw]) -> str:
         """Return the formulas."""
-        load = task.section.load
+        load = question.section.load
         laws = "; ".join(_in_words(load, name, law) for name, law in answer.items())
-        return plain(f"Imperfection {task.section.name}: {laws}.")
+        return plain(f"{question.title}: {laws}.")
 
 
 def _in_words(load: str, name: str, law: ImperfectionLaw) -> str:

@@ -1,24 +1,24 @@
 """Maps over two actuators: ``[[map]]``."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
 
 from matplotlib.axes import Axes
 
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, Grid, Progress
+from equimorph.model import Descriptor
 from equimorph.storage import write_map
-from equimorph.structures import Structure
 from equimorph.study import html
-from equimorph.study.kinds.actuator_grid import common_of, grid_of, unloaded_load
-from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.lookup import Extent, Ground, at_key, constraints_of
+from equimorph.study.arguments import unloaded_load
+from equimorph.study.fields import Number, requirement
+from equimorph.study.lookup import Extent, at_key
 from equimorph.study.names import map_files
-from equimorph.study.sections.maps import MapSection
+from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.tasks import (
     ActuatorMap,
     CurvatureMap,
@@ -28,63 +28,52 @@ from equimorph.tasks import (
 )
 
 
-@dataclass(frozen=True)
-class MapTask:
-    """A map that is wanted, with its grid, constraints and descriptor as objects."""
-
-    key: str
-    section: MapSection
-    structure: Structure
-    grid: Grid
-    constraints: tuple[Constraint, ...]
-    descriptor: Descriptor | None
-
-
-class MapKind(Kind[MapSection, MapTask, ActuatorMap]):
+class MapKind(Kind[ActuatorMap]):
     """Limit loads, or the first stable states under a load, over two actuators."""
 
     table = "map"
+    tasks = (limit_load_map, curvature_map)
+    left_out = ("options", "descriptor")
+    own = MappingProxyType(
+        {
+            "kind": (Literal["limit_load_map", "curvature_map"], ...),
+            "at": (Number | None, None),
+            "descriptor": (str | None, None),
+        }
+    )
 
-    def prepared(self, ground: Ground, section: MapSection, key: str) -> MapTask:
-        """Look up actuators, load and descriptor."""
-        structure = ground.structure
-        grid = grid_of(structure, section, key)
-        with at_key(key):
-            _check_level(structure, section, grid)
+    def check(self, section: Any) -> None:
+        """A level and a descriptor belong to curvature maps."""
+        if (section.kind == "curvature_map") != (section.at is not None):
+            raise requirement("give the load `at` in a curvature_map, and only there")
+        if section.kind == "limit_load_map" and section.descriptor is not None:
+            raise requirement("give a descriptor in a curvature_map only")
+
+    def look_up_more(self, question: Question) -> Descriptor | None:
+        """Look up the descriptor of a curvature map, and refuse a level out of range."""
+        section = question.section
+        with at_key(question.key):
+            _check_level(question)
             shown = "max_curvature" if section.descriptor is None else section.descriptor
-            descriptor = structure.descriptor(shown) if section.at is not None else None
-        constraints = constraints_of(structure, section.within, f"{key}.within")
-        return MapTask(key, section, structure, grid, constraints, descriptor)
+            return None if section.at is None else question.structure.descriptor(shown)
 
-    def extent(self, task: MapTask) -> Extent:
+    def extent(self, question: Question) -> Extent:
         """Grid of the map."""
-        grid, section = task.grid, task.section
-        return Extent(grid.box, section.fixed, task.constraints, grid.intervals)
+        grid, fixed = question["grid"], question["fixed"] or {}
+        return Extent(grid.box, fixed, question.within, grid.intervals)
 
-    def answer(
-        self, ground: Ground, eset: EquilibriumSet | None, task: MapTask, sink: Progress
-    ) -> ActuatorMap:
+    def answer(self, question: Question, arguments: Arguments) -> ActuatorMap:
         """Compute the map."""
-        section, structure = task.section, ground.structure
-        common = common_of(section, task.constraints, sink)
-        with at_key(task.key):
-            if section.at is None:
-                return limit_load_map(structure, task.grid, section.load, **common)
-            return curvature_map(
-                structure,
-                task.grid,
-                section.load,
-                section.at,
-                descriptor=task.descriptor,
-                **common,
-            )
+        if question.section.at is None:
+            return limit_load_map(**arguments.of(limit_load_map))
+        return curvature_map(**arguments.of(curvature_map), descriptor=question.extra)
 
-    def write_tables(self, task: MapTask, answer: ActuatorMap, folder: Path) -> None:
+    def write_tables(self, question: Question, answer: ActuatorMap, folder: Path) -> None:
         """Write settings and curves."""
-        write_map(answer, folder / f"{map_files(task.section.name)}.csv")
+        write_map(answer, folder / f"{map_files(question.name)}.csv")
 
     def figures(
-        self, ground: Ground, eset: EquilibriumSet | None, task: MapTask, answer: ActuatorMap
+        self, question: Question, eset: EquilibriumSet | None, answer: ActuatorMap
     ) -> Sequence[Figure]:
         """Return the map with its curves."""
 
@@ -94,11 +83,11 @@ class MapKind(Kind[MapSection, MapTask, ActuatorMap]):
             assert isinstance(answer, LimitLoadMap)
             return plotting.load_map(answer)
 
-        return [still(map_files(task.section.name), draw)]
+        return [still(map_files(question.name), draw)]
 
-    def report(self, task: MapTask, answer: ActuatorMap, folder: Path) -> list[str]:
+    def report(self, question: Question, answer: ActuatorMap, folder: Path) -> list[str]:
         """How many settings ended in which way, the figure, and the tables."""
-        section, files = task.section, map_files(task.section.name)
+        section, files = question.section, map_files(question.name)
         counts = [f"{count} {kind}" for kind, count in answer.counts.items() if count]
         what, caption = "Limit loads", "Limit loads, with the curves on which they jump or bend."
         if section.at is not None:
@@ -115,14 +104,15 @@ class MapKind(Kind[MapSection, MapTask, ActuatorMap]):
             f'<a href="{files}-curves.csv">{files}-curves.csv</a>.</p>',
         ]
 
-    def verdict(self, task: MapTask, answer: ActuatorMap) -> str:
+    def verdict(self, question: Question, answer: ActuatorMap) -> str:
         """How many settings ended in which way."""
         counts = ", ".join(f"{count} {kind}" for kind, count in answer.counts.items() if count)
-        return f"Map {task.section.name}: {counts}."
+        return f"{question.title}: {counts}."
 
 
-def _check_level(structure: Structure, section: MapSection, grid: Grid) -> None:
-    low = unloaded_load(structure, section, grid)
+def _check_level(question: Question) -> None:
+    section = question.section
+    low = unloaded_load(question.structure, section, question["grid"])
     if section.at is not None and not low < section.at < section.bound:
         raise InputError(
             f"`at` must lie between {section.load} = {low:g} and `bound` = "

@@ -1,106 +1,106 @@
 """Routes: ``[[route]]``."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from html import escape
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import AfterValidator
 from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Progress
 from equimorph.storage import write_schedule
-from equimorph.structures import State
 from equimorph.study import html
-from equimorph.study.choose import choose_state
-from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.kinds.landings import report_of_snaps, snaps_in_words
-from equimorph.study.kinds.way import figures_of_way, pictures_of_way
-from equimorph.study.lookup import (
-    Ground,
-    at_key,
-    check_parameters,
-    check_point,
-    check_state,
-    constraints_of,
-)
-from equimorph.study.names import route_name, schedule_table
-from equimorph.study.sections.routes import RouteSection
+from equimorph.study.answers import figures_of_way, pictures_of_way, report_of_snaps, snaps_in_words
+from equimorph.study.fields import Name, Positive, requirement
+from equimorph.study.names import PLANE, STABLE_PLANE, route_name, schedule_table
+from equimorph.study.question import Arguments, Figure, Kind, Question, still
+from equimorph.study.signatures import MEANINGS
 from equimorph.tasks import Route, alternatives, plan, smoothed
 
 Routes = tuple[Route, ...]
 """The route that was asked for, or its refusal; then others, if any were asked for."""
 
 
-@dataclass(frozen=True)
-class RouteTask:
-    """A route that is wanted, with its constraints as objects."""
-
-    key: str
-    section: RouteSection
-    constraints: tuple[Constraint, ...]
-
-    @property
-    def overview(self) -> str:
-        """Beginning of the name of the figure with all routes."""
-        return f"{self.section.name}-alternatives"
+def _check_unused(name: str) -> str:
+    """Refuse names under which files of the set are stored."""
+    if f"{name}-plane" in (STABLE_PLANE, PLANE):
+        raise requirement("be another name: figures of the set begin with it")
+    return name
 
 
-class RouteKind(Kind[RouteSection, RouteTask, Routes]):
+class RouteKind(Kind[Routes]):
     """Routes between two states: along way-points, planned, with snaps, or several of them."""
 
     table = "route"
+    tasks = (plan, alternatives, smoothed)
+    names = MappingProxyType({"count": "alternatives", "tolerance": "smooth"})
+    left_out = ("route",)
+    own = MappingProxyType(
+        {
+            "name": (Annotated[Name, AfterValidator(_check_unused)], ...),
+            "alternatives": (MEANINGS["count"] | None, None),
+            "smooth": (Positive | None, None),
+        }
+    )
 
-    def prepared(self, ground: Ground, section: RouteSection, key: str) -> RouteTask:
-        """Look up ends, way-points, rates and constraints."""
-        for end, state in (("start", section.start), ("goal", section.goal)):
-            check_state(ground, state, f"{key}.{end}")
-        for i, corner in enumerate(section.via or ()):
-            check_point(ground.box, corner, f"{key}.via[{i}]", whole=False)
-        check_parameters(ground.structure, section.rates or (), f"{key}.rates")
-        if section.alternatives is not None and len(ground.box.names) != 2:
+    def stems(self, section: Any) -> list[str]:
+        """Names of all its routes."""
+        return [route_name(section.name, k + 1) for k in range(section.alternatives or 1)]
+
+    def check(self, section: Any) -> None:
+        """Refuse demands of which a route can obey one only."""
+        given = ("via", "snap_price", "alternatives")
+        both = [key for key in given if getattr(section, key) is not None]
+        if len(both) > 1:
+            raise requirement(f"give one of {', '.join(given)} (not {' and '.join(both)})")
+        if section.smooth is not None and section.snap_price is not None:
+            raise requirement("give one of smooth, snap_price: routes that snap have corners")
+
+    def look_up_more(self, question: Question) -> None:
+        """Refuse alternatives where there is no plane."""
+        if question.section.alternatives is not None and len(question.free) != 2:
             raise InputError(
-                f"`{key}.alternatives` must be asked of a set over two parameters; "
-                f"got one over {len(ground.box.names)}."
+                f"`{question.key}.alternatives` must be asked of a set over two parameters; "
+                f"got one over {len(question.free)}."
             )
-        constraints = constraints_of(ground.structure, section.within, f"{key}.within")
-        return RouteTask(key, section, constraints)
 
-    def answer(
-        self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, sink: Progress
-    ) -> Routes:
-        """Choose both ends, plan, and round the corners if that is wanted."""
-        assert eset is not None
-        section = task.section
-        start = choose_state(eset, section.start, f"{task.key}.start")
-        goal = choose_state(eset, section.goal, f"{task.key}.goal")
-        with at_key(task.key):
-            return tuple(_routes(ground, eset, task, (start, goal)))
+    def answer(self, question: Question, arguments: Arguments) -> Routes:
+        """Plan; round the corners of every route that arrived, if that is wanted."""
+        if question.section.alternatives is not None:
+            routes = tuple(alternatives(**arguments.of(alternatives)))
+        else:
+            routes = (plan(**arguments.of(plan)),)
+        if question.section.smooth is None:
+            return routes
+        bounds = dict.fromkeys((*arguments.eset.constraints, *question.within))
+        demands = arguments.of(smoothed) | {"within": tuple(bounds)}
+        return tuple(smoothed(route, **demands) if route.arrived else route for route in routes)
 
-    def write_tables(self, task: RouteTask, answer: Routes, folder: Path) -> None:
+    def write_tables(self, question: Question, answer: Routes, folder: Path) -> None:
         """Write the schedules."""
-        for name, route in _named(task, answer):
+        for name, route in _named(question, answer):
             if route.schedule is not None:
                 write_schedule(route.schedule, folder / schedule_table(name))
 
     def figures(
-        self, ground: Ground, eset: EquilibriumSet | None, task: RouteTask, answer: Routes
+        self, question: Question, eset: EquilibriumSet | None, answer: Routes
     ) -> Sequence[Figure]:
         """Shapes, margins, plane and film of the best; all of them on one plane."""
-        found = [*figures_of_way(eset, task.section.name, answer[0])]
+        found = [*figures_of_way(eset, question.name, answer[0])]
         if len(answer) > 1 and eset is not None:
             draw = partial(plotting.alternative_routes, eset, answer)
-            found.insert(0, still(task.overview, draw))
+            found.insert(0, still(_overview(question), draw))
         return found
 
-    def report(self, task: RouteTask, answer: Routes, folder: Path) -> list[str]:
+    def report(self, question: Question, answer: Routes, folder: Path) -> list[str]:
         """Verdict, schedule and figures."""
-        name, route = task.section.name, answer[0]
+        name, route = question.name, answer[0]
         heading = f"<h2>Route {escape(name)}</h2>"
         pictures = pictures_of_way(folder, name, "route")
         if not route.arrived:
@@ -109,16 +109,16 @@ class RouteKind(Kind[RouteSection, RouteTask, Routes]):
         return [
             heading,
             f'<p class="verdict"><strong>Arrived.</strong> {snapping} is stable: '
-            f"{_size(route, html.number)}{_cost(route)}{_rounding(task)}.</p>",
+            f"{_size(route, html.number)}{_cost(route)}{_rounding(question)}.</p>",
             *report_of_snaps(route),
             html.schedule_links(schedule_table(name)),
-            *_report_of_all(task, answer, folder),
+            *_report_of_all(question, answer, folder),
             pictures,
         ]
 
-    def verdict(self, task: RouteTask, answer: Routes) -> str:
+    def verdict(self, question: Question, answer: Routes) -> str:
         """Say whether it arrived."""
-        route, head = answer[0], f"Route {task.section.name}"
+        route, head = answer[0], f"{question.title}"
         if not route.arrived:
             return f"{head}: [bold red]refused[/]. {plain(route.why)}"
         others = f" {len(answer)} routes differ in how they pass holes." if len(answer) > 1 else ""
@@ -127,29 +127,8 @@ class RouteKind(Kind[RouteSection, RouteTask, Routes]):
         return f"{head}: [bold green]arrived[/] {how}, {size}{_cost(route)}.{others}"
 
 
-def _routes(
-    ground: Ground, eset: EquilibriumSet, task: RouteTask, ends: tuple[State, State]
-) -> list[Route]:
-    """Plan; every route is rounded that arrived."""
-    section, monitor = task.section, [ground.height]
-    demands: dict[str, Any] = {
-        "within": task.constraints, "margin": section.margin, "monitor": monitor
-    }  # fmt: skip
-    wanted = {**demands, "objective": section.wish}
-    if section.alternatives is not None:
-        routes = list(alternatives(eset, *ends, section.alternatives, **wanted))
-    else:
-        routes = [plan(eset, *ends, via=section.via, snap_price=section.snap_price, **wanted)]
-    if section.smooth is None:
-        return routes
-    demands["within"] = tuple(dict.fromkeys((*eset.constraints, *task.constraints)))
-    return [
-        smoothed(route, section.smooth, **demands) if route.arrived else route for route in routes
-    ]
-
-
-def _named(task: RouteTask, answer: Routes) -> list[tuple[str, Route]]:
-    return [(route_name(task.section.name, k), route) for k, route in enumerate(answer, 1)]
+def _named(question: Question, answer: Routes) -> list[tuple[str, Route]]:
+    return [(route_name(question.name, k), route) for k, route in enumerate(answer, 1)]
 
 
 def _size(route: Route, number: Any) -> str:
@@ -165,14 +144,14 @@ def _cost(route: Route) -> str:
     return f", {route.objective}{priced} {html.number(route.cost)}"
 
 
-def _rounding(task: RouteTask) -> str:
-    smooth = task.section.smooth
+def _rounding(question: Question) -> str:
+    smooth = question.section.smooth
     return "" if smooth is None else f", corners rounded by {html.number(smooth)} at most"
 
 
-def _report_of_all(task: RouteTask, answer: Routes, folder: Path) -> list[str]:
+def _report_of_all(question: Question, answer: Routes, folder: Path) -> list[str]:
     """Routes side by side; nothing where there is only one."""
-    if task.section.alternatives is None:
+    if question.section.alternatives is None:
         return []
     if len(answer) == 1:
         return ["<p>No other route passes the holes of the stable set differently.</p>"]
@@ -184,11 +163,16 @@ def _report_of_all(task: RouteTask, answer: Routes, folder: Path) -> list[str]:
             html.number(route.cost),
             f'<a href="{schedule_table(name)}">{schedule_table(name)}</a>',
         ]
-        for number, (name, route) in enumerate(_named(task, answer), 1)
+        for number, (name, route) in enumerate(_named(question, answer), 1)
     ]
     head = ["", "length", "smallest margin", escape(answer[0].objective), "schedule"]
     caption = "Routes that cannot be drawn into each other; the first is the best."
     return [
         html.table(head, rows),
-        html.pictures(folder, {}, {f"{task.overview}.png": caption}),
+        html.pictures(folder, {}, {f"{_overview(question)}.png": caption}),
     ]
+
+
+def _overview(question: Question) -> str:
+    """Beginning of the name of the figure with all routes."""
+    return f"{question.name}-alternatives"

@@ -2,23 +2,24 @@
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
-from equimorph.model import Descriptor, Progress
+from equimorph.model import Descriptor
 from equimorph.structures import States
 from equimorph.study import html
-from equimorph.study.kinds.kind import Figure, Kind, still
-from equimorph.study.lookup import Ground, at_key, descriptor_at
-from equimorph.study.names import task_files
-from equimorph.study.sections.robustness import SnapGraphSection
+from equimorph.study.lookup import (
+    descriptor_at,
+)
+from equimorph.study.question import Arguments, Figure, Kind, Question, still
 
 Snaps = tuple[tuple[int, ...], tuple[Snap, ...], tuple[States, ...]]
 """Stable strata, runs of their boundaries, and the states from which the snaps of each begin."""
@@ -28,51 +29,32 @@ CAPTION = (
 )
 
 
-@dataclass(frozen=True)
-class SnapGraphTask:
-    """Where snaps lead, with the descriptor that tells states apart."""
-
-    key: str
-    section: SnapGraphSection
-    descriptor: Descriptor
-
-    @property
-    def files(self) -> str:
-        """Beginning of the names of its files."""
-        return task_files(SnapGraphKind.table, self.section.name)
-
-
-class SnapGraphKind(Kind[SnapGraphSection, SnapGraphTask, Snaps]):
+class SnapGraphKind(Kind[Snaps]):
     """Runs of the stability boundary, where snaps from them land, and the energy freed."""
 
     table = "snap_graph"
+    tasks = (snap_graph,)
+    own = MappingProxyType({"descriptor": (str | None, None)})
 
-    def prepared(self, ground: Ground, section: SnapGraphSection, key: str) -> SnapGraphTask:
-        """Look up the descriptor."""
-        text = section.descriptor
-        named = (
-            ground.structure.elevation
-            if text is None
-            else descriptor_at(ground.structure, text, f"{key}.descriptor")
-        )
-        return SnapGraphTask(key, section, named)
+    def look_up_more(self, question: Question) -> Descriptor:
+        """Look up the descriptor that tells states apart."""
+        text = question.section.descriptor
+        if text is None:
+            return question.structure.elevation
+        return descriptor_at(question.structure, text, f"{question.key}.descriptor")
 
-    def answer(
-        self, ground: Ground, eset: EquilibriumSet | None, task: SnapGraphTask, sink: Progress
-    ) -> Snaps:
-        """Follow the snaps; of their ways only the ends are kept."""
-        assert eset is not None
-        with at_key(task.key):
-            graph = snap_graph(eset, samples=task.section.samples, progress=sink)
+    def answer(self, question: Question, arguments: Arguments) -> Snaps:
+        """Follow the snaps; only the ends of their ways are kept."""
+        graph = snap_graph(**arguments.of(snap_graph))
         snaps = tuple(_lean(snap) for snap in graph.snaps)
-        return graph.strata, snaps, tuple(eset.points[snap.vertices] for snap in snaps)
+        return graph.strata, snaps, tuple(arguments.eset.points[each.vertices] for each in snaps)
 
-    def write_tables(self, task: SnapGraphTask, answer: Snaps, folder: Path) -> None:
+    def write_tables(self, question: Question, answer: Snaps, folder: Path) -> None:
         """Write every snap that was followed: from where, to where, and the energy freed."""
-        with (folder / f"{task.files}.csv").open("w", encoding="utf-8", newline="") as file:
+        with (folder / f"{question.files}.csv").open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file, lineterminator="\n")
             head = ["run", "from stratum", "to stratum", "status", "energy freed"]
-            value, parameters = task.descriptor, self._parameters(answer)
+            value, parameters = question.extra, self._parameters(answer)
             table.writerow([*head, *parameters, f"{value.name} before", f"{value.name} after"])
             for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1):
                 for state, landing in zip(states, snap.landings, strict=True):
@@ -83,18 +65,18 @@ class SnapGraphKind(Kind[SnapGraphSection, SnapGraphTask, Snaps]):
                     ])  # fmt: skip
 
     def figures(
-        self, ground: Ground, eset: EquilibriumSet | None, task: SnapGraphTask, answer: Snaps
+        self, question: Question, eset: EquilibriumSet | None, answer: Snaps
     ) -> Sequence[Figure]:
         """Two panels, over two parameters."""
         assert eset is not None
         if len(eset.names) != 2 or not answer[1]:
             return []
-        draw = partial(plotting.snap_panels, SnapGraph(eset, *answer[:2]), task.descriptor)
-        return [still(task.files, draw)]
+        draw = partial(plotting.snap_panels, SnapGraph(eset, *answer[:2]), question.extra)
+        return [still(question.files, draw)]
 
-    def report(self, task: SnapGraphTask, answer: Snaps, folder: Path) -> list[str]:
+    def report(self, question: Question, answer: Snaps, folder: Path) -> list[str]:
         """Figure, and a table of the runs."""
-        title = f"<h2>Snap graph {escape(task.section.name)}</h2>"
+        title = f"<h2>Snap graph {escape(question.name)}</h2>"
         words = f"<p>{escape(_extent(answer))}</p>"
         if not answer[1]:
             return [title, words]
@@ -115,11 +97,11 @@ class SnapGraphKind(Kind[SnapGraphSection, SnapGraphTask, Snaps]):
             ]
             for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1)
         ]
-        file = f"{task.files}.csv"
+        file = f"{question.files}.csv"
         return [
             title,
             words,
-            html.pictures(folder, {f"{task.files}.png": CAPTION}, {}),
+            html.pictures(folder, {f"{question.files}.png": CAPTION}, {}),
             html.table(head, rows),
             f'<p>Every snap that was followed: <a href="{file}">{file}</a>.</p>',
         ]
@@ -129,9 +111,9 @@ class SnapGraphKind(Kind[SnapGraphSection, SnapGraphTask, Snaps]):
         """Names of all parameters."""
         return list(answer[2][0][0].parameters) if answer[2] else []
 
-    def verdict(self, task: SnapGraphTask, answer: Snaps) -> str:
+    def verdict(self, question: Question, answer: Snaps) -> str:
         """Strata, runs, and the most energy that is freed."""
-        return f"Snap graph {task.section.name}: {plain(_extent(answer))}"
+        return f"Snap graph {question.name}: {plain(_extent(answer))}"
 
 
 def _lean(snap: Snap) -> Snap:

@@ -9,60 +9,37 @@ import numpy as np
 from rich.markup import escape as plain
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Progress
 from equimorph.storage import write_schedule
 from equimorph.study import html
-from equimorph.study.kinds.found import heading
-from equimorph.study.kinds.given import GivenWay, given_way
-from equimorph.study.kinds.kind import Figure, Kind
-from equimorph.study.kinds.way import figures_of_way, pictures_of_way
-from equimorph.study.lookup import Ground, at_key
-from equimorph.study.names import schedule_table, task_files
-from equimorph.study.sections.ways import VerifySection
+from equimorph.study.answers import figures_of_way, heading, pictures_of_way
+from equimorph.study.names import schedule_table
+from equimorph.study.question import Figure, Kind, Question
 from equimorph.tasks import Proof, Route, Verification, verify
 
 
-class VerifyKind(Kind[VerifySection, GivenWay, Verification]):
+class VerifyKind(Kind[Verification]):
     """Whether a schedule can be executed without a snap, and whether that is proved."""
 
     table = "verify"
+    tasks = (verify,)
+    left_out = ("options", "structure")
+    within_set = True
 
-    def prepared(self, ground: Ground, section: VerifySection, key: str) -> GivenWay:
-        """Look up the way and its constraints."""
-        return given_way(ground, section, key)
-
-    def answer(
-        self, ground: Ground, eset: EquilibriumSet | None, task: GivenWay, sink: Progress
-    ) -> Verification:
-        """Lift it finely."""
-        section = task.section
-        assert isinstance(section, VerifySection)
-        start = task.start(ground, eset)
-        with at_key(task.key):
-            return verify(
-                task.schedule,
-                start,
-                within=task.bounds(eset),
-                margin=section.margin,
-                monitor=[ground.height],
-                proof=section.proof,
-            )
-
-    def write_tables(self, task: GivenWay, answer: Verification, folder: Path) -> None:
+    def write_tables(self, question: Question, answer: Verification, folder: Path) -> None:
         """Write the schedule with its margins."""
         if answer.schedule is not None:
-            write_schedule(answer.schedule, folder / schedule_table(_files(task)))
+            write_schedule(answer.schedule, folder / schedule_table(question.files))
 
     def figures(
-        self, ground: Ground, eset: EquilibriumSet | None, task: GivenWay, answer: Verification
+        self, question: Question, eset: EquilibriumSet | None, answer: Verification
     ) -> Sequence[Figure]:
         """As of a route."""
-        return figures_of_way(eset, _files(task), _as_route(answer))
+        return figures_of_way(eset, question.files, _as_route(answer))
 
-    def report(self, task: GivenWay, answer: Verification, folder: Path) -> list[str]:
+    def report(self, question: Question, answer: Verification, folder: Path) -> list[str]:
         """Verdict, proof, schedule and figures."""
-        head = heading(self.table, task.section.name)
-        pictures = pictures_of_way(folder, _files(task), "way")
+        head = heading(question)
+        pictures = pictures_of_way(folder, question.files, "way")
         if not answer.verified:
             return [head, html.refused(_sentence(answer.why)), pictures]
         return [
@@ -70,21 +47,17 @@ class VerifyKind(Kind[VerifySection, GivenWay, Verification]):
             '<p class="verdict"><strong>Verified.</strong> Every state on the way is stable: '
             f"smallest margin {html.number(answer.margin)}.</p>",
             *([] if answer.proof is None else [_proof(answer.proof)]),
-            html.schedule_links(schedule_table(_files(task))),
+            html.schedule_links(schedule_table(question.files)),
             pictures,
         ]
 
-    def verdict(self, task: GivenWay, answer: Verification) -> str:
+    def verdict(self, question: Question, answer: Verification) -> str:
         """Say whether it can be executed."""
-        head = f"Verify {task.section.name}"
+        head = f"{question.title}"
         if not answer.verified:
             return f"{head}: [bold red]refused[/]. {plain(_sentence(answer.why))}"
         proof = "" if answer.proof is None else f", {answer.proof.status}"
         return f"{head}: [bold green]verified[/], smallest margin {answer.margin:.3f}{proof}."
-
-
-def _files(task: GivenWay) -> str:
-    return task_files(VerifyKind.table, task.section.name)
 
 
 def _as_route(answer: Verification) -> Route:

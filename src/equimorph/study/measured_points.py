@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -9,7 +10,6 @@ from jaxtyping import Float
 from equimorph.errors import InputError
 from equimorph.structures import Structure
 from equimorph.study.lookup import at_key, check_value
-from equimorph.study.sections.tasks import CalibrationSection
 from equimorph.tasks import MeasuredShape
 
 POINT = ("s", "x", "y")
@@ -26,7 +26,7 @@ class Measured:
     """Measured coordinates."""
 
 
-def measured_shapes(structure: Structure, section: CalibrationSection, key: str) -> Measured:
+def measured_shapes(structure: Structure, section: Any, key: str) -> Measured:
     """Shapes in the rows of a table: one row for each point, its columns s, x, y.
 
     Further columns are parameters, constant within a state; `state` tells states apart that have
@@ -96,7 +96,7 @@ def _check_numbers(column: Mapping[str, Float[np.ndarray, " rows"]], key: str) -
         raise InputError(f"`{key}.data` must have a positive sigma in every row.")
 
 
-def _check_columns(structure: Structure, section: CalibrationSection, key: str) -> list[str]:
+def _check_columns(structure: Structure, section: Any, key: str) -> list[str]:
     """Columns that are parameters; refuse columns that are missing or mean nothing."""
     columns, names = section.data.columns, [each.name for each in structure.parameters]
     missing = [name for name in POINT if name not in columns]

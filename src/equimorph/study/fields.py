@@ -1,13 +1,64 @@
-"""Fields of a study file: numbers, intervals, points and comparisons, strict and finite."""
+"""Fields of a study file: numbers, intervals, points and comparisons, strict and finite.
 
-from typing import Annotated, Any
+Comparisons are texts like ``max_curvature <= 20``. Nothing is evaluated: the structure looks up the
+descriptor, the bound is a number.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
-from equimorph.study.expressions import LARGEST, parse_comparison
-from equimorph.study.names import task_files
+from equimorph.model import Constraint
+from equimorph.structures import Structure
+
+LARGEST = 1e9
+"""Largest number of a study; all scales of a structure are near 1."""
+
+_FORM = re.compile(r"\s*([^<>=]*[^<>=\s])\s*(<=|>=)\s*([-+.\deE]+)\s*")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A constraint as it is written: descriptor, ``<=`` or ``>=``, bound."""
+
+    descriptor: str
+    sense: Literal["<=", ">="]
+    bound: float
+
+    def on(self, structure: Structure) -> Constraint:
+        """Return the same comparison with the descriptor of a structure."""
+        return Constraint(worst_named(structure, self.descriptor), self.sense, self.bound)
+
+
+def parse_comparison(text: str) -> Comparison:
+    """Read ``descriptor <= number`` or ``descriptor >= number``.
+
+    Raises
+    ------
+    InputError
+        If `text` has another form.
+
+    Examples
+    --------
+    >>> parse_comparison("height(1/3) >= 0.1")
+    Comparison(descriptor='height(1/3)', sense='>=', bound=0.1)
+    """
+    found = _FORM.fullmatch(text)
+    try:
+        bound = float(found[3]) if found else None
+    except ValueError:
+        bound = None
+    if found is None or bound is None or not abs(bound) <= LARGEST:
+        raise InputError(
+            f"`constraint` must read like max_curvature <= 20 or height(0.5) >= 0, with a number "
+            f"up to {LARGEST:g}; got {text!r}."
+        )
+    return Comparison(found[1], cast(Literal["<=", ">="], found[2]), bound)
 
 
 def requirement(text: str) -> PydanticCustomError:
@@ -58,7 +109,11 @@ def is_table(value: Any) -> bool:
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Interval = Annotated[list[Number], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST)]
 Point = dict[str, Number]
+Step = Annotated[Point, Field(min_length=1)]
+Seed = Annotated[int, Field(ge=0, le=2**31)]
 ComparisonText = Annotated[str, AfterValidator(_comparison)]
 Count = Annotated[int, Field(ge=2, le=int(LARGEST))]
 Intervals = Annotated[list[Count], Field(min_length=2, max_length=2)]
@@ -75,12 +130,3 @@ class TaskSection(Section):
     """A question of a study; its files begin with its name."""
 
     name: Name
-
-    @property
-    def needs_set(self) -> bool:
-        """Whether it is asked of the set of the study."""
-        return True
-
-    def stems(self, table: str) -> list[str]:
-        """Beginnings of the names of its files, which no other question may have."""
-        return [task_files(table, self.name)]

@@ -1,15 +1,20 @@
-"""Measured data beside a study file: a table of numbers, read with the study."""
+"""Files that a study names: measured data and schedules, read together with the study."""
 
 import csv
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, PlainSerializer, PlainValidator
 
-from equimorph.study.expressions import LARGEST
-from equimorph.study.sections.fields import Section, requirement
-from equimorph.study.sections.ways import FOLDER
+from equimorph.errors import InputError
+from equimorph.model import Schedule
+from equimorph.storage import read_schedule
+from equimorph.storage.files import fingerprint
+from equimorph.study.fields import LARGEST, Section, requirement
 
+FOLDER = "folder"
+"""In the context of validation: the folder from which names of files count."""
 MOST_ROWS = 100_000
 """Of a table."""
 
@@ -23,7 +28,7 @@ class DataTable(Section):
     """Numbers; None where an entry is empty."""
 
 
-def _read(given: Any, info: Any) -> Any:
+def _read_data(given: Any, info: Any) -> Any:
     """Read the file of a name; `FOLDER` of the context is where the study file lies."""
     if not isinstance(given, str) or Path(given).name != given or not given.endswith(".csv"):
         raise requirement("be the name of a CSV file that lies beside the study file")
@@ -60,5 +65,51 @@ def _number(cell: str, line: int) -> float:
     return value
 
 
-DataFile = Annotated[DataTable, BeforeValidator(_read)]
+DataFile = Annotated[DataTable, BeforeValidator(_read_data)]
 """Name of a CSV file in a study, with its content."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScheduleFile:
+    """A schedule that was read from its files.
+
+    Parameters
+    ----------
+    name
+        Of the table, as the study gives it.
+    schedule
+        What it holds.
+    """
+
+    name: str
+    schedule: Schedule
+
+    @property
+    def fingerprint(self) -> str:
+        """Of all that the file says: an edited file is another question."""
+        mine = self.schedule
+        return fingerprint(
+            {
+                "names": mine.names,
+                "values": mine.values.tolist(),
+                "way_points": mine.way_points.tolist(),
+                "start": mine.start,
+            }
+        )
+
+
+def _read_schedule_file(value: Any, info: Any) -> ScheduleFile:
+    if not isinstance(value, str):
+        raise requirement("be the name of a schedule's .csv file, in quotes")
+    folder = Path((info.context or {}).get(FOLDER, "."))
+    try:
+        return ScheduleFile(value, read_schedule(folder / value))
+    except (InputError, ValueError) as error:
+        raise requirement(f"be the table of a schedule that can be read: {error}") from error
+
+
+ScheduleName = Annotated[
+    ScheduleFile,
+    PlainValidator(_read_schedule_file),
+    PlainSerializer(lambda file: {"schedule": file.fingerprint}),
+]

@@ -4,8 +4,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator
 
-from equimorph.study.expressions import LARGEST
-from equimorph.study.sections.fields import (
+from equimorph.study.fields import (
+    LARGEST,
     Interval,
     Number,
     Section,

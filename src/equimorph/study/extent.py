@@ -1,0 +1,99 @@
+"""What part of an equilibrium set a study speaks of: its section, from the signature of the set."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, Field, create_model, model_validator
+
+from equimorph.errors import InputError
+from equimorph.manifold import INTERVALS, equilibrium_set
+from equimorph.model import Box, Constraint, parameter_vector
+from equimorph.structures import Structure
+from equimorph.study.fields import ComparisonText, Count, Interval, Point, Section, requirement
+from equimorph.study.lookup import Extent, at_key, check_value, constraints_of
+from equimorph.study.signatures import arguments_of
+
+WRITTEN = ("box", "fixed", "within", "intervals")
+"""Arguments of sets with words of their own below; all others are options, by their types."""
+OPTIONS = arguments_of(equilibrium_set, left_out=WRITTEN)
+
+
+def _one_to_three(table: dict[str, Any]) -> dict[str, Any]:
+    if not 1 <= len(table) <= 3:
+        raise requirement("span one, two or three free parameters")
+    return table
+
+
+class _Extent(Section):
+    """The part of the equilibrium set that is wanted."""
+
+    box: Annotated[dict[str, Interval], AfterValidator(_one_to_three)]
+    fixed: Point = Field(default_factory=dict)
+    within: list[ComparisonText] = Field(default_factory=list)
+    intervals: list[Count] | None = None
+
+    @model_validator(mode="after")
+    def _one_each(self) -> "_Extent":
+        if self.intervals is not None and len(self.intervals) != len(self.box):
+            raise requirement("give one number of intervals for each parameter of its box")
+        return self
+
+
+_options: dict[str, Any] = {key: each for one in OPTIONS for key, each in one.keys().items()}
+SetSection: type[Any] = create_model("SetSection", __base__=_Extent, **_options)
+"""Section on the set; see `equimorph.equilibrium_set`."""
+
+
+class PointSection(Section):
+    """A point of the parameter space whose equilibria are wanted."""
+
+    at: Point = Field(min_length=1)
+
+
+def extent_of_set(structure: Structure, wanted: Any) -> Extent:
+    """Look up the names of the section on the set.
+
+    Raises
+    ------
+    InputError
+        For names that the structure does not have, or values without meaning.
+    """
+    with at_key("set.box"):
+        box = Box(**{name: (bounds[0], bounds[1]) for name, bounds in wanted.box.items()})
+        for name, corner in zip(box.names * 2, [*box.lower, *box.upper], strict=True):
+            check_value(structure, name, corner)
+    _check_fixed(structure, box, wanted.fixed)
+    constraints = _bounds(structure, wanted.within)
+    options = {each.name: getattr(wanted, each.key) for each in OPTIONS}
+    return Extent(box, wanted.fixed, constraints, _intervals(wanted), options)
+
+
+def _check_fixed(structure: Structure, box: Box, fixed: Mapping[str, float]) -> None:
+    both = sorted(set(box.names) & set(fixed))
+    if both:
+        raise InputError(f"`set.fixed` must not name what `set.box` frees; got {', '.join(both)}.")
+    with at_key("set.fixed"):
+        for name, value in fixed.items():
+            check_value(structure, name, value)
+        middle = dict(zip(box.names, 0.5 * (box.lower + box.upper), strict=True))
+        vector = parameter_vector(structure.parameters, {**middle, **fixed})
+    assert np.isfinite(vector).all()
+
+
+def _intervals(wanted: Any) -> tuple[int, ...]:
+    """Intervals of the grid; what a study leaves out takes the library's default."""
+    return tuple(wanted.intervals or INTERVALS[len(wanted.box)])
+
+
+def _bounds(structure: Structure, texts: Sequence[str]) -> tuple[Constraint, ...]:
+    """Constraints of the set; structures with equilibria without end need a bound."""
+    constraints = constraints_of(structure, texts, "set.within")
+    bounded = {each.descriptor.name for each in constraints if each.sense == "<="}
+    needed = structure.endless_in
+    if needed and needed not in bounded:
+        raise InputError(
+            f"`set.within` must bound the {needed} of this structure, which has equilibria without "
+            f'end; got {", ".join(texts) or "nothing"}. Add "{needed} <= 20".'
+        )
+    return constraints

@@ -1,0 +1,248 @@
+"""Questions of a study: sections and look-ups come from the signature of a task.
+
+A kind of question names its task, draws its figures and says its words. What a user may write, the
+defaults, and how names become objects follow from the task's signature, see `arguments`; what each
+key means, from its docstring.
+"""
+
+import inspect
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, ClassVar, Generic, TypeVar
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawn
+from pydantic import create_model, model_validator
+
+from equimorph import plotting
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Constraint, Descriptor, Progress, Schedule
+from equimorph.structures import Structure
+from equimorph.study.arguments import Argument
+from equimorph.study.fields import TaskSection
+from equimorph.study.lookup import Extent, Ground, at_key
+from equimorph.study.names import task_files
+from equimorph.study.signatures import arguments_of
+
+A = TypeVar("A")
+Drawing = Axes | Drawn
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a study: its files, and how they get into a folder."""
+
+    files: tuple[str, ...]
+    draw: Callable[[Path], None]
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question of a study, with its names looked up.
+
+    Parameters
+    ----------
+    kind
+        What is asked.
+    key
+        Of its section in the file, for messages.
+    section
+        As it is written.
+    ground
+        What all questions share.
+    values
+        Arguments of the task, by name; states are chosen when the set is there.
+    extra
+        What a kind looks up besides.
+    """
+
+    kind: "Kind[Any]"
+    key: str
+    section: Any
+    ground: Ground
+    values: Mapping[str, Any]
+    extra: Any = None
+
+    def __getitem__(self, name: str) -> Any:
+        """Argument of the task."""
+        return self.values[name]
+
+    @property
+    def name(self) -> str:
+        """Name in the file; files of the answer begin with it."""
+        return str(self.section.name)
+
+    @property
+    def title(self) -> str:
+        """Kind and name, as the page and the screen begin."""
+        return f"{self.kind.table.replace('_', ' ').capitalize()} {self.name}"
+
+    @property
+    def files(self) -> str:
+        """Beginning of the names of its files."""
+        return task_files(self.kind.table, self.name)
+
+    @property
+    def structure(self) -> Structure:
+        """Of the whole study."""
+        return self.ground.structure
+
+    @property
+    def within(self) -> tuple[Constraint, ...]:
+        """Its own constraints."""
+        return tuple(self.values["within"])
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Free parameters of the set."""
+        return self.ground.box.names
+
+    def answer(self, eset: EquilibriumSet | None, sink: Progress) -> Any:
+        """Compute the answer; `InputError` names the key."""
+        arguments = self._arguments(eset, sink)
+        with at_key(self.key):
+            return self.kind.answer(self, arguments)
+
+    def _arguments(self, eset: EquilibriumSet | None, sink: Progress) -> "Arguments":
+        """All arguments, with states and constraints of the set."""
+        values = {
+            name: each.on(self.ground, eset) if hasattr(each, "on") else each
+            for name, each in self.values.items()
+        }
+        if self.kind.within_set and not isinstance(values.get("schedule"), Schedule):
+            bounds = () if eset is None else eset.constraints
+            values["within"] = tuple(dict.fromkeys((*bounds, *self.within)))
+        monitor: list[Descriptor] = [self.ground.height]
+        given = {
+            "eset": eset, "structure": self.structure, "progress": sink, "monitor": monitor,
+        }  # fmt: skip
+        return Arguments(given | values)
+
+
+class Arguments(dict[str, Any]):
+    """Arguments by the names that tasks give them."""
+
+    def of(self, task: Callable[..., Any]) -> dict[str, Any]:
+        """Those that a task takes."""
+        return {name: self[name] for name in inspect.signature(task).parameters if name in self}
+
+    @property
+    def eset(self) -> EquilibriumSet:
+        """Set of the study, which there is where a question needs it."""
+        assert isinstance(self["eset"], EquilibriumSet)
+        return self["eset"]
+
+
+class Kind(ABC, Generic[A]):
+    """A kind of question: its task, and how the answer is drawn and told. A is the answer."""
+
+    table: ClassVar[str]
+    """Its tables in the file are ``[[table]]``."""
+    tasks: ClassVar[tuple[Callable[..., Any], ...]]
+    """What is computed; the section has a key for each argument of each."""
+    names: ClassVar[Mapping[str, str]] = {}
+    """Keys of arguments that are called otherwise in studies."""
+    left_out: ClassVar[Sequence[str]] = ()
+    """Arguments that no key gives."""
+    own: ClassVar[Mapping[str, Any]] = {}
+    """Further keys, or keys with other types, as pydantic takes them: (type, default)."""
+    natural: ClassVar[bool] = False
+    """Whether states come from natural ones, not from the set."""
+    within_set: ClassVar[bool] = False
+    """Whether constraints of the set hold, too, where the task does not get the set itself."""
+
+    @cached_property
+    def arguments(self) -> tuple[Argument, ...]:
+        """Arguments of its tasks that a study gives."""
+        found: dict[str, Argument] = {}
+        for task in self.tasks:
+            for each in arguments_of(task, self.names, self.left_out, natural=self.natural):
+                found.setdefault(each.name, each)
+        return tuple(found.values())
+
+    @cached_property
+    def section(self) -> type[TaskSection]:
+        """What may be written."""
+        keys: dict[str, Any] = {}
+        for each in self.arguments:
+            keys |= each.keys()
+        keys |= self.own
+
+        def check(section: Any) -> Any:
+            for each in self.arguments:
+                each.check(section)
+            self.check(section)
+            return section
+
+        hooks: dict[str, Any] = {"_go_together": model_validator(mode="after")(check)}
+        section: type[TaskSection] = create_model(
+            f"{self.table}_section", __base__=TaskSection, __doc__=self.__doc__,
+            __validators__=hooks, **keys,
+        )  # fmt: skip
+        return section
+
+    @cached_property
+    def takes_set(self) -> bool:
+        """Whether a task takes the set itself."""
+        parameters = [each for task in self.tasks for each in inspect.signature(task).parameters]
+        return "eset" in parameters
+
+    def needs_set(self, section: Any) -> bool:
+        """Whether it is asked of the set of the study."""
+        return self.takes_set or any(each.needs_set(section) for each in self.arguments)
+
+    def stems(self, section: Any) -> list[str]:
+        """Beginnings of the names of its files, which no other question may have."""
+        return [task_files(self.table, section.name)]
+
+    def check(self, section: Any) -> None:  # for kinds with keys that depend on each other
+        """Refuse values of several keys that do not go together."""
+
+    def look_up(self, ground: Ground, section: Any, key: str) -> Question:
+        """Look up all names of a section; `InputError` names the key of what does not fit."""
+        values = {each.name: each.look_up(ground, section, key) for each in self.arguments}
+        question = Question(self, key, section, ground, values)
+        return replace(question, extra=self.look_up_more(question))
+
+    def look_up_more(self, question: Question) -> Any:
+        """Look up, or refuse, what follows from no type."""
+        return None
+
+    def extent(self, question: Question) -> Extent | None:  # of kinds with a grid of their own
+        """Grid that the answer needs beside that of the set."""
+        return None
+
+    def answer(self, question: Question, arguments: Arguments) -> A:
+        """Compute the answer."""
+        task = self.tasks[0]
+        answer: A = task(**arguments.of(task))
+        return answer
+
+    def write_tables(self, question: Question, answer: A, folder: Path) -> None:
+        """Write what people open with other programs."""
+
+    @abstractmethod
+    def figures(
+        self, question: Question, eset: EquilibriumSet | None, answer: A
+    ) -> Sequence[Figure]:
+        """Figures of the answer."""
+
+    @abstractmethod
+    def report(self, question: Question, answer: A, folder: Path) -> list[str]:
+        """Pieces of the page; the figures are in the folder."""
+
+    @abstractmethod
+    def verdict(self, question: Question, answer: A) -> str:
+        """Return one line for the screen, in rich's markup."""
+
+
+def still(name: str, draw: Callable[[], Drawing]) -> Figure:
+    """Figure that does not move, as PNG and SVG."""
+    return Figure((f"{name}.png", f"{name}.svg"), partial(_save, draw, name))
+
+
+def _save(draw: Callable[[], Drawing], name: str, folder: Path) -> None:
+    plotting.save(draw(), folder, name)

@@ -1,1 +1,0 @@
-"""Sections of a study file: what may be written, checked before anything is computed."""
