@@ -93,7 +93,7 @@ def test_the_answer_is_read_with_the_fitted_structure(run, monkeypatch):
     def fail(*_, **__):
         raise AssertionError
 
-    monkeypatch.setattr("equimorph.study.kinds.calibration.calibrate", fail)
+    monkeypatch.setattr("equimorph.study.question.Question.answer", fail)
     again = run_study(EXAMPLES / "calibration.toml", run[1]).of("calibration")["strip"]
     first = run[0].of("calibration")["strip"]
     np.testing.assert_array_equal(again.states.z, first.states.z)
@@ -122,9 +122,9 @@ def test_exact_points_give_the_exact_unknowns(tmp_path):
         for s, (x, y) in zip((0.5, 1.0), bent.shape(np.array([0.5, 1.0])), strict=True):
             rows.append(f"{state},{load},{s},{float(x)!r},{float(y)!r}")
     problem = prepared(tmp_path, table="\n".join(rows))
-    asked = problem.tasks[0]
+    asked = problem.questions[0]
     with unchecked():
-        found = asked.kind.answer(problem.ground, None, asked.task, Silent())
+        found = asked.answer(None, Silent())
     assert found.names == ("EI", "offset of P")
     np.testing.assert_allclose(found.values, [0.023, 0.01], rtol=1e-7)
 
@@ -133,9 +133,9 @@ def test_loads_that_the_natural_state_does_not_carry_are_refused(tmp_path):
     """A straight column buckles at P = π²/4 EI/L² = 0.197 N: the lift ends there."""
     study = STUDY.replace("theta_A = 0.0", "theta_A = 1.5707963267948966")
     problem = prepared(tmp_path, study, TABLE.replace("0.2,1.0", "0.3,1.0"))
-    asked = problem.tasks[0]
+    asked = problem.questions[0]
     with unchecked(), pytest.raises(InputError, match=r"natural state carries; got state 2.*0\.19"):
-        asked.kind.answer(problem.ground, None, asked.task, Silent())
+        asked.answer(None, Silent())
 
 
 @pytest.mark.parametrize(

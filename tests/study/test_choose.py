@@ -8,8 +8,7 @@ import pytest
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import Outcome
-from equimorph.study.choose import choose_state
-from equimorph.study.sections.extent import StateSection
+from equimorph.study.states import StateSection, choose_state
 
 AT = {"x_l": 0.8, "F": 0.0}
 REST = float(np.arccos(0.8))

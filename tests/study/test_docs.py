@@ -25,4 +25,4 @@ def test_a_piece_of_the_guide_is_a_sound_study(piece: str):
     if name not in STRUCTURES:  # the bridge is long: its keys are checked, not its names
         parse_study(ARCH + piece, "guide.toml")
         return
-    assert prepare(parse_study(STRUCTURES[name] + piece, "guide.toml")).tasks
+    assert prepare(parse_study(STRUCTURES[name] + piece, "guide.toml")).questions

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from equimorph.errors import InputError
 from equimorph.structures import Rod
-from equimorph.study.expressions import parse_comparison
+from equimorph.study.fields import parse_comparison
 
 NUMBERS = st.floats(-1e9, 1e9)
 

@@ -107,8 +107,7 @@ def test_a_second_run_takes_maps_from_the_folder(run, monkeypatch):
     def fail(*_, **__):
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("equimorph.study.kinds.map.limit_load_map", fail)
-    monkeypatch.setattr("equimorph.study.kinds.map.curvature_map", fail)
+    monkeypatch.setattr("equimorph.study.question.Question.answer", fail)
     again = run_study(run[1], run[2])
     np.testing.assert_array_equal(again.of("map")["limits"].value, run[0].of("map")["limits"].value)
 
@@ -116,7 +115,7 @@ def test_a_second_run_takes_maps_from_the_folder(run, monkeypatch):
 def test_the_example_asks_for_maps_alone():
     path = Path(__file__).parents[2] / "examples" / "maps.toml"
     problem = prepare(parse_study(path.read_text(encoding="utf-8"), path.name))
-    assert [task.section.kind for task in problem.tasks] == ["limit_load_map", "curvature_map"]
+    assert [task.section.kind for task in problem.questions] == ["limit_load_map", "curvature_map"]
     assert problem.ground.extent is None
 
 

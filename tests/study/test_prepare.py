@@ -16,7 +16,7 @@ def test_a_study_becomes_objects(arch_text: str):
     assert [str(constraint) for constraint in problem.ground.extent.constraints] == [
         "max_curvature <= 20"
     ]
-    assert problem.tasks[0].task.constraints[0].bound == 20.0
+    assert problem.questions[0].within[0].bound == 20.0
 
 
 def test_what_is_left_out_takes_the_structures_default(arch_text: str):

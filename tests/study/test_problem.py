@@ -11,8 +11,8 @@ from equimorph.study.problem import parse_study, read_study_text
 def test_a_study_is_read_as_it_is_written(arch_text: str):
     study = parse_study(arch_text, "arch.toml")
     assert study.equilibrium_set.box == {"Theta": [0.2, 2.5], "Delta": [-2.0, 2.0]}
-    assert study.routes[0].via == [{"Theta": 1.3}, {"Delta": 1.3}]
-    assert study.routes[0].start.highest == "height(0.5)"
+    assert study.tasks["route"][0].via == [{"Theta": 1.3}, {"Delta": 1.3}]
+    assert study.tasks["route"][0].start.highest == "height(0.5)"
 
 
 # What is changed in the study above, and what the one line must say.
@@ -20,8 +20,8 @@ WRONG = {
     "unknown key": (
         "intervals",
         "intervalls",
-        r"`set\.intervalls` must be a key of `set` \(box, fixed, intervals, within\); "
-        r"got intervalls\. Did you mean intervals\?",
+        r"`set\.intervalls` must be a key of `set` \(accuracy, box, checks, fixed, intervals, "
+        r"seed, within\); got intervalls\. Did you mean intervals\?",
     ),
     "unknown key of the structure": (
         'load = "uniform"',

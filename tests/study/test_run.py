@@ -134,7 +134,7 @@ def test_a_finished_run_is_not_repeated(
     def fail(*_: object, **__: object) -> None:
         raise AssertionError
 
-    for name in ("run.equilibrium_set", "kinds.route.plan", "kinds.route.choose_state"):
+    for name in ("run.equilibrium_set", "question.Question.answer", "states.choose_state"):
         monkeypatch.setattr(f"equimorph.study.{name}", fail)
     for name in ("surface", "parameter_plane", "shapes", "margins", "film", "save"):
         monkeypatch.setattr(plotting, name, fail)

@@ -13,7 +13,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_template_is_a_sound_study(kind: str):
     problem = prepare(parse_study(template(kind), kind, EXAMPLES))
-    assert problem.tasks
+    assert problem.questions
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -36,7 +36,7 @@ def test_the_data_of_a_template_come_with_it(tmp_path: Path):
     write_template(tmp_path / "mine.toml", "calibration")
     data = (EXAMPLES / "calibration.csv").read_text()
     assert (tmp_path / "calibration.csv").read_text() == data
-    assert read_problem(tmp_path / "mine.toml")[2].tasks
+    assert read_problem(tmp_path / "mine.toml")[2].questions
 
 
 def test_another_ending_is_refused(tmp_path: Path):

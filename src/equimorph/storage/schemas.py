@@ -132,7 +132,9 @@ def build(kind: type, values: Mapping[str, Any], version: int = 1) -> Any:
 @cache
 def schemas() -> dict[str, Schema]:
     """All records, by the names of their schemas; those of tasks are found by themselves."""
-    kinds = [*_dataclasses(tasks), *OTHERS]
+    # maps have a layout of their own
+    found = [kind for kind in _dataclasses(tasks) if not issubclass(kind, tasks.ActuatorMap)]
+    kinds = [*found, *OTHERS]
     return {
         _name(kind): Schema(_name(kind), kind, CHANGES.get(kind.__name__, Change()))
         for kind in kinds
