@@ -112,7 +112,8 @@ def parameterisation(
             above = _place(size, (middle, bottom + _BELOW, _WIDTH, _ABOVE))
             _draw_above(figure.add_axes(above, projection="3d"), own[0].eset, height)
             top = (bottom + _BELOW + _ABOVE + 0.04) / size[1]
-            figure.text((left + 0.08) / size[0], top, f"({chr(97 + number)})", size=8)
+            if len(charts) > 1:
+                figure.text((left + 0.08) / size[0], top, f"({chr(97 + number)})", size=8)
             for k, chart in enumerate(own):
                 inches = (left + k * _WIDTH + 0.55, bottom + 0.42, _WIDTH - 0.65, 1.1)
                 chart_domain(chart, figure.add_axes(_place(size, inches)))

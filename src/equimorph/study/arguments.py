@@ -9,7 +9,7 @@ import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, Protocol, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import AfterValidator, Field
 
@@ -29,6 +29,7 @@ from equimorph.study.fields import (
 )
 from equimorph.study.lookup import (
     Ground,
+    Later,
     at_key,
     check_parameters,
     check_point,
@@ -54,13 +55,6 @@ REQUIRED = inspect.Parameter.empty
 Intervals = Annotated[list[Count], Field(min_length=2, max_length=2)]
 OBJECTIVES = ("length", "travel", "work", "clearance", "time")
 """What a route may have least of."""
-
-
-class Later(Protocol):
-    """What becomes an argument only when the set is there."""
-
-    def on(self, ground: Ground, eset: EquilibriumSet | None) -> Any:
-        """Return the argument."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +142,7 @@ class NaturalArgument(Argument):
 
 
 @dataclass(frozen=True)
-class _FirstState:
+class _FirstState(Later):
     """State in which a schedule from a file begins."""
 
     schedule: Schedule

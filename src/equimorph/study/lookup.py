@@ -1,5 +1,6 @@
 """Names of a study file, looked up: parameters, descriptors, points, with the key of what fails."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -9,6 +10,7 @@ import numpy as np
 
 from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
 from equimorph.model import Box, Constraint, Descriptor, position
 from equimorph.structures import Structure
 from equimorph.study.fields import parse_comparison
@@ -47,6 +49,14 @@ class Ground:
         """Box of the set, which there is where a question needs it."""
         assert self.extent is not None
         return self.extent.box
+
+
+class Later(ABC):
+    """What becomes an argument of a task only when the set is there."""
+
+    @abstractmethod
+    def on(self, ground: Ground, eset: EquilibriumSet | None) -> Any:
+        """Return the argument."""
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from equimorph.model import Constraint, Descriptor, Progress, Schedule
 from equimorph.structures import Structure
 from equimorph.study.arguments import Argument
 from equimorph.study.fields import TaskSection
-from equimorph.study.lookup import Extent, Ground, at_key
+from equimorph.study.lookup import Extent, Ground, Later, at_key
 from equimorph.study.names import task_files
 from equimorph.study.signatures import arguments_of
 
@@ -109,7 +109,7 @@ class Question:
     def _arguments(self, eset: EquilibriumSet | None, sink: Progress) -> "Arguments":
         """All arguments, with states and constraints of the set."""
         values = {
-            name: each.on(self.ground, eset) if hasattr(each, "on") else each
+            name: each.on(self.ground, eset) if isinstance(each, Later) else each
             for name, each in self.values.items()
         }
         if self.kind.within_set and not isinstance(values.get("schedule"), Schedule):

@@ -13,7 +13,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import names_of, parameter_vector
 from equimorph.structures import State, States, Structure
 from equimorph.study.fields import Point, Section, Step, one, requirement
-from equimorph.study.lookup import Ground, at_key, check_point, check_values, descriptor_at
+from equimorph.study.lookup import Ground, Later, at_key, check_point, check_values, descriptor_at
 
 AGREEMENT = 1e-3
 """A descriptor given with `near` agrees when it is this close: values are copied from a report."""
@@ -42,7 +42,7 @@ class NaturalSection(Section):
 
 
 @dataclass(frozen=True)
-class ChosenState:
+class ChosenState(Later):
     """A state to be chosen when the set is there.
 
     Parameters
@@ -64,7 +64,7 @@ class ChosenState:
 
 
 @dataclass(frozen=True)
-class NaturalState:
+class NaturalState(Later):
     """A state to be led from a natural one, with the key of the study file."""
 
     section: NaturalSection

@@ -47,10 +47,21 @@ class CalibrationKind(Kind[Calibration]):
     left_out = ("start", "unknown", "measured", "family")
     own = MappingProxyType(
         {
-            "data": (DataFile, ...),
-            "unknown": (Annotated[dict[str, UnknownKind], Field(min_length=1)], ...),
-            "at": (Point, Field(default_factory=dict)),
-            "sigma": (Positive | None, None),
+            "data": (DataFile, Field(description="CSV file with a row for each measured point.")),
+            "unknown": (
+                Annotated[dict[str, UnknownKind], Field(min_length=1)],
+                Field(
+                    description="Unknowns: `value`, `offset` or `gain` of a parameter, or `data`."
+                ),
+            ),
+            "at": (
+                Point,
+                Field(default_factory=dict, description="Parameters that no column gives."),
+            ),
+            "sigma": (
+                Positive | None,
+                Field(default=None, description="Standard deviation of a coordinate."),
+            ),
         }
     )
 

@@ -31,7 +31,14 @@ class ImperfectionKind(Kind[Mapping[str, ImperfectionLaw]]):
     tasks = (imperfection_law,)
     names = MappingProxyType({"start": "state"})
     left_out = ("imperfection",)
-    own = MappingProxyType({"imperfections": (Annotated[list[str], Field(min_length=1)], ...)})
+    own = MappingProxyType(
+        {
+            "imperfections": (
+                Annotated[list[str], Field(min_length=1)],
+                Field(description="Parameters that may be off, one law for each."),
+            )
+        }
+    )
 
     def look_up_more(self, question: Question) -> None:
         """Refuse imperfections that are no parameters, or the load itself."""

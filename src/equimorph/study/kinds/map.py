@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from matplotlib.axes import Axes
+from pydantic import Field
 
 from equimorph import plotting
 from equimorph.errors import InputError
@@ -36,9 +37,18 @@ class MapKind(Kind[ActuatorMap]):
     left_out = ("options", "descriptor")
     own = MappingProxyType(
         {
-            "kind": (Literal["limit_load_map", "curvature_map"], ...),
+            "kind": (
+                Literal["limit_load_map", "curvature_map"],
+                Field(description="What is mapped."),
+            ),
             "at": (Number | None, None),
-            "descriptor": (str | None, None),
+            "descriptor": (
+                str | None,
+                Field(
+                    default=None,
+                    description="Descriptor shown by a curvature map; the largest curvature.",
+                ),
+            ),
         }
     )
 

@@ -37,8 +37,17 @@ class ReachKind(Kind[Reached]):
     names = MappingProxyType({"state": "start"})
     own = MappingProxyType(
         {
-            "kind": (Literal["reachable", "attainable"], "reachable"),
-            "targets": (list[list[Number]], Field(default_factory=list)),
+            "kind": (
+                Literal["reachable", "attainable"],
+                Field(default="reachable", description="By steering alone, or at all."),
+            ),
+            "targets": (
+                list[list[Number]],
+                Field(
+                    default_factory=list,
+                    description="Values of the descriptors; the page says which can be reached.",
+                ),
+            ),
         }
     )
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+from pydantic import Field
 from rich.markup import escape as plain
 
 from equimorph import plotting
@@ -34,7 +35,16 @@ class SnapGraphKind(Kind[Snaps]):
 
     table = "snap_graph"
     tasks = (snap_graph,)
-    own = MappingProxyType({"descriptor": (str | None, None)})
+    own = MappingProxyType(
+        {
+            "descriptor": (
+                str | None,
+                Field(
+                    default=None, description="Descriptor that tells states apart in the figure."
+                ),
+            )
+        }
+    )
 
     def look_up_more(self, question: Question) -> Descriptor:
         """Look up the descriptor that tells states apart."""
