@@ -6,7 +6,8 @@ passed is not checked again. Checks are built at the first call of a function, n
 """
 
 import sys
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence, Set
+from collections import deque
+from collections.abc import Callable, Hashable, Iterator, KeysView, Mapping, Sequence, ValuesView
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from functools import partial, wraps
@@ -14,7 +15,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from inspect import isclass
 from itertools import islice
-from types import FunctionType, ModuleType
+from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any
 
 import jaxtyping
@@ -164,15 +165,15 @@ def _tuple_form(values: tuple[Any, ...]) -> Hashable:
 
 
 def _other_form(value: Any) -> Hashable:
-    """Remember how values of this type are looked at."""
+    """Remember how values of this type are looked at: open files that are mappings, by it only."""
     kind = type(value)
     if issubclass(kind, np.ndarray):
         FORMS[kind] = lambda array: (kind, array.dtype, array.shape)
     elif issubclass(kind, tuple):
         FORMS[kind] = _tuple_form
-    elif issubclass(kind, Mapping):
+    elif issubclass(kind, dict | MappingProxyType):
         FORMS[kind] = _mapping_form
-    elif issubclass(kind, Sequence | Set) and kind not in (str, bytes, range):
+    elif issubclass(kind, list | set | frozenset | deque | KeysView | ValuesView):
         FORMS[kind] = _container_form
     elif issubclass(kind, type):
         FORMS[kind] = lambda thing: thing
