@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
@@ -12,10 +13,10 @@ from PIL import Image
 from equimorph import plotting
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
-from equimorph.model import Schedule, names_of
+from equimorph.model import Disc, HalfPlane, Schedule, names_of
 from equimorph.plotting.curves import states_along
-from equimorph.plotting.surroundings import Surroundings
-from equimorph.structures import Couple, PointForce, Rod
+from equimorph.plotting.surroundings import Surroundings, obstacles_of
+from equimorph.structures import Couple, PointForce, Rod, distance_to
 from equimorph.tasks import Route
 
 NOWHERE = Route("refused", "the goal is unstable", [])
@@ -206,3 +207,17 @@ def _route_of(path, descriptors):
         way_points=np.array([0, len(path.at) - 1]),
     )
     return Route("arrived", "", [], path, 1.0, 1.0, schedule)
+
+
+def test_obstacles_of_constraints_are_hatched_where_they_forbid():
+    """A disc, and the lower half-plane: one filled area each, with its edge."""
+    arch = Rod()
+    obstacles = (Disc((0.2, 0.4), 0.05), HalfPlane((0.0, -0.01), (0.0, 1.0)))
+    within = [distance_to(arch, each) >= 0.0 for each in obstacles]
+    assert obstacles_of([*within, arch.max_curvature <= 10]) == obstacles
+    path = lift(arch.natural_state(Theta=0.9), {"Theta": 1.0})
+    ax = plotting.shapes(path, count=2, obstacles=obstacles)
+    areas = [each for each in ax.collections if isinstance(each, QuadContourSet) and each.filled]
+    assert len(areas) == 2
+    around = areas[0].get_paths()[0].vertices
+    np.testing.assert_allclose(np.hypot(*(around - [0.2, 0.4]).T), 0.05, atol=2e-3)

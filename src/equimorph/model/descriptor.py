@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
+from equimorph.model.obstacle import Obstacle
 
 Evaluate = Callable[
     [Lanes, Parameters],
@@ -74,6 +75,8 @@ class Descriptor:
     branches
         For the largest of several smooth functions: all of them (−∞ where there are fewer) and
         their places, by which they are told apart.
+    obstacle
+        For the distance of the shape from an obstacle: this one, which figures show.
     """
 
     name: str
@@ -83,6 +86,7 @@ class Descriptor:
     origin: Hashable = None
     place: Evaluate | None = None
     branches: Branches | None = None
+    obstacle: Obstacle | None = None
 
     # one and many states differ by the number of axes only, which static types do not see
     @overload

@@ -23,7 +23,7 @@ from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along, track
 from equimorph.plotting.labels import symbol
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane, shade_regions
-from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes
+from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
 from equimorph.structures import States
 from equimorph.tasks import Route
 
@@ -119,7 +119,7 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
     canvas: Any = FigureCanvasAgg(figure)
     left = figure.add_axes((0.01, 0.15, 0.54, 0.84))
     right = figure.add_axes((0.64, 0.17, 0.335, 0.79))
-    around = Surroundings(states)
+    around = Surroundings(states, obstacles_of(eset.constraints))
     frame_shapes(left, around, room=0.1)
     left.axis("off")
     around.draw_grounds(left)

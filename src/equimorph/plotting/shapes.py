@@ -14,6 +14,7 @@ from mpl_toolkits.mplot3d import proj3d
 
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
+from equimorph.model import Obstacle
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along
 from equimorph.plotting.labels import BOX, with_unit
@@ -26,7 +27,14 @@ _MARGINS = (0.54, 0.36, 0.14, 0.06)  # inches around the frame: left, bottom, ri
 Outlines = Float[np.ndarray, "states points 2"]
 
 
-def framed(states: States, ax: Axes | None, *, room: float, below: float = 0.0) -> Axes:
+def framed(
+    states: States,
+    ax: Axes | None,
+    *,
+    room: float,
+    below: float = 0.0,
+    obstacles: Sequence[Obstacle] = (),
+) -> Axes:
     """Axes with the surroundings of states and limits around all their outlines.
 
     Parameters
@@ -39,8 +47,10 @@ def framed(states: States, ax: Axes | None, *, room: float, below: float = 0.0) 
         Empty border, as a share of the width of the outlines.
     below
         Inches of a new figure that stay free for what comes below the axes.
+    obstacles
+        Half-planes and discs to draw.
     """
-    around = Surroundings(states)
+    around = Surroundings(states, tuple(obstacles))
     if ax is None:
         height = _height(around, room) + below
         ax = style.new_axes(style.SINGLE_COLUMN, height, _MARGINS)
@@ -76,7 +86,12 @@ _ROOM = 0.085
 _BAR = 0.5  # inches for the colour bar and the labels above it
 
 
-def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None) -> Axes:
+def shapes(
+    path_or_route: Path | Route,
+    count: int = 13,
+    ax: Axes | None = None,
+    obstacles: Sequence[Obstacle] = (),
+) -> Axes:
     """Shapes at even distances along a path, from dark (start) to light (goal).
 
     Parameters
@@ -87,6 +102,8 @@ def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None)
         How many shapes, the first and the last included; at least 2.
     ax
         Where to draw; None makes a figure one column wide.
+    obstacles
+        Half-planes and discs that the shapes stay clear of, to draw.
 
     Returns
     -------
@@ -102,7 +119,7 @@ def shapes(path_or_route: Path | Route, count: int = 13, ax: Axes | None = None)
     states = states_along(path_of(path_or_route), count)
     outlines = states.shape()
     with style.house_style():
-        ax = framed(states, ax, room=_ROOM, below=_BAR)
+        ax = framed(states, ax, room=_ROOM, below=_BAR, obstacles=obstacles)
         progress = np.linspace(0.0, 1.0, count)
         colours = style.progress_map()(progress)
         widths = np.full(count, 0.9)

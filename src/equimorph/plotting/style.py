@@ -69,6 +69,7 @@ _SETTINGS: dict[str, Any] = {
     "lines.solid_joinstyle": "round",
     "lines.solid_capstyle": "round",
     "grid.linewidth": 0.3,
+    "hatch.linewidth": 0.4,
     "grid.color": "#d5d5d5",
     "figure.facecolor": "white",
     "savefig.facecolor": "white",

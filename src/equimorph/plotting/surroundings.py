@@ -1,6 +1,6 @@
 """Supports, loads and actuators around shapes: what a structure says of itself, drawn."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -14,7 +14,7 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import AbstractPathEffect
 from matplotlib.patheffects import Stroke as Casing
 
-from equimorph.model import ActuatorKind, Drawing, Support, SupportKind
+from equimorph.model import ActuatorKind, Constraint, Drawing, Obstacle, Support, SupportKind
 from equimorph.plotting import style
 from equimorph.plotting.support_symbols import AWAY, HUB, SYMBOLS, UPRIGHT, Stroke
 from equimorph.structures import States
@@ -60,9 +60,12 @@ class Surroundings:
     ----------
     states
         At least one, of one structure.
+    obstacles
+        Half-planes and discs that the shapes must stay clear of.
     """
 
     states: States
+    obstacles: tuple[Obstacle, ...] = ()
 
     @cached_property
     def outlines(self) -> Lines:
@@ -164,7 +167,9 @@ class Surroundings:
             moving.place(self.loaded)
 
     def draw_grounds(self, ax: Axes) -> None:
-        """Draw the rails of supports that move."""
+        """Draw obstacles, and the rails of supports that move."""
+        for obstacle in self.obstacles:
+            _draw_obstacle(ax, obstacle)
         for support in self.drawing.supports:
             if self.moves(support):
                 ax.plot(
@@ -246,6 +251,23 @@ class Surroundings:
             whole = self.size * sign[:, None] * _TURN
             found.append(_line(ax, place[:, None] + whole, linewidth=0.9, **look))
         return found
+
+
+def obstacles_of(constraints: Sequence[Constraint]) -> tuple[Obstacle, ...]:
+    """Obstacles that constraints keep shapes away from."""
+    found = (each.descriptor.obstacle for each in constraints)
+    return tuple(each for each in found if each is not None)
+
+
+def _draw_obstacle(ax: Axes, obstacle: Obstacle) -> None:
+    """Hatch what is forbidden, as far as the axes reach: call it after `frame_shapes`."""
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    x, y = np.meshgrid(np.linspace(left, right, 400), np.linspace(low, high, 400))
+    gap = obstacle.distance(np.stack([x, y], axis=2))
+    area = ax.contourf(x, y, gap, [-np.inf, 0.0], colors=["#f2f2f2"], hatches=["////"], zorder=0.2)
+    area.set_edgecolor(style.FAINT)
+    area.set_linewidth(0.0)
+    ax.contour(x, y, gap, [0.0], colors=[style.INK], linewidths=0.8, zorder=0.3)
 
 
 def frame_shapes(ax: Axes, around: Surroundings, room: float) -> None:

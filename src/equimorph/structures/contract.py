@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
-from equimorph.model import Descriptor, Drawing, Parameter, names_of
+from equimorph.model import Descriptor, Drawing, Parameter, names_of, parameter_vector
 from equimorph.structures.approach import straight_arcs
 
 Direction = tuple[Lanes, Parameters]
@@ -154,6 +154,21 @@ class Structure(ABC):
     @abstractmethod
     def unloaded(self) -> Mapping[str, float]:
         """Parameter values at which natural states are defined (loads at zero)."""
+
+    def natural_parameters(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameters"]:
+        """Parameters of a natural state: loads as in `unloaded`, others as given or by default.
+
+        Raises
+        ------
+        InputError
+            For unknown or meaningless parameters, or a load that has another value.
+        """
+        for name, rest in self.unloaded().items():
+            if values.get(name, rest) != rest:
+                raise InputError(
+                    f"`{name}` must be {rest:g} in the natural state; got {values[name]!r}."
+                )
+        return parameter_vector(self.parameters, {**values, **self.unloaded()})
 
     @abstractmethod
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:

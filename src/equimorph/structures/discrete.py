@@ -12,7 +12,6 @@ from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.model import parameter_vector
 from equimorph.structures.contract import Advance, Structure, advance_by
 from equimorph.structures.states import State
 
@@ -185,10 +184,7 @@ class DiscreteStructure(Structure):
             For unknown or meaningless parameters, a load that is not zero, or where the
             continuation from the default parameters does not converge.
         """
-        for name in self.unloaded():
-            if values.get(name, 0.0) != 0.0:
-                raise InputError(f"`{name}` must be 0 in the natural state; got {values[name]!r}.")
-        p = parameter_vector(self.parameters, {**values, **self.unloaded()})
+        p = self.natural_parameters(values)
         z, found = self.natural(p[None])
         if not found[0]:
             settings = ", ".join(f"{name}={value:g}" for name, value in values.items())

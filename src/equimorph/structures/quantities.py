@@ -110,7 +110,8 @@ def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
         return nearest(structure.arcs(z, p), obstacle)[1]
 
     name = f"distance({obstacle})"
-    return Descriptor(name, structure.length_unit, value, "distance", structure.signature, place)
+    unit, origin = structure.length_unit, structure.signature
+    return Descriptor(name, unit, value, "distance", origin, place, obstacle=obstacle)
 
 
 def outside(structure: Structure, box: Box) -> Descriptor:

@@ -18,7 +18,6 @@ from equimorph.model import (
     Parameter,
     Support,
     SupportKind,
-    parameter_vector,
 )
 from equimorph.structures.contract import Direction, Majorant, Structure, Symmetry
 from equimorph.structures.states import State
@@ -200,9 +199,7 @@ class Spring(Structure):
 
     def natural_state(self, **values: float) -> State:
         """Unloaded state with B above A."""
-        if values.get("F", 0.0) != 0.0:
-            raise InputError(f"`F` must be 0 in the natural state; got {values['F']!r}.")
-        p = parameter_vector(self.parameters, values)
+        p = self.natural_parameters(values)
         return State(self, self.natural(p[None])[0][0], p)
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:

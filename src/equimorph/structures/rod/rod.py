@@ -8,7 +8,7 @@ import numpy as np
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Drawing, Parameter, names_of, parameter_vector
+from equimorph.model import Drawing, Parameter, names_of
 from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.described import Described
@@ -278,10 +278,7 @@ class Rod(Described):
             straight rod has no upright side), where the continuation meets a fold, or where the
             elements do not resolve it.
         """
-        for name in self.unloaded():
-            if values.get(name, 0.0) != 0.0:
-                raise InputError(f"`{name}` must be 0 in the natural state; got {values[name]!r}.")
-        p = parameter_vector(self.parameters, values)
+        p = self.natural_parameters(values)
         natural = self._natural(p[None])
         if natural.outcome[0] == Outcome.FOUND:
             return State(self, natural.z[0], p)
