@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.manifold.complex.consistency import contradicted, turned_off_folds
+from equimorph.manifold.complex.description import contradicted, turned_off_folds
 from equimorph.manifold.geometry.topology import adjacency, senses
 from equimorph.model import Box, Constraint, Descriptor
 from oracles.complexes import SINGULAR, assert_faithful

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, stability_distance
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import faces_of, keys_of
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.model import Box

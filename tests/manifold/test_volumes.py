@@ -13,8 +13,8 @@ from equimorph.manifold import (
     stability_distance,
 )
 from equimorph.manifold.complex.marked_complex import fabric_of
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     adjacency,
@@ -24,7 +24,7 @@ from equimorph.manifold.geometry.topology import (
     orientation,
 )
 from equimorph.manifold.lifting import cells
-from equimorph.manifold.lifting.volumes import volumes_over
+from equimorph.manifold.lifting.cells import volumes_over
 from equimorph.manifold.refining.tetrahedra import dihedrals
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring

@@ -5,7 +5,6 @@ from scipy.spatial import cKDTree
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import fabric_of
-from equimorph.manifold.complex.separate_sheets import parted
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     adjacency,
@@ -13,6 +12,7 @@ from equimorph.manifold.geometry.topology import (
     flags_of,
     labels,
     orientation,
+    parted,
     projected_volume,
 )
 

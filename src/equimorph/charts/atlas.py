@@ -15,7 +15,7 @@ from equimorph.charts.paths import AtlasPath, path_over_cells
 from equimorph.charts.preparation import crossing_facets, first_copies
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, pieces
 from equimorph.structures import State, States
 

@@ -23,7 +23,7 @@ from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.preparation import cut_along_crossings, flip_overturned
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
 from equimorph.tolerances import SAME_STATE

@@ -13,8 +13,8 @@ from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits

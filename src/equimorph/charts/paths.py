@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from equimorph.charts.preparation import first_copies
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.lookup.over import rooted

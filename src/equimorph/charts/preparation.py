@@ -7,7 +7,6 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
-from equimorph.manifold.complex.separate_sheets import parted
 from equimorph.manifold.geometry.points import CROSSING
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
@@ -16,6 +15,7 @@ from equimorph.manifold.geometry.topology import (
     flags_of,
     keys_of,
     orientation,
+    parted,
     pieces,
 )
 from equimorph.manifold.queries.cusps import cusps_on_edges

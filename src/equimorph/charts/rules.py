@@ -18,7 +18,7 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.model import Box, Descriptor, Grid, parameter_vector, position
 from equimorph.structures import State, States, Structure
 

@@ -8,8 +8,8 @@ from equimorph.manifold.complex.equilibrium_set import (
     EquilibriumSet,
     Stratum,
 )
+from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.manifold.lookup.states_over import StatesOver
-from equimorph.manifold.lookup.straight_lifts import lift_to
 from equimorph.manifold.queries.components import Components, components
 from equimorph.manifold.queries.cusps import Cusps, cusps
 from equimorph.manifold.queries.levels import (

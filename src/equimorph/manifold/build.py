@@ -15,17 +15,15 @@ from equimorph.manifold.complex.arguments import (
     constraints,
     whole_number,
 )
-from equimorph.manifold.complex.base_mesh import BaseMesh, Lines, coarse_grid, grid_lines, grid_mesh
+from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.kept_sets import recall_set
-from equimorph.manifold.complex.questions import question_of_set
+from equimorph.manifold.complex.kept_sets import question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.lifting.account import account
-from equimorph.manifold.lifting.bisection import bisect
-from equimorph.manifold.lifting.cells import CellFinder, Cells
+from equimorph.manifold.lifting.cells import CellFinder, Cells, account
 from equimorph.manifold.lifting.completeness import check, seeds_from
 from equimorph.manifold.lifting.crossing_branches import flood_crossings
 from equimorph.manifold.lifting.flood import flood
+from equimorph.manifold.lifting.grid import Lines, bisect, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
 from equimorph.manifold.refining.refinement import refined

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold import EquilibriumSet, part, restricted
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.locate import cell_of, pieces_of
 from equimorph.model import Constraint, Descriptor

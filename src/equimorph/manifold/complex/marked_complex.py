@@ -15,7 +15,6 @@ from jaxtyping import Bool, Float, Int
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.separate_sheets import parted
 from equimorph.manifold.complex.vertices import Vertices, on_constraints, vertices_of
 from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
 from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING
@@ -25,7 +24,7 @@ from equimorph.manifold.geometry.tangents import (
     Ends,
     best_corners,
 )
-from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of, senses
+from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of, parted, senses
 from equimorph.structures import States
 
 ON_FOLD, ON_CAP, SIDES = 1, 2, 4

@@ -7,10 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.geometry.crossings import crossing_frames
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Corrected
 from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (
     cap_slopes,
     fold_slopes,

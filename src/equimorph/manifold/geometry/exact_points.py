@@ -18,9 +18,8 @@ from equimorph.equilibria.point_conditions import Values as TakesValues
 from equimorph.equilibria.settle import Guards, Planes, Settled, Tangents, settle
 from equimorph.equilibria.settle import lower_index as index_below
 from equimorph.manifold.geometry.crossings import reduction
-from equimorph.manifold.geometry.embedding import embed, principal_directions
 from equimorph.manifold.geometry.points import CAP, CORNER, FOLD, Points
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed, principal_directions
 from equimorph.manifold.geometry.tangents import orthonormal
 
 Span = Float[np.ndarray, "lanes k d"]

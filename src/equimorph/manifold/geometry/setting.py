@@ -1,10 +1,11 @@
-"""What is lifted: the structure, its free parameters, and the constraints that bound the set."""
+"""What is lifted: the structure, its free parameters and constraints; and its metric."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.model import Constraint
 from equimorph.structures import Structure
 
@@ -34,3 +35,27 @@ class Setting:
         """Open limits of the meaning of the free parameters."""
         chosen = [self.structure.parameters[k] for k in self.free]
         return np.array([[each.lower for each in chosen], [each.upper for each in chosen]])
+
+
+Coordinates = Float[np.ndarray, "lanes coordinates"]
+
+
+def embed(setting: Setting, z: Lanes, p: Parameters) -> Coordinates:
+    """Configuration in the metric and scaled free parameters: Euclidean distances measure."""
+    structure = setting.structure
+    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    return np.concatenate([u, p[:, setting.free] / setting.scales], axis=1)
+
+
+def principal_directions(
+    deviations: Float[np.ndarray, "lanes points coordinates"], count: int
+) -> Float[np.ndarray, "lanes count coordinates"]:
+    """Orthonormal directions in which clouds of points around their middles extend most.
+
+    From the eigenvectors of the points' inner products, which are fewer than the coordinates.
+    """
+    products = deviations @ np.swapaxes(deviations, 1, 2)
+    values, vectors = np.linalg.eigh(products)
+    chosen = np.swapaxes(vectors[:, :, ::-1][:, :, :count], 1, 2)
+    lengths = np.sqrt(np.maximum(values[:, ::-1][:, :count], 1e-300))
+    return np.asarray(chosen @ deviations / lengths[:, :, None])

@@ -10,9 +10,8 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.linalg import Border
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.kernels import square_sides
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 
 CHUNK = 2048
 DIFFERENCE = 1e-5

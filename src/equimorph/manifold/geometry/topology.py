@@ -285,3 +285,37 @@ def unbalanced(
     induced = _induced_signs(cells) * sense.signs[:, None]
     total = np.bincount(whole.cell_facets.ravel(), weights=induced.ravel())
     return int((total[facets] != 0).sum()) if len(cells) else 0
+
+
+def parted(
+    cells: Cells, crossings: Int[np.ndarray, "x d"], count: int
+) -> tuple[Cells, Int[np.ndarray, " V"]]:
+    """Cells parted at facets on crossings, and for each vertex then the one that it was.
+
+    Cells keep a vertex of a crossing in common as long as facets lead from one to the other around
+    it without crossing. The first `count` vertices are those that there were.
+    """
+    if len(crossings) == 0:
+        return cells, np.arange(count)
+    corners = cells.shape[1]
+    whole = adjacency(cells)
+    joined = ~flags_of(whole.facets, crossings)[whole.across]
+    links, facets = whole.links[joined], whole.facets[whole.across[joined]]
+    same = [cells[own][:, None] == facets[:, :, None] for own in links.T]
+    first, second = (
+        (own[:, None] * corners + at.argmax(axis=2)).ravel()
+        for own, at in zip(links.T, same, strict=True)
+    )
+    graph = coo_array((np.ones(len(first)), (first, second)), shape=(cells.size, cells.size))
+    _, around = connected_components(graph, directed=False)
+    met = np.isin(cells.ravel(), crossings)
+    # vertices off the crossings stay one, whatever their cells are like
+    key = np.where(met, around, -1 - cells.ravel())
+    _, first, label = np.unique(key, return_index=True, return_inverse=True)
+    origin = cells.ravel()[first]
+    order = np.argsort(origin, kind="stable")
+    number = np.empty(len(order), int)
+    again = np.diff(origin[order], prepend=-1) == 0
+    number[order] = np.where(again, count + np.cumsum(again) - 1, origin[order])
+    more = origin[order][again]
+    return number[label].reshape(cells.shape), np.concatenate([np.arange(count), more])

@@ -1,16 +1,108 @@
-"""Sheet lifting, part six: the cells of the set, of any dimension."""
+"""From discs and balls to the cells of a set, and from these to the set itself."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Float, Int
 
+from equimorph.manifold.complex.description import Complex, Frame, Lifting, described
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
-from equimorph.manifold.lifting.discs import assemble
+from equimorph.manifold.lifting.balls import Balls, fill
+from equimorph.manifold.lifting.crossing_branches import lonely
+from equimorph.manifold.lifting.discs import Discs, assemble
+from equimorph.manifold.lifting.edges import EFFORTS
 from equimorph.manifold.lifting.loops import find_loops
-from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.volumes import Volumes, volumes_over
+from equimorph.manifold.lifting.pairing import Pairing, abandoned
+from equimorph.model import Box
+from equimorph.structures import States
+
+
+@dataclass(frozen=True)
+class Volumes:
+    """Discs and balls, with what they depend on.
+
+    doubtful: triangles of `discs`, and tetrahedra of `balls`, that need division. What discs say of
+    folds and constraints is not kept: balls say it of their facets.
+    """
+
+    triangles: Int[np.ndarray, "T 3"]
+    tetrahedra: Int[np.ndarray, "N 4"]
+    faces: Int[np.ndarray, "N 4"]
+    around: Float[np.ndarray, "T 6"]
+    discs: Discs
+    balls: Balls
+
+
+def volumes_over(pairing: Pairing, known: Volumes | None) -> Volumes:
+    """Balls over all grid tetrahedra; those that are known stay where nothing changed."""
+    mesh, around = pairing.mesh, _around(pairing)
+    same = np.zeros(len(mesh.triangles), bool)
+    if known is not None:
+        count = len(known.triangles)
+        same[:count] = (mesh.triangles[:count] == known.triangles).all(axis=1)
+        same[:count] &= (around[:count] == known.around).all(axis=1)
+        same[known.discs.doubtful] = False
+    discs = assemble(pairing, find_loops(pairing, ~same))
+    discs = discs if known is None else _with_discs(discs, known.discs, same)
+    same[discs.doubtful] = False
+    kept = np.zeros(len(mesh.tetrahedra), bool)
+    if known is not None:
+        count = len(known.tetrahedra)
+        kept[:count] = (mesh.tetrahedra[:count] == known.tetrahedra).all(axis=1)
+        kept[:count] &= (mesh.faces[:count] == known.faces).all(axis=1)
+        kept &= same[mesh.faces].all(axis=1)
+        kept[known.balls.doubtful] = False
+    balls = fill(pairing, discs, ~kept)
+    balls = balls if known is None else _with_balls(balls, known.balls, kept)
+    return Volumes(mesh.triangles, mesh.tetrahedra, mesh.faces, around, discs, balls)
+
+
+def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
+    """What tells whether something changed around each triangle: its curves and its points."""
+    mesh, points, curves = pairing.mesh, pairing.points, pairing.curves
+    rays = pairing.rays[: points.count]
+    in_use = np.zeros(len(curves.edge), bool)
+    in_use[rays[rays >= 0]] = True
+    live = np.flatnonzero(in_use)
+    edge = np.array(curves.edge, int)[live]
+    # sums of irrational shares differ for different sets of curves
+    share = np.modf((live + 1) * np.sqrt(2.0))[0]
+    of_edge = np.bincount(edge, share, len(mesh.edges))
+    vertex = points.vertex[: points.count]
+    of_vertex = np.bincount(vertex[vertex >= 0], minlength=len(mesh.vertices))
+    return np.concatenate([of_edge[mesh.sides], of_vertex[mesh.triangles]], axis=1)
+
+
+def _with_discs(new: Discs, known: Discs, same: Bool[np.ndarray, " T"]) -> Discs:
+    """New discs, and known ones over triangles that are the same."""
+    kept = same[known.owner]
+    return replace(
+        new,
+        corners=np.concatenate([new.corners, known.corners[kept]]),
+        index=np.concatenate([new.index, known.index[kept]]),
+        owner=np.concatenate([new.owner, known.owner[kept]]),
+        met=np.concatenate([new.met, known.met[kept]]),
+        sheet=np.concatenate([new.sheet, known.sheet[kept]]),
+    )
+
+
+def _with_balls(new: Balls, known: Balls, kept: Bool[np.ndarray, " N"]) -> Balls:
+    """New balls, and known ones over tetrahedra that are the same."""
+
+    def joined(name: str, owner: str) -> Int[np.ndarray, "..."]:
+        own = kept[getattr(known, owner)]
+        return np.concatenate([getattr(new, name), getattr(known, name)[own]])
+
+    return replace(
+        new,
+        **{name: joined(name, "owner") for name in ("corners", "index", "owner")},
+        **{name: joined(name, "fold_owner") for name in ("folds", "fold_owner")},
+        **{name: joined(name, "cap_owner") for name in ("caps", "cap_owner")},
+        **{name: joined(name, "crossing_owner") for name in ("crossings", "crossing_owner")},
+    )
 
 
 def _nothing() -> Int[np.ndarray, " 0"]:
@@ -77,3 +169,59 @@ def _segments(pairing: Pairing) -> Cells:
     used = np.unique(corners)
     marked = (used[kind[used] == each, None] for each in (FOLD, CAP, CROSSING))
     return Cells(corners, index[regular], *marked)
+
+
+def account(
+    pairing: Pairing,
+    cells: Cells,
+    given: tuple[Box, Mapping[str, float], tuple[int, ...]],
+    bisected: int,
+) -> EquilibriumSet:
+    """Number the used points, find pieces, folds and boundaries, and write the audit."""
+    used = np.flatnonzero(np.bincount(cells.corners.ravel(), minlength=pairing.points.count))
+    number = np.full(pairing.points.count, -1)
+    number[used] = np.arange(len(used))
+    store = pairing.points
+    whole = Complex(
+        States(pairing.setting.structure, store.z[used].copy(), store.p[used].copy()),
+        store.kind[used].copy(),
+        store.index[used].copy(),
+        store.vertex[used].copy(),
+        number[cells.corners],
+        cells.index,
+        _kept(number[cells.folds]),
+        _kept(number[cells.caps]),
+        _kept(number[cells.crossings]),
+    )
+    lost = abandoned(pairing)
+    lifting = Lifting(
+        len(lost),
+        sum(int(pairing.effort[edge]) >= EFFORTS for _, edge in lost),
+        pairing.conflicts,
+        _parity_violations(pairing),
+        cells.doubtful if len(pairing.setting.free) > 1 else len(lonely(pairing)),
+        bisected,
+    )
+    return described(Frame(pairing.setting, pairing.mesh, *given), whole, lifting)
+
+
+def _kept(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:
+    """Facets whose points are all in use."""
+    return facets[(facets >= 0).all(axis=1)]
+
+
+def _parity_violations(pairing: Pairing) -> int:
+    """Curves whose ends contradict sign det F_z: equal parity across, opposite on return.
+
+    It is the other way round behind a crossing, where det [F_z F_t; tᵀ] changes its sign.
+    """
+    curves, points = pairing.curves, pairing.points
+    start, end = np.array(curves.start, int), np.array(curves.end, int)
+    crossed = np.zeros(len(start), int)
+    for curve, inner in curves.inner.items():
+        crossed[curve] = np.count_nonzero(points.kind[inner] == CROSSING)
+    closed = end >= 0
+    start, end = start[closed], end[closed]
+    returned = (points.vertex[start] == points.vertex[end]).astype(int)
+    change = points.index[start] - points.index[end] - returned - crossed[closed]
+    return int((change % 2 == 1).sum())

@@ -12,7 +12,7 @@ from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.seeds import Seeds, polished
-from equimorph.manifold.lookup.straight_lifts import lift_to
+from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.model import Progress, position
 from equimorph.structures import States
 

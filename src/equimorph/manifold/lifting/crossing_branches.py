@@ -13,10 +13,10 @@ from equimorph.equilibria.steps import Front, step_along
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.geometry.crossings import reduction
+from equimorph.manifold.lifting.edges import EFFORTS
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polished
-from equimorph.manifold.lifting.traced_edges import EFFORTS
 from equimorph.model import Progress
 
 DISTANCES = (0.03, 0.003, 0.0003)

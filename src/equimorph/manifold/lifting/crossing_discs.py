@@ -12,7 +12,6 @@ from jaxtyping import Float
 from scipy.optimize import brentq
 
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import (
     Aim,
     Pinned,
@@ -21,9 +20,9 @@ from equimorph.manifold.geometry.exact_points import (
     pin_crossings,
 )
 from equimorph.manifold.geometry.points import CROSSING
-from equimorph.manifold.lifting.disc_plans import Plan, chord_of, planes
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.polygon_cuts import MEETING, TURN, Chord
+from equimorph.manifold.lifting.polygon_cuts import MEETING, TURN, Chord, Plan, chord_of, planes
 
 Ways = list[list[Chord]]
 

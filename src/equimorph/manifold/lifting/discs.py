@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.equilibria.critical import null_border
 from equimorph.manifold.geometry.exact_points import pin
-from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, Points
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import flags_of
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.crossing_discs import (
@@ -16,18 +17,20 @@ from equimorph.manifold.lifting.crossing_discs import (
     put_hubs,
     split_crossings,
 )
-from equimorph.manifold.lifting.disc_plans import SINGULAR, Plan, chord_of, planes
-from equimorph.manifold.lifting.fold_normals import existence_normals
 from equimorph.manifold.lifting.loops import Loops, Polygon
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import (
     MEETING,
+    SINGULAR,
     TURN,
     Chord,
     Piece,
+    Plan,
+    chord_of,
     chords_to_split,
     cut,
     match_folds,
+    planes,
     triangulate,
 )
 
@@ -344,3 +347,24 @@ def _triangulate(pairing: Pairing, pieces: list[tuple[Plan, Piece, int]], found:
         found.index.extend([index] * len(own))
         found.owner.extend([plan.polygon.triangle] * len(own))
         found.sheet.extend([plan.sheet] * len(own))
+
+
+def existence_normals(
+    setting: Setting, points: Points, folds: Int[np.ndarray, " n"]
+) -> Float[np.ndarray, "n d"]:
+    """Vectors, in scaled free parameters, towards the side of a fold where sheets exist.
+
+    Near a fold with null vector φ the set is ``φᵀF_p δp + ½ φᵀF_zz[φ, φ] ξ² = 0``. The vector is
+    continuous along a fold and turns round only at a cusp.
+    """
+    structure, free = setting.structure, setting.free
+    z, p = points.z[folds], points.p[folds]
+    phi = null_border(structure, z, p)
+    none = np.zeros_like(p)
+    bend = np.einsum("li,li->l", phi, structure.second_derivative(z, p, (phi, none), (phi, none)))
+    slope = np.empty((len(folds), len(free)))
+    for k in range(len(free)):
+        dp = np.zeros_like(p)
+        dp[:, free[k]] = setting.scales[k]
+        slope[:, k] = np.einsum("li,li->l", phi, structure.parameter_derivative(z, p, dp))
+    return np.asarray(-slope * np.sign(bend)[:, None])

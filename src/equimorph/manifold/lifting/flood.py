@@ -9,9 +9,8 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.points import GRID
+from equimorph.manifold.lifting.edges import lift_directly, trace_rays
 from equimorph.manifold.lifting.pairing import HARD, LONG, UNTRACED, Pairing, Rays
-from equimorph.manifold.lifting.single_steps import lift_directly
-from equimorph.manifold.lifting.traced_edges import trace_rays
 from equimorph.model import Progress
 
 STEPS = 4

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.points import CROSSING
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import placed_frames, tangent_frames
 from equimorph.manifold.lifting.pairing import Pairing
 

@@ -8,7 +8,7 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.lifting.single_steps import lift_directly
+from equimorph.manifold.lifting.edges import lift_directly
 from equimorph.model import position
 
 COARSE = 5

@@ -15,9 +15,8 @@ from numpy.polynomial import chebyshev
 
 from equimorph.arrays import Cells, Flags, Lanes, Values
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import adjacency, keys_of, rows_of
 from equimorph.manifold.lookup.cell_index import Hits
 from equimorph.structures import States

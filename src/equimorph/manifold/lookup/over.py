@@ -11,8 +11,8 @@ from scipy.spatial.distance import cdist
 from equimorph.arrays import Lanes
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.geometry.topology import adjacency, senses
-from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits
-from equimorph.manifold.lookup.exact_states import Points, exact_states
+from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits, Rims, cells_beside
+from equimorph.manifold.lookup.exact_states import Points, exact_states, lift_to, turned_back
 from equimorph.manifold.lookup.kernels import (
     balanced,
     guesses,
@@ -21,8 +21,6 @@ from equimorph.manifold.lookup.kernels import (
     worth_trying,
 )
 from equimorph.manifold.lookup.near_crossings import NearCrossings
-from equimorph.manifold.lookup.rims import Rims, cells_beside
-from equimorph.manifold.lookup.straight_lifts import lift_to, turned_back
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
 

@@ -12,10 +12,9 @@ from equimorph.manifold.complex.cuts import roots
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import HOLE, ON_FOLD, RIM, Fabric, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import lower_index
 from equimorph.manifold.geometry.points import CROSSING
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.structures import States
 
 REACH = 1.5

@@ -22,9 +22,8 @@ from equimorph.manifold.complex.description import Frame, Lifting, described
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import HOLE, ON_CAP, Fabric, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import adjacency, pieces
 from equimorph.model import Constraint, Descriptor

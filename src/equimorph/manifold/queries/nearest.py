@@ -8,9 +8,8 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Rows, Values
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (
     best_corners,
     fold_slopes,

@@ -11,7 +11,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import placed_frames
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.locate import pieces_of

@@ -11,10 +11,9 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.complex.marked_complex import ON_CAP, ON_FOLD, Fabric
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected, lower_index
 from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import split_step
 
 FIRST, LEAST = 0.25, 1e-3

@@ -15,9 +15,8 @@ from equimorph.manifold.complex.arguments import check_accuracy
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.description import Frame, Lifting, described
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.kept_sets import recall_set
+from equimorph.manifold.complex.kept_sets import question_of_refinement, recall_set
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
-from equimorph.manifold.complex.questions import question_of_refinement
 from equimorph.manifold.refining.bettering import sharp
 from equimorph.manifold.refining.corners import smallest_free_angle
 from equimorph.manifold.refining.deviations import Memory, known

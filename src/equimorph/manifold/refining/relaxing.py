@@ -21,9 +21,9 @@ from equimorph.manifold.complex.marked_complex import (
     squared_sides,
 )
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected, lower_index
 from equimorph.manifold.geometry.points import CAP, CORNER, FOLD, REFINED
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.refining.collapsing import Around
 from equimorph.manifold.refining.deviations import deviations

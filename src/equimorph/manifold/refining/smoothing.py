@@ -7,9 +7,9 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.complex.marked_complex import Fabric, edges_of
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected
 from equimorph.manifold.geometry.points import REFINED
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.refining.surgery import best_apart, moved
 

@@ -9,8 +9,7 @@ from jaxtyping import Float
 
 from equimorph.equilibria import Event, Leg
 from equimorph.errors import InputError
-from equimorph.manifold.geometry.embedding import embed
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.motion.blocks import stable_path

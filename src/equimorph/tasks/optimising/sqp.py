@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Frames
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.tasks.optimising.programme import Expansion, Programme
 from equimorph.tasks.optimising.quadratic import Answer, Quadratic, solve
 from equimorph.tasks.optimising.tangent_steps import (

@@ -8,9 +8,8 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.equilibria.sensitivity import answers
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.embedding import embed
 from equimorph.manifold.geometry.exact_points import Aim, corrected
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
 from equimorph.manifold.queries.nearest import spots
 from equimorph.structures import State

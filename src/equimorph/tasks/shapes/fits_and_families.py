@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from equimorph.arrays import Edges
 from equimorph.manifold import Level, level_set
-from equimorph.manifold.geometry.embedding import embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import pieces
 from equimorph.manifold.queries.nearest import local_minima
 from equimorph.model import Constraint, combined

@@ -9,8 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.equilibria.point_conditions import Values
 from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.embedding import embed
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Descriptor
 from equimorph.tasks.optimising.tangent_steps import SetPoints, unconstrained_setting
