@@ -5,9 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equimorph.manifold.complex.base_mesh import MARGIN, SHIFT, BaseMesh
+from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.topology import adjacency, euler_characteristic, projected_volume
-from equimorph.manifold.lifting.grid import bisect, coarse_grid, grid_lines, grid_mesh
+from equimorph.manifold.lifting.grid import (
+    MARGIN,
+    SHIFT,
+    bisect,
+    coarse_grid,
+    grid_lines,
+    grid_mesh,
+)
 from equimorph.model import Box
 
 BOX = Box(a=(-1.0, 2.0), b=(-2.0, 2.0))
