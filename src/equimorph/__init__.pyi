@@ -39,6 +39,7 @@ from .equilibria import (
     Branch as Branch,
     CriticalCurve as CriticalCurve,
     Event as Event,
+    EventKind as EventKind,
     Landing as Landing,
     Lifts as Lifts,
     LimitLoad as LimitLoad,

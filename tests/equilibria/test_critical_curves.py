@@ -6,6 +6,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import equimorph as em
+from equimorph.equilibria.locus import Locus, nearest
+from equimorph.equilibria.trace_locus import trace_locus
+from equimorph.equilibria.trace_options import EventKind, TraceOptions
 from equimorph.errors import InputError
 from oracles.polynomial import Polynomial, pitchfork_form, slaved
 from typecheck import unchecked
@@ -270,3 +273,31 @@ def test_too_few_steps_are_an_end_that_says_so():
     )
     assert [end.kind for end in curve.ends] == ["lost", "lost"]
     assert curve.ends[0].detail == "no end in 3 steps"
+
+
+def test_without_conditions_the_general_tracer_follows_the_path_of_a_lift():
+    """Lifts, the case without conditions, march in compiled kernels: both must agree.
+
+    Tolerance: states are exact to round-off, times the slope of the path near its fold.
+    """
+    arch = em.Rod(elements=6, degree=6)
+    rest = arch.natural_state(Theta=0.9, Delta=0.4)
+    path = em.lift(rest, {"q": 8.0})
+    assert path.end.kind == EventKind.FOLD
+    load = np.array([[each.name for each in arch.parameters].index("q")])[0]
+    line = Locus(arch, rest.p, load, (), singular=False)
+    start, found = nearest(line, line.joined(rest.z[None], rest.p[None]))
+    assert found.all()
+    start = start.turned(np.sign(start.tangent[:, -1]))
+    _, forward = trace_locus(line, start, [], TraceOptions(largest_step=0.2, steps=25))
+    critical = forward.landmarks[0]
+    assert critical.kind == EventKind.CRITICAL
+    z, p = line.split(critical.spot.x)
+    np.testing.assert_allclose(p[0], path.end.state.p, rtol=1e-9)
+    np.testing.assert_allclose(z[0], path.end.state.z, rtol=1e-6, atol=1e-6)
+    before = [x for x, way in zip(forward.spots, forward.lengths, strict=True)
+              if way < critical.length - 0.3]  # fmt: skip
+    assert len(before) > 3
+    z, p = line.split(np.concatenate([spot.x for spot in before[1:]]))
+    for state, q in zip(z, p[:, load[0]], strict=True):
+        np.testing.assert_allclose(em.lift(rest, {"q": q}).end.state.z, state, rtol=0, atol=1e-9)

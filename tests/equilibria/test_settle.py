@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria.conditions import cubic, gap, quadratic
+from equimorph.equilibria.critical_tests import cubic, gap, quadratic
 from equimorph.equilibria.point_conditions import Crossing, Fold, Plane, Values, Vanishing
 from equimorph.equilibria.settle import (
     Guards,

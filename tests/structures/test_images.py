@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria.pools import Ground
+from equimorph.equilibria.random_search import Ground
 from typecheck import unchecked
 
 BAYS = [("A", "B"), ("B", "C"), ("C", "D")]

@@ -1,6 +1,5 @@
 """Equilibria: solving, lifting, events, limit loads, searching."""
 
-from equimorph.equilibria.completeness import Completeness
 from equimorph.equilibria.critical_curves import (
     CriticalCurve,
     branch_curve,
@@ -10,19 +9,18 @@ from equimorph.equilibria.critical_curves import (
     grazing_curve,
 )
 from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
-from equimorph.equilibria.imperfections import Corner, corners_of, worst_named, worst_over
 from equimorph.equilibria.legs import Leg, Waypoint
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
 from equimorph.equilibria.limit_load import LimitLoad, LimitLoads, limit_load
 from equimorph.equilibria.paths import lift_legs
-from equimorph.equilibria.pools import distinct
-from equimorph.equilibria.ranges import held_over
-from equimorph.equilibria.search import FoundStates, find_equilibria, search_points
+from equimorph.equilibria.random_search import distinct
+from equimorph.equilibria.search import Completeness, FoundStates, find_equilibria, search_points
 from equimorph.equilibria.settle import Guards, Settled, settle
 from equimorph.equilibria.snap import Landing, snap_landing
 from equimorph.equilibria.switching import Branch, branches
 from equimorph.equilibria.trace import Traces, trace
-from equimorph.equilibria.trace_options import TraceOptions
+from equimorph.equilibria.trace_options import EventKind, TraceOptions
+from equimorph.equilibria.worst_cases import Corner, corners_of, held_over, worst_named, worst_over
 
 __all__ = [
     "Branch",
@@ -30,6 +28,7 @@ __all__ = [
     "Corner",
     "CriticalCurve",
     "Event",
+    "EventKind",
     "FoundStates",
     "Guards",
     "Landing",

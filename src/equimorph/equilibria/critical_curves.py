@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Values
-from equimorph.equilibria.conditions import (
+from equimorph.equilibria.critical import normal_form
+from equimorph.equilibria.critical_tests import (
     bound,
     branching,
     branchings,
@@ -19,7 +20,6 @@ from equimorph.equilibria.conditions import (
     places,
     quadratic,
 )
-from equimorph.equilibria.critical import normal_form
 from equimorph.equilibria.lift import Event
 from equimorph.equilibria.locus import Locus, Spots, nearest
 from equimorph.equilibria.trace_locus import (

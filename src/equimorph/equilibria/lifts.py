@@ -12,8 +12,8 @@ from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.hidden_events import with_multiple_points
 from equimorph.equilibria.legs import Leg, listed, of_some, prepared, violated
 from equimorph.equilibria.paths import Event
-from equimorph.equilibria.trace import KINDS, Traces, trace
-from equimorph.equilibria.trace_options import EventCode, TraceOptions
+from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import States
@@ -102,7 +102,7 @@ class Lifts:
     def __getitem__(self, lane: int) -> Event:
         """How one of them ended."""
         words = str(self.criticality[lane]) or None, self.detail.get(lane, "")
-        return Event(str(self.kind[lane]), self.states[lane], float(self.at[lane]), *words)
+        return Event(EventKind(self.kind[lane]), self.states[lane], float(self.at[lane]), *words)
 
     @property
     def arrived(self) -> Flags:
@@ -205,7 +205,7 @@ class _Ledger:
         if len(points.t):
             z, p = curve.take(points.lanes).states(points.z, points.t)
             none = np.full(len(points.t), "", "U1")
-            regular = (np.full(len(points.t), REGULAR), points.index, none)
+            regular = (np.full(len(points.t), EventCode.REGULAR), points.index, none)
             self.points.append(_Part(lanes[points.lanes], z, p, number + points.t, *regular))
 
     def lifts(self, within: tuple[Constraint, ...], recorded: bool) -> Lifts:
@@ -237,14 +237,9 @@ class _Ledger:
         return Marks(lane, states, at, _kinds(code), index, words)
 
 
-REGULAR = -2
-"""Code of a point at which nothing happens."""
-
-
 def _kinds(code: Int[np.ndarray, " some"]) -> Shaped[np.ndarray, " some"]:
-    words = {**KINDS, REGULAR: ""}
     known, which = np.unique(code, return_inverse=True)
-    names = np.array([words[int(each)] for each in known], "U16")
+    names = np.array([EventCode(each).kind for each in known], "U16")
     return np.asarray(names[which])
 
 

@@ -116,7 +116,11 @@ def nearest(locus: Locus, x: Points) -> tuple[Spots, Flags]:
     guards = Guards(ITERATIONS, converged=ACCEPTED, contraction=SPREADING, free=1,
                     multipliers=MULTIPLIERS)  # fmt: skip
     frame = Tangents(locus.unfolded)
-    found = _settle(locus, x, (_vanishing(locus.tests, len(x)),), guards, frame)
+    conditions: tuple[Condition, ...] = (_vanishing(locus.tests, len(x)),)
+    if not locus.tests:  # without conditions the nearest point is the one at the same parameter
+        by_p = free_directions(locus.structure, locus.free, len(x))
+        conditions = (Plane(z, p, np.zeros((len(x), 1, z.shape[1])), by_p),)
+    found = _settle(locus, x, conditions, guards, frame)
     return _spots(locus, found, found.found, b)
 
 

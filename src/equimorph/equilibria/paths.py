@@ -11,8 +11,8 @@ from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.hidden_events import with_hidden_events, with_multiple_points
 from equimorph.equilibria.legs import Leg, listed, prepared
 from equimorph.equilibria.march import UNRESOLVED
-from equimorph.equilibria.trace import KINDS, Traces, trace
-from equimorph.equilibria.trace_options import EventCode, TraceOptions
+from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import State, States
@@ -25,12 +25,12 @@ SAME = 1e-8
 class Event:
     """Something that happened on a lift, at an exact state.
 
-    kind: "arrived", "fold", "branch point", "constraint", "returned" (a path that turned at a fold
-    came back to the parameters of its start), "critical" (stability changes where a path with
-    unknown parameters goes on), "multiple point" (several eigenvalues vanish at once, so that the
-    path has no direction; it ends within round-off of it) or "lost"; `at`: number of the leg +
-    share of it;
-    `criticality` of branch points; `detail`: one line.
+    kind: an `EventKind`, equal to its text: "arrived", "fold", "branch point", "constraint",
+    "returned" (a path that turned at a fold came back to the parameters of its start), "critical"
+    (stability changes where a path with unknown parameters goes on), "multiple point" (several
+    eigenvalues vanish at once, so that the path has no direction; it ends within round-off of it)
+    or "lost"; `at`: number of the leg + share of it; `criticality` of branch points; `detail`: one
+    line.
     """
 
     kind: str
@@ -38,6 +38,11 @@ class Event:
     at: float
     criticality: str | None = None
     detail: str = ""
+
+    def __post_init__(self) -> None:
+        """Name the kind by its member, where there is one: tasks know further ones."""
+        if self.kind in list(EventKind):
+            object.__setattr__(self, "kind", EventKind(self.kind))
 
 
 @dataclass(frozen=True)
@@ -186,7 +191,7 @@ def _passed(curve: Curve, outcome: Traces, number: int) -> list[Event]:
     z, p = _states(curve, passed.z, passed.t)
     return [
         Event(
-            KINDS[int(code)],
+            EventCode(code).kind,
             State(curve.structure, z[i], p[i]),
             number + float(passed.t[i]),
             criticality(curve, z[i : i + 1], passed.t[i : i + 1])[0]
@@ -201,7 +206,7 @@ def _end(curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, .
     code, t = int(outcome.code[0]), outcome.t
     z, p = _states(curve, outcome.z, t)
     state = State(curve.structure, z[0], p[0])
-    kind, detail, critical = KINDS[code], outcome.why.get(0, ""), None
+    kind, detail, critical = EventCode(code).kind, outcome.why.get(0, ""), None
     if code == EventCode.CONSTRAINT:
         worst = max(within, key=lambda c: c.excess(state.z[None], state.p[None])[0])
         detail = str(worst)

@@ -6,12 +6,102 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.special import gammaln, xlogy
 
-from equimorph.equilibria.completeness import Completeness
-from equimorph.equilibria.pools import Ground, Pools, distinct
+from equimorph.equilibria.random_search import Ground, Pools, distinct
 from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
+
+CONFIDENCE = 0.95
+REJECTED = 2.706
+"""Fall of twice the log-likelihood at the end of a one-sided interval of 95 %."""
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """Which of several independent runs found which equilibrium.
+
+    An estimate, not a promise: what no run can reach is not counted.
+
+    Parameters
+    ----------
+    captured
+        Whether each run found each equilibrium.
+
+    References
+    ----------
+    [Chao1987]_, [Cormack1992]_
+    """
+
+    captured: Bool[np.ndarray, "runs found"]
+
+    @property
+    def runs(self) -> int:
+        """Number of independent runs."""
+        return int(self.captured.shape[0])
+
+    @property
+    def found(self) -> int:
+        """Number of different equilibria found by all runs together."""
+        return int(self.captured.shape[1])
+
+    @property
+    def per_run(self) -> tuple[int, ...]:
+        """Number of equilibria found by each run."""
+        return tuple(int(count) for count in self.captured.sum(axis=1))
+
+    @property
+    def estimate(self) -> float:
+        """Chao's estimate of the number of equilibria, a lower bound if some are harder to find.
+
+        ``S + (m−1)/m · f₁(f₁−1)/(2(f₂+1))`` after m runs, with f₁ and f₂ the numbers of equilibria
+        found by exactly one and by exactly two runs.
+        """
+        times = self.captured.sum(axis=0)
+        once, twice = int((times == 1).sum()), int((times == 2).sum())
+        return self.found + (self.runs - 1) / self.runs * once * (once - 1) / (2.0 * (twice + 1.0))
+
+    @property
+    def upper(self) -> float:
+        """Number of equilibria at about 95 % confidence, if all are as easy to find as those found.
+
+        Largest number that the profile likelihood does not reject [Cormack1992]_; infinite where
+        no equilibrium was found twice. Never below `estimate`.
+        """
+        if self.found == 0:
+            return self.estimate
+        if int(self.captured.sum()) == self.found:
+            return np.inf
+        number, best = self.found, self._log_likelihood(self.found)
+        while best - self._log_likelihood(number + 1) <= 0.5 * REJECTED:
+            number += 1
+            best = max(best, self._log_likelihood(number))
+        return max(self.estimate, float(number))
+
+    def _log_likelihood(self, number: int) -> float:
+        """Of `number` equilibria, at the most likely chance of a catch, the same for all."""
+        trials, hits = self.runs * number, int(self.captured.sum())
+        ways = gammaln(number + 1) - gammaln(number - self.found + 1)
+        chance = hits / trials
+        return float(ways + xlogy(hits, chance) + xlogy(trials - hits, 1.0 - chance))
+
+    @property
+    def detectable(self) -> float:
+        """Chance per run from which on an equilibrium is among those found, at 95 % confidence.
+
+        One that a run finds with probability p escapes all m runs with probability (1 − p)^m.
+        """
+        return float(1.0 - (1.0 - CONFIDENCE) ** (1.0 / self.runs))
+
+    def __str__(self) -> str:
+        """One line with all numbers."""
+        runs = ", ".join(str(count) for count in self.per_run)
+        return (
+            f"{self.found} found (in single runs {runs}); estimated {self.estimate:.1f}, "
+            f"at most {self.upper:.0f} (95 %) if all are equally easy to find"
+        )
+
 
 Points = Float[np.ndarray, "points parameters"]
 

@@ -22,18 +22,6 @@ from equimorph.model import Constraint, Progress, Silent
 
 Names = Int[np.ndarray, " lanes"]
 
-LOST, CANCELLED, MULTIPLE = 0, -1, -3
-KINDS = {
-    EventCode.ARRIVED: "arrived",
-    EventCode.RETURNED: "returned",
-    EventCode.FOLD: "fold",
-    EventCode.BRANCH_POINT: "branch point",
-    EventCode.CONSTRAINT: "constraint",
-    EventCode.CRITICAL: "critical",
-    LOST: "lost",
-    MULTIPLE: "multiple point",
-    CANCELLED: "cancelled",
-}
 LANES_PER_THREAD = 128
 """A second thread is not worth its start for fewer lanes than this on each."""
 EVENTS_AT_ONCE = 512
@@ -85,8 +73,8 @@ def trace(
     and the threads.
 
     Whatever `progress` raises stops all threads and reaches the caller; only after
-    `CancelledError` lanes that were not finished have the code `CANCELLED`, and the others are
-    returned.
+    `CancelledError` lanes that were not finished have the code `EventCode.CANCELLED`, and the
+    others are returned.
     """
     options, batching = options or TraceOptions(), batching or Batching()
     count = max(1, min(batching.threads or threads(), len(z) // LANES_PER_THREAD))
@@ -100,8 +88,8 @@ def trace(
     try:
         _run(jobs, queue, progress or Silent())
     except CancelledError:
-        ledger.code[ledger.code == LOST] = CANCELLED
-        ledger.code[list(ledger.why)] = LOST
+        ledger.code[ledger.code == EventCode.LOST] = EventCode.CANCELLED
+        ledger.code[list(ledger.why)] = EventCode.LOST
     return _outcome(ledger, jobs)
 
 
@@ -231,7 +219,7 @@ class _Job:
         )
         ledger.index[at], ledger.travelled[at] = events.near_side(first), events.travelled[first]
         for i in first[~events.found[first]]:
-            kind = KINDS[int(events.code[i])]
+            kind = EventCode(int(events.code[i])).kind
             self.missed[int(events.lanes[i])] = f"the {kind} could not be located"
         last = np.full(len(events.lanes), np.inf)
         which = np.searchsorted(at, events.lanes)
@@ -239,7 +227,7 @@ class _Job:
         last[ended] = events.travelled[first][which[ended]]
         passing = ((events.code & ~stop) != 0) & (events.travelled < last)
         for i in np.flatnonzero(passing & ~events.found):
-            kind = KINDS[int(events.code[i])]
+            kind = EventCode(int(events.code[i])).kind
             self.missed[int(events.lanes[i])] = f"a {kind} on the way could not be located"
         some = events.take(passing)
         self.passed.append((some, ledger.retries[some.lanes]))
@@ -273,7 +261,7 @@ def _run(jobs: list[_Job], queue: _Queue, progress: Progress) -> None:
 def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Traces:
     """Put together what the jobs left; first tries of lanes that were retried are dropped."""
     for lane, reason in (pair for job in jobs for pair in job.missed.items()):
-        ledger.code[lane], ledger.why[lane] = LOST, reason
+        ledger.code[lane], ledger.why[lane] = EventCode.LOST, reason
     size = ledger.z.shape[1]
     passed = [part.take(_last(ledger, part, t)) for job in jobs for part, t in job.passed]
     parts = [part for job in jobs for part in job.block.points.parts()]
@@ -299,4 +287,4 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Traces:
 def _last(ledger: _Ledger, part: Points | Events, tries: Some) -> Bool[np.ndarray, " some"]:
     """Which entries belong to the last try of a lane that was finished."""
     of_last = ledger.retries[part.lanes] == tries
-    return np.asarray(of_last & (ledger.code[part.lanes] != CANCELLED))
+    return np.asarray(of_last & (ledger.code[part.lanes] != EventCode.CANCELLED))

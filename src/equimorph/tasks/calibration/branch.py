@@ -8,7 +8,6 @@ from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import ParameterLine, TraceOptions, settle, trace
-from equimorph.equilibria.trace import KINDS
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.structures import States, Structure
@@ -173,7 +172,7 @@ class Branch:
             )
             short = np.flatnonzero(ended.code != EventCode.ARRIVED)
             if len(short):
-                self._note(KINDS[int(ended.code[short[0]])], int(lanes[short[0]]))
+                self._note(EventCode(int(ended.code[short[0]])).kind, int(lanes[short[0]]))
                 return None
             z[lanes] = ended.z
         return z

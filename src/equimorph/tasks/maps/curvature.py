@@ -10,8 +10,8 @@ from jaxtyping import Bool
 
 from equimorph.arrays import Flags, Settings, Values
 from equimorph.equilibria import TraceOptions
-from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical
+from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.first_stable import FirstStable
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Grid, Progress, position

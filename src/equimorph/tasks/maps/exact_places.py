@@ -178,7 +178,7 @@ def correct_singular_states(
         Places of the two parameters that vary, for each lane its own.
     tests
         What vanishes on some of the lanes, by their numbers; see
-        `equimorph.equilibria.conditions`.
+        `equimorph.equilibria.critical_tests`.
     """
     vanishing = Vanishing(tests, np.arange(len(z)), TEST_DIFFERENCE, one_sided=True)
     return settle(structure, z, p, free_directions(structure, free, len(z)), [vanishing], NEARBY)

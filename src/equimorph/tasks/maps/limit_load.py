@@ -10,8 +10,8 @@ from jaxtyping import Bool
 
 from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
 from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, limit_load, trace
-from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Grid, Progress, position

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria import Event, Leg, Path, TraceOptions, lift
+from equimorph.equilibria import Event, EventKind, Leg, Path, TraceOptions, lift
 from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint, Descriptor, names_of
 from equimorph.structures import State, States
@@ -37,7 +37,7 @@ def path_by_blocks(
 ) -> Path:
     """Follow a course in blocks; where these end, by continuation to the next corner."""
     parts, here, time = [], start, 0.0
-    end = Event("arrived", start, 0.0)
+    end = Event(EventKind.ARRIVED, start, 0.0)
     while time < course.legs and end.kind == "arrived":
         stretch = follow_blocks(course, here, time, within)
         parts.append((stretch.states.z, stretch.states.p, stretch.times))

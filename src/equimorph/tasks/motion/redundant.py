@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.equilibria import Event
+from equimorph.equilibria import Event, EventKind
 from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint
 from equimorph.structures import State, States
@@ -210,24 +210,24 @@ def _end(course: Course, track: list[_Here], why: str, limits: Limits) -> Event:
     here = track[-1]
     state = State(course.structure, here.z[0], here.p[0])
     if here.time >= course.legs:
-        return Event("arrived", state, here.time)
+        return Event(EventKind.ARRIVED, state, here.time)
     if why.startswith("limit "):
         place = int(why.split()[1])
         name = course.structure.parameters[place].name
         low, high = limits[place]
         upper = abs(here.p[0, place] - high) < abs(here.p[0, place] - low)
-        return Event("limit", state, here.time, None, f"{name} {'<=' if upper else '>='} "
+        return Event(EventKind.LIMIT, state, here.time, None, f"{name} {'<=' if upper else '>='} "
                      f"{high if upper else low:g}")  # fmt: skip
     if why not in ("error", "long", "unstable"):
-        return Event("constraint", state, here.time, None, why)
+        return Event(EventKind.CONSTRAINT, state, here.time, None, why)
     middle = track[len(track) // 2 if len(track) > 2 else 0]
     margins = States(course.structure, *_pair(here, track[0], middle)).margin
     if margins[0] <= SOFT * margins.max():
-        return Event("critical", state, here.time)
+        return Event(EventKind.CRITICAL, state, here.time)
     sizes = [_singular(course, each) for each in (here, track[0], middle)]
     if sizes[0] <= FAINT * max(sizes) or sizes[0] <= SOFT**0.5 * max(sizes):
-        return Event("fold", state, here.time)
-    return Event("lost", state, here.time, None, "the step became too small")
+        return Event(EventKind.FOLD, state, here.time)
+    return Event(EventKind.LOST, state, here.time, None, "the step became too small")
 
 
 def _pair(*some: _Here) -> tuple[np.ndarray, np.ndarray]:

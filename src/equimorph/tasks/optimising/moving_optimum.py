@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.equilibria import Event, Leg
+from equimorph.equilibria import Event, EventKind, Leg
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.model import Constraint, Descriptor
@@ -386,7 +386,7 @@ def _result(track: _Track, why: str, start: State) -> FollowedOptimum:
     )
     if why or track.jumps or len(optima) < 2:
         return found
-    path = stable_path(states, times, Event("arrived", states[-1], times[-1]))
+    path = stable_path(states, times, Event(EventKind.ARRIVED, states[-1], times[-1]))
     if not path.length[-1] > 0.0:
         return found
     rules = [each.descriptor for each in problem.rules if not is_stability(each)]

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Pair
-from equimorph.equilibria.conditions import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.critical import Critical, Test, null_border
+from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.locus import Locus, Spots, advance, nearest
 from equimorph.model import position
 from equimorph.structures import State

@@ -11,7 +11,6 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Parameters, Values
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.legs import check_starts
-from equimorph.equilibria.trace import KINDS
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position
@@ -229,6 +228,6 @@ class _Rays:
             Box(**{n: (low, high) for n, low, high in zip(names, a, b, strict=True)})
             for a, b in zip((middle - half).tolist(), (middle + half).tolist(), strict=True)
         )
-        kinds = tuple(KINDS[int(code)] for code in self.code)
+        kinds = tuple(EventCode(int(code)).kind for code in self.code)
         met = States(self.states.structure, self.z, self.p)
         return Room(self.shape, self.states, self.scale, met, kinds, boxes)
