@@ -284,7 +284,7 @@ def test_without_conditions_the_general_tracer_follows_the_path_of_a_lift():
     rest = arch.natural_state(Theta=0.9, Delta=0.4)
     path = em.lift(rest, {"q": 8.0})
     assert path.end.kind == EventKind.FOLD
-    load = np.array([[each.name for each in arch.parameters].index("q")])[0]
+    load = np.array([[each.name for each in arch.parameters].index("q")])
     line = Locus(arch, rest.p, load, (), singular=False)
     start, found = nearest(line, line.joined(rest.z[None], rest.p[None]))
     assert found.all()
