@@ -93,7 +93,7 @@ def test_a_new_study_passes_the_check(kind: str, shell: Shell):
     assert shell("new", "mine.toml", "--kind", kind) == 0
     assert shell("check", "mine.toml") == 0
     asked = "2 maps" if kind == "maps" else "1 point and 1 route"
-    assert f"sound study with {asked}" in shell.out
+    assert f"valid: it asks for {asked}" in shell.out
 
 
 def test_new_overwrites_nothing(shell: Shell):
@@ -274,7 +274,7 @@ def test_memory_that_runs_out_is_one_line(shell: Shell, monkeypatch: pytest.Monk
         raise MemoryError
 
     Path("spring.toml").write_text(SPRING)
-    monkeypatch.setattr("equimorph.cli.show.run_study", run_out)
+    monkeypatch.setattr("equimorph.cli.run.run_study", run_out)
     assert shell("run", "spring.toml") == 2
     assert _says_one_line(shell, "must fit into memory")
 

@@ -63,7 +63,7 @@ def _check(content: bytes, file: Path) -> bool:
         code, said, complaint = _command("check", str(file))
     event("sound" if code == 0 else "refused")
     if code == 0:
-        assert "is a sound study with" in said
+        assert "is valid: it asks for" in said
         assert complaint == ""
     else:
         assert code == 2

@@ -118,7 +118,7 @@ def new(
 @app.command()
 def check(file: Annotated[Path, typer.Argument(help="Study file.")]) -> None:
     """Check a study file without computing anything."""
-    from equimorph.cli.show import check_and_show
+    from equimorph.cli.check import check_and_show
 
     check_and_show(file)
 
@@ -134,7 +134,7 @@ def run(
     ] = False,
 ) -> None:
     """Run a study: equilibrium set, equilibria, routes, figures, schedules, report."""
-    from equimorph.cli.show import run_and_show
+    from equimorph.cli.run import run_and_show
 
     out = out or Path("results") / file.stem
     try:
@@ -154,6 +154,6 @@ def paper(
     ),
 ) -> None:
     """Compute the article's figures and tables anew, ours beside theirs."""
-    from equimorph.cli.show import reproduce_and_show
+    from equimorph.cli.paper import reproduce_and_show
 
     reproduce_and_show(out)

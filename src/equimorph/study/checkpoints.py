@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from equimorph.errors import InputError
-from equimorph.model import Journal
-from equimorph.storage import open_journal
 from equimorph.storage.files import checksum, fingerprint, move_whole
 from equimorph.storage.records import content_of, load_record
 from equimorph.structures import Structure
@@ -71,28 +69,8 @@ class Checkpoints:
         file = self._store(key, content_of(compute()))
         return cast(Answer, load_record(file, self.structure))
 
-    def long_answer(self, question: dict[str, Any], compute: Callable[[Journal], Answer]) -> Answer:
-        """Return the answer of a computation that keeps answers to parts of it; see `answer`.
-
-        Parameters
-        ----------
-        question
-            As of any answer.
-        compute
-            Finds the answer, with a journal, which is removed at the end.
-        """
-        path = self.results.checkpoints / f"{fingerprint(question)}.journal"
-
-        def resume() -> Answer:
-            with open_journal(path, replace=True) as journal:
-                return compute(journal)
-
-        answer = self.answer(question, resume)
-        path.unlink(missing_ok=True)
-        return answer
-
     def forget_others(self) -> None:
-        """Remove answers that were not asked for, and journals of computations."""
+        """Remove answers that were not asked for."""
         for file in self.results.checkpoints.iterdir():
             if file.name.partition("-")[0] not in self.asked:
                 file.unlink()

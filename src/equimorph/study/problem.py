@@ -5,19 +5,35 @@ equilibria at points and questions on it, like routes between states, or maps ov
 both. Types are strict and unknown keys are refused.
 """
 
+import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError, create_model, model_validator
 
 from equimorph.errors import InputError
-from equimorph.study.complaint import complaint
+from equimorph.study.complaint import complaint, cut
 from equimorph.study.data_files import FOLDER
 from equimorph.study.extent import PointSection, SetSection
 from equimorph.study.fields import Section, requirement
 from equimorph.study.kinds import KINDS
 from equimorph.study.structures import StructureSection
-from equimorph.study.syntax import parse_toml
+
+_PLACE = re.compile(r"(.*) \(at line (\d+), column (\d+)\)")
+
+# How to write what was probably meant, by the beginning of what Python's parser finds.
+_REMEDIES = {
+    "Invalid value": "Text stands in quotes, decimals have a point, true and false no capitals.",
+    "Cannot overwrite a value": "Give each key once.",
+    "Cannot declare": "Begin each section once; a list has double brackets, [[route]], each time.",
+    "Expected '=' after a key": "Write key = value; decimals have a point, tables { }.",
+    "Expected newline": "Write one value; text stands in quotes, decimals have a point.",
+    "Unclosed": "Close what this line, or one above, has opened.",
+    "Unterminated": "Close the text with another quote.",
+    'Expected "': "Close the text with another quote.",
+    "Illegal character": "Close the text with another quote.",
+}
 
 
 class Study(Section):
@@ -115,3 +131,41 @@ def parse_study(text: str, name: str, folder: Path | None = None) -> Study:
         return STUDY.model_validate(content, context={FOLDER: folder or Path()})
     except ValidationError as error:
         raise complaint(error, STUDY, name) from error
+
+
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """Read TOML.
+
+    Parameters
+    ----------
+    text
+        Content of a file.
+    name
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        If `text` is malformed: with the line and what stands there.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise InputError(f"{name}: the study must not nest lists or tables so deep.") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{name}: {_sentence(str(error), text)}") from error
+    except ValueError as error:
+        raise InputError(f"{name}: numbers must be readable; got one of many digits.") from error
+
+
+def _sentence(finding: str, text: str) -> str:
+    remedy = next((hint for start, hint in _REMEDIES.items() if finding.startswith(start)), "")
+    place = _PLACE.fullmatch(finding)
+    if place is None:
+        return f"the file must be valid TOML; got an error: {finding}. {remedy}".rstrip()
+    # The parser counts what \n ends.
+    line = text.replace("\r\n", "\n").split("\n")[int(place[2]) - 1].strip()
+    return (
+        f"line {place[2]} must be valid TOML; got {cut(line) or 'nothing'} "
+        f"({place[1]}, at column {place[3]}). {remedy}".rstrip()
+    )

@@ -9,12 +9,11 @@ from typing import Any
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.model import Journal, Progress, Silent
+from equimorph.model import Progress, Silent
 from equimorph.storage import write_results
 from equimorph.storage.files import read_text
 from equimorph.structures import States
 from equimorph.study.checkpoints import Checkpoints
-from equimorph.study.figures import draw_figures
 from equimorph.study.folder import ResultsFolder, open_results_folder
 from equimorph.study.lookup import Extent, Ground, at_key
 from equimorph.study.memory import MemoryWatch, check_memory
@@ -22,7 +21,7 @@ from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, route_name
 from equimorph.study.prepare import Answered, Outcome, Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text
 from equimorph.study.question import Question
-from equimorph.study.report import report
+from equimorph.study.report import draw_figures, report
 from equimorph.tasks import Route
 
 
@@ -138,7 +137,7 @@ def _question(study: Study, *, of_set: bool) -> dict[str, Any]:
 def _equilibrium_set(
     study: Study, ground: Ground, extent: Extent, checkpoints: Checkpoints, progress: Progress
 ) -> EquilibriumSet:
-    def compute(journal: Journal) -> EquilibriumSet:
+    def compute() -> EquilibriumSet:
         with at_key("set"):
             return equilibrium_set(
                 ground.structure,
@@ -148,10 +147,9 @@ def _equilibrium_set(
                 intervals=extent.intervals,
                 **extent.options,
                 progress=progress,
-                journal=journal,
             )
 
-    return checkpoints.long_answer(_question(study, of_set=True), compute)
+    return checkpoints.answer(_question(study, of_set=True), compute)
 
 
 def _equilibria(
