@@ -44,7 +44,9 @@ def test_progress_runs_from_dark_to_light_evenly():
     assert steps.max() < 2.5 * steps.mean()
 
 
-@pytest.mark.parametrize(("index", "label"), [(0, "stable"), (2, "index 2"), (5, "index ≥ 3")])
+@pytest.mark.parametrize(
+    ("index", "label"), [(0, "stable"), (2, "index 2"), (3, "index ≥ 3"), (5, "index ≥ 3")]
+)
 def test_indices_are_named(index, label):
     assert style.index_label(index) == label
 
@@ -65,3 +67,21 @@ def test_the_same_drawing_gives_the_same_file(tmp_path):
     for extension in ("png", "svg"):
         first, second = (tmp_path / f"{name}.{extension}" for name in ("first", "second"))
         assert first.read_bytes() == second.read_bytes()
+
+
+def test_the_largest_count_has_the_same_shade_whatever_it_is():
+    assert style.count_shades(1)[-1] == style.count_shades(6)[-1]
+    assert style.count_shades(0) == style.count_shades(3)[:1]
+
+
+def test_room_below_leaves_the_axes_their_size_and_distance_from_the_top():
+    axes = style.new_axes(3.0, 2.0, ROOM)
+    figure = axes.get_figure(root=True)
+
+    def inches() -> np.ndarray:
+        return np.array(axes.get_position().bounds) * np.tile(figure.get_size_inches(), 2)
+
+    before = inches()
+    style.grow_below(axes, 0.5)
+    assert figure.get_size_inches() == pytest.approx([3.0, 2.5])
+    np.testing.assert_allclose(inches(), np.add(before, [0.0, 0.5, 0.0, 0.0]), rtol=1e-12)

@@ -1,9 +1,10 @@
+import os
 from pathlib import Path
 
 import pytest
 
 from equimorph.errors import InputError
-from equimorph.storage.files import replacing, write_text
+from equimorph.storage.files import fingerprint, locked, replacing, write_text
 
 
 def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path: Path):
@@ -29,3 +30,19 @@ def test_a_new_file_has_the_permissions_of_any_new_file(tmp_path: Path):
 def test_a_missing_folder_is_an_input_error(tmp_path: Path):
     with pytest.raises(InputError, match="No such file or directory"):
         write_text(tmp_path / "none" / "a.txt", "")
+
+
+def test_a_place_in_use_is_refused_with_its_user(tmp_path: Path):
+    path = tmp_path / "lock"
+    with locked(path, "results"), pytest.raises(InputError) as found, locked(path, "results"):
+        pass
+    assert str(found.value).startswith("`results` must not be in use by another run; got one that")
+    assert f"process {os.getpid()} on " in str(found.value)
+    with locked(path, "results"):
+        pass
+
+
+def test_fingerprints_tell_content_from_order():
+    first, second = {"a": 1, "b": {"c": 2, "d": [1, 2]}}, {"b": {"d": [1, 2], "c": 2}, "a": 1}
+    assert fingerprint(first) == fingerprint(second)
+    assert fingerprint(first) != fingerprint({"a": 1, "b": {"c": 2, "d": [2, 1]}})

@@ -140,3 +140,10 @@ def test_a_folder_that_is_a_file_is_refused_and_left_alone(schedule: Schedule, t
     with pytest.raises(InputError, match="can be written"):
         write_schedule(schedule, tmp_path / "file" / "route.csv")
     assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_the_order_of_keys_in_the_sidecar_does_not_count(schedule: Schedule, written: Path):
+    sidecar = written.with_suffix(".json")
+    content = json.loads(sidecar.read_text())
+    sidecar.write_text(json.dumps(dict(reversed(content.items()))))
+    assert read_schedule(written).names == schedule.names

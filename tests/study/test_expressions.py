@@ -42,3 +42,10 @@ def test_other_forms_are_refused(text: str):
 def test_a_comparison_on_a_structure_is_the_constraint_of_the_library():
     arch = Rod()
     assert str(parse_comparison("max_curvature<=6").on(arch)) == str(arch.max_curvature <= 6)
+
+
+@pytest.mark.parametrize("sense", ["<=", ">="])
+def test_bounds_are_as_large_as_numbers_of_studies(sense: str):
+    assert parse_comparison(f"a {sense} -1e9").bound == -1e9
+    with pytest.raises(InputError, match=r"with a number up to 1e\+09; got"):
+        parse_comparison(f"a {sense} 1.000001e9")
