@@ -8,7 +8,6 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.point_conditions import Condition, Directions, Move, Some
-from equimorph.linalg import BorderedSolution
 from equimorph.structures import Structure
 
 DOUBTFUL = 1e-4
@@ -115,7 +114,7 @@ class Problem:
 
     def take(self, some: Some) -> "Problem":
         """Return the problem of some of the lanes."""
-        if self.width == 0:
+        if self.width == 0 and not self.conditions:
             return self
         conditions = tuple(each.take(some) for each in self.conditions)
         frame = self.frame.take(some)
@@ -129,15 +128,33 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Step:
-    """A Newton step: changes of z and of the other unknowns, and what the factorisation told."""
+class Tangent:
+    """The set near points: a step onto it, directions along it, and what the factorisation told.
+
+    dz, da: the step, of z and of the other unknowns; along_z, along_a: the directions.
+    """
 
     dz: Lanes
     da: Float[np.ndarray, "lanes k"]
+    along_z: Float[np.ndarray, "lanes k size"]
+    along_a: Float[np.ndarray, "lanes k k"]
     index: Numbers
     sure: Flags
-    along: Float[np.ndarray, "lanes k bordered"]
-    null: Lanes
+
+    @property
+    def frames(self) -> Float[np.ndarray, "lanes k bordered"]:
+        """Directions of all unknowns."""
+        return np.concatenate([self.along_z, self.along_a], axis=2)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A Newton step of z and the other unknowns, the set where it starts, and the null vector."""
+
+    dz: Lanes
+    da: Float[np.ndarray, "lanes k"]
+    tangent: Tangent
+    null: Float[np.ndarray, "lanes border"]
 
 
 @dataclass(frozen=True)
@@ -148,8 +165,8 @@ class Points:
     z: Lanes
     p: Parameters
     beta: Values
-    b: Lanes
-    rows: Float[np.ndarray, "lanes k bordered"]
+    b: Float[np.ndarray, "lanes border"]
+    rows: Float[np.ndarray, "lanes rows bordered"]
 
     def take(self, some: Some) -> "Points":
         """Return some of the lanes."""
@@ -159,89 +176,79 @@ class Points:
     def moved(self, step: Step, share: Values) -> "Points":
         """Points after shares of a step, with the border and the rows renewed."""
         problem, still, wide = self.problem, share == 0.0, share[:, None]
-        dz = wide * step.dz
-        dz[still] = 0.0
-        z, beta = self.z + dz, self.beta
-        if problem.width == 0:
-            return Points(problem, z, self.p, beta, self.b, self.rows)
-        da = wide * step.da
-        da[still] = 0.0
+        dz, da = wide * step.dz, wide * step.da
+        dz[still], da[still] = 0.0, 0.0
+        p, beta, rows = self.p, self.beta, self.rows
+        if problem.directions.shape[1]:
+            p = p + problem.change(da[:, None])[:, 0]
         if problem.unfolded:
             beta = beta + da[:, -1]
-        b, rows = step.null, self.rows
-        if isinstance(problem.frame, Tangents):
-            rows = _dual(problem.structure, step.along)
-        return Points(problem, z, self.p + problem.change(da[:, None])[:, 0], beta, b, rows)
+        if isinstance(problem.frame, Tangents) and problem.width:
+            rows = _dual(problem.structure, step.tangent.frames)
+        return Points(problem, self.z + dz, p, beta, step.null, rows)
 
     def step(self) -> Step:
         """Newton step onto the set and along it to the conditions."""
-        problem = self.problem
-        if problem.width == 0 and not problem.conditions:
-            return self._fixed_step()
-        onto, along, solution = self.directions()
-        size = problem.structure.size
-        at = Critical(problem.structure, self.z, self.p, self.b)
-        onto_z, along_z = (np.ascontiguousarray(each[..., :size]) for each in (onto, along))
-        onto_p = problem.change(onto[:, None, size:])[:, 0]
-        move = Move(onto_z, onto_p, along_z, problem.change(along[:, :, size:]))
+        problem, tangent = self.problem, self.tangent()
+        if not problem.conditions:
+            return Step(tangent.dz, tangent.da, tangent, self.b)
+        # conditions without use for the border get any vector in its place
+        at = Critical(problem.structure, self.z, self.p, self.b if problem.critical else self.z)
+        onto_p = problem.change(tangent.da[:, None])[:, 0]
+        move = Move(tangent.dz, onto_p, tangent.along_z, problem.change(tangent.along_a))
         found = [condition.linear(at, move) for condition in problem.conditions]
-        step = onto
-        if found:
+        slopes, value = found[0].slopes, found[0].value
+        if len(found) > 1:
             slopes = np.concatenate([each.slopes for each in found], axis=1)
             value = np.concatenate([each.value for each in found], axis=1)
-            spare = slopes.shape[1] < slopes.shape[2] and not isinstance(problem.frame, Held)
-            amount = _amount(slopes, value, _gram(problem.structure, along) if spare else None)
-            step = onto + np.einsum("lk,lki->li", amount, along)
-        null = _unit(at.v) if problem.renews_border else self.b
-        sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
-        index = solution.negative - problem.structure.constraints
-        return Step(step[:, :size].copy(), step[:, size:], index, sure, along, null)
+        spare = slopes.shape[1] < slopes.shape[2] and not isinstance(problem.frame, Held)
+        gram = _gram(problem.structure, tangent.frames) if spare else None
+        amount = _amount(slopes, value, gram)[:, None]
+        dz = tangent.dz + (amount @ tangent.along_z)[:, 0]
+        da = tangent.da + (amount @ tangent.along_a)[:, 0]
+        return Step(dz, da, tangent, _unit(at.v) if problem.renews_border else self.b)
 
-    def _fixed_step(self) -> Step:
-        """The same at fixed parameters: the structure's fused step."""
-        lanes, size = self.z.shape
-        still, one, none = np.zeros((lanes, size)), np.ones(lanes), np.zeros(lanes)
-        move = self.problem.structure.advance(
-            self.z, self.p, np.zeros_like(self.p), still, one, none
-        )
-        sure = np.ones(lanes, bool)
-        return Step(move.dz, np.zeros((lanes, 0)), move.index, sure, self.rows, self.b)
-
-    def directions(
-        self,
-    ) -> tuple[
-        Float[np.ndarray, "lanes bordered"], Float[np.ndarray, "lanes k bordered"], BorderedSolution
-    ]:
+    def tangent(self) -> Tangent:
         """Newton step onto the set where the rows vanish, and directions along the set."""
         problem, structure = self.problem, self.problem.structure
         (lanes, size), k = self.z.shape, self.problem.width
+        if k == 0 or isinstance(problem.frame, Held):
+            return self._over_parameters()
         columns = np.empty((lanes, k, size))
-        residual = structure.residual(self.z, self.p)
+        rhs = np.zeros((lanes, k + 1, size + k))
+        rhs[:, 0, :size], rhs[:, 1:, size:] = -structure.residual(self.z, self.p), np.eye(k)
         if problem.unfolded:
-            columns[:, -1], residual = self.b, residual + self.beta[:, None] * self.b
+            columns[:, -1] = self.b
+            rhs[:, 0, :size] -= self.beta[:, None] * self.b
         for i in range(k - problem.unfolded):
             dp = np.ascontiguousarray(problem.directions[:, i])
             columns[:, i] = structure.parameter_derivative(self.z, self.p, dp)
-        if isinstance(problem.frame, Held):
-            rhs = -np.concatenate([residual[:, None], columns], axis=1)
-            solution = structure.solve(self.z, self.p, rhs)
-            x = np.zeros((lanes, k + 1, size + k))
-            x[:, :, :size], x[:, 1:, size:] = solution.x, np.eye(k)
-            return x[:, 0], x[:, 1:], solution
-        rhs = np.zeros((lanes, k + 1, size + k))
-        rhs[:, 0, :size], rhs[:, 1:, size:] = -residual, np.eye(k)
         inner, corner = (np.ascontiguousarray(each) for each in np.split(self.rows, [size], axis=2))
         solution = structure.solve(self.z, self.p, rhs, (columns, inner, corner))
-        return solution.x[:, 0], solution.x[:, 1:], solution
+        sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
+        dz, along_z = np.ascontiguousarray(solution.x[:, 0, :size]), solution.x[:, 1:, :size]
+        da, along_a = solution.x[:, 0, size:], solution.x[:, 1:, size:]
+        return Tangent(dz, da, along_z, along_a, solution.negative - structure.constraints, sure)
+
+    def _over_parameters(self) -> Tangent:
+        """The same where parameters are the coordinates: the structure's fused steps."""
+        (lanes, size), k = self.z.shape, self.problem.width
+        still, one, none = np.zeros((lanes, size)), np.ones(lanes), np.zeros(lanes)
+        along_z, along_a = np.empty((lanes, k, size)), np.tile(np.eye(k), (lanes, 1, 1))
+        for i in range(max(k, 1)):
+            fixed = np.zeros_like(self.p)
+            dp = np.ascontiguousarray(self.problem.directions[:, i]) if k else fixed
+            move = self.problem.structure.advance(self.z, self.p, dp, still, one, none)
+            along_z[:, i : i + 1] = move.tangent_z[:, None]
+        sure = np.ones(lanes, bool)
+        return Tangent(move.dz, np.zeros((lanes, k)), along_z, along_a, move.index, sure)
 
 
 def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
     """Guesses, with a border and rows if these are needed."""
     structure, (lanes, size), k = problem.structure, z.shape, problem.width
-    beta, b, rows = np.zeros(lanes), np.zeros_like(z), np.zeros((lanes, k, size + k))
-    here = Points(problem, z, p, beta, b, rows)
-    if k == 0:
-        return here
+    empty = np.zeros((lanes, 0))
+    here = Points(problem, z, p, np.zeros(lanes), empty, empty[:, :, None])
     frame = problem.frame
     if not isinstance(frame, Held) and frame.border is not None:
         here = replace(here, b=frame.border)
@@ -251,9 +258,10 @@ def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
         by_a = np.einsum("lmp,lkp->lmk", frame.by_p, problem.directions)
         by_beta = [] if frame.by_beta is None else [frame.by_beta[:, :, None]]
         return replace(here, rows=np.concatenate([frame.by_z, by_a, *by_beta], axis=2))
-    if isinstance(frame, Tangents):  # any rows that see the tangent space will do, then its own
+    if isinstance(frame, Tangents) and k:
+        # any rows that see the tangent space will do, then its own
         waves = np.cos(np.outer(np.arange(1, k + 1), 1.7 * np.arange(size + k)) + 0.4)
-        along = replace(here, rows=np.tile(waves, (lanes, 1, 1))).directions()[1]
+        along = replace(here, rows=np.tile(waves, (lanes, 1, 1))).tangent().frames
         return replace(here, rows=_dual(structure, along))
     return here
 

@@ -151,7 +151,8 @@ class Settled:
     sure
         Whether pivots of the last factorisation were large enough for the index.
     frames
-        Directions (dz, steps along the directions) of the tangent space at the last step.
+        Directions (dz, steps along the directions) of the tangent space at the last step, if they
+        were asked for.
     unfolding
         β of F + βb = 0, zero at points that exist without it.
     """
@@ -180,6 +181,8 @@ def settle(
     conditions: Sequence[Condition] = (),
     guards: Guards | None = None,
     frame: Frame | None = None,
+    *,
+    frames: bool = True,
 ) -> Settled:
     """Correct guesses to points with F(z; p) = 0 at which conditions hold.
 
@@ -196,6 +199,8 @@ def settle(
         How steps are limited, when a lane ends, and which points are believed.
     frame
         Coordinates along the set: `Tangents` (if not given), `Planes` or `Held`.
+    frames
+        Whether the tangent spaces are returned, too.
 
     Returns
     -------
@@ -208,7 +213,7 @@ def settle(
     if directions is None:
         directions = np.zeros((len(z), 0, p.shape[1]))
     here = start_at(Problem(structure, directions, tuple(conditions), frame), z, p)
-    run = _Run(here, guards)
+    run = _Run(here, guards, frames=frames)
     while len(run.lanes):
         step = here.step()  # onto the set, and along it to the conditions
         status, share = run.judge(here, step)
@@ -263,7 +268,7 @@ def _at_fixed_parameters(structure: Structure, z: Lanes, p: Parameters, guards: 
 class _Run:
     """The lanes that are still on their way, and what became of the others."""
 
-    def __init__(self, here: Points, guards: Guards) -> None:
+    def __init__(self, here: Points, guards: Guards, *, frames: bool) -> None:
         """Begin with all lanes."""
         count, width = len(here.z), here.problem.width
         self.lanes, self.guards, self.number = np.arange(count), guards, 0
@@ -272,7 +277,7 @@ class _Run:
         self.z, self.p, self.beta = here.z.copy(), here.p.copy(), here.beta.copy()
         self.status = np.full(count, Status.OPEN.value)
         self.index, self.sure = np.full(count, -1), np.zeros(count, bool)
-        self.frames = np.zeros((count, width, here.z.shape[1] + width))
+        self.frames = np.zeros((count, width if frames else 0, here.z.shape[1] + width))
 
     def judge(self, here: Points, step: Step) -> tuple[Numbers, Values]:
         """Status of each lane after a step, and the share of the step that is taken."""
@@ -314,11 +319,10 @@ class _Run:
         at = self.lanes[some]
         self.status[at] = status[some]
         self.z[at], self.p[at], self.beta[at] = here.z[some], here.p[some], here.beta[some]
-        self.index[at], self.sure[at], self.frames[at] = (
-            step.index[some],
-            step.sure[some],
-            step.along[some],
-        )
+        told = step.tangent
+        self.index[at], self.sure[at] = told.index[some], told.sure[some]
+        if self.frames.shape[1]:
+            self.frames[at] = told.frames[some]
 
     def settled(self) -> Settled:
         """Points and status of all lanes."""
