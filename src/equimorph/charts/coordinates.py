@@ -77,7 +77,7 @@ def solve_over_parameters(
     functions = tuple(scalars.scalars[k].function for k in asked)
     values = TargetValues(functions, wanted[:, asked], FORWARD, one_sided=True)
     directions = free_directions(structure, unknown, len(tried))
-    return settle(structure, z, p, directions, [values], QUICK, Held())
+    return settle(structure, z, p, directions, [values], QUICK, Held(), frames=False)
 
 
 def solve_on_the_set(
@@ -90,7 +90,7 @@ def solve_on_the_set(
     values = TargetValues(functions, wanted, FORWARD, one_sided=True, reach=ON_SET.longest)
     directions = free_directions(structure, setting.free, len(wanted))
     frame = embedded_planes(structure, setting.free, rows)
-    return settle(structure, *guess, directions, [values], ON_SET, frame)
+    return settle(structure, *guess, directions, [values], ON_SET, frame, frames=False)
 
 
 def full_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
