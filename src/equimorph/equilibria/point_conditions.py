@@ -207,20 +207,26 @@ class Vanishing:
         Numbers of the lanes.
     difference, one_sided
         As for `Values`.
+    at_null
+        Whether the border is the null vector at the point itself. Otherwise it is the one that the
+        corrector holds, which lags one step behind: next to pitchforks that costs convergence.
     """
 
     tests: Callable[[Some], Sequence[Test]]
     lanes: Some
     difference: float = TEST_DIFFERENCE
     one_sided: bool = False
+    at_null: bool = False
     critical = True
 
     def linear(self, at: Critical, move: Move) -> Linear:
         """By differences along the directions, the border kept."""
-        own = self.tests(self.lanes)
+        own, border = self.tests(self.lanes), at.b
+        if self.at_null:
+            border = at.v / np.linalg.norm(at.v, axis=1, keepdims=True)
 
         def scalars(z: Lanes, p: Parameters) -> Scalars:
-            b = np.tile(at.b, (len(z) // len(at.b), 1))
+            b = np.tile(border, (len(z) // len(border), 1))
             there = Critical(at.structure, z, p, b)
             return np.stack([test(there) for test in own], axis=1)
 
@@ -228,7 +234,8 @@ class Vanishing:
 
     def take(self, some: Some) -> "Vanishing":
         """Return the tests of some of the lanes."""
-        return Vanishing(self.tests, self.lanes[some], self.difference, self.one_sided)
+        lanes = self.lanes[some]
+        return Vanishing(self.tests, lanes, self.difference, self.one_sided, self.at_null)
 
 
 def _seconds(

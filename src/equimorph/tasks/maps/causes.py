@@ -139,8 +139,11 @@ def equal_extrema(
             near = np.tile(here[lanes], (len(at.z) // len(lanes), 1))
             away = np.abs(found[:, None] - near[:, :, None])
             away = np.where(np.isfinite(values)[:, None], away, np.inf)
-            one, other = np.take_along_axis(values, away.argmin(axis=2), 1).T
-            return np.asarray((one - other) / np.maximum(np.abs(one) + np.abs(other), 1.0))
+            which = away.argmin(axis=2)
+            one, other = np.take_along_axis(values, which, 1).T
+            gap = (one - other) / np.maximum(np.abs(one) + np.abs(other), 1.0)
+            # one extremum near both places is always equal to itself
+            return np.where(which[:, 0] == which[:, 1], np.nan, gap)
 
         return test
 

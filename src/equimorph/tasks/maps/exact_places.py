@@ -180,5 +180,5 @@ def correct_singular_states(
         What vanishes on some of the lanes, by their numbers; see
         `equimorph.equilibria.critical_tests`.
     """
-    vanishing = Vanishing(tests, np.arange(len(z)), TEST_DIFFERENCE, one_sided=True)
+    vanishing = Vanishing(tests, np.arange(len(z)), TEST_DIFFERENCE, one_sided=True, at_null=True)
     return settle(structure, z, p, free_directions(structure, free, len(z)), [vanishing], NEARBY)
