@@ -16,7 +16,7 @@ from equimorph.charts.preparation import add_cusp_vertices, cut_along_crossings,
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of, squared_sides
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.points import REFINED
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labels
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.queries.levels import part_of
@@ -279,6 +279,6 @@ def _amid(
     lowest = store.index[ends].min(axis=1)
     if not (good & (index == lowest)).all():
         return None
-    kinds = np.full(len(ends), REFINED)
+    kinds = np.full(len(ends), VertexKind.REFINED)
     rows = np.ascontiguousarray(store.rows[ends[:, 0]])
     return vertices_of(setting, (z, p), kinds, (index, np.full(len(ends), -1)), rows)

@@ -13,7 +13,7 @@ from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
@@ -24,7 +24,7 @@ from equimorph.tolerances import SAME_STATE
 
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
 
-SINGULAR = (FOLD, CORNER, CROSSING)
+SINGULAR = (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING)
 """Kinds of vertices at which the Jacobian is singular."""
 OVERHANG = 0.3
 """How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried."""
@@ -329,14 +329,16 @@ def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
     on_box = np.zeros(len(facets), bool)
     for bound in (eset.box.lower, eset.box.upper):
         on_box |= (np.abs(lines - bound) <= SLACK * size).all(axis=1).any(axis=1)
-    capped = np.isin(eset.kinds, (CAP, CORNER))[facets].all(axis=1)
-    met = (eset.kinds == CROSSING)[facets].all(axis=1)
+    capped = np.isin(eset.kinds, (VertexKind.CAP, VertexKind.CORNER))[facets].all(axis=1)
+    met = (eset.kinds == VertexKind.CROSSING)[facets].all(axis=1)
     ended = whole.counts[some] == 1
     if cells.cut is not None:
         capped &= ~cells.cut[facets].all(axis=1)
     cut = np.ones(len(facets), bool)
     if cells.cut is not None:  # where an edge could not be cut, whole cells are left out
-        cut = (cells.cut | np.isin(eset.kinds, (FOLD, CORNER)))[facets].all(axis=1)
+        cut = (cells.cut | np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER)))[facets].all(
+            axis=1
+        )
     kinds = np.select(
         [flags_of(facets, np.concatenate(folds)), ended & on_box & outer, ended & met & outer,
          ended & capped & outer, ended & cut, ended],

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from equimorph.charts.preparation import first_copies
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
 from equimorph.manifold.lookup.exact_states import exact_states
@@ -128,14 +128,14 @@ def _at_end(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
     """Vertices on folds at which the set ends: no way should touch them."""
     whole, at = adjacency(eset.cells), np.zeros(len(eset.points), bool)
     at[whole.facets[whole.counts == 1]] = True
-    return at & np.isin(eset.kinds, (FOLD, CORNER))
+    return at & np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER))
 
 
 def _pulled(eset: EquilibriumSet, path: list[int]) -> Way:
     """The way, straight in the parameters between its vertices on folds."""
     if eset.cells.shape[1] != 3:
         return list(path)
-    folded = np.isin(eset.kinds, (FOLD, CORNER, CROSSING))
+    folded = np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))
     stops = [0, *(k for k in range(1, len(path) - 1) if folded[path[k]]), len(path) - 1]
     way: Way = [path[0]]
     for a, b in pairwise(stops):
@@ -154,7 +154,7 @@ def _states_on(eset: EquilibriumSet, way: Way) -> States:
     share = np.array([0.0 if isinstance(s, int) else s[2] for s in way])
     weights = np.stack([1.0 - share, share], axis=1)
     p = np.einsum("nk,nkp->np", weights, eset.points.p[ends])
-    folded = np.isin(eset.kinds, (FOLD, CORNER, CROSSING))[ends]
+    folded = np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))[ends]
     some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
     weights[some] = rooted(weights[some], folded[some])
     z = np.einsum("nk,nki->ni", weights, eset.points.z[ends])

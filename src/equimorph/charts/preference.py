@@ -21,7 +21,7 @@ from equimorph.manifold.complex.marked_complex import (
     fabric_of,
 )
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.lookup.over import rooted
@@ -164,12 +164,12 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     eset, corners = preference.cells.eset, preference.cells.corners
     values = np.ones(len(eset.points))
     used = np.unique(corners)
-    met = used[eset.kinds[used] == CROSSING]
+    met = used[eset.kinds[used] == VertexKind.CROSSING]
     values[met] = np.where(_preferred_beside(preference, met), -1.0, 1.0)
-    used = used[eset.kinds[used] != CROSSING]
+    used = used[eset.kinds[used] != VertexKind.CROSSING]
     states = eset.points[used]
     values[used] = np.where(preference.prefers(states.z, states.p), -1.0, 1.0)
-    folded = np.isin(eset.kinds, (FOLD, CORNER))
+    folded = np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER))
     # paths to a fold end just before it or there: look a little way off
     doubtful = used[folded[used] & (values[used] > 0.0)]
     pairs = np.unique(
@@ -195,7 +195,7 @@ def _preferred_beside(preference: Preference, met: Int[np.ndarray, " n"]) -> Boo
     two = list(permutations(range(corners.shape[1]), 2))
     pairs = np.concatenate([corners[:, list(each)] for each in two])
     cell = np.tile(preference.cells.numbers, len(two))
-    regular = ~np.isin(eset.kinds, (FOLD, CORNER, CROSSING))
+    regular = ~np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))
     kept = np.flatnonzero(np.isin(pairs[:, 0], met) & regular[pairs[:, 1]])
     _, first = np.unique(pairs[kept, 0], return_index=True)
     vertex, other = pairs[kept[first]].T
@@ -244,7 +244,7 @@ def _narrowed(
 def _straight(fabric: Fabric, ends: Ends, about: About) -> Way:
     """States over straight lines between the ends of edges; those on constraints stay on them."""
     store, structure = fabric.vertices, fabric.setting.structure
-    folded = np.isin(store.kinds[ends], (FOLD, CORNER))
+    folded = np.isin(store.kinds[ends], (VertexKind.FOLD, VertexKind.CORNER))
     bent = np.full(len(ends), bool(about[0] & (ON_CAP | ON_FOLD))) | folded.all(axis=1)
 
     def way(lanes: Int[np.ndarray, " n"], t: Float[np.ndarray, " n"]) -> Solved:
@@ -273,10 +273,14 @@ def _vertices(
     """Vertices on edges, on the same folds and caps as both ends."""
     store = fabric.vertices
     kinds = store.kinds[ends]
-    on_fold = np.isin(kinds, (FOLD, CORNER)).all(axis=1)
-    on_cap = np.isin(kinds, (CAP, CORNER)).all(axis=1)
-    kind = np.select([on_fold & on_cap, on_fold, on_cap], [CORNER, FOLD, CAP], REFINED)
-    plain = np.isin(kinds[:, 0], (FOLD, CORNER)).astype(int)
+    on_fold = np.isin(kinds, (VertexKind.FOLD, VertexKind.CORNER)).all(axis=1)
+    on_cap = np.isin(kinds, (VertexKind.CAP, VertexKind.CORNER)).all(axis=1)
+    kind = np.select(
+        [on_fold & on_cap, on_fold, on_cap],
+        [VertexKind.CORNER, VertexKind.FOLD, VertexKind.CAP],
+        VertexKind.REFINED,
+    )
+    plain = np.isin(kinds[:, 0], (VertexKind.FOLD, VertexKind.CORNER)).astype(int)
     rows = store.rows[ends[np.arange(len(ends)), plain]]
     others = (index, np.full(len(ends), -1))
     return vertices_of(fabric.setting, states, kind, others, np.ascontiguousarray(rows))

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
-from equimorph.manifold.geometry.points import CROSSING
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     Adjacency,
@@ -47,14 +47,14 @@ def cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:
 
 def crossing_facets(eset: EquilibriumSet, whole: Adjacency) -> Bool[np.ndarray, " F"]:
     """Facets at which a set that `cut_along_crossings` cut ends where other sheets cross."""
-    met = (eset.kinds == CROSSING)[whole.facets].all(axis=1)
+    met = (eset.kinds == VertexKind.CROSSING)[whole.facets].all(axis=1)
     return np.asarray(met & (whole.counts == 1) & ~_on_box(eset, whole.facets))
 
 
 def first_copies(eset: EquilibriumSet) -> Int[np.ndarray, " V"]:
     """For each vertex the first one that is the same state."""
     own = np.arange(len(eset.points))
-    met = np.flatnonzero(eset.kinds == CROSSING)
+    met = np.flatnonzero(eset.kinds == VertexKind.CROSSING)
     if len(met):
         rows = np.concatenate([eset.points.z[met], eset.points.p[met]], axis=1)
         _, first, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)

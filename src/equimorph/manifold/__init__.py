@@ -4,10 +4,12 @@ from equimorph.manifold.build import INTERVALS, equilibrium_set
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.equilibrium_set import (
     Boundary,
+    BoundaryKind,
     Component,
     EquilibriumSet,
     Stratum,
 )
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.manifold.lookup.states_over import StatesOver
 from equimorph.manifold.queries.components import Components, components
@@ -32,6 +34,7 @@ __all__ = [
     "INTERVALS",
     "Audit",
     "Boundary",
+    "BoundaryKind",
     "Component",
     "Components",
     "Cusps",
@@ -45,6 +48,7 @@ __all__ = [
     "StabilityDistance",
     "StatesOver",
     "Stratum",
+    "VertexKind",
     "cell_sizes",
     "components",
     "cusps",

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.errors import InputError
-from equimorph.manifold import Boundary, EquilibriumSet
+from equimorph.manifold import Boundary, BoundaryKind, EquilibriumSet
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.model import Box, Descriptor, names_of
 from equimorph.storage.hdf import add_dimension, get, get_json, put, put_json
@@ -106,7 +106,7 @@ def read_set(group: h5py.Group, owner: Owner) -> EquilibriumSet:
         component=get(group, "component"),
         stratum=get(group, "stratum"),
         folds=tuple(_chains(group, "fold", d)),
-        boundaries=tuple(Boundary(vertices, kind) for vertices, kind in chains),
+        boundaries=tuple(Boundary(vertices, BoundaryKind(kind)) for vertices, kind in chains),
         components=tuple(_built("Component", each, about) for each in about["components"]),
         strata=tuple(_built("Stratum", each, about) for each in about["strata"]),
         audit=_built("Audit", about["audit"], about),

@@ -8,8 +8,14 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.manifold.complex.equilibrium_set import Boundary, Component, EquilibriumSet, Stratum
-from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
+from equimorph.manifold.complex.equilibrium_set import (
+    Boundary,
+    BoundaryKind,
+    Component,
+    EquilibriumSet,
+    Stratum,
+)
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import (
     PAIR,
@@ -83,7 +89,14 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
     component = labels(len(corners), whole.links)
     parting = folds | crossed
     stratum = labels(len(corners), whole.links[whole.manifold & ~parting[whole.across]])
-    boundaries = _boundaries(whole, {"cap": caps, "crossing": crossed, "fold": folds})
+    boundaries = _boundaries(
+        whole,
+        {
+            BoundaryKind.CAP: caps,
+            BoundaryKind.CROSSING: crossed,
+            BoundaryKind.FOLD: folds,
+        },
+    )
     strata = tuple(
         Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
@@ -114,7 +127,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
 
 
 def _boundaries(
-    whole: Adjacency, flagged: Mapping[str, Bool[np.ndarray, " F"]]
+    whole: Adjacency, flagged: Mapping[BoundaryKind, Bool[np.ndarray, " F"]]
 ) -> tuple[Boundary, ...]:
     """Pieces of the boundary; of facets of several kinds the first counts."""
     once = whole.counts == 1
@@ -127,9 +140,9 @@ def _boundaries(
     for piece in pieces(whole.facets[once]):
         keys = keys_of(_facets_of(piece, whole.facets.shape[1]), base)
         amounts = {kind: int(np.isin(keys, own).sum()) for kind, own in marked.items()}
-        amounts["box"] = len(keys) - sum(amounts.values())
+        amounts[BoundaryKind.BOX] = len(keys) - sum(amounts.values())
         kinds = [kind for kind, amount in amounts.items() if amount]
-        out.append(Boundary(piece, kinds[0] if len(kinds) == 1 else "mixed"))
+        out.append(Boundary(piece, kinds[0] if len(kinds) == 1 else BoundaryKind.MIXED))
     return tuple(out)
 
 
@@ -207,7 +220,7 @@ def _audit(
         wrong=int(wrong.sum()),
         euler_characteristic=euler_characteristic(corners, edges),
         components=int(component.max(initial=-1)) + 1,
-        loops=tuple((kind, kinds.count(kind)) for kind in sorted(set(kinds))),
+        loops=tuple((str(kind), kinds.count(kind)) for kind in sorted(set(kinds))),
         largest_residual=float(points.residual.max(initial=0.0)),
         checked=0,
         missing=0,
@@ -261,4 +274,4 @@ def turned_off_folds(
 
 def singular_points(kinds: Int[np.ndarray, " V"]) -> Bool[np.ndarray, " V"]:
     """Which points lie on a fold, or where sheets cross."""
-    return np.isin(kinds, (FOLD, CORNER, CROSSING))
+    return np.isin(kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))

@@ -26,7 +26,7 @@ from equimorph.manifold.geometry.exact_points import (
     corrected_amid,
     lower_index,
 )
-from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import Cubics, Ends, split_step
 
@@ -302,9 +302,14 @@ def _counted(
     fold, cap, crossing = (bool(mark & each) for each in (ON_FOLD, ON_CAP, ON_CROSSING))
     count = lower_index if fold or crossing else _index
     found[found] = count(setting, at.z[found], at.p[found]) == lowest[found]
-    kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
+    kind = {
+        (False, False): VertexKind.REFINED,
+        (True, False): VertexKind.FOLD,
+        (False, True): VertexKind.CAP,
+        (True, True): VertexKind.CORNER,
+    }
     others = (lowest[found], np.full(found.sum(), -1))
-    kinds = np.full(found.sum(), CROSSING if crossing else kind[fold, cap])
+    kinds = np.full(found.sum(), VertexKind.CROSSING if crossing else kind[fold, cap])
     states = (at.z[found], at.p[found])
     return vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
 

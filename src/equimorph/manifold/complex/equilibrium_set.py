@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -38,18 +39,30 @@ class Stratum:
     component: int
 
 
+class BoundaryKind(StrEnum):
+    """What a piece of the boundary lies on."""
+
+    BOX = "box"
+    CAP = "cap"
+    """A constraint that bounds the set."""
+    CROSSING = "crossing"
+    FOLD = "fold"
+    MIXED = "mixed"
+    """Several of these."""
+
+
 @dataclass(frozen=True)
 class Boundary:
-    """A connected piece of the boundary: on the box ("box") or a constraint ("cap").
+    """A connected piece of the boundary: on the box or a constraint.
 
-    Of parts of sets also on a "fold" or a "crossing"; "mixed" if on several of these.
+    Boundaries of parts of sets may also lie on a fold or a crossing.
 
     vertices: one point (d = 1), a loop with the first vertex repeated (d = 2; an arc between ends
     of crossings, where there are such), or triangles, one a row (d = 3).
     """
 
     vertices: Int[np.ndarray, "..."]
-    kind: str
+    kind: BoundaryKind
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +77,7 @@ class EquilibriumSet:
     points
         States of the vertices.
     kinds
-        0 over the grid, 1 on a fold, 2 on a constraint, 3 between folds of one grid edge, 4 where a
-        fold meets a constraint, 5 amid others over a grid tetrahedron, 6 added by refinement, 7
-        where two sheets cross.
+        What each vertex lies on, see `VertexKind`.
     index
         Negative eigenvalues at the vertices; on folds that of the lower side.
     cells, cell_index, component, stratum
@@ -200,7 +211,7 @@ class EquilibriumSet:
     @cached_property
     def _sheets(self) -> Sheets:
         """The cells, made ready for queries."""
-        caps = [piece.vertices for piece in self.boundaries if piece.kind != "box"]
+        caps = [piece.vertices for piece in self.boundaries if piece.kind != BoundaryKind.BOX]
         folded, capped = np.zeros((2, len(self.points)), bool)
         singular = (*self.folds, *self.crossings)
         for flags, pieces in ((folded, singular), (capped, caps)):

@@ -13,7 +13,13 @@ from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.manifold.complex.equilibrium_set import Boundary, Component, EquilibriumSet, Stratum
+from equimorph.manifold.complex.equilibrium_set import (
+    Boundary,
+    BoundaryKind,
+    Component,
+    EquilibriumSet,
+    Stratum,
+)
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.model import (
     Box,
@@ -139,7 +145,7 @@ def _set(entry: Findings, setting: Setting, box: Box, fixed: Mapping[str, float]
     rest = iter(arrays)
     named: dict[str, Any] = {name: next(rest) for name in ARRAYS}
     mesh = BaseMesh(**{name: next(rest) for name in MESH})
-    boundaries = tuple(Boundary(next(rest), kind) for kind in text["boundaries"])
+    boundaries = tuple(Boundary(next(rest), BoundaryKind(kind)) for kind in text["boundaries"])
     pieces: dict[str, Any] = {
         name: tuple(next(rest) for _ in range(count)) for name, count in text["pieces"].items()
     }

@@ -17,7 +17,7 @@ from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.vertices import Vertices, on_constraints, vertices_of
 from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
-from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.tangents import (
@@ -114,7 +114,9 @@ class Fabric:
         """
         store, at = self.vertices, edges[:, side]
         slopes = store.fold_slope[at]
-        hub = np.flatnonzero((store.kinds[at] == CROSSING) & (self.dimension == TRIANGLES))
+        hub = np.flatnonzero(
+            (store.kinds[at] == VertexKind.CROSSING) & (self.dimension == TRIANGLES)
+        )
         if len(hub):
             chord = store.place[edges[hub, 1 - side]] - store.place[at[hub]]
             x, y = np.einsum("nkc,nc->kn", store.rows[at[hub]], chord)
@@ -292,8 +294,8 @@ def _outer_marks(
         on = (np.abs(places - bound) <= ON_BOX * size).all(axis=1)
         for k in range(len(size)):
             marks |= np.where(on[:, k], SIDES << (2 * k + side), 0)
-    capped = np.isin(eset.kinds, (CAP, CORNER))
-    met = np.flatnonzero(eset.kinds == CROSSING)
+    capped = np.isin(eset.kinds, (VertexKind.CAP, VertexKind.CORNER))
+    met = np.flatnonzero(eset.kinds == VertexKind.CROSSING)
     capped[met] = on_constraints(setting, eset.points.z[met], eset.points.p[met])
     return np.where(marks > 0, marks, np.where(capped[facets].all(axis=1), ON_CAP, HOLE))
 

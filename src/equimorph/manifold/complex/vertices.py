@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.geometry.crossings import crossing_frames
 from equimorph.manifold.geometry.exact_points import Corrected
-from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, REFINED
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (
     cap_slopes,
@@ -111,7 +111,7 @@ def vertices_of(
 ) -> Vertices:
     """Vertices with their frames; `others` are index and grid vertex, `rows` nearby planes."""
     z, p = states
-    crossing = kinds == CROSSING
+    crossing = kinds == VertexKind.CROSSING
     d = len(setting.free)
     frame = np.empty((len(z), d, z.shape[1] + d))
     folds, caps, crossings = (np.zeros((len(z), d)) for _ in range(3))
@@ -119,10 +119,10 @@ def vertices_of(
     frame[plain] = tangent_frames(setting, z[plain], p[plain], rows[plain])
     if len(met):
         frame[met], crossings[met] = crossing_frames(setting, z[met], p[met], rows[met])
-    capped = np.isin(kinds, (CAP, CORNER))
+    capped = np.isin(kinds, (VertexKind.CAP, VertexKind.CORNER))
     capped[met] = on_constraints(setting, z[met], p[met])
     for out, function, wanted in (
-        (folds, fold_slopes, np.isin(kinds, (FOLD, CORNER))),
+        (folds, fold_slopes, np.isin(kinds, (VertexKind.FOLD, VertexKind.CORNER))),
         (caps, cap_slopes, capped),
     ):
         own = np.flatnonzero(wanted)
@@ -134,7 +134,7 @@ def vertices_of(
 def free_vertices(setting: Setting, at: Corrected) -> Vertices:
     """Vertices inside sheets."""
     count, d = at.frames.shape[:2]
-    kinds, nowhere = np.full(count, REFINED), np.full(count, -1)
+    kinds, nowhere = np.full(count, VertexKind.REFINED), np.full(count, -1)
     slopes = np.zeros((3, count, d))
     return _with_slopes(
         setting,

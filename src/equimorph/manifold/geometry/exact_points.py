@@ -18,7 +18,7 @@ from equimorph.equilibria.point_conditions import Values as TakesValues
 from equimorph.equilibria.settle import Guards, Planes, Settled, Tangents, settle
 from equimorph.equilibria.settle import lower_index as index_below
 from equimorph.manifold.geometry.crossings import reduction
-from equimorph.manifold.geometry.points import CAP, CORNER, FOLD, Points
+from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed, principal_directions
 from equimorph.manifold.geometry.tangents import orthonormal
 
@@ -254,7 +254,10 @@ def pin(
     towards = np.array([group[member] for group in groups], int)
     z += share * (points.z[towards] - z)
     p += share * (points.p[towards] - p)
-    fold, cap = kind in {FOLD, CORNER}, kind in {CAP, CORNER}
+    fold, cap = (
+        kind in {VertexKind.FOLD, VertexKind.CORNER},
+        kind in {VertexKind.CAP, VertexKind.CORNER},
+    )
     rows = principal_directions(deviations, span.shape[1] - fold - cap)
     around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
     aim = Aim(setting, fold, cap, span, embed(setting, z, p), rows)

@@ -1,6 +1,7 @@
 """Known points of the equilibrium set: over grid vertices, on edges, inside triangles."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -8,10 +9,28 @@ from jaxtyping import Bool, Float, Int
 from equimorph.manifold.geometry.kernels import match_or_add
 from equimorph.structures import Structure
 
-GRID, FOLD, CAP, BETWEEN, CORNER, AMID, REFINED, CROSSING = 0, 1, 2, 3, 4, 5, 6, 7
-"""Kinds of points: over a grid vertex, on a fold, on a constraint, between folds on an edge, on a
-fold and a constraint at once, amid others over a grid tetrahedron, added by refinement, where two
-sheets cross."""
+
+class VertexKind(IntEnum):
+    """What a vertex of a set lies on."""
+
+    GRID = 0
+    """A vertex of the grid."""
+    FOLD = 1
+    CAP = 2
+    """A constraint that bounds the set."""
+    BETWEEN = 3
+    """A grid edge, between two of its folds."""
+    CORNER = 4
+    """A fold and a constraint at once."""
+    AMID = 5
+    """The inside of a grid tetrahedron, amid others."""
+    REFINED = 6
+    """An edge of the set that was bisected."""
+    CROSSING = 7
+    """A crossing of two sheets."""
+
+
+GRID, FOLD, CAP, BETWEEN, CORNER, AMID, REFINED, CROSSING = VertexKind
 
 SAME = 1e-6
 """Distance in the metric below which two polished equilibria over one vertex are the same."""

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.arrays import Values
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.exact_points import Pinned, Span, middles, pin, pin_crossings
-from equimorph.manifold.geometry.points import AMID, CAP, CORNER, CROSSING, FOLD, Points
+from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import distinct
@@ -65,7 +65,7 @@ def pin_confined(
     low = np.array([points.index[list(group)].min() for group in groups], int)
     sizes = np.array([len(group) for group in groups])
     z, p, _ = middles(setting, points, groups)
-    best = np.full(len(groups), -np.inf if kind == FOLD else ON_FACE)
+    best = np.full(len(groups), -np.inf if kind == VertexKind.FOLD else ON_FACE)
     found = np.zeros(len(groups), bool)
     towards = product(SHARES, range(min(TRIED, int(sizes.max(initial=0)))))
     for share, member in ((0.0, 0), *towards):
@@ -75,7 +75,7 @@ def pin_confined(
         own = [groups[lane] for lane in lanes.tolist()]
         pinned = pin(setting, points, own, kind, span[lanes], (member, share))
         depth = np.where(pinned.found, depths(frames[lanes], pinned.p[:, setting.free]), -np.inf)
-        if kind in {CAP, AMID}:
+        if kind in {VertexKind.CAP, VertexKind.AMID}:
             near = np.flatnonzero(depth > best[lanes])
             index = setting.structure.index(pinned.z[near], pinned.p[near])
             depth[near[index != low[lanes[near]]]] = -np.inf
@@ -125,7 +125,7 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     doubtful[spheres.doubtful] = True
     caps, lost = _caps(pairing, spheres.others)
     doubtful[spheres.others.owner[lost]] = True
-    crossing = pairing.points.kind == CROSSING
+    crossing = pairing.points.kind == VertexKind.CROSSING
     closed = closed_surfaces(spheres.others, caps, ~doubtful[spheres.others.owner], crossing)
     parts = part(closed)
     doubtful[closed.owner[~parts.whole]] = True
@@ -168,18 +168,21 @@ def _caps(
     amount = np.bincount(surfaces.surface, minlength=count)
     around = np.bincount(surfaces.rim_surface, minlength=count)
     at, points = _grouped(surfaces.rim_surface, surfaces.rims, count)
-    ends = {kind: pairing.points.kind[points] == kind for kind in (CORNER, CROSSING)}
+    ends = {
+        kind: pairing.points.kind[points] == kind
+        for kind in (VertexKind.CORNER, VertexKind.CROSSING)
+    }
     ended = {kind: np.bincount(at[own], minlength=count) for kind, own in ends.items()}
     every = sum(ended.values())
     # a fold runs from corner to corner, maybe far from the middle of the rim
     singular = {kind: (own == 2) & (every == 2) for kind, own in ended.items()}
     plain = (every == 0) & (around > 0) & (amount > 3)
     caps, lost = np.full(count, -1), (every > 0) & ~np.logical_or(*singular.values())
-    for kind, own in (*singular.items(), (CAP, plain)):
+    for kind, own in (*singular.items(), (VertexKind.CAP, plain)):
         used = own[at] & ends.get(kind, np.True_)
         groups = _groups(at[used], points[used], np.flatnonzero(own))
         caps[own] = _pinned(pairing, groups, kind, surfaces.owner[own], cap=True)
-        lost |= own & (caps < 0) & ((kind != CAP) | (around > 3))
+        lost |= own & (caps < 0) & ((kind != VertexKind.CAP) | (around > 3))
     return caps, lost
 
 
@@ -212,7 +215,7 @@ def _middles(
     own = points == cap[at]
     middles[at[own]] = points[own]
     left = (middles < 0) & parts.whole[parts.curve_surface]
-    for kind, own in ((FOLD, ~parts.curve_met), (CROSSING, parts.curve_met)):
+    for kind, own in ((VertexKind.FOLD, ~parts.curve_met), (VertexKind.CROSSING, parts.curve_met)):
         chosen = np.flatnonzero(left & own)
         owner = parts.closed.owner[parts.curve_surface[chosen]]
         middles[chosen] = _pinned(pairing, _groups(at, points, chosen), kind, owner)
@@ -242,7 +245,7 @@ def _apexes(
     wanted = np.flatnonzero(~folded & (apexes < 0) & whole)
     at, points = _grouped(parts.region, parts.closed.corners, count)
     owner = parts.closed.owner[parts.region_surface[wanted]]
-    found = np.array(_pinned(pairing, _groups(at, points, wanted), AMID, owner), int)
+    found = np.array(_pinned(pairing, _groups(at, points, wanted), VertexKind.AMID, owner), int)
     apexes[wanted] = found
     doubtful[owner[found < 0]] = True
     return apexes
@@ -292,7 +295,7 @@ def _pinned(
 
     Crossings belong to two surfaces, whose groups are the same; `cap`: on a constraint.
     """
-    if kind == CROSSING:
+    if kind == VertexKind.CROSSING:
         return _shared(pairing, groups, owner, cap=cap)
     return _new(pairing, groups, kind, owner, cap=cap)
 
@@ -309,7 +312,9 @@ def _shared(
     once = {key: keys.count(key) for key in keys}
     over = dict(zip(keys, owner.tolist(), strict=True))
     own = np.array([over[key] for key in once], int)
-    found = dict(zip(once, _new(pairing, list(once), CROSSING, own, cap=cap), strict=True))
+    found = dict(
+        zip(once, _new(pairing, list(once), VertexKind.CROSSING, own, cap=cap), strict=True)
+    )
     return [found[key] if once[key] == SHEETS else -1 for key in keys]
 
 
@@ -345,7 +350,7 @@ def _pin_inside(
     """Pin points inside their grid tetrahedra; crossings, and folds if need be, in the box."""
     setting, mesh = pairing.setting, pairing.mesh
     span = np.tile(np.eye(len(setting.free)), (len(groups), 1, 1))
-    if kind == CROSSING:
+    if kind == VertexKind.CROSSING:
         pinned = pin_crossings(setting, pairing.points, groups, span, cap)
     else:
         frames = mesh.vertices[mesh.tetrahedra[owner]]

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.complex.description import Complex, Frame, Lifting, described
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.balls import Balls, fill
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.discs import Discs, assemble
@@ -165,9 +165,16 @@ def _segments(pairing: Pairing) -> Cells:
     corners = np.array(pairs, int).reshape(-1, 2)
     kind, index = points.kind[: points.count], points.index[: points.count]
     # of two neighbours on a curve at most one is singular
-    regular = np.where(np.isin(kind[corners[:, 0]], (FOLD, CROSSING)), corners[:, 1], corners[:, 0])
+    regular = np.where(
+        np.isin(kind[corners[:, 0]], (VertexKind.FOLD, VertexKind.CROSSING)),
+        corners[:, 1],
+        corners[:, 0],
+    )
     used = np.unique(corners)
-    marked = (used[kind[used] == each, None] for each in (FOLD, CAP, CROSSING))
+    marked = (
+        used[kind[used] == each, None]
+        for each in (VertexKind.FOLD, VertexKind.CAP, VertexKind.CROSSING)
+    )
     return Cells(corners, index[regular], *marked)
 
 
@@ -219,7 +226,7 @@ def _parity_violations(pairing: Pairing) -> int:
     start, end = np.array(curves.start, int), np.array(curves.end, int)
     crossed = np.zeros(len(start), int)
     for curve, inner in curves.inner.items():
-        crossed[curve] = np.count_nonzero(points.kind[inner] == CROSSING)
+        crossed[curve] = np.count_nonzero(points.kind[inner] == VertexKind.CROSSING)
     closed = end >= 0
     start, end = start[closed], end[closed]
     returned = (points.vertex[start] == points.vertex[end]).astype(int)

@@ -19,7 +19,7 @@ from equimorph.manifold.geometry.exact_points import (
     lower_index,
     pin_crossings,
 )
-from equimorph.manifold.geometry.points import CROSSING
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import MEETING, TURN, Chord, Plan, chord_of, planes
@@ -85,7 +85,7 @@ def _agree(plans: list[Plan], ways: Iterable[list[Chord]]) -> bool:
 def put_hubs(pairing: Pairing, plans: list[Plan]) -> set[int]:
     """Lead folds that cross a chord of a crossing through a hub; return triangles without one."""
     lost: set[int] = set()
-    plans = [plan for plan in plans if CROSSING in plan.kinds.values()]
+    plans = [plan for plan in plans if VertexKind.CROSSING in plan.kinds.values()]
     for hub in [plan for plan in plans if plan.those(TURN) and _joined(plan) < _singular(plan)]:
         triangle, chord = hub.polygon.triangle, hub.chords[0]
         point = _hub(pairing, triangle, chord)
@@ -149,7 +149,7 @@ def _pinned(
     good = pinned.found & pairing.mesh.covers(pinned.p[:, setting.free])
     low = lower_index(setting, pinned.z, pinned.p)
     return [
-        store.add(pinned.z[k], pinned.p[k], int(low[k]), CROSSING) if good[k] else None
+        store.add(pinned.z[k], pinned.p[k], int(low[k]), VertexKind.CROSSING) if good[k] else None
         for k in range(len(wanted))
     ]
 
@@ -190,7 +190,7 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     except (_NoCrossingError, ValueError):
         return None
     index = int(store.index[ends].min())
-    pairing.hubs[chord] = store.add(found[-1].z[0], found[-1].p[0], index, CROSSING)
+    pairing.hubs[chord] = store.add(found[-1].z[0], found[-1].p[0], index, VertexKind.CROSSING)
     return pairing.hubs[chord]
 
 

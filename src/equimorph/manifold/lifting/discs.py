@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria.critical import null_border
 from equimorph.manifold.geometry.exact_points import pin
-from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD, Points
+from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import flags_of
 from equimorph.manifold.lifting.crossing_branches import lonely
@@ -148,7 +148,7 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     wanted = [(plan, kind) for plan, kind in wanted if kind]
     pairs = [(plan, (plan.points[0], plan.points[-1]), kind) for plan, kind in wanted]
     extra = _pinned(pairing, pairs)
-    crossing = [k for k, (_, kind) in enumerate(wanted) if kind == CROSSING]
+    crossing = [k for k, (_, kind) in enumerate(wanted) if kind == VertexKind.CROSSING]
     ends = pin_ends(pairing, [wanted[k][0] for k in crossing])
     for k, point in zip(crossing, ends, strict=True):
         extra[k] = point
@@ -166,10 +166,10 @@ def _through(plan: Plan) -> int:
     Where the ends of a fold and of a crossing are both missing, no point is found.
     """
     if len(plan.those(TURN)) % 2:
-        return CORNER
+        return VertexKind.CORNER
     if len(plan.those(MEETING)) % 2:
-        return CROSSING
-    return CAP if _same_side(plan, (plan.points[0], plan.points[-1])) else 0
+        return VertexKind.CROSSING
+    return VertexKind.CAP if _same_side(plan, (plan.points[0], plan.points[-1])) else 0
 
 
 def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan]:
@@ -254,7 +254,7 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     """Put an exact point on chords that would lie on a grid edge, or block triangulation."""
     wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
     folds = [(plan, chord) for plan, chord in wanted if plan.singular(chord[0]) == TURN]
-    extra = _pinned(pairing, [(plan, chord, FOLD) for plan, chord in folds])
+    extra = _pinned(pairing, [(plan, chord, VertexKind.FOLD) for plan, chord in folds])
     for (plan, chord), point in zip(folds, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
@@ -287,7 +287,7 @@ def _chords_to_split(plan: Plan) -> list[Chord]:
 def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int | None]:
     """Numbers of new exact points of some kind between pairs; None where none was found."""
     out: list[int | None] = [None] * len(wanted)
-    for kind in (FOLD, CAP, CORNER):
+    for kind in (VertexKind.FOLD, VertexKind.CAP, VertexKind.CORNER):
         own = [k for k, each in enumerate(wanted) if each[2] == kind]
         if not own:
             continue

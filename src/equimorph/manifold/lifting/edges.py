@@ -11,7 +11,7 @@ from equimorph.equilibria.curves import correction_size, squared_length
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
-from equimorph.manifold.geometry.points import BETWEEN, CAP, CROSSING, FOLD
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import ABANDONED, Pairing, Rays
 from equimorph.model import Constraint
@@ -176,7 +176,7 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
 
 def _number(pairing: Pairing, point: Inner, edge: int) -> int:
     """Number of a point inside an edge; one where curves cross belongs to both."""
-    if point[3] == CROSSING:
+    if point[3] == VertexKind.CROSSING:
         return pairing.crossing(*point[:3], edge)
     return pairing.points.add(*point, edge)
 
@@ -219,7 +219,7 @@ def _caps(pairing: Pairing, outcome: Traces, line: ParameterLine, good: Flags) -
     z, p = outcome.z[lanes], line.take(lanes).parameters(outcome.t[lanes])
     # counted anew: a fold may lie between the last step and the constraint
     index = pairing.setting.structure.index(z, p).tolist()
-    return {int(lane): (z[k], p[k], index[k], CAP) for k, lane in enumerate(lanes)}
+    return {int(lane): (z[k], p[k], index[k], VertexKind.CAP) for k, lane in enumerate(lanes)}
 
 
 def _inner(
@@ -237,17 +237,19 @@ def _inner(
     at = np.flatnonzero(np.isin(passed.code, (EventCode.FOLD, EventCode.BRANCH_POINT)))
     z, index = passed.z[at].copy(), passed.index[at].min(axis=1)
     p = line.start[passed.lanes[at]] + passed.t[at][:, None] * line.velocity[passed.lanes[at]]
-    kind = np.where(passed.code[at] == EventCode.FOLD, FOLD, CROSSING)
+    kind = np.where(passed.code[at] == EventCode.FOLD, VertexKind.FOLD, VertexKind.CROSSING)
     keep = np.ones(len(at), bool)
-    own = np.flatnonzero(kind == CROSSING)
+    own = np.flatnonzero(kind == VertexKind.CROSSING)
     if len(own):
-        pinned = _pinned(pairing, rays.take(passed.lanes[at[own]]), (z[own], p[own]), CROSSING)
+        pinned = _pinned(
+            pairing, rays.take(passed.lanes[at[own]]), (z[own], p[own]), VertexKind.CROSSING
+        )
         z[own], p[own] = pinned.z, pinned.p
         index[own] = lower_index(pairing.setting, pinned.z, pinned.p)
         good[passed.lanes[at[own[~pinned.found]]]] = False
         crossed = passed.lanes[at[own]]
         keep[own] = _first_ones(pairing, crossed, pinned)
-        doubtful = np.flatnonzero((kind == FOLD) & np.isin(passed.lanes[at], crossed))
+        doubtful = np.flatnonzero((kind == VertexKind.FOLD) & np.isin(passed.lanes[at], crossed))
         there = (z[doubtful], p[doubtful])
         keep[doubtful] = _pinned(
             pairing, rays.take(passed.lanes[at[doubtful]]), there, EventCode.FOLD
@@ -310,4 +312,4 @@ def _between(outcome: Traces, line: ParameterLine, lane: int, span: tuple[float,
     p = line.start[lane] + points.t[at] * line.velocity[lane]
     # counted anew: near crossings the tracer may have met round-off
     index = int(line.structure.index(points.z[at : at + 1], p[None])[0])
-    return points.z[at], p, index, BETWEEN
+    return points.z[at], p, index, VertexKind.BETWEEN

@@ -8,7 +8,7 @@ constraint. New ends are new equilibria.
 import numpy as np
 
 from equimorph.errors import InputError
-from equimorph.manifold.geometry.points import GRID
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.edges import lift_directly, trace_rays
 from equimorph.manifold.lifting.pairing import HARD, LONG, UNTRACED, Pairing, Rays
 from equimorph.model import Progress
@@ -45,7 +45,7 @@ def flood_directly(pairing: Pairing, progress: Progress) -> None:
     while len((rays := pairing.marked(UNTRACED)).points):
         _lift(pairing, rays, 1)
         _refuse_endless(pairing)
-        live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == GRID)
+        live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == VertexKind.GRID)
         progress.report("lifting edges", int(live), None)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.manifold.geometry.points import CROSSING
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import placed_frames, tangent_frames
 from equimorph.manifold.lifting.pairing import Pairing
@@ -74,7 +74,7 @@ def _closed(pairing: Pairing, chains: list[Polygon]) -> bool:
     its chord is given a point (see `assembly`).
     """
     crossings = [
-        {point for point in chain.points if pairing.points.kind[point] == CROSSING}
+        {point for point in chain.points if pairing.points.kind[point] == VertexKind.CROSSING}
         for chain in chains
     ]
     if len(chains) == 2 and crossings[0] and crossings[0] == crossings[1]:

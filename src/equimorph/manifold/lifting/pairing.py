@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import ParameterLine
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.manifold.geometry.points import CROSSING, SAME, Points
+from equimorph.manifold.geometry.points import SAME, Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
 
 UNTRACED, ABANDONED, LONG, HARD = -1, -2, -3, -4
@@ -110,7 +110,7 @@ class Pairing:
             gap = self.points.z[point, :n] - z[:n]
             if gap**2 @ self.setting.structure.mass < SAME**2:
                 return point
-        known.append(self.points.add(z, p, index, CROSSING, edge))
+        known.append(self.points.add(z, p, index, VertexKind.CROSSING, edge))
         return known[-1]
 
     def alive(self, curve: int) -> bool:

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.geometry.points import CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import plane_bases
 from equimorph.manifold.lifting.loops import Polygon
 from equimorph.manifold.lifting.pairing import Pairing
@@ -195,7 +195,11 @@ def _fan_out(
     return triangles
 
 
-SINGULAR = {FOLD: TURN, CORNER: TURN, CROSSING: MEETING}
+SINGULAR: dict[int, int] = {
+    VertexKind.FOLD: TURN,
+    VertexKind.CORNER: TURN,
+    VertexKind.CROSSING: MEETING,
+}
 """What points of some kinds are to `cutting`; those of all other kinds are regular."""
 
 

@@ -13,7 +13,7 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import HOLE, ON_FOLD, RIM, Fabric, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.exact_points import lower_index
-from equimorph.manifold.geometry.points import CROSSING
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.structures import States
 
@@ -53,7 +53,7 @@ def cusps(eset: EquilibriumSet) -> Cusps:
     fabric = fabric_of(eset)
     ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
     hubs = _turning_hubs(fabric, ends)
-    ends = ends[(fabric.vertices.kinds[ends] != CROSSING).all(axis=1)]
+    ends = ends[(fabric.vertices.kinds[ends] != VertexKind.CROSSING).all(axis=1)]
     turning = ends[_turning(fabric, ends)]
     lowest = fabric.vertices.index[turning].min(axis=1)
     states: list[tuple[np.ndarray, np.ndarray, int]] = []
@@ -77,7 +77,7 @@ def _turning_hubs(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarra
     """Vertices at which the image of a fold turns back as it passes a crossing."""
     store = fabric.vertices
     both = np.concatenate([ends, ends[:, ::-1]])
-    both = both[store.kinds[both[:, 0]] == CROSSING]
+    both = both[store.kinds[both[:, 0]] == VertexKind.CROSSING]
     point = fabric.points[both[:, 0]]
     order = np.argsort(point, kind="stable")
     _, first, counts = np.unique(point[order], return_index=True, return_counts=True)

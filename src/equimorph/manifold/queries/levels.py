@@ -22,7 +22,7 @@ from equimorph.manifold.complex.description import Frame, Lifting, described
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import HOLE, ON_CAP, Fabric, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.points import CAP, CORNER, CROSSING, FOLD
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import adjacency, pieces
@@ -214,8 +214,12 @@ def part_of(
         facets = np.concatenate([facets, capped])
         marks = np.concatenate([marks, np.full(len(capped), ON_CAP)])
     kinds = fabric.vertices.kinds.copy()
-    plain = on_level & (kinds != CROSSING)
-    kinds[plain] = np.where(np.isin(kinds[plain], (FOLD, CORNER)), CORNER, CAP)
+    plain = on_level & (kinds != VertexKind.CROSSING)
+    kinds[plain] = np.where(
+        np.isin(kinds[plain], (VertexKind.FOLD, VertexKind.CORNER)),
+        VertexKind.CORNER,
+        VertexKind.CAP,
+    )
     fabric = replace(
         fabric.only(cells),
         vertices=replace(fabric.vertices, kinds=kinds),
