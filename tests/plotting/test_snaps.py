@@ -30,7 +30,7 @@ def test_snaps_are_drawn_where_they_begin_and_end(graph):
     landed = [landing for snap in graph.snaps for landing in snap.landings]
     ends = np.concatenate([np.asarray(each.get_offsets())[:, 1] for each in along.collections])
     np.testing.assert_allclose(ends, [each.state.z[0] for each in landed], rtol=1e-12)
-    assert bar.get_ylabel().startswith("energy freed")
+    assert bar.get_ylabel().startswith("energy released")
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["1 stable", "2 stable", "stability boundary", "snaps to a state of the set"]
 

@@ -37,7 +37,7 @@ def run(tmp_path_factory) -> tuple[Outcome, Path]:
 
 
 def test_every_snap_that_was_followed_is_in_the_table(run):
-    """Height x_l tan δ before the snap at the fold, and the energy freed until the landing."""
+    """Height x_l tan δ before the snap at the fold, and the energy released until the landing."""
     outcome, out = run
     _, snaps, _ = outcome.of("snap_graph")["where"]
     with (out / "where-snap_graph.csv").open(encoding="utf-8") as file:
@@ -51,7 +51,7 @@ def test_every_snap_that_was_followed_is_in_the_table(run):
         assert heights[0] == pytest.approx(x * np.tan(delta), abs=1e-4)
         angles = np.arctan(np.array(heights) / x)
         before, after = 0.5 * (1 - x / np.cos(angles)) ** 2 + force * x * np.tan(angles)
-        assert float(row["energy freed"]) == pytest.approx(before - after, abs=1e-7)
+        assert float(row["energy released"]) == pytest.approx(before - after, abs=1e-7)
         assert row["from stratum"] == row["to stratum"] == "0"
 
 

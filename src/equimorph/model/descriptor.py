@@ -22,7 +22,7 @@ Branches = Callable[
 ]
 
 EASE = 1e-9
-"""Relative room beside a bound that counts as rounding."""
+"""Relative excess over a bound that counts as rounding."""
 
 
 @runtime_checkable
@@ -74,7 +74,7 @@ class Descriptor:
         For extrema along the structure: the arclength where they are.
     branches
         For the largest of several smooth functions: all of them (−∞ where there are fewer) and
-        their places, by which they are told apart.
+        their places, which identify them.
     obstacle
         For the distance of the shape from an obstacle: this one, which figures show.
     """
@@ -165,7 +165,7 @@ def combined(
     Parameters
     ----------
     name
-        Its name; by this it is told apart from other descriptors of the structure.
+        Its name, which must differ from those of other descriptors of the structure.
     function
         Of as many arrays (lanes) as descriptors, entry by entry.
     descriptors

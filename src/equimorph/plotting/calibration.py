@@ -1,4 +1,4 @@
-"""Fitted shapes with the measured points, and what is left between them."""
+"""Fitted shapes with the measured points, and the residuals."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ _LOOKS: tuple[tuple[str, str, dict[str, Any]], ...] = (
 
 
 def calibration(found: Calibration, measured: MeasuredShape, ax: Axes | None = None) -> Axes:
-    """Shapes at the fitted unknowns under the measured points; below, what is left over.
+    """Shapes at the fitted unknowns under the measured points; below, the residuals.
 
     Parameters
     ----------
@@ -64,7 +64,9 @@ def calibration(found: Calibration, measured: MeasuredShape, ax: Axes | None = N
         places = np.linspace(0.0, 1.0, points.shape[1]) if measured.s is None else measured.s
         _draw_residuals(below, np.asarray(places, dtype=float), left, colours)
         unit = found.states.structure.length_unit
-        below.set_ylabel("left over / σ" if measured.sigma is not None else with_unit("left", unit))
+        below.set_ylabel(
+            "residual / σ" if measured.sigma is not None else with_unit("residual", unit)
+        )
     return ax
 
 
@@ -74,7 +76,7 @@ def _draw_residuals(
     left: Float[np.ndarray, "states points 2"],
     colours: Float[np.ndarray, "states 4"],
 ) -> None:
-    """Fitted less measured coordinates over the places of the points."""
+    """Residuals, fitted minus measured coordinates, over the arclengths of the points."""
     ax.axhline(0.0, color=style.FAINT, linewidth=style.HAIRLINE, zorder=1)
     for own, colour in zip(left, colours, strict=True):
         for axis, (_, marker, look) in enumerate(_LOOKS):

@@ -1,4 +1,4 @@
-"""A film of the structure on its way along a route, beside the moving point in the plane."""
+"""A film of a structure that follows a route, next to its point in the parameter plane."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath

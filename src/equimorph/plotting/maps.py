@@ -97,7 +97,7 @@ class Panel:
 
 
 def new_map_axes(wider: float = 0.0) -> Axes:
-    """Empty axes for a map, one column wide; labels get so many inches more on both sides."""
+    """Empty axes for a map, one column wide; labels get that many inches more on both sides."""
     height = _BOTTOM + _FRAME_HEIGHT + _TOP
     room = (_LEFT + wider, _BOTTOM, _RIGHT + wider, _TOP)
     return style.new_axes(style.SINGLE_COLUMN, height, room)

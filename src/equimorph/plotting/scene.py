@@ -146,7 +146,7 @@ def _cut(
 def _runs(
     points: Float[np.ndarray, "points 2"], wanted: Bool[np.ndarray, " points"]
 ) -> list[Float[np.ndarray, "_ 2"]]:
-    """Runs of wanted points, each with the first point after it."""
+    """Runs of selected points, each with the first point after it."""
     switch = np.diff(np.concatenate([[False], wanted, [False]]).astype(int))
     starts, ends = np.flatnonzero(switch > 0), np.flatnonzero(switch < 0)
     return [points[a : b + 1] for a, b in zip(starts, ends, strict=True)]

@@ -1,4 +1,4 @@
-"""Where snaps lead: the stability boundary, the energy freed there, states before and after."""
+"""Where snaps lead: the stability boundary, the energy released there, states before and after."""
 
 from typing import Any
 
@@ -68,7 +68,7 @@ def snap_panels(graph: SnapGraph, descriptor: Descriptor | None = None) -> Figur
         bar = figure.add_axes((0.915, 0.235, 0.014, 0.695))
         entries = _draw_plane(plane, graph, shades) + _entries(graph)
         _draw_along(along, graph, descriptor or eset.structure.elevation, shades)
-        figure.colorbar(shades, cax=bar, label=f"energy freed{_unit(graph)}")
+        figure.colorbar(shades, cax=bar, label=f"energy released{_unit(graph)}")
         for letter, ax in zip("ab", (plane, along), strict=True):
             ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
         figure.legend(handles=entries, loc="lower center", ncols=6, bbox_to_anchor=(0.5, 0.0))

@@ -1,4 +1,4 @@
-"""Settings with the largest limit load: where they are, and what is left of it beside them."""
+"""Settings with the largest limit load, and how it falls off around them."""
 
 from collections.abc import Sequence
 from typing import Any

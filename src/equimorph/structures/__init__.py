@@ -1,4 +1,4 @@
-"""Structures: what can be bent, and the states it can be in."""
+"""Elastic structures, their equilibrium states, and descriptors of these."""
 
 from collections.abc import Callable, Mapping
 from typing import Any

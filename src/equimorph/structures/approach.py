@@ -1,4 +1,4 @@
-"""How near a structure comes to an obstacle, and where."""
+"""Distance between a structure and an obstacle, and the place where it is smallest."""
 
 import numpy as np
 from jaxtyping import Float
@@ -10,11 +10,11 @@ STEPS = 8
 """Newton steps towards the nearest point of an arc."""
 STARTS = np.array([0.0, 1.0])
 
-Arcs = Float[np.ndarray, "lanes arcs 4 2"]
+Arcs = Float[np.ndarray, "lanes arcs 4 space"]
 """Cubic arcs: both ends, and the derivatives there with respect to the share of the arc."""
 
 
-def straight_arcs(corners: Float[np.ndarray, "lanes points 2"]) -> Arcs:
+def straight_arcs(corners: Float[np.ndarray, "lanes points space"]) -> Arcs:
     """Arcs of a polygon."""
     side = np.diff(corners, axis=1)
     return np.stack([corners[:, :-1], corners[:, 1:], side, side], axis=2)

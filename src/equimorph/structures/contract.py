@@ -1,4 +1,4 @@
-"""What a structure must offer so that everything else works with it."""
+"""The contract of structures: the methods by which the rest of the package uses them."""
 
 import json
 from abc import ABC, abstractmethod
@@ -48,7 +48,7 @@ class Symmetry:
     signs: Float[np.ndarray, " parameters"]
     """Sign of each parameter of the image: −1 where it is reversed."""
     order: Int[np.ndarray, " parameters"] | None = None
-    """From which parameter each of the image comes, if some change places: two end angles, say."""
+    """Number of the parameter from which each one comes; None: all keep their place."""
 
     def image(
         self, p: Float[np.ndarray, "*lanes parameters"]
@@ -73,9 +73,9 @@ class Structure(ABC):
     length_unit: str = "1"
     """Unit of the coordinates to draw."""
     endless_in: ClassVar[str] = ""
-    """Descriptor without a bound on which there are equilibria without end, if there are."""
+    """Descriptor to bound, as infinitely many equilibria exist where it grows; empty if none."""
     energy_scale: float = 1.0
-    """What one unit of `energy` is in the units of the parameters: E in joules, say."""
+    """Value of one unit of `energy` in the units of the parameters, in joules for example."""
 
     @property
     def size(self) -> int:
@@ -181,10 +181,10 @@ class Structure(ABC):
     @abstractmethod
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
-    ) -> Float[np.ndarray, "lanes points 2"]:
+    ) -> Float[np.ndarray, "lanes points space"]:
         """Coordinates to draw."""
 
-    def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 2"]:
+    def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 space"]:
         """Shape as cubic arcs: both ends, and the derivatives there; straight lines by default."""
         return straight_arcs(self.shape(z, p))
 
@@ -199,7 +199,7 @@ class Structure(ABC):
 
     @property
     def elevation(self) -> Descriptor:
-        """Descriptor that tells states apart in figures of the set: the energy by default."""
+        """Descriptor that is the height in figures of the set: the energy by default."""
         return Descriptor("energy", "energy", self.energy, "E", self.signature)
 
     def symmetries(self) -> tuple[Symmetry, ...]:

@@ -25,7 +25,7 @@ BALANCED = 1e-13
 """Largest residual of a guess that is an equilibrium already: round-off."""
 
 
-def continued(
+def continue_equilibria(
     structure: Structure,
     guess: Callable[[Parameters], Lanes],
     start: Parameters,
@@ -36,18 +36,18 @@ def continued(
     The guess at `start` is corrected; each step predicts by the change of the guess and corrects
     by Newton. Lanes that do not converge are not found.
     """
-    z, found = corrected(structure, guess(start), start)
+    z, found = correct_at_parameters(structure, guess(start), start)
     if np.array_equal(start, p):
         return z, found
     before = start
     for k in range(1, STEPS + 1):
         here = start + (p - start) * (k / STEPS)
-        z, good = corrected(structure, z + guess(here) - guess(before), here)
+        z, good = correct_at_parameters(structure, z + guess(here) - guess(before), here)
         found, before = found & good, here
     return z, found
 
 
-def corrected(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
+def correct_at_parameters(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
     """Newton at fixed parameters, and whether it settled; balanced guesses stay as they are."""
     z = z.copy()
     settled = np.zeros(len(z), bool)
@@ -73,8 +73,8 @@ NEAR = 0.1
 class DiscreteStructure(Structure):
     """Structure with a sparse KKT matrix and a natural state known at the default parameters.
 
-    What remains to be said: `layout`, `entries`, `linearised` and `natural_guess`, besides the rest
-    of the contract.
+    Subclasses give `layout`, `entries`, `linearised` and `natural_guess`, and the rest of the
+    contract.
     """
 
     @property
@@ -153,7 +153,7 @@ class DiscreteStructure(Structure):
         guess = self.natural_guess(p)
         force = self.residual(guess, p)[0]
         if np.isfinite(force).all():
-            z, found = corrected(self, guess, p)
+            z, found = correct_at_parameters(self, guess, p)
             before, after = guess[0, : self.unknowns], z[0, : self.unknowns]
             allowed = NEAR * (1.0 + np.abs(before).max())
             if found[0] and np.abs(after - before).max() <= allowed:
@@ -169,7 +169,7 @@ class DiscreteStructure(Structure):
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Natural state, continued from the default parameters."""
         start = np.where(np.isnan(self._reference), p, self._reference)
-        return continued(self, self.natural_guess, start, p)
+        return continue_equilibria(self, self.natural_guess, start, p)
 
     def unloaded(self) -> Mapping[str, float]:
         """All loads zero."""

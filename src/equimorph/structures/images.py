@@ -60,7 +60,7 @@ def sign_between(a: np.ndarray, b: np.ndarray) -> float | None:
     return None
 
 
-def exchanged(
+def parameter_exchange(
     here: Sequence[np.ndarray], image: Sequence[np.ndarray]
 ) -> tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]] | None:
     """Signs and order (see `Symmetry`) of parameters whose effects have images among each other.

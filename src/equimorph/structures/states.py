@@ -1,4 +1,4 @@
-"""Equilibrium states: one, or a batch."""
+"""Equilibrium states: a single one, and batches of them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -96,7 +96,7 @@ class States:
 
     def shape(
         self, s: Float[np.ndarray, " points"] | None = None
-    ) -> Float[np.ndarray, "lanes points 2"]:
+    ) -> Float[np.ndarray, "lanes points space"]:
         """Coordinates to draw, in the structure's unit of length."""
         return self.structure.shape(self.z, self.p, s)
 
@@ -173,6 +173,8 @@ class State:
         """Whether the discretisation represents the state."""
         return bool(self.batch.resolved[0])
 
-    def shape(self, s: Float[np.ndarray, " points"] | None = None) -> Float[np.ndarray, "points 2"]:
+    def shape(
+        self, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "points space"]:
         """Coordinates to draw, in the structure's unit of length."""
         return np.asarray(self.batch.shape(s)[0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equimorph.structures import EnergyStructure
-from equimorph.structures.energy.enclosures import can_enclose, enclosed
+from equimorph.structures.energy.enclosures import can_enclose, enclosure
 from equimorph.structures.energy.tape import casadi, tape
 from equimorph.tasks import verify
 
@@ -32,7 +32,7 @@ def test_values_lie_between_the_bounds(formula):
     generator = np.random.default_rng(3)
     low = generator.uniform(-1.2, 1.0, (60, 2))
     high = low + generator.uniform(0.0, 0.8, (60, 2))
-    least, most = enclosed(one, low, high)
+    least, most = enclosure(one, low, high)
     for _ in range(100):
         inside = low + generator.random((60, 2)) * (high - low)
         value = one(inside)
@@ -45,7 +45,7 @@ def test_narrow_intervals_give_narrow_bounds():
     x = ca.SX.sym("x")
     one = tape((x,), ca.sin(x) * x**2)
     at = np.linspace(-2, 2, 9)[:, None]
-    least, most = enclosed(one, at - 1e-9, at + 1e-9)
+    least, most = enclosure(one, at - 1e-9, at + 1e-9)
     assert (most - least).max() < 1e-7
     np.testing.assert_allclose(0.5 * (least + most), one(at), atol=1e-12)
 
@@ -54,7 +54,7 @@ def test_poles_have_no_bounds():
     ca = casadi()
     x = ca.SX.sym("x")
     for formula in (1 / x, ca.tan(x + ca.pi / 2), ca.log(x)):
-        least, most = enclosed(tape((x,), formula), np.array([[-0.1]]), np.array([[0.1]]))
+        least, most = enclosure(tape((x,), formula), np.array([[-0.1]]), np.array([[0.1]]))
         assert np.isinf(least[0, 0]) or np.isinf(most[0, 0])
 
 

@@ -1,4 +1,4 @@
-"""What the author of an energy declares: unknowns, parameters, and expressions in them."""
+"""Declarations of an energy: its unknowns, its parameters, and expressions in them."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence

@@ -36,7 +36,7 @@ def can_enclose(tape: Tape) -> bool:
     return {OPERATIONS[int(code)] for code in np.unique(tape.code[:, 0])} <= KNOWN
 
 
-def enclosed(
+def enclosure(
     tape: Tape, low: Float[np.ndarray, "lanes inputs"], high: Float[np.ndarray, "lanes inputs"]
 ) -> tuple[Float[np.ndarray, "lanes outputs"], Float[np.ndarray, "lanes outputs"]]:
     """Bounds of the outputs for all inputs between two bounds; infinite where there are none."""

@@ -22,7 +22,7 @@ from equimorph.structures.energy.declared import (
     unknowns_of,
 )
 from equimorph.structures.energy.drawing import energy_drawing, forces_of, marks_of
-from equimorph.structures.energy.enclosures import can_enclose, enclosed
+from equimorph.structures.energy.enclosures import can_enclose, enclosure
 from equimorph.structures.energy.tape import Derivatives, Tape, casadi, tape
 
 
@@ -178,7 +178,7 @@ class EnergyStructure(DiscreteStructure):
 
         def bound(v: Direction, w: Direction) -> Lanes:
             around = np.concatenate([*v, *w], axis=1)
-            least, most = enclosed(
+            least, most = enclosure(
                 second,
                 np.concatenate([low, -around], axis=1),
                 np.concatenate([high, around], axis=1),

@@ -185,7 +185,7 @@ def elevation(frame: FrameFields) -> Descriptor:
     return total_energy(frame)
 
 
-def named(frame: FrameFields, text: str) -> Descriptor:
+def descriptor_from_text(frame: FrameFields, text: str) -> Descriptor:
     """Descriptor written like ``displacement(B,y)`` or ``moment(A-B,A)``."""
     found = _CALL.fullmatch(re.sub(r"\s", "", text))
     name, *given = found.groups() if found else ("", None, None)

@@ -264,7 +264,7 @@ class Frame(FrameFields):
 
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written like ``displacement(B,y)`` or ``moment(A-B,A)``."""
-        return descriptors.named(self, text)
+        return descriptors.descriptor_from_text(self, text)
 
 
 def _plain(given: Any) -> Any:

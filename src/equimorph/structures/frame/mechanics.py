@@ -31,7 +31,7 @@ class Pulls(NamedTuple):
 
 
 class FrameMechanics(DiscreteStructure):
-    """Everything of a frame but its names: a structure whose Lagrangian is a `FrameModel`."""
+    """Mechanics of a frame, whose Lagrangian is a `FrameModel`; `Frame` adds names and checks."""
 
     kind: ClassVar[str] = "frame"
 

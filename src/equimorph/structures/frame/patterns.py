@@ -1,4 +1,4 @@
-"""What the parameters of a frame do: loads and actuators as arrays."""
+"""Effects of the parameters of a frame, loads and actuators, as arrays."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -10,7 +10,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.mechanics import FrameMechanics
-from equimorph.structures.images import edges_of_image, exchanged, images, is_symmetry
+from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
 
 Matrix = Float[np.ndarray, "scalars scalars"]
 
@@ -20,10 +20,10 @@ def symmetries(frame: FrameMechanics) -> tuple[Symmetry, ...]:
     found = []
     for name, axes, joints in images(frame.model.network.places):
         image = _Image(frame, axes, joints)
-        if not image.possible or image.exchanged is None:
+        if not image.possible or image.exchange is None:
             continue
         if is_symmetry(frame, image.apply):
-            found.append(Symmetry(name, image.apply, *image.exchanged))
+            found.append(Symmetry(name, image.apply, *image.exchange))
     return tuple(found)
 
 
@@ -63,7 +63,7 @@ class _Image:
         return np.asarray(ends[self.there, 0] != self.joints[ends[:, 0]])
 
     @cached_property
-    def exchanged(
+    def exchange(
         self,
     ) -> tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]] | None:
         """Signs and order of the parameters in the image; None if the image is another frame."""
@@ -83,7 +83,7 @@ class _Image:
             image[6][self.there] = given.length[k]
             heres.append(np.concatenate([each.ravel() for each in here]))
             mapped.append(np.concatenate([each.ravel() for each in image]))
-        return exchanged(heres, mapped)
+        return parameter_exchange(heres, mapped)
 
     @cached_property
     def nodes(self) -> Int[np.ndarray, " nodes"]:
@@ -104,8 +104,8 @@ class _Image:
         model, (nx, ny) = self.frame.model, self.axes
         m, count = model.multipliers, model.scalars
         members, points = len(model.lengths), len(model.owner) // len(model.lengths)
-        assert self.exchanged is not None
-        signs, order = self.exchanged
+        assert self.exchange is not None
+        signs, order = self.exchange
         matrix, parts = np.zeros((count, count)), []
         matrix[m + order, range(m, count - 1)] = signs
         matrix[-1, -1] = 1.0

@@ -1,4 +1,4 @@
-"""What can be asked of the states of a rod."""
+"""Descriptors of a rod as methods."""
 
 from abc import abstractmethod
 from functools import cached_property
@@ -13,7 +13,7 @@ from equimorph.structures.states import State
 
 
 class Described(Measured):
-    """The part of a rod's contract that its descriptors answer, in the user's units."""
+    """A rod with its descriptors, in the user's units."""
 
     @property
     @abstractmethod
@@ -100,4 +100,4 @@ class Described(Measured):
 
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
-        return descriptors.named(self, text)
+        return descriptors.descriptor_from_text(self, text)

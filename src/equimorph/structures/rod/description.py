@@ -1,4 +1,4 @@
-"""From what a user says of a rod to its model and its parameters."""
+"""Description of a rod by its user, and how its model and parameters follow."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

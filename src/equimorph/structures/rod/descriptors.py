@@ -127,7 +127,7 @@ def end_moment(rod: Measured, end: int) -> Descriptor:
     return Descriptor(f"end_moment({end})", label, value, f"M({end})", rod.signature)
 
 
-def named(rod: Measured, text: str) -> Descriptor:
+def descriptor_from_text(rod: Measured, text: str) -> Descriptor:
     """Descriptor written as text."""
     match = re.fullmatch(r"\s*(\w+)\s*(?:\(\s*([^()]*?)\s*\))?\s*", text)
     name, argument = (match.group(1), match.group(2)) if match else ("", None)

@@ -20,7 +20,7 @@ from equimorph.structures.rod.fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
 from equimorph.structures.rod.mechanics import LARGEST_TAIL, Mechanics
-from equimorph.structures.rod.model import RodModel, packed
+from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
 from equimorph.structures.rod.symmetry import mirrors
 
@@ -55,7 +55,7 @@ class GeneralMechanics(Mechanics):
 
     @cached_property
     def _step_data(self) -> tuple[object, ...]:
-        model, parts = self.model, packed(self.model)
+        model, parts = self.model, pack_tables(self.model)
         squared, turned = (np.ascontiguousarray(a) for a in (model.quadratic, model.turned))
         tables = parts.points, model.softness, parts.slope, parts.picks, parts.splits
         first = np.int64(self.unknown_nodes.start)

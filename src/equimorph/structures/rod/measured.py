@@ -22,7 +22,7 @@ ARCS = 128
 
 
 class Measured(Structure):
-    """The part of a rod's contract that its mechanics answer.
+    """Everything of a rod that its mechanics compute, in the user's units.
 
     Unknowns, multipliers, residuals and energies are non-dimensional; parameters, shapes and
     descriptors are in the user's units.

@@ -1,4 +1,4 @@
-"""What a rod's mechanics must offer; `Rod` adds names, natural states and descriptors."""
+"""Interface of a rod's mechanics; `Rod` adds names, natural states and descriptors."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable

@@ -357,7 +357,7 @@ class Packed:
     splits: Int[np.ndarray, "3"]
 
 
-def packed(model: RodModel) -> Packed:
+def pack_tables(model: RodModel) -> Packed:
     """Tables of a rod."""
     m, tables = model.multipliers, (model.sine, model.cosine, model.tension, model.slope)
     used: list[Bool[np.ndarray, " scalars"]] = [np.asarray(a.any(axis=1)) for a in tables]

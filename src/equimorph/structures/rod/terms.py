@@ -1,4 +1,4 @@
-"""What acts on a rod: loads, couples, intrinsic curvature and tendons, each with an amplitude."""
+"""Loads, couples, intrinsic curvatures and tendons of a rod, each with an amplitude."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence

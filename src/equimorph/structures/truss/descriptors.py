@@ -99,7 +99,7 @@ def elevation(truss: TrussMechanics) -> Descriptor:
     return displacement(truss, *truss.network.moves[0].split("."))
 
 
-def named(truss: TrussMechanics, text: str) -> Descriptor:
+def descriptor_from_text(truss: TrussMechanics, text: str) -> Descriptor:
     """Descriptor written like ``force(A-B)``, ``displacement(B, y)`` or ``max_utilisation``."""
     found = _CALL.fullmatch(re.sub(r"\s", "", text))
     name, *given = found.groups() if found else ("", None, None)

@@ -13,7 +13,7 @@ from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
 from equimorph.structures.contract import Direction, Symmetry
 from equimorph.structures.discrete import DiscreteStructure, along_corners
-from equimorph.structures.images import edges_of_image, exchanged, images, is_symmetry
+from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.supports import supports_of_point
 from equimorph.structures.truss.bar import Energies
 from equimorph.structures.truss.kernels import linearise_lanes
@@ -29,7 +29,7 @@ SMALLEST = 0.02
 
 
 class TrussMechanics(DiscreteStructure):
-    """Everything of a truss but its names.
+    """Energy, forces, stiffness and drawing of a truss; `Truss` adds names and checks.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def _exchanged(
         image[joints], moved[there] = axes * forces, rates
         heres.append(np.append(forces, rates))
         mapped.append(np.append(image, moved))
-    return exchanged(heres, mapped)
+    return parameter_exchange(heres, mapped)
 
 
 def _image(

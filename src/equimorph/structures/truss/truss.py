@@ -12,7 +12,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.discrete import corrected
+from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.network import (
     check_parameter_names,
     direction_of_mechanism,
@@ -128,7 +128,7 @@ class Truss(TrussMechanics):
     def _equilibrium(self) -> Float[np.ndarray, " unknowns"]:
         """Displacements at rest; refuse mechanisms."""
         p, drawn = self._rest_load, np.zeros((1, self.unknowns))
-        z, found = corrected(self, drawn, p)
+        z, found = correct_at_parameters(self, drawn, p)
         found &= np.abs(z).max() <= np.ptp(self.network.places, axis=0).max()
         stiffness = self.layout.dense(self.entries(z if found[0] else drawn, p))[0]
         values, vectors = np.linalg.eigh(stiffness)
@@ -239,7 +239,7 @@ class Truss(TrussMechanics):
 
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written like ``force(A-B)`` or ``displacement(B, y)``."""
-        return descriptors.named(self, text)
+        return descriptors.descriptor_from_text(self, text)
 
 
 def _rates(made: TrussNetwork, actuators: Patterns) -> Float[np.ndarray, "bars actuators"]:

@@ -31,7 +31,7 @@ CAPTION = (
 
 
 class SnapGraphKind(Kind[Snaps]):
-    """Runs of the stability boundary, where snaps from them land, and the energy freed."""
+    """Runs of the stability boundary, where snaps from them land, and the energy released."""
 
     table = "snap_graph"
     tasks = (snap_graph,)
@@ -60,10 +60,10 @@ class SnapGraphKind(Kind[Snaps]):
         return graph.strata, snaps, tuple(arguments.eset.points[each.vertices] for each in snaps)
 
     def write_tables(self, question: Question, answer: Snaps, folder: Path) -> None:
-        """Write every snap that was followed: from where, to where, and the energy freed."""
+        """Write every snap that was followed: from where, to where, and the energy released."""
         with (folder / f"{question.files}.csv").open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file, lineterminator="\n")
-            head = ["run", "from stratum", "to stratum", "status", "energy freed"]
+            head = ["run", "from stratum", "to stratum", "status", "energy released"]
             value, parameters = question.extra, self._parameters(answer)
             table.writerow([*head, *parameters, f"{value.name} before", f"{value.name} after"])
             for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1):
@@ -95,7 +95,7 @@ class SnapGraphKind(Kind[Snaps]):
             for name in self._parameters(answer)
             if np.ptp(np.concatenate([states[name] for states in answer[2]])) > 0.0
         ]
-        head = ["run", "from", "to", *map(escape, varied), "snaps followed", "energy freed"]
+        head = ["run", "from", "to", *map(escape, varied), "snaps followed", "energy released"]
         rows = [
             [
                 str(number),
