@@ -61,7 +61,7 @@ def test_the_page_tells_runs_and_energies(run):
     _, snaps, _ = outcome.of("snap_graph")["where"]
     most = max(snap.released[1] for snap in snaps)
     assert "<h2>Snap graph where</h2>" in page
-    assert f"of the stability boundary; a snap frees {most:.4g} at most." in page
+    assert f"of the stability boundary; a snap releases {most:.4g} at most." in page
     assert (out / "where-snap_graph.png").exists()
 
 

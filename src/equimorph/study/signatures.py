@@ -27,6 +27,7 @@ from equimorph.model import (
 )
 from equimorph.structures import State, States, Structure
 from equimorph.study import arguments as given
+from equimorph.study import composite_arguments as composite
 from equimorph.study.arguments import Argument
 from equimorph.study.fields import (
     ComparisonText,
@@ -128,11 +129,11 @@ PLAIN = (bool, int, float)
 Make = Callable[..., Argument]
 SORTS: tuple[tuple[Callable[[Form], bool], Make, Any], ...] = (
     (lambda form: form.is_any(State, States), given.StateArgument, StateSection),
-    (lambda form: form.is_any(Schedule), given.WayArgument, None),
-    (lambda form: form.is_any(Rates), given.ObjectiveArgument, given.Objective),
+    (lambda form: form.is_any(Schedule), composite.WayArgument, None),
+    (lambda form: form.is_any(Rates), composite.ObjectiveArgument, composite.Objective),
     (lambda form: form.is_any(Descriptor), given.DescriptorArgument, str),
     (lambda form: form.is_any(Box), given.BoxArgument, dict[str, Interval]),
-    (lambda form: form.is_any(Grid), given.GridArgument, None),
+    (lambda form: form.is_any(Grid), composite.GridArgument, None),
     (lambda form: form.is_any(Rule), given.RuleArgument, RuleSection),
     (lambda form: form.has_ranges, given.ActuatorsArgument, list[str]),
     (lambda form: form.mapping_of(Any), given.LegsArgument, list[Step]),
@@ -147,7 +148,7 @@ SORTS: tuple[tuple[Callable[[Form], bool], Make, Any], ...] = (
 )
 """Which class of arguments stands for which types, the first that fits, and how it is written."""
 ELSEWHERE: Mapping[Any, tuple[Make, Any]] = {
-    given.GridArgument: (given.ActuatorGridArgument, None),
+    composite.GridArgument: (composite.ActuatorGridArgument, None),
     given.WayPointsArgument: (given.PointsArgument, list[Step]),
 }
 """What stands for them in tasks that do not take the set."""
@@ -184,7 +185,7 @@ def arguments_of(
     if not any(form.is_any(EquilibriumSet) for form in forms.values()):
         other |= ELSEWHERE
     if any(form.is_any(Schedule) for form in forms.values()):
-        other |= {given.StateArgument: (given.WayStartArgument, StateSection)}
+        other |= {given.StateArgument: (composite.WayStartArgument, StateSection)}
     if natural:
         other |= {given.StateArgument: (given.NaturalArgument, NaturalSection)}
     found = []
@@ -211,7 +212,9 @@ def _argument(
             make, written = other.get(make, (make, MEANINGS.get(form.name, written)))  # noqa: PLW2901
             return make(form.name, key, written, default)
     if form.options is not None:
-        return given.OptionsArgument(form.name, key, form.options, default, _parts(form.options))
+        return composite.OptionsArgument(
+            form.name, key, form.options, default, _parts(form.options)
+        )
     return None if form.plain is None else Argument(form.name, key, form.plain, default)
 
 

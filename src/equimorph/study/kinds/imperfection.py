@@ -14,12 +14,8 @@ from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
-from equimorph.study.answers import (
-    heading,
-)
-from equimorph.study.lookup import (
-    check_parameters,
-)
+from equimorph.study.answers import heading
+from equimorph.study.lookup import check_parameters
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.tasks import ImperfectionLaw, imperfection_law
 

@@ -15,7 +15,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.storage import write_map
 from equimorph.study import html
-from equimorph.study.arguments import unloaded_load
+from equimorph.study.composite_arguments import unloaded_load
 from equimorph.study.fields import Number, requirement
 from equimorph.study.lookup import Extent, at_key
 from equimorph.study.names import map_files

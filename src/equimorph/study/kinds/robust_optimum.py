@@ -14,6 +14,9 @@ from equimorph.study.answers import figures_of_states, free_columns, heading, re
 from equimorph.study.question import Figure, Kind, Question
 from equimorph.tasks import RobustOptimum, robust_optimum
 
+ROUNDING = 1e-12
+"""Price that is shown as zero."""
+
 
 class RobustOptimumKind(Kind[RobustOptimum]):
     """The stable state that is best in the worst case over a box of imperfections."""
@@ -78,5 +81,5 @@ def _in_words(question: Question, answer: RobustOptimum) -> str:
     return (
         f"With errors {errors} {risk}. At {place} {name} is {html.number(answer.guaranteed, 6)} in "
         f"the worst case, and {html.number(answer.value, 6)} without errors: its price is "
-        f"{html.number(answer.price)}.{edge}"
+        f"{html.number(answer.price if answer.price > ROUNDING else 0.0)}.{edge}"
     )

@@ -12,9 +12,7 @@ from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import State
 from equimorph.study import html
-from equimorph.study.answers import (
-    heading,
-)
+from equimorph.study.answers import heading
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.tasks import Room, stable_room
 

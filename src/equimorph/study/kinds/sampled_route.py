@@ -17,9 +17,7 @@ from equimorph.study.answers import (
     pictures_of_way,
 )
 from equimorph.study.fields import requirement
-from equimorph.study.names import (
-    schedule_table,
-)
+from equimorph.study.names import schedule_table
 from equimorph.study.question import Figure, Kind, Question
 from equimorph.study.states import NaturalSection
 from equimorph.tasks import Route, plan_sampled

@@ -14,9 +14,7 @@ from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.plotting.robustness import MOST_BARS
 from equimorph.study import html
-from equimorph.study.answers import (
-    heading,
-)
+from equimorph.study.answers import heading
 from equimorph.study.question import Figure, Kind, Question, still
 from equimorph.tasks import Sensitivity, sensitivity
 

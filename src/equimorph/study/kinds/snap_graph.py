@@ -17,9 +17,7 @@ from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
 from equimorph.model import Descriptor
 from equimorph.structures import States
 from equimorph.study import html
-from equimorph.study.lookup import (
-    descriptor_at,
-)
+from equimorph.study.lookup import descriptor_at
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 
 Snaps = tuple[tuple[int, ...], tuple[Snap, ...], tuple[States, ...]]
@@ -122,7 +120,7 @@ class SnapGraphKind(Kind[Snaps]):
         return list(answer[2][0][0].parameters) if answer[2] else []
 
     def verdict(self, question: Question, answer: Snaps) -> str:
-        """Strata, runs, and the most energy that is freed."""
+        """Strata, runs, and the most energy that is released."""
         return f"Snap graph {question.name}: {plain(_extent(answer))}"
 
 
@@ -149,7 +147,7 @@ def _extent(answer: Snaps) -> str:
     most = max(snap.released[1] for snap in snaps)
     stable = "1 stable stratum" if len(strata) == 1 else f"{len(strata)} stable strata"
     runs = "1 run" if len(snaps) == 1 else f"{len(snaps)} runs"
-    return f"{stable}, {runs} of the stability boundary; a snap frees {most:.4g} at most."
+    return f"{stable}, {runs} of the stability boundary; a snap releases {most:.4g} at most."
 
 
 def _between(low: float, high: float) -> str:

@@ -9,9 +9,7 @@ from pathlib import Path
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
-from equimorph.study.answers import (
-    heading,
-)
+from equimorph.study.answers import heading
 from equimorph.study.question import Figure, Kind, Question, still
 from equimorph.tasks import Trials, random_trials
 
