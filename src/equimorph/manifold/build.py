@@ -16,6 +16,7 @@ from equimorph.manifold.complex.arguments import (
     whole_number,
 )
 from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.complex.description import Frame
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
@@ -46,7 +47,7 @@ GRIDS = 3
 """Grids that are tried, each with twice the intervals, until refinement succeeds everywhere, and
 over one parameter until nothing is missing."""
 CHEAP = 4
-"""Times the independent checks in diagrams over one parameter, and in symmetric slices."""
+"""Multiplier for the number of completeness checks in 1-D sets and symmetric slices."""
 SEARCHES = 6
 """Rounds of independent checks; what one round finds missing is lifted before the next."""
 RECOVERED = 50
@@ -54,7 +55,7 @@ RECOVERED = 50
 HIDDEN = 12
 """Rounds of bisection around missing states that bring no new equilibria over grid vertices."""
 HOPELESS = 50
-"""Doubtful grid cells, and four times what there were at first, beyond which bisection ends."""
+"""Stop bisecting once more than 50 cells, and 4× the initial number, are undecided."""
 
 INTERVALS = {1: (200,), 2: (47, 81), 3: (24, 24, 24)}
 """Of the grid, by the number of free parameters, if not given."""
@@ -127,25 +128,27 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     seed, checks = whole_number("seed", seed, 0), whole_number("checks", checks, 0)
     intervals = _intervals(box, intervals)
     setting = _setting(structure, box, fixed or {}, constraints(within))
-    effort = (seed, checks, accuracy)
-    compute = partial(_on_grids, setting, (box, dict(fixed or {}), intervals), effort, progress)
+    known = dict(fixed or {})
+    compute = partial(_on_grids, setting, box, known, intervals, seed, checks, accuracy, progress)
     if journal is None:
         return compute()
-    question = question_of_set(setting, box, intervals, effort)
-    return recall_set(journal, question, setting, box, dict(fixed or {}), compute)
+    question = question_of_set(setting, box, intervals, seed, checks, accuracy)
+    return recall_set(journal, question, setting, box, known, compute)
 
 
 def _on_grids(
     setting: Setting,
-    given: tuple[Box, Mapping[str, float], tuple[int, ...]],
-    effort: tuple[int, int, float | None],
+    box: Box,
+    fixed: Mapping[str, float],
+    intervals: tuple[int, ...],
+    seed: int,
+    checks: int,
+    accuracy: float | None,
     progress: Progress,
 ) -> EquilibriumSet:
-    """Set over a grid, or a finer one if it is too coarse."""
-    box, fixed, intervals = given
-    seed, checks, accuracy = effort
+    """Lift a set over a grid, or over a finer one if that is too coarse."""
     for number in range(GRIDS):
-        eset = _of_grid(setting, (box, fixed, intervals), (seed, checks), progress)
+        eset = _of_grid(setting, box, fixed, intervals, seed, checks, progress)
         if accuracy is not None:
             eset = refined(eset, accuracy, progress)
         # over one parameter no cells are bisected to find what they hide
@@ -159,16 +162,14 @@ def _on_grids(
 
 def _of_grid(
     setting: Setting,
-    given: tuple[Box, Mapping[str, float], tuple[int, ...]],
-    effort: tuple[int, int],
+    box: Box,
+    fixed: Mapping[str, float],
+    intervals: tuple[int, ...],
+    seed: int,
+    checks: int,
     progress: Progress,
 ) -> EquilibriumSet:
-    """Set over a grid, with checks.
-
-    `given` are box, fixed values and intervals; `effort` the random seed and the number of checks.
-    """
-    box, _, intervals = given
-    seed, checks = effort
+    """Lift a set over one grid, and what the completeness checks find that it lacks."""
     lines = grid_lines(box, intervals, _off_zero(setting))
     progress.report("seeds", 0, 1)
     pairing = start_pairing(setting, grid_mesh(lines))
@@ -179,7 +180,8 @@ def _of_grid(
     for number in range(SEARCHES):
         pairing.fit()
         cells, bisected = _lifted(pairing, finder, progress)
-        eset = account(pairing, cells, given, bisected)
+        frame = Frame(setting, pairing.mesh, box, fixed, intervals)
+        eset = account(pairing, cells, frame, bisected)
         found = check(eset, generator, _checks(checks, setting), progress)
         lacking = len(found.missing)
         if lacking == 0 or number == SEARCHES - 1:

@@ -59,12 +59,12 @@ def numbers(name: str, values: Any, *, each: str) -> Float[np.ndarray, "..."]:
 
 
 def check_kind(name: str, given: Any, kind: type | UnionType, wanted: str) -> None:
-    """Refuse what is not of a kind.
+    """Check the type.
 
     Raises
     ------
     InputError
-        With what is `wanted` instead.
+        If the type differs; the message names the expected type.
     """
     if not isinstance(given, kind):
         raise InputError(f"`{name}` must be {wanted}; got {given!r}.")

@@ -37,9 +37,11 @@ def question_of_set(
     setting: Setting,
     box: Box,
     intervals: tuple[int, ...],
-    effort: tuple[int, int, float | None],
+    seed: int,
+    checks: int,
+    accuracy: float | None,
 ) -> str:
-    """All that a set depends on; `effort` are the seed, the number of checks, and the accuracy.
+    """All that a set depends on.
 
     Raises
     ------
@@ -55,7 +57,7 @@ def question_of_set(
         "box": [box.names, box.lower.tolist(), box.upper.tolist()],
         "within": within,
         "intervals": intervals,
-        "effort": effort,
+        "effort": (seed, checks, accuracy),
     }
     return json.dumps(given, sort_keys=True)
 

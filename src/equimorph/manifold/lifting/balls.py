@@ -31,7 +31,7 @@ from equimorph.manifold.lifting.sphere_regions import (
 from equimorph.manifold.lifting.spheres import Surfaces, find_spheres
 
 SHARES = (0.25, 0.5, 0.8, 0.95)
-"""Shares of the way from the middle of a group to one of its points, at which is tried again."""
+"""Fractions between centroid and member used as retry starting points."""
 TRIED = 8
 """Points of a group towards which is tried at most."""
 ON_FACE = 1e-9

@@ -1,6 +1,5 @@
 """From discs and balls to the cells of a set, and from these to the set itself."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -16,7 +15,6 @@ from equimorph.manifold.lifting.discs import Discs, assemble
 from equimorph.manifold.lifting.edges import EFFORTS
 from equimorph.manifold.lifting.loops import find_loops
 from equimorph.manifold.lifting.pairing import Pairing, abandoned
-from equimorph.model import Box
 from equimorph.structures import States
 
 
@@ -181,7 +179,7 @@ def _segments(pairing: Pairing) -> Cells:
 def account(
     pairing: Pairing,
     cells: Cells,
-    given: tuple[Box, Mapping[str, float], tuple[int, ...]],
+    frame: Frame,
     bisected: int,
 ) -> EquilibriumSet:
     """Number the used points, find pieces, folds and boundaries, and write the audit."""
@@ -209,7 +207,7 @@ def account(
         cells.doubtful if len(pairing.setting.free) > 1 else len(lonely(pairing)),
         bisected,
     )
-    return described(Frame(pairing.setting, pairing.mesh, *given), whole, lifting)
+    return described(frame, whole, lifting)
 
 
 def _kept(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:

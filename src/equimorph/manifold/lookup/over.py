@@ -25,7 +25,7 @@ from equimorph.model import Constraint
 from equimorph.structures import States, Structure
 
 OVERHANG = 0.3
-"""How far beyond a cell, in barycentric coordinates, a point may lie to be tried from it."""
+"""Barycentric tolerance for using a cell as an initial guess."""
 SAME = 1e-6
 """Distance in the metric below which two states over one point are the same."""
 CLOSEST = 1e-3
