@@ -7,14 +7,14 @@ from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
 from equimorph.arrays import Flags, Lanes, Parameters, Settings
+from equimorph.equilibria.settle import Guards, settle
 from equimorph.model import Grid, position
 from equimorph.structures import Structure
 
 SHARE = 0.25
 """Largest correction of a step to a neighbour, relative to the step: beyond, it is not taken."""
-ITERATIONS = 8
-CONVERGED = 1e-7
-"""Size of the last correction; Newton squares it."""
+GUARDS = Guards(iterations=8, longest=np.inf, converged=1e-7)
+"""Newton squares the last correction."""
 TRIES = 3
 """Vertices of each unreached piece of the grid at which the structure is asked."""
 
@@ -164,15 +164,9 @@ def _stepped(
     n = structure.unknowns
     still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
     tangent = structure.advance(z, p, target - p, still, one, none).tangent_z
-    end, fixed = z + tangent, np.zeros_like(p)
-    size = np.full(len(z), np.inf)
-    for _ in range(ITERATIONS):
-        move = structure.advance(end, target, fixed, still, one, none)
-        end = end + move.dz
-        size = np.sqrt(move.dz[:, :n] ** 2 @ structure.mass)
-        if not (size > CONVERGED).any():
-            break
+    near = settle(structure, z + tangent, target, guards=GUARDS)
+    end = near.z
     step, miss = (
         np.sqrt(each[:, :n] ** 2 @ structure.mass) for each in (tangent, end - z - tangent)
     )
-    return end, (size <= CONVERGED) & (miss <= SHARE * step + 1e-9) & (move.index == 0)
+    return end, near.found & (miss <= SHARE * step + 1e-9) & (near.index == 0)

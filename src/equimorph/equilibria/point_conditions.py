@@ -262,16 +262,12 @@ def _differences(
     """Values after the step onto the set and differences around it, all in one call."""
     lanes, k = move.along_z.shape[:2]
     structure = at.structure
-    squared = move.along_z[:, :, : structure.unknowns] ** 2 @ structure.mass
+    u = move.along_z[:, :, : structure.unknowns]
+    squared = np.einsum("lki,lki,i->lk", u, u, structure.mass)
     squared += ((move.along_p / structure.scales) ** 2).sum(axis=2)
     h = step / np.sqrt(np.maximum(squared, 1e-300))  # directions may be long where F_z is soft
-    z, p = (
-        _rounds(base, h.T[:, :, None] * np.swapaxes(along, 0, 1), one_sided=one_sided)
-        for base, along in (
-            (at.z + move.onto_z, move.along_z),
-            (at.p + move.onto_p, move.along_p),
-        )
-    )
+    z = _rounds(at.z + move.onto_z, move.along_z, h, one_sided=one_sided)
+    p = _rounds(at.p + move.onto_p, move.along_p, h, one_sided=one_sided)
     flat = scalars(z, p)
     found = flat.reshape(-1, lanes, flat.shape[1])
     ahead = found[1 : 1 + k]
@@ -281,15 +277,18 @@ def _differences(
 
 def _rounds(
     base: Float[np.ndarray, "lanes width"],
-    steps: Float[np.ndarray, "k lanes width"],
+    along: Float[np.ndarray, "lanes k width"],
+    h: Float[np.ndarray, "lanes k"],
     *,
     one_sided: bool,
 ) -> Float[np.ndarray, "many width"]:
-    """All lanes at a base, then after each of the steps, then before it."""
-    k = len(steps)
+    """All lanes at a base, then h ahead along each of the directions, then behind it."""
+    k = h.shape[1]
     out = np.empty((1 + (1 if one_sided else 2) * k, *base.shape))
     out[0] = base
-    np.add(base, steps, out=out[1 : 1 + k])
-    if not one_sided:
-        np.subtract(base, steps, out=out[1 + k :])
+    for i in range(k):  # without arrays in between: these cost more than the products
+        there = np.multiply(h[:, i, None], along[:, i], out=out[1 + i])
+        if not one_sided:
+            np.subtract(base, there, out=out[1 + k + i])
+        there += base
     return out.reshape(-1, base.shape[1])
