@@ -22,13 +22,8 @@ from equimorph.equilibria.critical_tests import (
 )
 from equimorph.equilibria.lift import Event
 from equimorph.equilibria.locus import Locus, Spots, nearest
-from equimorph.equilibria.trace_locus import (
-    Landmark,
-    Side,
-    Watch,
-    trace_locus,
-    watched,
-)
+from equimorph.equilibria.locus_events import Landmark, Watch, watched
+from equimorph.equilibria.trace_locus import Side, trace_locus
 from equimorph.equilibria.trace_options import EventKind, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position

@@ -8,7 +8,7 @@ from jaxtyping import Int
 from equimorph.arrays import Values
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.lift import check_start
-from equimorph.equilibria.trace_locus import Watch
+from equimorph.equilibria.locus_events import Watch
 from equimorph.equilibria.trace_options import EventKind
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position
