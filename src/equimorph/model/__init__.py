@@ -12,11 +12,13 @@ from equimorph.model.drawing import (
 )
 from equimorph.model.function_content import content_of_descriptor, content_of_function
 from equimorph.model.journal import (
+    NOT_KEPT,
     Findings,
     Journal,
+    Progress,
+    Silent,
     recalled,
 )
-from equimorph.model.keeping import NOT_KEPT
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.parameter import (
     Box,
@@ -27,7 +29,6 @@ from equimorph.model.parameter import (
     parameter_vector,
     position,
 )
-from equimorph.model.progress import Progress, Silent
 from equimorph.model.schedule import Rates, Schedule
 from equimorph.model.spline import Spline
 

@@ -1,10 +1,11 @@
-"""Journals: whole answers of long computations, kept for a program that is run again.
+"""Sinks that long computations are given: progress reports, journals; and what files leave out.
 
 A deterministic computation asks the same questions in the same order each time. It hands each
 answer to a journal; begun again with that journal, it is given the answers back.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -41,3 +42,22 @@ def recalled(journal: Journal, step: str, compute: Callable[[], Findings]) -> Fi
         found = compute()
         journal.keep(step, found)
     return found
+
+
+@runtime_checkable
+class Progress(Protocol):
+    """Receives how far a computation is."""
+
+    def report(self, stage: str, done: int, total: int | None) -> None:
+        """Take note that `done` of `total` units (unknown if None) of `stage` are finished."""
+
+
+class Silent:
+    """The sink that ignores everything."""
+
+    def report(self, stage: str, done: int, total: int | None) -> None:
+        """Do nothing."""
+
+
+NOT_KEPT: Mapping[str, bool] = MappingProxyType({"kept": False})
+"""Metadata of a dataclass's field that files leave out; it needs a default."""
