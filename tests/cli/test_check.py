@@ -2,7 +2,7 @@
 
 import pytest
 
-from equimorph.cli import show
+from equimorph.cli import check
 
 
 @pytest.mark.parametrize(
@@ -17,4 +17,4 @@ from equimorph.cli import show
     ],
 )
 def test_sections_are_counted_as_one_says_it(number: int, word: str, words: str):
-    assert show._count(number, word) == words
+    assert check._count(number, word) == words
