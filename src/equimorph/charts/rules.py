@@ -111,7 +111,13 @@ def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np
 
 
 def lowest(descriptor: Descriptor) -> Rule:
-    """Prefer the lowest value of a descriptor, like the energy."""
+    """Prefer the lowest value of a descriptor, like the energy.
+
+    Parameters
+    ----------
+    descriptor
+        A descriptor of the set's structure.
+    """
     return _Least(
         f"lowest {descriptor.name}",
         lambda _: lambda found: descriptor.function(found.states.z, found.states.p),
@@ -120,7 +126,13 @@ def lowest(descriptor: Descriptor) -> Rule:
 
 
 def highest(descriptor: Descriptor) -> Rule:
-    """Prefer the highest value of a descriptor."""
+    """Prefer the highest value of a descriptor.
+
+    Parameters
+    ----------
+    descriptor
+        A descriptor of the set's structure.
+    """
     return _Least(
         f"highest {descriptor.name}",
         lambda _: lambda found: -descriptor.function(found.states.z, found.states.p),
@@ -133,6 +145,11 @@ def nearest(to: State | int) -> Rule:
 
     Of a state its configuration counts. States on the stratum come first; elsewhere the distance in
     configuration and scaled parameters to the nearest of its vertices counts.
+
+    Parameters
+    ----------
+    to
+        A state, or the number of a stratum of the set.
 
     Raises
     ------
@@ -226,6 +243,13 @@ def first_stable_on_path(parameter: str, bound: float = BOUND) -> Rule:
 
 def rule_from(identity: Mapping[str, Any], structure: Structure) -> Rule:
     """Return a rule by its identity, with the descriptors of a structure.
+
+    Parameters
+    ----------
+    identity
+        Plain data as of `Rule.identity`.
+    structure
+        Structure that has the descriptors.
 
     Raises
     ------

@@ -11,9 +11,9 @@ from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint, Descriptor, names_of
 from equimorph.structures import State, States
 from equimorph.tasks.distances import path_lengths, step_lengths
-from equimorph.tasks.motion.course import Course
-from equimorph.tasks.motion.local_coordinates import (
+from equimorph.tasks.motion.course import (
     EXACT,
+    Course,
     correct_onto_targets,
     linearise,
     shortest_change,

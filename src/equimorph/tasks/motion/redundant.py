@@ -16,8 +16,8 @@ from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint
 from equimorph.structures import State, States
 from equimorph.tasks.motion.blocks import Stretch
-from equimorph.tasks.motion.course import Course
-from equimorph.tasks.motion.local_coordinates import (
+from equimorph.tasks.motion.course import (
+    Course,
     correct_onto_targets,
     linearise,
     shortest_change,
