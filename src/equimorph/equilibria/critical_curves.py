@@ -31,6 +31,8 @@ from equimorph.structures import State, States
 
 NEAR = 1e-3
 """Distance in the metric by which a start may miss its curve."""
+PLACES = 8
+"""Decimal places of lengths in which special points that coincide agree."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -138,6 +140,7 @@ def _curve(
     assert backward.end is not None, "sides are followed to their ends"
     assert forward.end is not None, "sides are followed to their ends"
     back = [Landmark(m.kind, m.spot, -m.length, m.detail) for m in backward.landmarks[::-1]]
+    marks = (*back, *here, *forward.landmarks)
     first = forward.end if forward.closed else backward.end
     ends = (Landmark(first.kind, first.spot, -backward.lengths[-1], first.detail), forward.end)
     spots = [*backward.spots[:0:-1], *forward.spots]
@@ -149,9 +152,14 @@ def _curve(
         States(locus.structure, z, p),
         lengths,
         np.array([*backward.index[:0:-1], *forward.index]),
-        tuple(_event(locus, mark) for mark in (*back, *here, *forward.landmarks)),
+        tuple(_event(locus, mark) for mark in sorted(marks, key=_place)),
         (_event(locus, ends[0]), _event(locus, ends[1])),
     )
+
+
+def _place(mark: Landmark) -> tuple[float, str]:
+    """Order of special points along a curve; of those that coincide, by their kinds."""
+    return round(mark.length, PLACES), mark.kind
 
 
 def _event(locus: Locus, mark: Landmark) -> Event:
