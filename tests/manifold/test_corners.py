@@ -5,7 +5,7 @@ import pytest
 
 from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.complex.marked_complex import fabric_of
-from equimorph.manifold.refining.corners import corner_angles, squeezed
+from equimorph.manifold.refining.quality import corner_angles, squeezed
 from equimorph.model import Box
 from oracles.surfaces import transcriticals
 from typecheck import unchecked

@@ -9,8 +9,7 @@ from equimorph import lift, plotting, storage
 from equimorph.manifold import EquilibriumSet, equilibrium_set, locate, refine, restricted
 from equimorph.manifold.complex.marked_complex import fabric_of
 from equimorph.manifold.geometry.topology import adjacency
-from equimorph.manifold.refining.corners import squeezed
-from equimorph.manifold.refining.surgery import angles
+from equimorph.manifold.refining.quality import smallest_angles, squeezed
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
 from oracles.complexes import assert_crossings, assert_faithful, assert_upright
@@ -316,7 +315,7 @@ def test_figure_names_the_branch_points(symmetric_slice):
 def angles_off_curves(eset: EquilibriumSet) -> np.ndarray:
     """Smallest angles, in degrees, of triangles that are not squeezed between curves."""
     fabric = fabric_of(eset)
-    return np.degrees(angles(fabric)[~squeezed(fabric, np.radians(10.0))])
+    return np.degrees(smallest_angles(fabric.squared)[~squeezed(fabric, np.radians(10.0))])
 
 
 @pytest.fixture(scope="module")

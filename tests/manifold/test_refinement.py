@@ -1,6 +1,7 @@
 """Refined sets: closed forms tell how far cells are from surfaces; topology must not change."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -22,10 +23,12 @@ from equimorph.manifold.complex.marked_complex import (
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import adjacency, chains, euler_characteristic
 from equimorph.manifold.queries.cusps import with_cusps_beside
-from equimorph.manifold.refining.leading import led_between
+from equimorph.manifold.refining.deviation import Memory
+from equimorph.manifold.refining.follow_edge import follow_edge
 from equimorph.manifold.refining.patches import patch_around
-from equimorph.manifold.refining.smoothing import smooth
-from equimorph.manifold.refining.surgery import angles, collapse, flip, smallest_angle
+from equimorph.manifold.refining.quality import qualities_near, smallest_angle, smallest_angles
+from equimorph.manifold.refining.refill import flip, refill, repeat
+from equimorph.manifold.refining.vertex_stars import moves
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
 from oracles.complexes import (
@@ -409,7 +412,7 @@ def test_several_edges_of_a_cell_are_cut_alike_on_both_sides():
 
 
 def test_collapses_take_slivers_away_and_keep_the_topology(coarse):
-    less = collapse(flip(coarse), passes=6)
+    less = refill(coarse, Memory())
     assert len(less.cells) < len(coarse.cells)
     assert euler_characteristic(less.cells) == euler_characteristic(coarse.cells)
     assert smallest_angle(less) > 2 * smallest_angle(coarse)
@@ -427,7 +430,7 @@ def test_a_patch_goes_back_as_it_is(coarse):
     back = patch.replaced(patch.fabric)
     for whole, again in ((coarse.cells, back.cells), (coarse.facets, back.facets)):
         assert sorted(map(tuple, whole.tolist())) == sorted(map(tuple, again.tolist()))
-    better = patch.replaced(collapse(flip(patch.fabric), passes=4))
+    better = patch.replaced(refill(patch.fabric, Memory()))
     assert len(better.cells) < len(coarse.cells)
     assert (adjacency(better.cells).counts <= 2).all()
     assert euler_characteristic(better.cells) == euler_characteristic(coarse.cells)
@@ -471,7 +474,7 @@ def test_a_fold_that_bulges_far_out_is_followed_to_its_end(coarse):
     """From one of its vertices to the eighth after it, halfway; but not as one of another index."""
     folds = chains(coarse.facets[(coarse.marks & ON_FOLD) > 0])
     line = max(folds, key=len)[:9]
-    found = led_between(coarse, line[[0, 8]], ON_FOLD, 0)
+    found = follow_edge(coarse, line[[0, 8]], ON_FOLD, 0)
     place = coarse.vertices.place[line]
     length = np.linalg.norm(np.diff(place, axis=0), axis=1)
     before = np.concatenate([[0.0], np.cumsum(length)])
@@ -479,7 +482,7 @@ def test_a_fold_that_bulges_far_out_is_followed_to_its_end(coarse):
     assert abs(before[near.argmin()] - 0.5 * before[-1]) < near.min() + 0.2 * before[-1]
     assert near.min() <= length.max()
     assert np.abs(coarse.setting.structure.residual(found.z, found.p)).max() < 1e-12
-    assert led_between(coarse, line[[0, 8]], ON_FOLD, 1) is None
+    assert follow_edge(coarse, line[[0, 8]], ON_FOLD, 1) is None
 
 
 def test_vertices_in_use_are_not_found_again(coarse):
@@ -513,8 +516,11 @@ def test_vertices_that_are_added_twice_to_the_same_ones_do_not_meet(coarse):
 def test_smoothing_widens_angles_and_stays_on_the_surface(coarse):
     """Residuals are those of Newton's method; triangles below 20° get fewer."""
     flipped = flip(coarse)
-    moved = smooth(flipped, angles(flipped) < np.radians(25.0))
-    before, after = (np.sort(angles(each)) for each in (flipped, moved))
+    near = np.ones(len(flipped.vertices), bool)
+    quality = qualities_near(flipped, near)
+    sharp = partial(moves, sharp=np.radians(25.0))
+    moved, *_ = repeat(sharp, 1, flipped, quality, near, Memory(), np.inf)
+    before, after = (np.sort(smallest_angles(each.squared)) for each in (flipped, moved))
     assert (after < np.radians(20.0)).sum() < (before < np.radians(20.0)).sum()
     assert after[0] >= before[0]
     assert len(moved.vertices) > len(flipped.vertices)

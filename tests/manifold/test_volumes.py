@@ -12,7 +12,7 @@ from equimorph.manifold import (
     refine,
     stability_distance,
 )
-from equimorph.manifold.complex.marked_complex import fabric_of
+from equimorph.manifold.complex.marked_complex import fabric_of, squared_sides
 from equimorph.manifold.geometry.exact_points import Aim, corrected
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
@@ -25,7 +25,7 @@ from equimorph.manifold.geometry.topology import (
 )
 from equimorph.manifold.lifting import cells
 from equimorph.manifold.lifting.cells import volumes_over
-from equimorph.manifold.refining.tetrahedra import dihedrals
+from equimorph.manifold.refining.quality import smallest_angles
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
 from oracles.complexes import assert_faithful, assert_folds_are_singular
@@ -246,7 +246,7 @@ def test_refined_three_sphere_is_within_the_accuracy():
     # seen from the middle of the sphere no cell is turned over, and none is slender
     whole = np.concatenate([fine.points.z, fine.coordinates], axis=1)
     assert not folded_over(fine, np.linalg.det(whole[fine.cells])).any()
-    smallest = np.degrees(dihedrals(whole, fine.cells)).min()
+    smallest = np.degrees(smallest_angles(squared_sides(whole, fine.cells))).min()
     assert fine.audit.smallest_dihedral == pytest.approx(smallest, rel=1e-9)
     assert smallest > 5.0
     place = np.concatenate([fine.points.z, fine.coordinates], axis=1)

@@ -28,7 +28,7 @@ from equimorph.manifold.queries.levels import (
 from equimorph.manifold.queries.locate import Location, Place, locate
 from equimorph.manifold.queries.snap_graph import Snap, SnapGraph, snap_graph
 from equimorph.manifold.queries.stability_distance import StabilityDistance, stability_distance
-from equimorph.manifold.refining.refinement import refine
+from equimorph.manifold.refining.refine import refine
 
 __all__ = [
     "INTERVALS",

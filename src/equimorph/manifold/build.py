@@ -27,7 +27,7 @@ from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import Lines, bisect, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
-from equimorph.manifold.refining.refinement import refined
+from equimorph.manifold.refining.refine import refined
 from equimorph.model import (
     Box,
     Constraint,

@@ -19,7 +19,6 @@ from equimorph.manifold.complex.vertices import Vertices, on_constraints, vertic
 from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.tangents import (
     Ends,
     best_corners,
@@ -49,9 +48,8 @@ class Fabric:
     Where sheets cross, each of their parts has vertices of its own (see `parted_sheets`).
 
     box: lower and upper bounds of the free parameters; squared: lengths of the sides of the cells,
-    squared, in the order 01, 02, 12 and so on; sense: sign that the areas of triangles in the free
-    parameters have, unless they are overturned; empty in other dimensions. Corners of tetrahedra
-    are so ordered that all are oriented alike, and most project as the parity of their index says.
+    squared, in the order 01, 02, 12 and so on. Corners of triangles and tetrahedra are so ordered
+    that all are oriented alike, and most project as the parity of their index says.
     """
 
     setting: Setting
@@ -62,7 +60,6 @@ class Fabric:
     facets: Int[np.ndarray, "F d"]
     marks: Int[np.ndarray, " F"]
     squared: Float[np.ndarray, "C sides"]
-    sense: Int[np.ndarray, " T"]
 
     @property
     def dimension(self) -> int:
@@ -130,27 +127,9 @@ class Fabric:
             cells=self.cells[cells],
             cell_index=self.cell_index[cells],
             squared=self.squared[cells],
-            sense=self.sense[cells] if self.dimension == TRIANGLES else self.sense,
         )
 
-    def overturned(
-        self, cells: Int[np.ndarray, "n corners"], sense: Int[np.ndarray, " n"]
-    ) -> Bool[np.ndarray, " n"]:
-        """Which of some cells project against their sense."""
-        place = self.vertices.place
-        flat = place[:, place.shape[1] - self.dimension :]
-        if len(cells) > len(flat):
-            flat = np.ascontiguousarray(flat)
-        return np.asarray(volumes(flat[cells]) * sense < 0.0)
-
-    @property
-    def parity(self) -> Int[np.ndarray, " C"]:
-        """Sense of triangles on the set: that over the parameters changes with their index."""
-        return np.asarray(self.sense * np.where(self.cell_index % 2 == 0, 1, -1))
-
-    def backward(
-        self, cells: Int[np.ndarray, "n 3"], parity: Int[np.ndarray, " n"]
-    ) -> Bool[np.ndarray, " n"]:
+    def looks_back(self, cells: Int[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
         """Which triangles look backwards, on average, in the tangent planes at their corners."""
         cells, store = np.ascontiguousarray(cells), self.vertices
         total = np.empty(len(cells))
@@ -159,7 +138,7 @@ class Fabric:
             for at, stop in shares(len(cells))
         ]
         deque(results_of(tasks), maxlen=0)
-        return np.asarray(total * parity <= 0.0)
+        return np.asarray(total <= 0.0)
 
     def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
         """Cut edges at new vertices, and all cells and facets around them.
@@ -180,7 +159,6 @@ class Fabric:
             squared=squared,
             cells=cells,
             cell_index=self.cell_index[of_cells],
-            sense=self.sense[of_cells] if self.dimension == TRIANGLES else self.sense,
             facets=facets,
             marks=self.marks[of_facets],
         )
@@ -269,14 +247,12 @@ def fabric_of(eset: EquilibriumSet) -> Fabric:
     marks[outer] |= np.where(marks[outer] > 0, outer_marks & ~HOLE, outer_marks)
     marked = marks > 0
     box = np.stack([eset.box.lower, eset.box.upper])
-    if d == TETRAHEDRA:
+    if d >= TRIANGLES:
         against = sense.signs < 0
-        cells[against] = cells[against][:, [0, 1, 3, 2]]
+        cells[against, -2:] = cells[against, :-3:-1]
     squared = squared_sides(vertices.place, cells)
     facets = (whole.facets[marked], marks[marked])
-    upright = sense.signs * np.where(eset.cell_index % 2 == 0, 1, -1)
-    upright = upright if d == TRIANGLES else np.zeros(0, int)
-    return Fabric(setting, box, vertices, cells, eset.cell_index, *facets, squared, upright)
+    return Fabric(setting, box, vertices, cells, eset.cell_index, *facets, squared)
 
 
 def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:

@@ -32,7 +32,6 @@ class Patch:
             cells=np.concatenate([rest.cells, by.cells]),
             cell_index=np.concatenate([rest.cell_index, by.cell_index]),
             squared=np.concatenate([rest.squared, by.squared]),
-            sense=np.concatenate([rest.sense, by.sense]),
             facets=np.concatenate([rest.facets, by.facets[kept]]),
             marks=np.concatenate([rest.marks, by.marks[kept]]),
         )

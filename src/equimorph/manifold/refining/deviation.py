@@ -93,6 +93,11 @@ class Memory:
     lost: set[tuple[int, int]] = field(default_factory=set)
     """Edges on curves that do not lead from one end to the other: something is hidden there."""
 
+    def forget(self, touched: Bool[np.ndarray, " V"]) -> None:
+        """Forget edges between some vertices: those that now lie on a fold deviate otherwise."""
+        kept = ~(touched[self.keys >> 32] & touched[self.keys & 0xFFFFFFFF])
+        self.keys, self.error = self.keys[kept], self.error[kept]
+
     def barred(self, fabric: Fabric) -> tuple[Int[np.ndarray, "n 2"], Int[np.ndarray, " n"]]:
         """Edges that were bisected, with the vertices on them, where these are there."""
         live = np.zeros(len(fabric.vertices), bool)

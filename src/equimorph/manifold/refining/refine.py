@@ -17,13 +17,17 @@ from equimorph.manifold.complex.description import Frame, Lifting, described
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import question_of_refinement, recall_set
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
-from equimorph.manifold.refining.bettering import sharp
-from equimorph.manifold.refining.corners import smallest_free_angle
-from equimorph.manifold.refining.deviations import Memory, known
-from equimorph.manifold.refining.righting import righted
-from equimorph.manifold.refining.settling import settled, tidied, told_apart
-from equimorph.manifold.refining.surgery import smallest_angle
-from equimorph.manifold.refining.tetrahedra import smallest_dihedral
+from equimorph.manifold.refining.bisect import part_sheets, settle
+from equimorph.manifold.refining.deviation import Memory, known
+from equimorph.manifold.refining.quality import (
+    SHARP,
+    qualities,
+    smallest_angle,
+    smallest_dihedral,
+    smallest_free_angle,
+)
+from equimorph.manifold.refining.refill import refill
+from equimorph.manifold.refining.repair import repair
 from equimorph.model import Journal, Progress, Silent
 
 TRIALS = 4
@@ -76,9 +80,9 @@ def refined(eset: EquilibriumSet, accuracy: float, progress: Progress) -> Equili
     if len(eset.cells) == 0:
         return eset
     memory = Memory()
-    fabric = tidied(fabric_of(eset), memory)
-    fabric = _settled_and_righted(fabric, SHARE[len(eset.names)] * accuracy, memory, progress)
-    fabric = told_apart(fabric, memory)
+    fabric = refill(fabric_of(eset), memory)
+    fabric = _settle_and_repair(fabric, SHARE[len(eset.names)] * accuracy, memory, progress)
+    fabric = part_sheets(fabric, memory)
     edges = known(fabric, memory)
     audit = eset.audit
     lifting = Lifting(
@@ -114,29 +118,32 @@ def _changed(before: Audit, after: Audit) -> int:
     return int(np.abs(counts[0] - counts[1]).sum())
 
 
-def _settled_and_righted(
+def _settle_and_repair(
     fabric: Fabric, tolerance: float, memory: Memory, progress: Progress
 ) -> Fabric:
     """Bisect and flip until nothing is left to do; then take slivers away, and begin again."""
-    fabric = settled(fabric, tolerance, memory, progress)
-    fabric = settled(tidied(fabric, memory, fine=True), tolerance, memory, progress)
+    fabric = settle(fabric, tolerance, memory, progress)
+    fabric = settle(refill(fabric, memory, fine=True), tolerance, memory, progress)
     if fabric.dimension == 1:
         return fabric
-    return (_tamed if fabric.dimension == 3 else righted)(fabric, tolerance, memory)
+    return (_better_tetrahedra if fabric.dimension == 3 else repair)(fabric, tolerance, memory)
 
 
-def _tamed(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
+def _better_tetrahedra(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     """Slivers taken away where no edge gets to deviate; else others cut, and so on."""
     best, fewest = fabric, None
     for _ in range(TRIALS):
-        fabric = tidied(fabric, memory, fine=True, limit=tolerance)
+        fabric = refill(fabric, memory, fine=True, limit=tolerance)
         # edges that come to lie on a fold may deviate from it
-        fabric = settled(fabric, tolerance, memory)
-        faults = (int((known(fabric, memory).error > tolerance).sum()), sharp(fabric))
+        fabric = settle(fabric, tolerance, memory)
+        faults = (
+            int((known(fabric, memory).error > tolerance).sum()),
+            int((qualities(fabric.vertices, fabric.cells, fabric.cell_index) < SHARP).sum()),
+        )
         if fewest is not None and faults >= fewest:
             return best
         best, fewest = fabric, faults
         if not any(faults):
             return best
-        fabric = settled(tidied(fabric, memory, fine=True), tolerance, memory)
+        fabric = settle(refill(fabric, memory, fine=True), tolerance, memory)
     return best

@@ -34,7 +34,7 @@ def on_plain_curves(
     return np.asarray(plain & np.isin(marks, (ON_FOLD, ON_CAP)) & (fabric.dimension == 2))
 
 
-def led_between(
+def follow_edge(
     fabric: Fabric, edge: Int[np.ndarray, " 2"], mark: int, lowest: int
 ) -> Vertices | None:
     """Vertex halfway along the curve between the ends of an edge on a plain curve.

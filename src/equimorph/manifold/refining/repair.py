@@ -7,12 +7,11 @@ from jaxtyping import Bool
 
 from equimorph.manifold.complex.marked_complex import CURVES, ON_CROSSING, Fabric
 from equimorph.manifold.queries.cusps import with_cusps_beside
-from equimorph.manifold.refining.corners import squeezed
-from equimorph.manifold.refining.deviations import Edges, Memory, known, near_lost
+from equimorph.manifold.refining.bisect import bisect, settle
+from equimorph.manifold.refining.deviation import Edges, Memory, known, near_lost
 from equimorph.manifold.refining.patches import Patch, patch_around
-from equimorph.manifold.refining.settling import bisected, settled, tidied
-from equimorph.manifold.refining.smoothing import SHARP
-from equimorph.manifold.refining.surgery import angles, collapse, flip
+from equimorph.manifold.refining.quality import SHARP, overturned, smallest_angles, squeezed
+from equimorph.manifold.refining.refill import flip, refill
 
 GROWN = 4
 """How much more cells a patch may get: where edges cannot be bisected, cuts around them go on."""
@@ -27,7 +26,7 @@ Step = Callable[[Fabric, float, Memory], Fabric]
 """What is done to a fabric, given the tolerance."""
 
 
-def righted(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
+def repair(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     """Cells turned upright that bisection and flips have left overturned, as far as possible.
 
     One group after the other, with what is around it.
@@ -69,7 +68,7 @@ def _best(patch: Patch, tolerance: float, memory: Memory) -> tuple[Fabric, Memor
             if not any(fewest[1:]):
                 return best
             fabric = step(with_cusps_beside(fabric, _bad(fabric)), tolerance, inner)
-            fabric = settled(tidied(fabric, inner, fine=True), tolerance, inner, most=most)
+            fabric = settle(refill(fabric, inner, fine=True), tolerance, inner, most=most)
             faults = _faults(fabric, tolerance, inner)
             if len(fabric.cells) > most or sum(faults[1:]) > hopeless:
                 break
@@ -80,13 +79,13 @@ def _best(patch: Patch, tolerance: float, memory: Memory) -> tuple[Fabric, Memor
 
 def _bad(fabric: Fabric) -> Bool[np.ndarray, " C"]:
     """Cells that are overturned, look backwards, or have a small angle where that can be helped."""
-    over = fabric.overturned(fabric.cells, fabric.sense)
-    return np.asarray(over | fabric.backward(fabric.cells, fabric.parity) | _sharp(fabric))
+    over = overturned(fabric.vertices, fabric.cells, fabric.cell_index)
+    return np.asarray(over | fabric.looks_back(fabric.cells) | _sharp(fabric))
 
 
 def _sharp(fabric: Fabric) -> Bool[np.ndarray, " C"]:
     """Cells with a small angle, unless they lie between curves that meet at one."""
-    sharp = angles(fabric) < SHARP
+    sharp = smallest_angles(fabric.squared) < SHARP
     if not (fabric.marks & ON_CROSSING).any():
         return np.asarray(sharp)
     return np.asarray(sharp & ~squeezed(fabric, SHARP) if sharp.any() else sharp)
@@ -95,11 +94,11 @@ def _sharp(fabric: Fabric) -> Bool[np.ndarray, " C"]:
 def _faults(fabric: Fabric, tolerance: float, memory: Memory) -> tuple[int, int, int, int]:
     """Numbers of edges that deviate, and of cells overturned, looking backwards, and sharp."""
     deviating = int((known(fabric, memory).error > tolerance).sum())
-    over = int(fabric.overturned(fabric.cells, fabric.sense).sum())
+    over = int(overturned(fabric.vertices, fabric.cells, fabric.cell_index).sum())
     return (
         deviating,
         over,
-        int(fabric.backward(fabric.cells, fabric.parity).sum()),
+        int(fabric.looks_back(fabric.cells).sum()),
         int(_sharp(fabric).sum()),
     )
 
@@ -136,7 +135,7 @@ def _cut(
     chosen = np.unique(edges.of_cells[cells])
     chosen = chosen[wanted[chosen] & ~edges.stuck[chosen]]
     chosen = chosen[np.argsort(-edges.length[chosen], kind="stable")]
-    return flip(bisected(fabric, edges, chosen, memory), memory.cut)
+    return flip(bisect(fabric, edges, chosen, memory), memory.cut)
 
 
 def _finer(share: float) -> Step:
@@ -148,7 +147,7 @@ def _finer(share: float) -> Step:
         patch = patch_around(fabric, near, NEXT)
         inner = memory.among(patch.inside)
         most = GROWN * len(patch.fabric.cells)
-        out = patch.replaced(settled(patch.fabric, share * tolerance, inner, most=most))
+        out = patch.replaced(settle(patch.fabric, share * tolerance, inner, most=most))
         memory.learn(inner, patch.inside)
         return out
 
@@ -160,7 +159,7 @@ def _merged(short: float) -> Step:
 
     def step(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
         del tolerance
-        return flip(collapse(fabric, passes=6, short=short), memory.cut)
+        return refill(fabric, memory, fine=True, short=short)
 
     return step
 

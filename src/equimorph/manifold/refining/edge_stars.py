@@ -1,20 +1,30 @@
-"""Rings of tetrahedra around edges, and how else the polygons around these can be filled.
+"""Stars of edges and facets of tetrahedra filled anew between the same vertices [Freitag1997]_.
 
-An edge inside has one polygon around it. An edge on a surface of marked facets has one on each
-side, both closed by the chord that takes the edge's place on the surface; on the boundary one side
-is missing.
+An edge inside has one polygon around it, which is filled by the best of all its triangulations. An
+edge on a surface of marked facets has one polygon on each side, both closed by the chord that takes
+the edge's place on the surface; on the boundary one side is missing. A facet between two cells
+gives way to an edge through it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.complex.marked_complex import CURVES, ON_CROSSING, SIDES, Fabric
-from equimorph.manifold.geometry.topology import among, keys_of
-from equimorph.manifold.refining.tetrahedra import Judge, determinants, dihedrals
+from equimorph.arrays import Cells, Edges
+from equimorph.manifold.complex.marked_complex import (
+    CURVES,
+    ON_CROSSING,
+    SIDES,
+    Fabric,
+    squared_sides,
+)
+from equimorph.manifold.complex.vertices import Vertices
+from equimorph.manifold.geometry.topology import among, distinct, keys_of, rows_of
+from equimorph.manifold.refining.quality import POOR, determinants, smallest_angles
+from equimorph.manifold.refining.stars import Kind, Refills, Rows
 
 MOST = 7
 """Cells around edges that are looked at."""
@@ -22,7 +32,108 @@ EDGES = (((0, 1), (2, 3)), ((0, 2), (3, 1)), ((0, 3), (1, 2)),
          ((1, 2), (0, 3)), ((1, 3), (2, 0)), ((2, 3), (0, 1)))  # fmt: skip
 """Edges of a tetrahedron, each with the others' ends: even permutations of the corners."""
 
-Ends = Int[np.ndarray, "n 2"]
+Keys = Int[np.ndarray, " keys"]
+"""Keys of edges or facets, in order."""
+
+
+def reconnections(
+    fabric: Fabric, quality: Float[np.ndarray, " cells"], near: Bool[np.ndarray, " V"], but: Edges
+) -> Refills:
+    """Other cells around the edges and facets of poor ones with a corner near.
+
+    Edges between the pairs of vertices `but` do not come into being.
+    """
+    base = len(fabric.vertices)
+    poor = (quality < POOR[3]) & near[fabric.cells].any(axis=1)
+    beside = np.zeros(base, bool)
+    beside[fabric.cells[poor]] = True
+    around = np.flatnonzero(beside[fabric.cells].sum(axis=1) > 1)
+    barred, facets = _known(fabric, fabric.cells[around], but)
+    sides = [fabric.cells[poor][:, list(k)] for k in combinations(range(4), 2)]
+    edges = rows_of(distinct(np.concatenate([keys_of(side, base) for side in sides])), base, 2)
+    part = replace(fabric, cells=fabric.cells[around], cell_index=fabric.cell_index[around])
+    rings = rings_around(part, edges)
+    rings = replace(rings, cells=np.where(rings.cells < 0, -1, around[rings.cells]))
+    return _without_edges(fabric, rings, barred, facets).joined(
+        _through_facets(fabric, poor, around, barred)
+    )
+
+
+def _known(fabric: Fabric, around: Cells, but: Edges) -> tuple[Keys, Keys]:
+    """Keys of all edges and of all facets between corners of some cells; `but` count as edges."""
+    base = len(fabric.vertices)
+    near = np.zeros(base, bool)
+    near[around] = True
+    cells = fabric.cells[near[fabric.cells].sum(axis=1) > 1]
+    edges = [keys_of(cells[:, list(k)], base) for k in combinations(range(4), 2)]
+    cells = cells[near[cells].sum(axis=1) > 2]
+    facets = [keys_of(cells[:, list(k)], base) for k in combinations(range(4), 3)]
+    return distinct(np.concatenate([*edges, keys_of(but, base)])), distinct(np.concatenate(facets))
+
+
+def _without_edges(fabric: Fabric, rings: "Rings", barred: Keys, facets: Keys) -> Refills:
+    """Refills that take edges out."""
+    base = len(fabric.vertices)
+    # on surfaces the other diagonal is new, unless one side of the edge has a single cell
+    flat = ((rings.first >= 0).sum(axis=1) == 2) | ((rings.second >= 0).sum(axis=1) == 2)
+    rings = rings.take((rings.mark == 0) | flat | ~among(keys_of(rings.chord, base), barred))
+    fillings = [
+        fill(fabric.vertices, rings.ends, each, barred) for each in (rings.first, rings.second)
+    ]
+    good = (fillings[0].quality > 0.0) & (fillings[1].quality > 0.0)
+    come = np.concatenate([each.cells for each in fillings], axis=1)
+    index = np.repeat(rings.index, fillings[0].cells.shape[1], axis=1)
+    chord, on = rings.chord, rings.mark > 0
+    new = np.stack([np.column_stack([rings.ends[:, k], chord]) for k in (0, 1)], axis=1)
+    between = come[:, :, 1:].reshape(-1, 3)
+    old = among(keys_of(between, base), facets) & (between[:, 0] >= 0)
+    good &= ~old.reshape(come.shape[:2]).any(axis=1)
+    marked = np.argsort(keys_of(fabric.facets, base))
+    known = keys_of(fabric.facets, base)[marked]
+    good &= ~(among(keys_of(new.reshape(-1, 3), base), known).reshape(-1, 2).any(axis=1) & on)
+    lost = np.stack([np.column_stack([rings.ends, chord[:, k]]) for k in (0, 1)], axis=1)
+    number = np.arange(len(on))
+    gone_row, gone_at = np.nonzero(rings.cells >= 0)
+    come_row, come_at = np.nonzero(come[:, :, 0] >= 0)
+    on_row = np.repeat(number[on], 2)
+    at = np.searchsorted(known, keys_of(lost[on].reshape(-1, 3), base))
+    return Refills(
+        fabric, len(on), rings.cells[gone_row, gone_at], gone_row,
+        come[come_row, come_at], index[come_row, come_at], come_row,
+        marked[at], on_row, new[on].reshape(-1, 3), np.repeat(rings.mark[on], 2), on_row,
+        Kind.RECONNECTION, np.zeros(len(on), bool),
+    ).take(good)  # fmt: skip
+
+
+def _through_facets(
+    fabric: Fabric, poor: Bool[np.ndarray, " cells"], around: Rows, barred: Keys
+) -> Refills:
+    """Refills that put edges through facets: two cells become three."""
+    base, own = len(fabric.vertices), fabric.cells[around]
+    # facets so ordered that the corner opposite sees them turn to the left
+    order = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+    facets = np.concatenate([own[:, list(each)] for each in order])
+    tips, owner = np.concatenate(list(own.T)), np.tile(around, 4)
+    keys = keys_of(facets, base)
+    by_key = np.argsort(keys, kind="stable")
+    same = np.flatnonzero(keys[by_key[1:]] == keys[by_key[:-1]])
+    one, other = by_key[same], by_key[same + 1]
+    new = keys_of(np.stack([tips[one], tips[other]], axis=1), base)
+    good = (poor[owner[one]] | poor[owner[other]]) & ~among(new, barred)
+    good &= ~among(keys[one], np.sort(keys_of(fabric.facets, base)))
+    good &= fabric.cell_index[owner[one]] == fabric.cell_index[owner[other]]
+    one, other = one[good], other[good]
+    (i, j, k), low, high = facets[one].T, tips[one], tips[other]
+    come = np.stack(
+        [np.stack([low, high, *pair], axis=1) for pair in ((i, j), (j, k), (k, i))], axis=1
+    ).reshape(-1, 4)
+    number, none = np.arange(len(one)), np.zeros(0, int)
+    gone = np.stack([owner[one], owner[other]], axis=1).ravel()
+    index = np.repeat(fabric.cell_index[owner[one]], 3)
+    return Refills(
+        fabric, len(one), gone, np.repeat(number, 2), come, index, np.repeat(number, 3),
+        none, none, np.zeros((0, 3), int), none, none, Kind.RECONNECTION, np.zeros(len(one), bool),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -34,7 +145,7 @@ class Rings:
     inside. mark: of the edges; index: of the cells at first and second.
     """
 
-    ends: Ends
+    ends: Edges
     mark: Int[np.ndarray, " n"]
     cells: Int[np.ndarray, "n ring"]
     first: Int[np.ndarray, "n corners"]
@@ -46,13 +157,13 @@ class Rings:
         return Rings(*(column[some] for column in vars(self).values()))
 
     @property
-    def chord(self) -> Ends:
+    def chord(self) -> Edges:
         """What takes the place of edges on surfaces."""
         last = (self.first >= 0).sum(axis=1) - 1
         return np.stack([self.first[:, 0], self.first[np.arange(len(last)), last]], axis=1)
 
 
-def rings_around(fabric: Fabric, ends: Ends) -> Rings:
+def rings_around(fabric: Fabric, ends: Edges) -> Rings:
     """Rings around edges, sorted ends each, that can be taken out; those of others are left out."""
     base, mark = len(fabric.vertices), fabric.edge_marks(ends)
     ends, mark = ends[_single(mark)], mark[_single(mark)]
@@ -81,7 +192,7 @@ def _single(mark: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
 
 def _arcs(
     fabric: Fabric, keys: Int[np.ndarray, " n"]
-) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " a"], Ends]:
+) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " a"], Edges]:
     """Cells around edges: the edge, the cell, and its other side, turning to the right."""
     base = len(fabric.vertices)
     edges, owners, arcs = [], [], []
@@ -100,7 +211,7 @@ def _arcs(
 
 def _ordered(
     fabric: Fabric,
-    about: tuple[Ends, Int[np.ndarray, " n"], Int[np.ndarray, " n"]],
+    about: tuple[Edges, Int[np.ndarray, " n"], Int[np.ndarray, " n"]],
     table: Int[np.ndarray, "n ring 3"],
 ) -> Rings:
     """Rings with their cells one after the other, parted where facets are marked."""
@@ -168,7 +279,10 @@ class Filling:
 
 
 def fill(
-    judge: Judge, ends: Ends, polygons: Int[np.ndarray, "n ring"], barred: Int[np.ndarray, " m"]
+    vertices: Vertices,
+    ends: Edges,
+    polygons: Int[np.ndarray, "n ring"],
+    barred: Int[np.ndarray, " m"],
 ) -> Filling:
     """Fill polygons with the triangles that give the largest smallest angle.
 
@@ -185,7 +299,7 @@ def fill(
         if len(own) == 0:
             continue
         ring = polygons[own, :m]
-        values = _triangles(judge, ends[own], ring, barred)
+        values = _triangles(vertices, ends[own], ring, barred)
         of, within = _triangulations(m)
         each = values[:, of].min(axis=2)
         best = each.argmax(axis=1)
@@ -201,10 +315,10 @@ def fill(
 
 
 def _triangles(
-    judge: Judge, ends: Ends, ring: Int[np.ndarray, "n m"], barred: Int[np.ndarray, " b"]
+    vertices: Vertices, ends: Edges, ring: Int[np.ndarray, "n m"], barred: Int[np.ndarray, " b"]
 ) -> Float[np.ndarray, "n triangles"]:
     """Smallest angle of the two tetrahedra over each triangle of polygons."""
-    m, base = ring.shape[1], len(judge.place)
+    m, base = ring.shape[1], len(vertices)
     chosen = _corners(m)
     corners = ring[:, chosen].reshape(-1, 3)
     out = np.full(len(corners), np.inf)
@@ -212,11 +326,13 @@ def _triangles(
         end = np.repeat(ends[:, side], len(chosen))
         cells = np.concatenate([end[:, None], corners[:, order]], axis=1)
         # most are never wanted: the tangent space at the end will do
-        flat = judge.flat(ends[:, side], ring)[:, chosen[:, order]]
+        away = vertices.place[ring] - vertices.place[ends[:, side]][:, None]
+        flat = (away @ np.swapaxes(vertices.rows[ends[:, side]], 1, 2))[:, chosen[:, order]]
         upright = determinants(flat.reshape(-1, 3, 3)) > 0.0
         out[~upright] = -np.inf
         looked = np.flatnonzero(out > -np.inf)
-        out[looked] = np.minimum(out[looked], dihedrals(judge.place, cells[looked]))
+        angle = smallest_angles(squared_sides(vertices.place, cells[looked]))
+        out[looked] = np.minimum(out[looked], angle)
     each = out.reshape(len(ring), -1)
     for i, j in combinations(range(m), 2):
         if j - i in {1, m - 1}:

@@ -8,12 +8,10 @@ from equimorph.manifold.complex.marked_complex import CURVES, Fabric
 from equimorph.manifold.complex.shared_edges import copies, doubled, first_copies, with_copies
 from equimorph.manifold.complex.vertices import Vertices, gathered
 from equimorph.manifold.geometry.topology import keys_of
-from equimorph.manifold.refining.bettering import bettered
-from equimorph.manifold.refining.deviations import Edges, Memory, chosen, known
-from equimorph.manifold.refining.leading import led_between, on_plain_curves
+from equimorph.manifold.refining.deviation import Edges, Memory, chosen, known
+from equimorph.manifold.refining.follow_edge import follow_edge, on_plain_curves
 from equimorph.manifold.refining.patches import patch_around
-from equimorph.manifold.refining.smoothing import SHARP, smooth
-from equimorph.manifold.refining.surgery import SHORT, angles, collapse, flip
+from equimorph.manifold.refining.refill import flip, refill
 from equimorph.model import Progress, Silent
 
 ROUNDS = 200
@@ -31,7 +29,7 @@ RINGS = 4
 """Rings of cells around edges that deviate, which longer ones to be cut first may lie in."""
 
 
-def settled(
+def settle(
     fabric: Fabric,
     tolerance: float,
     memory: Memory,
@@ -50,17 +48,17 @@ def settled(
         if hopeless or len(fabric.cells) > most or not todo.any():
             break
         if progress is not None and _few(fabric, todo):
-            fabric = _settled_around(fabric, edges.ends[todo], tolerance, memory)
+            fabric = _settle_around(fabric, edges.ends[todo], tolerance, memory)
             continue
         (progress or Silent()).report(
             "refining", int((edges.error <= tolerance).sum()), len(edges.error)
         )
         before = len(fabric.vertices)
-        fabric = bisected(fabric, edges, chosen(edges, tolerance), memory)
+        fabric = bisect(fabric, edges, chosen(edges, tolerance), memory)
         if fabric.dimension == 2:
             fabric = flip(fabric, memory.cut, since=before)
         elif fabric.dimension == 3 and len(fabric.cells) > GROWN * cells:
-            fabric = tidied(fabric, memory)
+            fabric = refill(fabric, memory)
             cells = len(fabric.cells)
     return fabric
 
@@ -70,7 +68,7 @@ def _few(fabric: Fabric, todo: Bool[np.ndarray, " E"]) -> bool:
     return fabric.dimension == 2 and int(np.count_nonzero(todo)) * LOCAL < len(todo)
 
 
-def _settled_around(
+def _settle_around(
     fabric: Fabric, ends: Int[np.ndarray, "n 2"], tolerance: float, memory: Memory
 ) -> Fabric:
     """Bisect and flip around some edges until none deviates there."""
@@ -78,40 +76,22 @@ def _settled_around(
     near[ends] = True
     patch = patch_around(fabric, near, RINGS)
     inner = memory.among(patch.inside)
-    out = patch.replaced(settled(patch.fabric, tolerance, inner))
+    out = patch.replaced(settle(patch.fabric, tolerance, inner))
     memory.learn(inner, patch.inside)
     return out
 
 
-def told_apart(fabric: Fabric, memory: Memory) -> Fabric:
+def part_sheets(fabric: Fabric, memory: Memory) -> Fabric:
     """Vertices on edges of several sheets that join the same two points of their crossing."""
     ends = doubled(fabric)
     if len(ends) == 0:
         return fabric
     edges, base = known(fabric, memory), len(fabric.vertices)
     those = np.flatnonzero(np.isin(keys_of(edges.ends, base), keys_of(ends, base)))
-    return bisected(fabric, edges, those, memory)
+    return bisect(fabric, edges, those, memory)
 
 
-def tidied(fabric: Fabric, memory: Memory, fine: bool = False, limit: float = np.inf) -> Fabric:
-    """Take slivers away; of triangles that are `fine` already also by moving vertices.
-
-    Where cells are coarse, short edges may be all that keeps two folds apart.
-    """
-    if fabric.dimension == 3:
-        return bettered(fabric, memory, limit, fine)
-    if fabric.dimension == 1:
-        return fabric
-    short = SHORT if fine else 0.0
-    fabric = flip(collapse(flip(fabric, memory.cut), passes=4, short=short), memory.cut)
-    if not fine:
-        return fabric
-    return flip(smooth(fabric, angles(fabric) < SHARP), memory.cut)
-
-
-def bisected(
-    fabric: Fabric, edges: Edges, at_once: Int[np.ndarray, " n"], memory: Memory
-) -> Fabric:
+def bisect(fabric: Fabric, edges: Edges, at_once: Int[np.ndarray, " n"], memory: Memory) -> Fabric:
     """Put exact vertices on edges; remember where that failed."""
     ends = edges.ends
     at_once = at_once[first_copies(fabric, ends[at_once], edges.marks[at_once])]
@@ -119,9 +99,9 @@ def bisected(
     for side in edges.of_cells.T:
         np.minimum.at(lowest, side, fabric.cell_index)
 
-    done, parts, left = _found(fabric, edges, at_once, lowest)
+    done, parts, left = _vertices_on(fabric, edges, at_once, lowest)
     for edge in left[on_plain_curves(fabric, ends[left], edges.marks[left])].tolist():
-        led = led_between(fabric, ends[edge], int(edges.marks[edge]), int(lowest[edge]))
+        led = follow_edge(fabric, ends[edge], int(edges.marks[edge]), int(lowest[edge]))
         if led is None:
             memory.lost.add((int(ends[edge, 0]), int(ends[edge, 1])))
             continue
@@ -147,7 +127,7 @@ def bisected(
     return fabric.bisected(whole, more) if len(at) else fabric
 
 
-def _found(
+def _vertices_on(
     fabric: Fabric,
     edges: Edges,
     wanted: Int[np.ndarray, " n"],

@@ -1,0 +1,257 @@
+"""Refill: stars of edges and vertices are filled anew where their cells get better.
+
+Candidates are the flip of an edge (triangles), the best filling of the ring around an edge and
+three cells in place of two around a facet (tetrahedra) [Freitag1997]_, the collapse of a vertex
+into one of its neighbours, and the same star with its vertex moved along the set. One rule decides
+about all of them: there must be fewer poor cells or a better worst one, no edge that deviates from
+the set by more than a limit, and none that was bisected before. Marked facets (folds, constraints,
+crossings, sides of the box) and the rim of a patch stay what they are.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from equimorph.arrays import Edges
+from equimorph.manifold.complex.marked_complex import TETRAHEDRA, TRIANGLES, Fabric
+from equimorph.manifold.geometry.topology import among, keys_of, rows_of
+from equimorph.manifold.refining.deviation import Memory, deviations
+from equimorph.manifold.refining.edge_stars import reconnections
+from equimorph.manifold.refining.kernels import flip_edges
+from equimorph.manifold.refining.quality import (
+    POOR,
+    qualities,
+    qualities_near,
+    smallest_angles,
+    worst,
+)
+from equimorph.manifold.refining.stars import Kind, Refills
+from equimorph.manifold.refining.vertex_stars import collapses, moves
+
+ROUNDS = {2: (2, 3), 3: (6, 12)}
+"""How often all candidates are tried in turn, around what changed, by the dimension; for coarse and
+for fine cells."""
+RECONNECTIONS, COLLAPSES, MOVES = 20, 3, 6
+"""How often candidates of a kind are looked for in a round, as long as some help."""
+GAIN = np.radians(0.2) / np.pi
+"""Least gain of a refill: poor cells fewer, and the growth of the worst quality relative to π."""
+WORSE, MUCH_WORSE = 0.7, 0.2
+"""Least share of the worst quality that must remain; and if a short edge goes."""
+STEEPER = 1e-3
+"""Least gain of a flip: minus the sum of the cotangents of both opposite angles."""
+OPPOSITE = np.array([[1, 2], [2, 0], [0, 1]])
+"""The other corners of triangles."""
+LONGER = 1.5
+"""Largest ratio of the longest sides of the cells after and before."""
+SHORT = 0.05
+"""Ratio of the lengths of two edges of a triangle below which the shorter one counts as poor."""
+
+
+Near = Bool[np.ndarray, " V"]
+Quality = Float[np.ndarray, " cells"]
+Candidates = Callable[[Fabric, Quality, Near], Refills]
+"""Refills that could be done, of fabric, qualities of its cells and vertices to look at."""
+
+
+def refill(
+    fabric: Fabric,
+    memory: Memory,
+    limit: float = np.inf,
+    *,
+    fine: bool = False,
+    short: float = SHORT,
+) -> Fabric:
+    """Refill stars as long as cells get better; no edge comes that deviates by more than `limit`.
+
+    Where cells are `fine` already, vertices are moved, too, and edges collapsed that are shorter
+    than a share `short` of others beside them: on coarse cells these may keep two folds apart.
+    """
+    if fabric.dimension < TRIANGLES:
+        return fabric
+    near = np.ones(len(fabric.vertices), bool)
+    touched = ~near
+    for _ in range(ROUNDS[fabric.dimension][fine]):
+        fabric, changed = _reconnect(fabric, memory)
+        quality = qualities_near(fabric, near | changed)
+        for candidates, passes in _kinds(fabric, memory, short if fine else 0.0)[: 2 + fine]:
+            found = repeat(candidates, passes, fabric, quality, near, memory, limit)
+            fabric, quality, own = found
+            near, changed = _extended(near, fabric), _extended(changed, fabric) | own
+        near, touched = changed, _extended(touched, fabric) | changed
+        if not near.any():
+            break
+    memory.forget(touched)
+    return fabric
+
+
+def _reconnect(fabric: Fabric, memory: Memory) -> tuple[Fabric, Near]:
+    """Flip edges of triangles; and the corners of the cells that this changed."""
+    changed = np.zeros(len(fabric.vertices), bool)
+    if fabric.dimension == TRIANGLES:
+        before = fabric.cells
+        fabric = flip(fabric, memory.barred(fabric)[0])
+        changed[fabric.cells[(fabric.cells != before).any(axis=1)]] = True
+    return fabric, changed
+
+
+def _kinds(fabric: Fabric, memory: Memory, short: float) -> list[tuple[Candidates, int]]:
+    """Functions that return candidates, and how often each is called in a round."""
+    but, _ = memory.barred(fabric)
+    rings = partial(reconnections, but=but)
+    return [
+        (rings, RECONNECTIONS if fabric.dimension == TETRAHEDRA else 0),
+        (partial(collapses, short=short), COLLAPSES),
+        (moves, MOVES),
+    ]
+
+
+def repeat(
+    candidates: Candidates,
+    passes: int,
+    fabric: Fabric,
+    quality: Quality,
+    near: Near,
+    memory: Memory,
+    limit: float,
+) -> tuple[Fabric, Quality, Near]:
+    """Apply the best candidates again and again, around what changed before; and what changed."""
+    changed = np.zeros(len(fabric.vertices), bool)
+    for _ in range(passes):
+        refills, come = _best(candidates(fabric, quality, near), quality, memory, limit)
+        # vertices that were found stay, even if unused: what follows would copy all others
+        fabric = refills.fabric
+        if refills.count == 0:
+            break
+        near = np.zeros(len(fabric.vertices), bool)
+        near[fabric.cells[refills.gone]] = True
+        near[refills.come] = True
+        changed = _extended(changed, fabric) | near
+        fabric, quality = _applied(refills, quality, come)
+    return fabric, quality, _extended(changed, fabric)
+
+
+def _extended(near: Near, fabric: Fabric) -> Near:
+    """Flags of vertices, false for those added since."""
+    return np.pad(near, (0, len(fabric.vertices) - len(near)))
+
+
+def _best(
+    refills: Refills, quality: Quality, memory: Memory, limit: float
+) -> tuple[Refills, Quality]:
+    """Refills that help, the best first, with stars that do not overlap; and their qualities."""
+    if refills.fabric.dimension == TRIANGLES:
+        # `qualities_near` looks at triangles on average over their corners only
+        gone = refills.gone
+        quality = quality.copy()
+        cells, index = refills.fabric.cells[gone], refills.fabric.cell_index[gone]
+        quality[gone] = qualities(refills.fabric.vertices, cells, index)
+    gain = _gains(refills, quality, smallest_angles(refills.squared))
+    refills = refills.take(gain > GAIN)  # qualities are no better than angles
+    come = qualities(refills.fabric.vertices, refills.come, refills.index)
+    gain = _gains(refills, quality, come)
+    kept = gain > GAIN
+    come, gain, refills = come[kept[refills.come_row]], gain[kept], refills.take(kept)
+    kept = _allowed(refills, memory, limit)
+    kept &= _apart(refills, np.where(kept, gain, -1.0))
+    return refills.take(kept), come[kept[refills.come_row]]
+
+
+def _gains(refills: Refills, quality: Quality, come: Quality) -> Float[np.ndarray, " refills"]:
+    """Number of poor cells fewer, and growth of the worst quality relative to π, if some come.
+
+    Minus one where cells get much poorer, or much longer.
+    """
+    count, poor = refills.count, POOR[refills.fabric.dimension]
+    old = quality[refills.gone]
+    before = worst(old, refills.gone_row, count)
+    after = worst(come, refills.come_row, count)
+    fewer = np.bincount(refills.gone_row[old < poor], minlength=count)
+    fewer -= np.bincount(refills.come_row[come < poor], minlength=count)
+    reach, longest = np.zeros(count), np.zeros(count)
+    sides = refills.fabric.squared[refills.gone]
+    np.maximum.at(reach, refills.gone_row, sides.max(axis=1, initial=0.0))
+    np.maximum.at(longest, refills.come_row, refills.squared.max(axis=1, initial=0.0))
+    collapse = refills.kind is Kind.COLLAPSE
+    vertices_go = np.where(refills.short, MUCH_WORSE, WORSE)
+    least = np.where((before > 0.0) & collapse, vertices_go, 1.0) * before
+    good = (after >= least) & (longest <= LONGER**2 * reach)
+    # vertices may go to have fewer poor cells; the same vertices must have a better worst one
+    fewer = collapse * (fewer + refills.short)
+    return np.where(good, fewer + (after - before) / np.pi, -1.0)
+
+
+def _allowed(refills: Refills, memory: Memory, limit: float) -> Bool[np.ndarray, " refills"]:
+    """Whether no edge comes that was bisected, while its vertex stays, or deviates too much."""
+    fabric, base = refills.fabric, len(refills.fabric.vertices)
+    row, key = refills.new_edges
+    good = np.ones(refills.count, bool)
+    cut, on_edge = memory.barred(fabric)
+    order = np.argsort(keys_of(cut, base))
+    known, on_edge = keys_of(cut, base)[order], on_edge[order]
+    back = np.flatnonzero(among(key, known))
+    good[row[back[~refills.vanishes(row[back], on_edge[np.searchsorted(known, key[back])])]]] = (
+        False
+    )
+    if np.isfinite(limit):
+        kept = good[row]
+        row, key = row[kept], key[kept]
+        error = deviations(fabric, rows_of(key, base, 2), refills.edge_marks(row, key))
+        good[row[error > limit]] = False
+    return good
+
+
+def _apart(refills: Refills, gain: Float[np.ndarray, " refills"]) -> Bool[np.ndarray, " refills"]:
+    """Refills with some gain, the best first, without those that touch what an earlier one does."""
+    row, claims = refills.claims
+    order = np.argsort(row, kind="stable")
+    ends = np.searchsorted(row[order], np.arange(refills.count + 1))
+    _, claims = np.unique(claims[order], return_inverse=True)
+    touched, kept = np.zeros(len(claims), bool), np.zeros(refills.count, bool)
+    best = np.argsort(-gain, kind="stable")
+    for number in best[gain[best] > 0.0].tolist():
+        own = claims[ends[number] : ends[number + 1]]
+        if not touched[own].any():
+            touched[own] = True
+            kept[number] = True
+    return kept
+
+
+def _applied(refills: Refills, quality: Quality, come: Quality) -> tuple[Fabric, Quality]:
+    """Fabric and qualities of its cells after some refills."""
+    fabric = refills.fabric
+    stays, left = np.ones(len(fabric.cells), bool), np.ones(len(fabric.facets), bool)
+    stays[refills.gone] = False
+    left[refills.lost] = False
+    fabric = replace(
+        fabric,
+        cells=np.concatenate([fabric.cells[stays], refills.come]),
+        cell_index=np.concatenate([fabric.cell_index[stays], refills.index]),
+        squared=np.concatenate([fabric.squared[stays], refills.squared]),
+        facets=np.concatenate([fabric.facets[left], refills.new]),
+        marks=np.concatenate([fabric.marks[left], refills.marks]),
+    )
+    return fabric, np.concatenate([quality[stays], come])
+
+
+def flip(fabric: Fabric, but: Edges | None = None, since: int = 0) -> Fabric:
+    """Flip edges of triangles whose opposite angles add up to more than π, if nothing folds over.
+
+    And those whose flip leaves fewer cells overturned, whatever the angles. Edges between the pairs
+    of vertices `but` do not come into being. Where nothing was left to be flipped before the
+    vertices from the number `since` on were added, only their surroundings are looked at.
+    """
+    cells, squared = fabric.cells.copy(), fabric.squared.copy()
+    fixed = fabric.facets
+    if but is not None:
+        near = np.zeros(len(fabric.vertices), bool)
+        near[cells] = True
+        fixed = np.concatenate([fixed, but[near[but[:, 0]] & near[but[:, 1]]]])
+    place, rows = fabric.vertices.place, fabric.vertices.rows
+    flat = np.ascontiguousarray(place[:, -TRIANGLES:])
+    sense = np.where(fabric.cell_index % 2 == 0, 1, -1)
+    parts = (fabric.cell_index, sense, np.ascontiguousarray(fixed), place, rows, flat, OPPOSITE)
+    count = flip_edges(cells, squared, *parts, STEEPER, since)
+    return replace(fabric, cells=cells, squared=squared) if count else fabric
