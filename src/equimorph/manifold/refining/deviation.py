@@ -117,8 +117,8 @@ class Memory:
 
     def learn(self, inner: "Memory", inside: Bool[np.ndarray, " V"]) -> None:
         """Take over what came to be known among some of the vertices, and those added since."""
-        keys, at = np.unique(np.concatenate([self.keys, inner.keys]), return_index=True)
-        self.keys, self.error = keys, np.concatenate([self.error, inner.error])[at]
+        keys, at = np.unique(np.concatenate([inner.keys, self.keys]), return_index=True)
+        self.keys, self.error = keys, np.concatenate([inner.error, self.error])[at]
         beyond = {(a, b) for a, b in self.stuck if not (inside[a] and inside[b])}
         self.stuck = beyond | inner.stuck
         kept = ~inside[self.cut].all(axis=1)
