@@ -41,6 +41,8 @@ INTERVALS = 24
 """Intervals of the grid over which natural states are known."""
 BOUND = 100.0
 """Largest load up to which paths are followed, unless said."""
+ROUND_OFF = 1e-14
+"""Load in its scale that counts as none: no path is followed over round-off."""
 AT_END = 1e-7
 """Part of a path that may be left where an event lies at its end."""
 
@@ -294,7 +296,8 @@ class _OnPath(Rule):
             p[:, setting.free] = points
             z, good = start.states(p)
             begin = start.parameters(p)
-            moving = good & (p[:, start.load] != start.low)
+            away = np.abs(p[:, start.load] - start.low) / eset.structure.scales[start.load]
+            moving = good & (away > ROUND_OFF)
             z[moving] = ends(z[moving], begin[moving], p[moving])
             z[~good] = np.nan
             return z
