@@ -222,7 +222,7 @@ class _Track:
     @property
     def at_jump(self) -> bool:
         """Whether the failure ahead is so close that the optimum jumps there."""
-        return self.failure - self.last.time <= CLOSEST * (1.0 + self.last.time)
+        return bool(self.failure - self.last.time <= CLOSEST * (1.0 + self.last.time))
 
     def smooth_pair(self) -> tuple[_Found, _Found] | None:
         """Last two optima, if the optimum moves smoothly between them."""
