@@ -1,4 +1,7 @@
-"""`reduce`: at most one preferred state over each point, with barriers and gaps."""
+"""`reduce`: at most one preferred state over each point, with barriers and gaps.
+
+See docs/decisions.md, "Preferences are bisected, not modelled".
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -8,6 +8,8 @@ a winding number: turn every projected cell counter-clockwise and add up its edg
 the contributions of neighbours cancel; what remains are the edges e on which the set folds over
 (jump j = ±2) or ends (±1). Cutting these edges at their crossings gives the exact regions
 of constant N, with no raster in between.
+
+See docs/decisions.md, "Charts are cells over coordinates".
 """
 
 from collections.abc import Callable

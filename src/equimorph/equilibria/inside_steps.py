@@ -2,6 +2,8 @@
 
 It is the cubic through its values and slopes (``dσ/ds = vᵀ D²F[v, T]`` with the unit eigenvector
 v). Points are added until it is known that it does not reach zero, or where.
+
+See docs/decisions.md, "Hidden events".
 """
 
 from dataclasses import dataclass, replace

@@ -5,6 +5,8 @@ Branch points are regular solutions of minimally augmented systems [Govaerts2000
 ``∂g = −∂(vᵀF_z v)`` at fixed v. Folds, constraints and other scalars are roots along the curve,
 found by inverse quadratic interpolation where the last three points allow it, else by bisection
 [Chandrupatla1997]_; every trial point is corrected onto the curve.
+
+See docs/decisions.md, "Events are roots of scalars along the curve".
 """
 
 from collections.abc import Callable

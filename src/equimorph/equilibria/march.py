@@ -1,4 +1,7 @@
-"""Lanes that march together along their curves: the engine under every lift."""
+"""Lanes that march together along their curves: the engine under every lift.
+
+See docs/decisions.md, "Lanes march in compiled kernels".
+"""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,7 @@
-"""All equilibria at given parameters, with an estimate of how many are missing."""
+"""All equilibria at given parameters, with an estimate of how many are missing.
+
+See docs/decisions.md, "Searches follow lines through known equilibria".
+"""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -4,6 +4,8 @@ A point of a lane solves F(z; p) = 0 and as many conditions as the parameters ha
 Each step goes onto the equilibrium set and along its tangent space: folds are regular points, and
 conditions are differentiated along the set only. With fewer conditions than directions the step
 along the set is the shortest, with more the one of least squares.
+
+See docs/decisions.md, "One corrector".
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""Snap landing: where a structure goes when it loses stability."""
+"""Snap landing: where a structure goes when it loses stability.
+
+See docs/decisions.md, "Snap landings are gradient flows".
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""`follow`: trace many lanes, locate what happened to each, and tell how it ended."""
+"""`follow`: trace many lanes, locate what happened to each, and tell how it ended.
+
+See docs/decisions.md, "Two engines trace".
+"""
 
 import threading
 import time

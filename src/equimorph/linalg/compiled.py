@@ -4,6 +4,8 @@ numba's own cache looks only at the file that a kernel stands in, so that after 
 would go on with old copies of those that it calls; and processes that compile the same kernel at
 the same time can mix up its files. Here a change of any kernel's source makes all of them new, and
 processes wait for each other.
+
+See docs/decisions.md, "Compiled kernels are cached by content".
 """
 
 import fcntl

@@ -1,4 +1,7 @@
-"""What to draw around the shape of a structure: supports, loads and actuators, as plain data."""
+"""What to draw around the shape of a structure: supports, loads and actuators, as plain data.
+
+See docs/decisions.md, "The structure says what to draw".
+"""
 
 from dataclasses import dataclass
 from enum import StrEnum

@@ -3,6 +3,8 @@
 Names do not identify functions: a program that is run again may give another function the same
 name. What counts is the code with its constants, the values that it closes over, its defaults, and
 the globals and attributes that it names, all the way down.
+
+See docs/decisions.md, "Journals keep whole sets".
 """
 
 import functools

@@ -2,6 +2,8 @@
 
 What other programs look at (sets, states, maps, routes, charts) has a layout of its own; all other
 results of tasks are written field by field, see `values`. Every group says which it is.
+
+See docs/decisions.md, "Records carry a schema and a version".
 """
 
 from collections.abc import Callable

@@ -1,4 +1,7 @@
-"""The stability margin: smallest eigenvalue of the constrained Hessian in the metric."""
+"""The stability margin: smallest eigenvalue of the constrained Hessian in the metric.
+
+See docs/decisions.md, "The metric is diagonal".
+"""
 
 from functools import partial
 from itertools import pairwise

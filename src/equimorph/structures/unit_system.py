@@ -1,4 +1,7 @@
-"""Quantities with their units: what a user writes as "12 kN m^2" as numbers in one system."""
+"""Quantities with their units: what a user writes as "12 kN m^2" as numbers in one system.
+
+See docs/decisions.md, "Units are converted at the door".
+"""
 
 import re
 from collections.abc import Mapping

@@ -3,6 +3,8 @@
 Types are those of the public face: `State`, `Descriptor`, ``Sequence[Constraint]`` and so on, see
 `SORTS`. A number or a word is taken as it is written; what it may be follows from its type, or from
 its name where that means the same in all tasks, see `MEANINGS`.
+
+See docs/decisions.md, "Keys of a study come from signatures".
 """
 
 import inspect

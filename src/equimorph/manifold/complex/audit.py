@@ -1,4 +1,7 @@
-"""The audit of an equilibrium set: what was checked, and what was found."""
+"""The audit of an equilibrium set: what was checked, and what was found.
+
+See docs/decisions.md, "Every cell is checked once more".
+"""
 
 from dataclasses import dataclass
 

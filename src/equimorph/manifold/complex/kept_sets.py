@@ -1,4 +1,7 @@
-"""Sets in journals: the question that a set answers, and the set as one entry."""
+"""Sets in journals: the question that a set answers, and the set as one entry.
+
+See docs/decisions.md, "Journals keep whole sets".
+"""
 
 import json
 from collections.abc import Callable, Mapping

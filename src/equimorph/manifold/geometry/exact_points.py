@@ -2,6 +2,8 @@
 
 All are found by `equilibria.settle`; this module says what is sought in the terms of the set: its
 metric, spans of the free parameters, and planes through places.
+
+See docs/decisions.md, "A fold point must part the right indices".
 """
 
 from collections.abc import Sequence

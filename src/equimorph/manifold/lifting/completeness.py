@@ -1,4 +1,7 @@
-"""Are there equilibria that a set lacks? Ask an independent search, and lift what it finds."""
+"""Are there equilibria that a set lacks? Ask an independent search, and lift what it finds.
+
+See docs/decisions.md, "Random checks are also the last seeds".
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Grids over the box of the free parameters, and the bisection of their edges."""
+"""Grids over the box of the free parameters, and the bisection of their edges.
+
+See docs/decisions.md, "Inner grid lines are moved a little".
+"""
 
 from dataclasses import dataclass, field, replace
 from itertools import permutations

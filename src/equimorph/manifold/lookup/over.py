@@ -1,4 +1,7 @@
-"""The states of an equilibrium set over points: the cells above them, polished by Newton."""
+"""The states of an equilibrium set over points: the cells above them, polished by Newton.
+
+See docs/decisions.md, "Queries try only the cells that a point can lie over".
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

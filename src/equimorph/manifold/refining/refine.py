@@ -4,6 +4,8 @@ The longest edge of a cell goes first, so that angles do not shrink from one bis
 [Rivara1984]_. New vertices are predicted by the cubic that touches the tangent spaces at both ends
 of the edge, and corrected orthogonally to the mean of both spaces; on folds, constraints and sides
 of the box along these.
+
+See docs/decisions.md, "Refinement bisects towards the cubic".
 """
 
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""Curves on which a map is not smooth: their kinds and exact places."""
+"""Curves on which a map is not smooth: their kinds and exact places.
+
+See docs/decisions.md, "Curves of maps are found edge by edge".
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,7 @@
-"""Sequential quadratic programming on an equilibrium set, many starts at a time."""
+"""Sequential quadratic programming on an equilibrium set, many starts at a time.
+
+See docs/decisions.md, "Optima by our own SQP".
+"""
 
 from dataclasses import dataclass, replace
 

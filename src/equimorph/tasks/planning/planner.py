@@ -1,4 +1,7 @@
-"""`plan`: a stable route between two states of an equilibrium set."""
+"""`plan`: a stable route between two states of an equilibrium set.
+
+See docs/decisions.md, "Routes are judged by lifts".
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -5,6 +5,8 @@ T(z) = z − A⁻¹F(z; p(t)), A = F_z at the middle. With ‖T(z̄) − z̄‖ 
 distance r of the chord, ``Y + (Z₁ + Z₂ r) r ≤ r`` proves one equilibrium within r for every t; as
 ‖I − A⁻¹F_z‖ < 1 there, F_z stays regular and keeps the inertia of A [DayLessardMischaikow2007]_.
 All bounds are componentwise, in the maximum norm with weights s, so that they hold in z as it is.
+
+See docs/decisions.md, "Proofs are componentwise".
 """
 
 from dataclasses import dataclass
