@@ -24,7 +24,8 @@ from equimorph.model import Constraint
 class Events:
     """Located events of lanes, sorted by lane and then by arclength.
 
-    `code` as in `tracing`; `index` before and after; `found` tells which could be located.
+    `code` holds members of `EventCode`, `index` the index before and after the event; `found` tells
+    which events were located.
     """
 
     lanes: Int[np.ndarray, " events"]

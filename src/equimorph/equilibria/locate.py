@@ -142,7 +142,11 @@ def _null_guess(curve: Curve, z: Lanes, t: Values) -> Lanes:
 
 
 def locate_fold(curve: Curve, bracket: Bracket) -> Located:
-    """Fold of the path: where dt/ds vanishes."""
+    """Locate the fold inside each step, where dt/ds changes sign, as the zero of dt/ds.
+
+    The path is regular there, so that neither g nor a null vector is needed. The first trial is the
+    turning point of the cubic through both ends.
+    """
     old, new = bracket.before, bracket.after
     a, b = old.tangent_t, new.tangent_t
     # slope of the cubic at a share s: a + 2 s bend + 3 s² bow

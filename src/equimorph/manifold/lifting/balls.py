@@ -1,4 +1,4 @@
-"""Sheet lifting, part five: discs close into spheres around tetrahedra, filled by coning.
+"""Sheet lifting, the balls: discs close into spheres around tetrahedra, filled by coning.
 
 A sphere of four triangles of one index bounds one tetrahedron. Others are coned from an exact point
 inside: on the fold surface that parts two indices, on the constraint that cuts the ball off, else

@@ -1,4 +1,4 @@
-"""Sheet lifting, part four: polygons become triangulated discs that fit together."""
+"""Sheet lifting, the discs: polygons become triangulated discs that fit together."""
 
 from dataclasses import dataclass, field
 

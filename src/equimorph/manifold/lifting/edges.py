@@ -1,4 +1,7 @@
-"""Lift grid edges: by one verified step, or by pseudo-arclength in ever finer steps."""
+"""Lift grid edges: by one verified step, or by pseudo-arclength in ever finer steps.
+
+A fold on a traced edge becomes a vertex of the set, exactly as the trace located it.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -231,6 +234,7 @@ def _inner(
 ) -> dict[int, list[Inner]]:
     """Folds and crossings of each lane in order, with one regular point between neighbours.
 
+    Folds stay where the trace located them (`equilibria.locate`); crossings are corrected again.
     Lanes on which a crossing cannot be polished are not `good` any more.
     """
     passed = outcome.passed

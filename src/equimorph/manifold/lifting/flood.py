@@ -1,4 +1,4 @@
-"""Sheet lifting, part two: lift edges from all known points until nothing new appears.
+"""Sheet lifting, the flood: lift edges from all known points until nothing new appears.
 
 From each known equilibrium over an edge's end, the edge is lifted: the curve ends over the other
 end, or turns at folds and comes back as another equilibrium over the same end, or leaves through a

@@ -1,4 +1,4 @@
-"""Sheet lifting, part three: around each triangle the lifted edges close into polygons.
+"""Sheet lifting, the loops: around each triangle the lifted edges close into polygons.
 
 Every point over a corner of a triangle belongs to one curve on each of the two edges that meet
 there, so that the curves form closed loops, and open chains that end on a constraint at both ends.

@@ -1,4 +1,4 @@
-"""Sheet lifting, part one: the pairs of equilibria over the ends of grid edges."""
+"""Sheet lifting: the pairs of equilibria over the ends of grid edges."""
 
 from dataclasses import dataclass, field
 
