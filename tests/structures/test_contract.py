@@ -260,7 +260,7 @@ def test_supports_and_forces_are_drawn_on_the_shape(specimen):
 
 
 @every_structure
-def test_a_drawing_shows_every_load_and_every_actuator(specimen):
+def test_a_drawing_shows_every_load(specimen):
     """Forces and couples are proportional to loads, so that none are left at p = 0."""
     structure = specimen.structure
     z, p, _, _ = specimen.states(3)
@@ -273,10 +273,31 @@ def test_a_drawing_shows_every_load_and_every_actuator(specimen):
         drawn = structure.drawing(z, alone)
         sizes = [np.abs(each.vectors).max() for each in drawn.forces]
         sizes += [np.abs(each.moments).max() for each in drawn.couples]
-        assert max(sizes) > 0.0
+        name = structure.parameters[k].name
+        assert max(sizes, default=0.0) > 0.0, f"`drawing` must show the load {name}"
     bare = structure.drawing(z, np.zeros_like(p))
     assert not any(each.vectors.any() for each in bare.forces)
     assert not any(each.moments.any() for each in bare.couples)
+
+
+@every_structure
+def test_energy_is_a_descriptor_of_every_structure(specimen):
+    """Reports show it for every state, in the units of the parameters. 1e-14: round-off."""
+    structure = specimen.structure
+    z, p, _, _ = specimen.states()
+    told = structure.descriptor("energy").function(z, p)
+    exact = structure.energy_scale * structure.energy(z, p)
+    np.testing.assert_allclose(told, exact, rtol=1e-14)
+
+
+@every_structure
+def test_every_structure_is_rebuilt_from_its_identity(specimen):
+    """Bit for bit; a kind that is missing in `KINDS` is refused here."""
+    structure = specimen.structure
+    again = from_identity(structure.identity())
+    z, p, _, _ = specimen.states()
+    np.testing.assert_array_equal(again.residual(z, p), structure.residual(z, p))
+    assert again.identity() == structure.identity()
 
 
 def test_only_a_symmetric_load_has_the_mirror():

@@ -5,6 +5,7 @@ import pytest
 from equimorph.cli.app import Kind
 from equimorph.errors import InputError
 from equimorph.study import parse_study, prepare, read_problem
+from equimorph.study.kinds import KINDS as QUESTIONS
 from equimorph.study.template import KINDS, template, write_template
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -19,6 +20,12 @@ def test_a_template_is_a_sound_study(kind: str):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_examples_are_the_templates(kind: str):
     assert (EXAMPLES / f"{kind}.toml").read_text() == template(kind)
+
+
+def test_every_table_stands_in_a_template():
+    """A new kind of question gets an example in `study/templates/tasks.toml`."""
+    texts = "".join(template(kind) for kind in KINDS)
+    assert [each.table for each in QUESTIONS if f"[[{each.table}]]" not in texts] == []
 
 
 def test_every_template_can_be_asked_for():

@@ -61,7 +61,9 @@ class Structure(ABC):
     """A structure with energy E(u; p), constraints c(u; p) = 0 and L = E + λ·c.
 
     All methods take and return batches, lanes first. ``z = (u, λ)`` has `unknowns` + `constraints`
-    entries and F = (∂L/∂u, c).
+    entries and F = (∂L/∂u, c). A subclass gives the attributes without a value below and all
+    abstract methods, and `drawing` if there are loads; its `kind` is registered in
+    `equimorph.structures.KINDS`.
     """
 
     kind: ClassVar[str]
@@ -93,7 +95,7 @@ class Structure(ABC):
 
     @abstractmethod
     def identity(self) -> dict[str, Any]:
-        """Return the kind and the data from which the structure can be built again."""
+        """Return the kind, and the arguments of the constructor as plain data, by their names."""
 
     @cached_property
     def signature(self) -> Hashable:
@@ -141,7 +143,11 @@ class Structure(ABC):
         border: Border | None = None,
         shift: Values | None = None,
     ) -> BorderedSolution:
-        """Solve with the KKT matrix F_z − shift·mass, bordered by (columns, rows, corner)."""
+        """Solve with the KKT matrix F_z − shift·mass, bordered by (columns, rows, corner).
+
+        The shift acts on the unknowns, not on the multipliers. `equimorph.linalg.solve_bordered`
+        does it for a dense matrix, `DiscreteStructure` for a sparse one.
+        """
 
     @abstractmethod
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
@@ -189,13 +195,19 @@ class Structure(ABC):
         return straight_arcs(self.shape(z, p))
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
-        """Supports, loads and actuators to draw around the shape; none by default."""
+        """Supports, loads and actuators to draw around the shape; none by default.
+
+        A structure with loads draws each as a force or a couple proportional to it.
+        """
         del z, p
         return Drawing()
 
     @abstractmethod
     def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written as `text`, like ``height(0.5)``."""
+        """Return the descriptor written as `text`, like ``height(0.5)``.
+
+        Every structure knows ``energy``, which reports show: `energy` times `energy_scale`.
+        """
 
     @property
     def elevation(self) -> Descriptor:
