@@ -10,7 +10,7 @@ import pytest
 
 from equimorph.errors import CancelledError, InputError
 from equimorph.manifold import EquilibriumSet, build, equilibrium_set, refine
-from equimorph.manifold.refining import refinement
+from equimorph.manifold.refining import refine as refinement
 from equimorph.model import Box, Journal, Progress
 from equimorph.storage import open_journal
 from equimorph.storage.journal import MARK

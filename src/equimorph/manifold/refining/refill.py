@@ -52,6 +52,8 @@ SHORT = 0.05
 
 Near = Bool[np.ndarray, " V"]
 Quality = Float[np.ndarray, " cells"]
+NewNear = Bool[np.ndarray, " new_vertices"]
+NewQuality = Float[np.ndarray, " new_cells"]
 Candidates = Callable[[Fabric, Quality, Near], Refills]
 """Refills that could be done, of fabric, qualities of its cells and vertices to look at."""
 
@@ -116,7 +118,7 @@ def repeat(
     near: Near,
     memory: Memory,
     limit: float,
-) -> tuple[Fabric, Quality, Near]:
+) -> tuple[Fabric, NewQuality, NewNear]:
     """Apply the best candidates again and again, around what changed before; and what changed."""
     changed = np.zeros(len(fabric.vertices), bool)
     for _ in range(passes):
@@ -133,14 +135,14 @@ def repeat(
     return fabric, quality, _extended(changed, fabric)
 
 
-def _extended(near: Near, fabric: Fabric) -> Near:
+def _extended(near: Bool[np.ndarray, " old"], fabric: Fabric) -> NewNear:
     """Flags of vertices, false for those added since."""
     return np.pad(near, (0, len(fabric.vertices) - len(near)))
 
 
 def _best(
     refills: Refills, quality: Quality, memory: Memory, limit: float
-) -> tuple[Refills, Quality]:
+) -> tuple[Refills, Float[np.ndarray, " come"]]:
     """Refills that help, the best first, with stars that do not overlap; and their qualities."""
     if refills.fabric.dimension == TRIANGLES:
         # `qualities_near` looks at triangles on average over their corners only
@@ -159,7 +161,9 @@ def _best(
     return refills.take(kept), come[kept[refills.come_row]]
 
 
-def _gains(refills: Refills, quality: Quality, come: Quality) -> Float[np.ndarray, " refills"]:
+def _gains(
+    refills: Refills, quality: Quality, come: Float[np.ndarray, " come"]
+) -> Float[np.ndarray, " refills"]:
     """Number of poor cells fewer, and growth of the worst quality relative to π, if some come.
 
     Minus one where cells get much poorer, or much longer.
@@ -219,7 +223,9 @@ def _apart(refills: Refills, gain: Float[np.ndarray, " refills"]) -> Bool[np.nda
     return kept
 
 
-def _applied(refills: Refills, quality: Quality, come: Quality) -> tuple[Fabric, Quality]:
+def _applied(
+    refills: Refills, quality: Quality, come: Float[np.ndarray, " come"]
+) -> tuple[Fabric, NewQuality]:
     """Fabric and qualities of its cells after some refills."""
     fabric = refills.fabric
     stays, left = np.ones(len(fabric.cells), bool), np.ones(len(fabric.facets), bool)

@@ -13,6 +13,8 @@ from equimorph.manifold.geometry.topology import among, distinct, keys_of
 
 Rows = Int[np.ndarray, " n"]
 """Numbers of refills, vertices or cells."""
+Pairs = tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]]
+"""Two numbers for each pair of things that belong together."""
 
 
 class Kind(Enum):
@@ -35,18 +37,18 @@ class Around:
         amount = np.bincount(self._cells.ravel(), minlength=base)
         self._starts = np.concatenate([[0], np.cumsum(amount)])
 
-    def of(self, vertices: Rows) -> tuple[Rows, Rows]:
+    def of(self, vertices: Rows) -> Pairs:
         """All pairs of a vertex, by its place in `vertices`, and a cell around it."""
         row, at = self._pairs(vertices)
         return row, self._number[at]
 
-    def _pairs(self, vertices: Rows) -> tuple[Rows, Rows]:
+    def _pairs(self, vertices: Rows) -> Pairs:
         count = self._starts[vertices + 1] - self._starts[vertices]
         row = np.repeat(np.arange(len(vertices)), count)
         offset = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
         return row, self._order[self._starts[vertices][row] + offset] // self._corners
 
-    def links(self, vertices: Rows, size: int, base: int) -> tuple[Rows, Rows]:
+    def links(self, vertices: Rows, size: int, base: int) -> Pairs:
         """All pairs of a vertex, by its place in `vertices`, and the key of a face in its link."""
         row, at = self._pairs(vertices)
         own = self._cells[at]
@@ -54,7 +56,7 @@ class Around:
         turn = (at[:, None] + np.arange(1, self._corners)) % self._corners
         return _faces(row, np.take_along_axis(own, turn, 1), size, base)
 
-    def edge_links(self, edges: Edges, size: int, base: int) -> tuple[Rows, Rows]:
+    def edge_links(self, edges: Edges, size: int, base: int) -> Pairs:
         """All pairs of an edge, by its place in `edges`, and the key of a face in its link."""
         row, at = self._pairs(edges[:, 0])
         own = self._cells[at]
@@ -64,7 +66,7 @@ class Around:
         return _faces(row, own[~ends].reshape(len(own), self._corners - 2), size, base)
 
 
-def _faces(row: Rows, corners: Cells, size: int, base: int) -> tuple[Rows, Rows]:
+def _faces(row: Rows, corners: Cells, size: int, base: int) -> Pairs:
     """Rows and keys of all faces of a size of simplices."""
     if corners.shape[1] < size:
         return row[:0], row[:0]
@@ -85,16 +87,16 @@ class Refills:
 
     fabric: Fabric
     count: int
-    gone: Rows
-    gone_row: Rows
-    come: Cells
-    index: Rows
-    come_row: Rows
-    lost: Rows
-    lost_row: Rows
-    new: Cells
-    marks: Rows
-    new_row: Rows
+    gone: Int[np.ndarray, " gone"]
+    gone_row: Int[np.ndarray, " gone"]
+    come: Int[np.ndarray, "come corners"]
+    index: Int[np.ndarray, " come"]
+    come_row: Int[np.ndarray, " come"]
+    lost: Int[np.ndarray, " lost"]
+    lost_row: Int[np.ndarray, " lost"]
+    new: Int[np.ndarray, "new ends"]
+    marks: Int[np.ndarray, " new"]
+    new_row: Int[np.ndarray, " new"]
     kind: Kind
     short: Bool[np.ndarray, " refills"]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Edges
 from equimorph.manifold.complex.edge_points import chunks
@@ -31,7 +31,7 @@ from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import distinct, keys_of, rows_of
 from equimorph.manifold.refining.quality import POOR, SHARP, determinants, smallest_angles, worst
-from equimorph.manifold.refining.stars import Around, Kind, Refills, Rows
+from equimorph.manifold.refining.stars import Around, Kind, Pairs, Refills, Rows
 
 SHORT = 0.5
 """Edges of poor tetrahedra that are shorter than this share of the longest one may go."""
@@ -136,12 +136,14 @@ def _linked(fabric: Fabric, moves: Edges) -> Bool[np.ndarray, " m"]:
     return good
 
 
-def _distinct(pairs: tuple[Rows, Rows], base: int) -> Rows:
+def _distinct(pairs: Pairs, base: int) -> Int[np.ndarray, " keys"]:
     """Distinct pairs of a row and a key, as one number each."""
     return distinct(pairs[0] * base + pairs[1])
 
 
-def in_all_sheets(fabric: Fabric, moves: Edges) -> tuple[Edges, Rows]:
+def in_all_sheets(
+    fabric: Fabric, moves: Edges
+) -> tuple[Int[np.ndarray, "moves 2"], Int[np.ndarray, " moves"]]:
     """Moves with the refill that each belongs to: along crossings one refill of all sheets.
 
     Left out are moves along crossings that some sheet does not allow.
