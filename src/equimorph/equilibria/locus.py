@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.equilibria.newton_step import Planes, Tangents
-from equimorph.equilibria.point_conditions import Condition, Move, Plane, Vanishing
+from equimorph.equilibria.point_conditions import Condition, Directions, Move, Plane, Vanishing
 from equimorph.equilibria.settle import Guards, Settled, free_directions, settle
 from equimorph.structures import Structure
 
@@ -62,6 +62,11 @@ class Locus:
         scaled = 1.0 / structure.scales[self.free] ** 2
         return np.concatenate([structure.mass, multipliers, scaled, np.ones(int(self.unfolded))])
 
+    @cached_property
+    def directions(self) -> Directions:
+        """Directions of the free parameters, for one lane."""
+        return free_directions(self.structure, self.free, 1)
+
     def joined(self, z: Lanes, p: Parameters) -> Points:
         """Coordinates of states."""
         return np.concatenate([z, p[:, self.free], np.zeros((len(z), int(self.unfolded)))], axis=1)
@@ -69,7 +74,8 @@ class Locus:
     def split(self, x: Points) -> tuple[Lanes, Parameters]:
         """z and all parameters."""
         size = self.structure.size
-        p = np.tile(self.base, (len(x), 1))
+        p = np.empty((len(x), len(self.base)))
+        p[:] = self.base
         p[:, self.free] = x[:, size : size + len(self.free)]
         return np.ascontiguousarray(x[:, :size]), p
 
@@ -77,7 +83,9 @@ class Locus:
         """Test functions at points, one border for each."""
         return Critical(self.structure, *self.split(x), b)
 
-    def lengths(self, steps: Points) -> Values:
+    def lengths(
+        self, steps: Float[np.ndarray, "*lanes coordinates"]
+    ) -> Float[np.ndarray, "*lanes"]:
         """Lengths of steps in the metric."""
         return np.asarray(np.sqrt(steps**2 @ self.weights))
 
@@ -118,7 +126,7 @@ def nearest(locus: Locus, x: Points) -> tuple[Spots, Flags]:
     frame = Tangents(locus.unfolded)
     conditions: tuple[Condition, ...] = (_vanishing(locus.tests, len(x)),)
     if not locus.tests:  # without conditions the nearest point is the one at the same parameter
-        by_p = free_directions(locus.structure, locus.free, len(x))
+        by_p = locus.directions.repeat(len(x), axis=0)
         conditions = (Plane(z, p, np.zeros((len(x), 1, z.shape[1])), by_p),)
     found = _settle(locus, x, conditions, guards, frame)
     return _spots(locus, found, found.found, b)
@@ -186,7 +194,7 @@ def _settle(
     frame: Tangents | Planes,
 ) -> Settled:  # fmt: skip
     z, p = locus.split(x)
-    directions = free_directions(locus.structure, locus.free, len(x))
+    directions = locus.directions.repeat(len(x), axis=0)
     return settle(locus.structure, z, p, directions, conditions, guards, frame)
 
 
@@ -210,31 +218,16 @@ def _spots(
     basis, border, regular = np.zeros_like(kernel), b.copy(), np.zeros(len(x), bool)
     at = np.flatnonzero(good)
     if len(at):
-        own = kernel[at]
-        tangent = _tangents(locus, x[at], own, b[at])
+        # the direction along which the tests stay zero is the last, and is to come first
+        turned = np.linalg.svd(found.slopes[at, : len(locus.tests)])[2][:, ::-1] @ kernel[at]
         if ahead is not None:
-            tangent *= np.sign(np.einsum("li,li->l", tangent, ahead[at]))[:, None]
-        own = np.concatenate([tangent[:, None], own], axis=1)
-        basis[at], regular[at] = orthonormal(locus, own)
+            turned[:, 0] *= np.sign(np.einsum("li,li->l", turned[:, 0], ahead[at]))[:, None]
+        basis[at], regular[at] = orthonormal(locus, turned)
         v = locus.critical(x[at], b[at]).v
         v = v / np.linalg.norm(v, axis=1, keepdims=True)
         # a regular F_z has no null vector: the old border stays
         border[at] = np.where(np.isfinite(v).all(axis=1)[:, None], v, b[at])
     return Spots(x, basis, border), regular
-
-
-def _tangents(locus: Locus, x: Points, kernel: Bases, b: Lanes) -> Points:
-    """Directions of kernels along which the tests stay zero."""
-    slopes = test_slopes(locus, x, kernel, locus.tests, b)[1]
-    null = np.ones((len(x), 1)) if slopes.shape[1] == 0 else _null(slopes)
-    return np.asarray(np.einsum("ld,ldi->li", null, kernel))
-
-
-def _null(slopes: Float[np.ndarray, "lanes k d"]) -> Float[np.ndarray, "lanes d"]:
-    whole = np.isfinite(slopes).all(axis=(1, 2))
-    null = np.full((len(slopes), slopes.shape[2]), np.nan)
-    null[whole] = np.linalg.svd(slopes[whole])[2][:, -1]
-    return null
 
 
 def test_slopes(
@@ -253,19 +246,17 @@ def test_slopes(
     return found.value, found.slopes
 
 
-def orthonormal(
-    locus: Locus, vectors: Float[np.ndarray, "lanes some coordinates"]
-) -> tuple[Bases, Flags]:
+def orthonormal(locus: Locus, vectors: Bases) -> tuple[Bases, Flags]:
     """Orthonormal bases in the metric, the first vector's direction first; which are whole."""
-    lanes, d = len(vectors), locus.dimension
-    basis, count = np.zeros((lanes, d, vectors.shape[2])), np.zeros(lanes, int)
-    for vector in np.moveaxis(vectors, 1, 0):
-        rest = vector
-        for _ in range(2):  # twice is enough for round-off
-            share = np.einsum("ldi,li->ld", basis * locus.weights, rest)
-            rest = rest - np.einsum("ld,ldi->li", share, basis)
-        norm, whole = locus.lengths(rest), locus.lengths(vector)
-        new = np.flatnonzero((norm > DEPENDENT * whole) & (count < d))
-        basis[new, count[new]] = rest[new] / norm[new, None]
-        count[new] += 1
-    return basis, count == d
+    basis, rows = np.zeros_like(vectors), np.zeros_like(vectors)
+    regular, whole = np.ones(len(vectors), bool), locus.lengths(vectors)
+    for i in range(vectors.shape[1]):
+        rest = vectors[:, i]
+        for _ in range(2 if i else 0):  # twice is enough for round-off
+            share = rows[:, :i] @ rest[:, :, None]
+            rest = rest - (share * basis[:, :i]).sum(axis=1)
+        norm = locus.lengths(rest)
+        regular &= norm > DEPENDENT * whole[:, i]
+        basis[:, i] = rest / np.maximum(norm, 1e-300)[:, None]
+        rows[:, i] = basis[:, i] * locus.weights
+    return basis, regular

@@ -149,11 +149,15 @@ class Tangent:
 
 @dataclass(frozen=True)
 class Step:
-    """A Newton step of z and the other unknowns, the set where it starts, and the null vector."""
+    """A Newton step of z and the other unknowns, the set where it starts, and the null vector.
+
+    slopes: those of the conditions along the directions.
+    """
 
     dz: Lanes
     da: Float[np.ndarray, "lanes k"]
     tangent: Tangent
+    slopes: Float[np.ndarray, "lanes m k"]
     null: Float[np.ndarray, "lanes border"]
 
 
@@ -191,7 +195,8 @@ class Points:
         """Newton step onto the set and along it to the conditions."""
         problem, tangent = self.problem, self.tangent()
         if not problem.conditions:
-            return Step(tangent.dz, tangent.da, tangent, self.b)
+            none = np.zeros((len(self.z), 0, problem.width))
+            return Step(tangent.dz, tangent.da, tangent, none, self.b)
         # conditions without use for the border get any vector in its place
         at = Critical(problem.structure, self.z, self.p, self.b if problem.critical else self.z)
         onto_p = problem.change(tangent.da[:, None])[:, 0]
@@ -206,7 +211,7 @@ class Points:
         amount = _amount(slopes, value, gram)[:, None]
         dz = tangent.dz + (amount @ tangent.along_z)[:, 0]
         da = tangent.da + (amount @ tangent.along_a)[:, 0]
-        return Step(dz, da, tangent, _unit(at.v) if problem.renews_border else self.b)
+        return Step(dz, da, tangent, slopes, _unit(at.v) if problem.renews_border else self.b)
 
     def tangent(self) -> Tangent:
         """Newton step onto the set where the rows vanish, and directions along the set."""
@@ -223,8 +228,8 @@ class Points:
         for i in range(k - problem.unfolded):
             dp = np.ascontiguousarray(problem.directions[:, i])
             columns[:, i] = structure.parameter_derivative(self.z, self.p, dp)
-        inner, corner = (np.ascontiguousarray(each) for each in np.split(self.rows, [size], axis=2))
-        solution = structure.solve(self.z, self.p, rhs, (columns, inner, corner))
+        border = (columns, self.rows[:, :, :size], self.rows[:, :, size:])
+        solution = structure.solve(self.z, self.p, rhs, border)
         sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
         dz, along_z = np.ascontiguousarray(solution.x[:, 0, :size]), solution.x[:, 1:, :size]
         da, along_a = solution.x[:, 0, size:], solution.x[:, 1:, size:]

@@ -183,8 +183,12 @@ class Values:
             move = Move(*onto, move.along_z, move.along_p)
 
         def excess(z: Lanes, p: Parameters) -> Scalars:
-            found = np.stack([function(z, p) for function in self.functions], axis=1)
-            return np.asarray(found - np.tile(self.targets, (len(z) // len(self.targets), 1)))
+            found = np.empty((len(z) // len(self.targets), *self.targets.shape))
+            flat = found.reshape(len(z), -1)
+            for i, function in enumerate(self.functions):
+                flat[:, i] = function(z, p)
+            found -= self.targets
+            return flat
 
         return _differences(excess, at, move, self.difference, one_sided=self.one_sided)
 
@@ -226,9 +230,11 @@ class Vanishing:
             border = at.v / np.linalg.norm(at.v, axis=1, keepdims=True)
 
         def scalars(z: Lanes, p: Parameters) -> Scalars:
-            b = np.tile(border, (len(z) // len(border), 1))
-            there = Critical(at.structure, z, p, b)
-            return np.stack([test(there) for test in own], axis=1)
+            b = np.concatenate([border] * (len(z) // len(border)))
+            there, found = Critical(at.structure, z, p, b), np.empty((len(z), len(own)))
+            for i, test in enumerate(own):
+                found[:, i] = test(there)
+            return found
 
         return _differences(scalars, at, move, self.difference, one_sided=self.one_sided)
 
@@ -263,7 +269,7 @@ def _differences(
     lanes, k = move.along_z.shape[:2]
     structure = at.structure
     u = move.along_z[:, :, : structure.unknowns]
-    squared = np.einsum("lki,lki,i->lk", u, u, structure.mass)
+    squared = u**2 @ structure.mass
     squared += ((move.along_p / structure.scales) ** 2).sum(axis=2)
     h = step / np.sqrt(np.maximum(squared, 1e-300))  # directions may be long where F_z is soft
     z = _rounds(at.z + move.onto_z, move.along_z, h, one_sided=one_sided)
@@ -272,7 +278,7 @@ def _differences(
     found = flat.reshape(-1, lanes, flat.shape[1])
     ahead = found[1 : 1 + k]
     change = ahead - found[0] if one_sided else 0.5 * (ahead - found[1 + k :])
-    return Linear(found[0], np.moveaxis(change, 0, 2) / h[:, None])
+    return Linear(found[0], change.transpose(1, 2, 0) / h[:, None])
 
 
 def _rounds(

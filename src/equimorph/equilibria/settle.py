@@ -155,6 +155,8 @@ class Settled:
     frames
         Directions (dz, steps along the directions) of the tangent space at the last step, if they
         were asked for.
+    slopes
+        Those of the conditions along these directions.
     unfolding
         β of F + βb = 0, zero at points that exist without it.
     """
@@ -167,6 +169,7 @@ class Settled:
     index: Numbers
     sure: Flags
     frames: Float[np.ndarray, "lanes k bordered"]
+    slopes: Float[np.ndarray, "lanes m k"]
     unfolding: Values
 
     @property
@@ -264,7 +267,8 @@ def _at_fixed_parameters(structure: Structure, z: Lanes, p: Parameters, guards: 
         status[todo[small]], status[todo[~alive]] = Status.FOUND, Status.SINGULAR
         todo = todo[alive & ~small]
     sure, frames = np.ones(count, bool), np.zeros((count, 0, structure.size))
-    return Settled(z, p.copy(), status, size, first, index, sure, frames, np.zeros(count))
+    slopes, unfolding = np.zeros((count, 0, 0)), np.zeros(count)
+    return Settled(z, p.copy(), status, size, first, index, sure, frames, slopes, unfolding)
 
 
 class _Run:
@@ -280,6 +284,7 @@ class _Run:
         self.status = np.full(count, Status.OPEN.value)
         self.index, self.sure = np.full(count, -1), np.zeros(count, bool)
         self.frames = np.zeros((count, width if frames else 0, here.z.shape[1] + width))
+        self.slopes = np.zeros((count, 0, width))
 
     def judge(self, here: Points, step: Step) -> tuple[Numbers, Values]:
         """Status of each lane after a step, and the share of the step that is taken."""
@@ -325,10 +330,13 @@ class _Run:
         self.index[at], self.sure[at] = told.index[some], told.sure[some]
         if self.frames.shape[1]:
             self.frames[at] = told.frames[some]
+            if self.slopes.shape[1] != step.slopes.shape[1]:  # it is only known now
+                self.slopes = np.zeros((len(self.slopes), *step.slopes.shape[1:]))
+            self.slopes[at] = step.slopes[some]
 
     def settled(self) -> Settled:
         """Points and status of all lanes."""
-        told = (self.index, self.sure, self.frames, self.beta)
+        told = (self.index, self.sure, self.frames, self.slopes, self.beta)
         return Settled(self.z, self.p, self.status, self.size, self.first, *told)
 
 
