@@ -106,7 +106,7 @@ class Spots:
         """Unit tangents."""
         return np.ascontiguousarray(self.basis[:, 0])
 
-    def take(self, lanes: Some | Flags) -> "Spots":
+    def take(self, lanes: Some | Flags | slice) -> "Spots":
         """Return some of the lanes."""
         return Spots(self.x[lanes], self.basis[lanes], self.b[lanes])
 
@@ -216,8 +216,8 @@ def _spots(
     x, kernel = _coordinates(locus, found), found.frames.copy()
     kernel[:, :, size : size + k] *= locus.structure.scales[locus.free]
     basis, border, regular = np.zeros_like(kernel), b.copy(), np.zeros(len(x), bool)
-    at = np.flatnonzero(good)
-    if len(at):
+    if good.any():
+        at = slice(None) if good.all() else np.flatnonzero(good)
         # the direction along which the tests stay zero is the last, and is to come first
         turned = np.linalg.svd(found.slopes[at, : len(locus.tests)])[2][:, ::-1] @ kernel[at]
         if ahead is not None:

@@ -70,7 +70,7 @@ class Walks:
     last: Points
     last_tangent: Points
 
-    def take(self, lanes: Some | Flags) -> "Walks":
+    def take(self, lanes: Some | Flags | slice) -> "Walks":
         """Return some of the lanes."""
         columns = list(vars(self).values())
         return Walks(columns[0].take(lanes), *(column[lanes] for column in columns[1:]))

@@ -225,9 +225,10 @@ class Points:
         if problem.unfolded:
             columns[:, -1] = self.b
             rhs[:, 0, :size] -= self.beta[:, None] * self.b
-        for i in range(k - problem.unfolded):
-            dp = np.ascontiguousarray(problem.directions[:, i])
-            columns[:, i] = structure.parameter_derivative(self.z, self.p, dp)
+        if many := problem.directions.shape[1]:
+            z, p = self.z.repeat(many, axis=0), self.p.repeat(many, axis=0)
+            dp = problem.directions.reshape(-1, p.shape[1])
+            columns[:, :many] = structure.parameter_derivative(z, p, dp).reshape(lanes, many, size)
         border = (columns, self.rows[:, :, :size], self.rows[:, :, size:])
         solution = structure.solve(self.z, self.p, rhs, border)
         sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
@@ -252,17 +253,16 @@ class Points:
 def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
     """Guesses, with a border and rows if these are needed."""
     structure, (lanes, size), k = problem.structure, z.shape, problem.width
-    empty = np.zeros((lanes, 0))
-    here = Points(problem, z, p, np.zeros(lanes), empty, empty[:, :, None])
-    frame = problem.frame
+    border, rows, frame = np.zeros((lanes, 0)), np.zeros((lanes, 0, 0)), problem.frame
     if not isinstance(frame, Held) and frame.border is not None:
-        here = replace(here, b=frame.border)
+        border = frame.border
     elif problem.critical:
-        here = replace(here, b=null_border(structure, z, p))
+        border = null_border(structure, z, p)
     if isinstance(frame, Planes):
-        by_a = np.einsum("lmp,lkp->lmk", frame.by_p, problem.directions)
+        by_a = frame.by_p @ problem.directions.transpose(0, 2, 1)
         by_beta = [] if frame.by_beta is None else [frame.by_beta[:, :, None]]
-        return replace(here, rows=np.concatenate([frame.by_z, by_a, *by_beta], axis=2))
+        rows = np.concatenate([frame.by_z, by_a, *by_beta], axis=2)
+    here = Points(problem, z, p, np.zeros(lanes), border, rows)
     if isinstance(frame, Tangents) and k:
         # any rows that see the tangent space will do, then its own
         waves = np.cos(np.outer(np.arange(1, k + 1), 1.7 * np.arange(size + k)) + 0.4)
@@ -327,25 +327,27 @@ def _amount(
     Lengths are measured by the products of the directions, if these are given.
     """
     count, m, k = slopes.shape
-    amount, whole = np.full((count, k), np.nan), np.isfinite(slopes).all(axis=(1, 2))
-    whole &= np.isfinite(value).all(axis=1)
-    if not whole.all():
-        amount[whole] = _amount(slopes[whole], value[whole], None if gram is None else gram[whole])
-        return amount
-    if m > k or k == 0:
-        return np.asarray(-np.einsum("lkm,lm->lk", np.linalg.pinv(slopes, rcond=RANK), value))
-    spread = np.swapaxes(slopes, 1, 2)
+    spread = slopes.transpose(0, 2, 1)
     if m < k and gram is not None:
         spread = np.linalg.solve(gram, spread)
     matrix = slopes if m == k else slopes @ spread
-    size = np.abs(matrix).max(axis=(1, 2), initial=0.0)
-    regular = np.abs(np.linalg.det(matrix)) > SINGULAR * size**m
-    share = -np.linalg.solve(matrix[regular], value[regular, :, None])
-    amount[regular] = (share if m == k else spread[regular] @ share)[:, :, 0]
-    rest = np.flatnonzero(~regular)
-    if len(rest):
+    if m > k or k == 0:
+        regular = np.zeros(count, bool)
+    else:
+        with np.errstate(invalid="ignore", over="ignore"):
+            size = np.abs(matrix).max(axis=(1, 2), initial=0.0)
+            regular = np.abs(np.linalg.det(matrix)) > SINGULAR * size**m
+    if regular.all():
+        share = np.linalg.solve(matrix, -value[:, :, None])
+        return np.asarray((share if m == k else spread @ share)[:, :, 0])
+    amount = np.full((count, k), np.nan)
+    if regular.any():
+        some = None if gram is None else gram[regular]
+        amount[regular] = _amount(slopes[regular], value[regular], some)
+    rest = ~regular & np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(value).all(axis=1)
+    if rest.any():
         inverse = np.linalg.pinv(slopes[rest], rcond=RANK)
-        amount[rest] = -np.einsum("lkm,lm->lk", inverse, value[rest])
+        amount[rest] = -(inverse @ value[rest, :, None])[:, :, 0]
     return amount
 
 

@@ -316,6 +316,9 @@ class _Run:
         ended = np.flatnonzero(status != Status.OPEN)
         if len(ended):
             self.record(here, step, status, ended)
+            if len(ended) == len(status):
+                self.lanes = self.lanes[:0]
+                return here
             left = np.flatnonzero(status == Status.OPEN)
             self.lanes, here = self.lanes[left], here.take(left)
             self.known = None if self.known is None else self.known[left]
@@ -361,7 +364,7 @@ def _believed(
 ) -> Settled:
     """The points, with those that are not believed marked."""
     z, p, status, index = settled.z, settled.p, settled.status.copy(), settled.index.copy()
-    doubtful = settled.found & ~(settled.sure & (settled.size < NEAR))
+    doubtful = (status == Status.FOUND) & ~(settled.sure & (settled.size < NEAR))
     if doubtful.any():
         index[doubtful] = structure.index(z[doubtful], p[doubtful])
 

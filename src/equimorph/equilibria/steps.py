@@ -173,12 +173,11 @@ def least_inside(
     root = np.sqrt(np.maximum(c2**2 - 3.0 * a * c3, 0.0))
     sum_ = -(c2 + np.where(c2 >= 0.0, root, -root))
     with np.errstate(divide="ignore", invalid="ignore"):
-        turns = np.stack([a / sum_, sum_ / (3.0 * c3)])
-    shares = np.stack([np.zeros_like(f), np.ones_like(f), *np.nan_to_num(turns, posinf=0.0)])
-    shares = np.clip(shares, 0.0, 1.0)
+        shares = np.array([np.zeros_like(f), np.ones_like(f), a / sum_, sum_ / (3.0 * c3)])
+    shares = np.fmin(np.fmax(shares, 0.0), 1.0)  # where there is no turn, an end again
     heights = f + shares * (a + shares * (c2 + shares * c3))
-    at = np.argmin(heights, axis=0)[None]
-    return np.take_along_axis(shares, at, 0)[0], np.take_along_axis(heights, at, 0)[0]
+    least = heights.argmin(axis=0), np.arange(len(f))
+    return shares[least], heights[least]
 
 
 Places = tuple[np.ndarray, ...]

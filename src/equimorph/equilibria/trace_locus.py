@@ -78,7 +78,7 @@ def trace_locus(
             here, lanes = here.take(on), lanes[on]
         there, good = step(locus, here, watches, options)
         for i in np.flatnonzero(good).tolist():
-            ends = here.take(np.array([i])), there.take(np.array([i]))
+            ends = here.take(slice(i, i + 1)), there.take(slice(i, i + 1))
             good[i] = _record(locus, sides[lanes[i]], ends, watches, options)
         if sides[0].end is None and sides[1].end is None:
             sides = _close(locus, sides, (here, there), good)
@@ -98,13 +98,16 @@ def step(
     """Try one step of each lane; which are good. The others are to be tried with shorter ones."""
     guess = predict(locus, here, here.length)
     spots, found = advance(locus, here.spots, here.length, guess, following=FOLLOWING)
+    if found.all():
+        there = _look(locus, here, spots, watches, options)
+        return there, _judge(here, there, options)
     at = np.flatnonzero(found)
     if len(at) == 0:
         return here, found
     there = _look(locus, here.take(at), spots.take(at), watches, options)
     good = found.copy()
     good[at] = _judge(here.take(at), there, options)
-    return there if found.all() else here.with_others(there, at), good
+    return here.with_others(there, at), good
 
 
 def update(here: Walks, there: Walks, good: Flags) -> Walks:

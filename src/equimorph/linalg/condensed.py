@@ -127,16 +127,11 @@ class CondensedLayout:
         lanes, m, k = len(arrays[0]), arrays[1].shape[1], arrays[2].shape[1]
         size = self.unknown.stop - self.unknown.start + m
         sides = arrays[5].shape[1]
-        shapes = {
-            "diagonal": (lanes, self.nodes),
-            "border": (lanes, m, self.nodes),
-            "columns": (lanes, k, size),
-            "rows": (lanes, k, size),
-            "corner": (lanes, k, k),
-            "rhs": (lanes, sides, size + k),
-            "trailing": (lanes, m, m),
-        }
-        for (name, shape), array in zip(shapes.items(), arrays, strict=True):
+        nodes, columns, corner = self.nodes, (lanes, k, size), (lanes, k, k)
+        ends = (corner, (lanes, sides, size + k), (lanes, m, m))
+        shapes = ((lanes, nodes), (lanes, m, nodes), columns, columns, *ends)
+        names = ("diagonal", "border", "columns", "rows", "corner", "rhs", "trailing")
+        for name, shape, array in zip(names, shapes, arrays, strict=True):
             if array.shape != shape:
                 raise InputError(f"`{name}` must have shape {shape}; got {array.shape}.")
 
