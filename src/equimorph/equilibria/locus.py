@@ -1,6 +1,6 @@
 """Loci: curves of equilibria in several parameters on which scalar tests vanish."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,8 @@ LEAST_COSINE = 0.9
 """Of the angle between the tangents at both ends of a step."""
 SPREADING = 4.0
 """Growth of corrections at which the search for the nearest point ends."""
+SMALL_EIGENVALUE = 1e-7
+"""Size below which an eigenvalue is the one that vanishes along the locus."""
 MULTIPLIERS = 1e-2
 """Weight of squared multipliers in the length of corrections: they are not in the metric."""
 DEPENDENT = 1e-6
@@ -92,14 +94,16 @@ class Locus:
 
 @dataclass(frozen=True)
 class Spots:
-    """Points of loci, one a lane: coordinates, orthonormal kernels of [F_z F_p], borders.
+    """Points of loci, one a lane: coordinates, orthonormal kernels of [F_z F_p], borders, index.
 
-    The first direction of a kernel is the unit tangent of the curve.
+    The first direction of a kernel is the unit tangent of the curve. The index counts the negative
+    eigenvalues of the constrained Hessian, those within 1e-7 of zero left out.
     """
 
     x: Points
     basis: Bases
     b: Lanes
+    index: Int[np.ndarray, " lanes"]
 
     @property
     def tangent(self) -> Points:
@@ -108,13 +112,13 @@ class Spots:
 
     def take(self, lanes: Some | Flags | slice) -> "Spots":
         """Return some of the lanes."""
-        return Spots(self.x[lanes], self.basis[lanes], self.b[lanes])
+        return Spots(*(column[lanes] for column in vars(self).values()))
 
     def turned(self, sign: Values) -> "Spots":
         """The same with tangents times a sign of each lane."""
         basis = self.basis.copy()
         basis[:, 0] *= sign[:, None]
-        return Spots(self.x, basis, self.b)
+        return replace(self, basis=basis)
 
 
 def nearest(locus: Locus, x: Points) -> tuple[Spots, Flags]:
@@ -216,6 +220,7 @@ def _spots(
     x, kernel = _coordinates(locus, found), found.frames.copy()
     kernel[:, :, size : size + k] *= locus.structure.scales[locus.free]
     basis, border, regular = np.zeros_like(kernel), b.copy(), np.zeros(len(x), bool)
+    index = np.full(len(x), -1)
     if good.any():
         at = slice(None) if good.all() else np.flatnonzero(good)
         # the direction along which the tests stay zero is the last, and is to come first
@@ -223,11 +228,23 @@ def _spots(
         if ahead is not None:
             turned[:, 0] *= np.sign(np.einsum("li,li->l", turned[:, 0], ahead[at]))[:, None]
         basis[at], regular[at] = orthonormal(locus, turned)
-        v = locus.critical(x[at], b[at]).v
-        v = v / np.linalg.norm(v, axis=1, keepdims=True)
-        # a regular F_z has no null vector: the old border stays
-        border[at] = np.where(np.isfinite(v).all(axis=1)[:, None], v, b[at])
-    return Spots(x, basis, border), regular
+        border[at], index[at] = _border_and_index(locus, x[at], b[at])
+    return Spots(x, basis, border, index), regular
+
+
+def _border_and_index(locus: Locus, x: Points, b: Lanes) -> tuple[Lanes, Int[np.ndarray, " lanes"]]:
+    """Null vectors of F_z as borders, and the index, both from one call."""
+    lanes, size = len(x), locus.structure.size
+    (z, p), rhs = locus.split(np.concatenate([x, x])), np.zeros((2 * lanes, 1, size + 1))
+    rhs[:, 0, -1] = 1.0
+    row = np.concatenate([b, b])[:, None]
+    shift = np.repeat([0.0, -SMALL_EIGENVALUE], lanes)
+    solved = locus.structure.solve(z, p, rhs, (row, row, np.zeros((2 * lanes, 1, 1))), shift)
+    v = solved.x[:lanes, 0, :-1]
+    v = v / np.sqrt((v**2).sum(axis=1))[:, None]
+    # a regular F_z has no null vector: the old border stays
+    border = np.where(np.isfinite(v).all(axis=1)[:, None], v, b)
+    return border, solved.negative[lanes:] - locus.structure.constraints
 
 
 def test_slopes(
@@ -252,7 +269,7 @@ def orthonormal(locus: Locus, vectors: Bases) -> tuple[Bases, Flags]:
     regular, whole = np.ones(len(vectors), bool), locus.lengths(vectors)
     for i in range(vectors.shape[1]):
         rest = vectors[:, i]
-        for _ in range(2 if i else 0):  # twice is enough for round-off
+        if i:
             share = rows[:, :i] @ rest[:, :, None]
             rest = rest - (share * basis[:, :i]).sum(axis=1)
         norm = locus.lengths(rest)

@@ -19,8 +19,6 @@ ZERO = 1e-9
 """Size of a watched test that counts as zero: noise of tests that vanish identically."""
 BISECTIONS = 5
 """Halvings of a step in which the index changes."""
-SMALL_EIGENVALUE = 1e-7
-"""Size below which an eigenvalue is the one that vanishes along the locus."""
 STENCIL = 6
 """Points around a double point, from which it is interpolated."""
 _SECOND = {
@@ -57,18 +55,22 @@ class Landmark:
 class Walks:
     """Where curves are, one a lane.
 
-    Points, watched values with slopes, other negative eigenvalues, length of the next step, way so
-    far, and the points before with their tangents.
+    Points, watched values with slopes, length of the next step, way so far, and the points before
+    with their tangents.
     """
 
     spots: Spots
     values: Watched
     slopes: Watched
-    index: Int[np.ndarray, " lanes"]
     length: Values
     travelled: Values
     last: Points
     last_tangent: Points
+
+    @property
+    def index(self) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues besides those that vanish."""
+        return self.spots.index
 
     def take(self, lanes: Some | Flags | slice) -> "Walks":
         """Return some of the lanes."""
@@ -110,15 +112,6 @@ def predict(locus: Locus, here: Walks, lengths: Values) -> Points:
     moves = (here.last - here.spots.x, here.spots.tangent, here.last_tangent)
     steps = (factor[:, None] * move for factor, move in zip(factors, moves, strict=True))
     return np.asarray(here.spots.x + sum(steps))
-
-
-def negative_others(locus: Locus, spots: Spots) -> Int[np.ndarray, " lanes"]:
-    """Negative eigenvalues of the constrained Hessian, those within 1e-7 of zero not counted."""
-    z, p = locus.split(spots.x)
-    nothing = np.zeros((len(z), 0, locus.structure.size))
-    shift = np.full(len(z), -SMALL_EIGENVALUE)
-    solved = locus.structure.solve(z, p, nothing, shift=shift)
-    return np.asarray(solved.negative - locus.structure.constraints)
 
 
 def watched(
@@ -202,7 +195,7 @@ def _double(locus: Locus, walk: Walks, size: float) -> tuple[float, Spots]:
     low, high = 0.0, size
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        same = negative_others(locus, _part(locus, walk, middle))[0] == walk.index[0]
+        same = _part(locus, walk, middle).index[0] == walk.index[0]
         low, high = (middle, high) if same else (low, middle)
     width = high - low
     first = min(max(low - 2.0 * width, 0.0), size - (STENCIL - 1) * width)

@@ -291,9 +291,8 @@ class _Run:
         guards, before = self.guards, self.size[self.lanes]
         size = length(here.problem.structure, step, guards.multipliers)
         small = size < guards.converged
-        if guards.following > 0.0:
-            known = np.where(np.isfinite(before), before, 0.0)
-            small |= (size < NEAR) & (size**3 < guards.following * known**2)
+        if guards.following > 0.0 and self.number:
+            small |= (size < NEAR) & (size**3 < guards.following * before**2)
         self.number += 1
         goes_on = Status.OPEN if self.number < guards.iterations else Status.UNFINISHED
         status = np.where(small, Status.FOUND.value, goes_on.value)

@@ -17,7 +17,6 @@ from equimorph.equilibria.locus_events import (
     Walks,
     Watch,
     landmarks,
-    negative_others,
     predict,
     watched,
 )
@@ -122,9 +121,8 @@ def begin(locus: Locus, starts: Spots, watches: Sequence[Watch], options: TraceO
     """Stand at the starts."""
     lanes = len(starts.x)
     values, slopes = watched(locus, starts, watches, np.zeros((lanes, len(watches))))
-    index = negative_others(locus, starts)
     first, none = np.full(lanes, options.first_step), np.zeros(lanes)
-    return Walks(starts, values, slopes, index, first, none, starts.x, starts.tangent)
+    return Walks(starts, values, slopes, first, none, starts.x, starts.tangent)
 
 
 def _look(
@@ -132,13 +130,12 @@ def _look(
 ) -> Walks:
     """What is watched at the ends of steps, and how long the next ones should be."""
     values, slopes = watched(locus, spots, watches, here.values)
-    index = negative_others(locus, spots)
     cosine = np.einsum("li,li->l", spots.tangent * locus.weights, here.spots.tangent)
     turning = np.arccos(np.clip(cosine, -1.0, 1.0))
     growth = np.clip(options.turning / np.maximum(turning, 1e-3), 0.5, 2.0)
     longer = np.minimum(here.length * growth, options.largest_step)
     way, last = here.travelled + here.length, (here.spots.x, here.spots.tangent)
-    return Walks(spots, values, slopes, index, longer, way, *last)
+    return Walks(spots, values, slopes, longer, way, *last)
 
 
 def _judge(here: Walks, there: Walks, options: TraceOptions) -> Flags:
@@ -149,9 +146,14 @@ def _judge(here: Walks, there: Walks, options: TraceOptions) -> Flags:
     sign, length = np.sign(here.values), (there.travelled - here.travelled)[:, None]
     ends = (sign * here.values, sign * there.values)
     rates = (sign * here.slopes, sign * there.slopes)
-    flat = [each.ravel() for each in (*ends, *rates, np.broadcast_to(length, sign.shape))]
-    least = least_inside((flat[0], flat[1]), (flat[2], flat[3]), flat[4])[1].reshape(sign.shape)
-    hides = ((ends[1] > 0.0) & (least < CLOSE * np.minimum(*ends))).any(axis=1)
+    close, third = CLOSE * np.minimum(*ends), length / 3.0
+    # cubics lie above the least of their Bernstein coefficients
+    below = np.minimum(ends[0] + third * rates[0], ends[1] - third * rates[1]) < close
+    at = np.nonzero((ends[1] > 0.0) & below)
+    hides = np.zeros(len(sign), bool)
+    if len(at[0]):
+        pair, slopes = (ends[0][at], ends[1][at]), (rates[0][at], rates[1][at])
+        hides[at[0][least_inside(pair, slopes, length[at[0], 0])[1] < close[at]]] = True
     hides |= np.abs(there.index - here.index) > 1
     return np.asarray(~hides | (length[:, 0] <= NARROW * options.first_step))
 
@@ -190,7 +192,7 @@ def _record(
     if end is not None:
         side.spots.append(end.spot)
         side.lengths.append(end.length)
-        side.index.append(int(negative_others(locus, end.spot)[0]))
+        side.index.append(int(end.spot.index[0]))
     else:
         side.spots.append(after.spots)
         side.lengths.append(float(after.travelled[0]))
