@@ -161,7 +161,7 @@ def advance(
     if meets is None:
         by_z, by_p = _rows(locus, rows[:, :1])
         conditions.append(Plane(*locus.split(ahead), by_z, by_p))
-    by_beta = np.ascontiguousarray(rows[:, :, -1]) if locus.unfolded else None
+    by_beta = rows[:, :, -1] if locus.unfolded else None
     frame = Planes(*_rows(locus, rows), by_beta, spots.b)
     found = _settle(locus, x, tuple(conditions), guards, frame)
     near = found.first <= FIRST_SHARE * np.abs(lengths) + ACCEPTED
@@ -174,7 +174,7 @@ def onto_set(locus: Locus, x: Points, spots: Spots) -> Points:
     """Points of the equilibrium set above guesses, moved across the kernels of spots near by."""
     rows = spots.basis * locus.weights
     by_z, by_p = _rows(locus, rows)
-    by_beta = np.ascontiguousarray(rows[:, :, -1]) if locus.unfolded else None
+    by_beta = rows[:, :, -1] if locus.unfolded else None
     plane = Plane(*locus.split(x), by_z, by_p)
     guards = Guards(iterations=3, converged=ACCEPTED)
     found = _settle(locus, x, (plane,), guards, Planes(by_z, by_p, by_beta, spots.b))
@@ -186,7 +186,7 @@ def _rows(locus: Locus, rows: Bases) -> tuple[np.ndarray, np.ndarray]:
     size, k = locus.structure.size, len(locus.free)
     by_p = np.zeros((*rows.shape[:2], len(locus.base)))
     by_p[:, :, locus.free] = rows[:, :, size : size + k]
-    return np.ascontiguousarray(rows[:, :, :size]), by_p
+    return rows[:, :, :size], by_p
 
 
 def _vanishing(tests: tuple[Test, ...], lanes: int) -> Vanishing:

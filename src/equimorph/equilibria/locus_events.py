@@ -99,8 +99,9 @@ def predict(locus: Locus, here: Walks, lengths: Values) -> Points:
     In the coordinate along a tangent a curve is a graph, whose derivative is the unit tangent over
     the cosine of the angle between.
     """
-    row = here.spots.tangent * locus.weights
-    back = np.einsum("li,li->l", row, here.last - here.spots.x)
+    there, row = here.spots.x, here.spots.basis[:, 0] * locus.weights
+    gap = here.last - there
+    back = np.einsum("li,li->l", row, gap)
     rate = np.einsum("li,li->l", row, here.last_tangent)
     known = back < 0.0
     share = np.where(known, lengths / np.where(known, back, 1.0), 0.0)
@@ -109,9 +110,10 @@ def predict(locus: Locus, here: Walks, lengths: Values) -> Points:
         lengths * (1.0 - share) ** 2,
         (lengths - back) * share**2 / rate,
     )
-    moves = (here.last - here.spots.x, here.spots.tangent, here.last_tangent)
-    steps = (factor[:, None] * move for factor, move in zip(factors, moves, strict=True))
-    return np.asarray(here.spots.x + sum(steps))
+    moves = (gap, here.spots.basis[:, 0], here.last_tangent)
+    for factor, move in zip(factors, moves, strict=True):
+        there = there + factor[:, None] * move
+    return there
 
 
 def watched(

@@ -179,9 +179,10 @@ class Points:
 
     def moved(self, step: Step, share: Values) -> "Points":
         """Points after shares of a step, with the border and the rows renewed."""
-        problem, still, wide = self.problem, share == 0.0, share[:, None]
+        problem, wide, moving = self.problem, share[:, None], share != 0.0
         dz, da = wide * step.dz, wide * step.da
-        dz[still], da[still] = 0.0, 0.0
+        if not moving.all():  # those that do not may have steps that are no numbers
+            dz[~moving], da[~moving] = 0.0, 0.0
         p, beta, rows = self.p, self.beta, self.rows
         if problem.directions.shape[1]:
             p = p + problem.change(da[:, None])[:, 0]

@@ -300,10 +300,13 @@ class _Run:
             status[~small & ~(size <= guards.contraction * before)] = Status.NOT_SHRINKING
         if guards.too_long < np.inf:
             status[~(size < guards.too_long)] = Status.TOO_LONG
-        share = np.ones(len(size)) if self.known is None else _lengthening(here, step, self.known)
-        status[~np.isfinite(share * size)] = Status.SINGULAR
-        if guards.longest < np.inf:
-            share *= np.minimum(1.0, guards.longest / np.maximum(np.abs(share) * size, 1e-300))
+        long, share = size, np.ones(len(size))
+        if self.known is not None:
+            share = _lengthening(here, step, self.known)
+            long = np.abs(share) * size
+        status[~np.isfinite(long)] = Status.SINGULAR
+        if guards.longest < np.inf and not (long <= guards.longest).all():
+            share *= np.minimum(1.0, guards.longest / np.maximum(long, 1e-300))
         share[status > Status.UNFINISHED] = 0.0
         self.size[self.lanes] = size
         if self.number == 1:
