@@ -38,6 +38,29 @@ def test_left_half_load_runs_clean(q, cap):
     assert eset.crossings == ()
 
 
+@pytest.mark.parametrize("load", ["left-half", "uniform"])
+@pytest.mark.parametrize("intervals", [(31, 33), (51, 19)])
+def test_points_that_close_cells_along_a_constraint_are_of_their_sheet(load, intervals):
+    """Both ends on one side of a grid triangle, and a fold inside that its edges do not show.
+
+    Near (0.80, 0) points on the constraint amid two of index 13 have index 14, far outside: cells
+    that they close hide the fold.
+    """
+    rod = Rod(load=load)
+    with unchecked():
+        eset = equilibrium_set(
+            rod,
+            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
+            fixed={"q": 2.5},
+            within=[rod.max_curvature <= 40],
+            intervals=intervals,
+            checks=0,
+        )
+    assert eset.audit.bisected > 0
+    assert eset.audit.clean, eset.audit
+    assert_faithful(eset)
+
+
 @pytest.mark.parametrize(
     ("name", "box", "grid"),
     [

@@ -25,6 +25,7 @@ from equimorph.manifold.geometry.setting import Setting, embed, principal_direct
 from equimorph.manifold.geometry.tangents import orthonormal
 
 Span = Float[np.ndarray, "lanes k d"]
+Numbers = Int[np.ndarray, " lanes"]
 
 LED = (3, 12)
 """Steps from a known fold to the middle between several: few, else many."""
@@ -56,7 +57,7 @@ class Corrected:
     z: Lanes
     p: Parameters
     frames: Frames
-    index: Int[np.ndarray, " lanes"]
+    index: Numbers
     found: Flags
 
     def take(self, some: Flags) -> "Corrected":
@@ -156,7 +157,8 @@ def corrected(
     z: Lanes,
     p: Parameters,
     around: Values,
-    lower: Int[np.ndarray, " lanes"] | None = None,
+    lower: Numbers | None = None,
+    index: Numbers | None = None,
 ) -> Pinned:
     """Points that are sought, from guesses.
 
@@ -168,8 +170,10 @@ def corrected(
     lower
         Index on the lower side of folds, if it is known: where two eigenvalues nearly vanish,
         another fold may be met.
+    index
+        Index of the sheet, if it is known: far from the guess, that of another may be met.
     """
-    found = _settled(aim, z, p, around, lower)
+    found = _settled(aim, z, p, around, lower, index)
     good = found.found
     if aim.crossing:
         good[good] = _crosses(aim.take(np.flatnonzero(good)), found.z[good], found.p[good])
@@ -188,14 +192,20 @@ def corrected_amid(
     Their tangent spaces and index are those at the start of the last step.
     """
     span = np.tile(np.eye(len(setting.free)), (len(middle), 1, 1))
-    found = _settled(Aim(setting, False, False, span, middle, rows), *states, around, None)
+    aim = Aim(setting, False, False, span, middle, rows)
+    found = _settled(aim, *states, around, None, None)
     frames, good = np.zeros_like(found.frames), found.found
     frames[good] = orthonormal(setting, found.frames[good])
     return Corrected(found.z, found.p, frames, found.index, good)
 
 
 def _settled(
-    aim: Aim, z: Lanes, p: Parameters, around: Values, lower: Int[np.ndarray, " lanes"] | None
+    aim: Aim,
+    z: Lanes,
+    p: Parameters,
+    around: Values,
+    lower: Numbers | None,
+    index: Numbers | None,
 ) -> Settled:
     """Newton's method with the guards of the set."""
     setting, centre = aim.setting, aim.centre(p)
@@ -207,6 +217,7 @@ def _settled(
         trust=REACH * around + 1e-3,
         middle=centre,
         lower_index=lower,
+        index=index,
         within=setting.constraints,
     )
     frame: Planes | Tangents = Tangents(unfolded=aim.crossing)
@@ -223,7 +234,7 @@ def _crosses(aim: Aim, z: Lanes, p: Parameters) -> Flags:
     return np.asarray(known.crosses & small)
 
 
-def lower_index(setting: Setting, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+def lower_index(setting: Setting, z: Lanes, p: Parameters) -> Numbers:
     """Index on the lower side of folds: eigenvalues below the one that vanishes."""
     return index_below(setting.structure, z, p)
 
@@ -236,7 +247,10 @@ def pin(
     span: Span,
     shift: tuple[int, float] = (0, 0.0),
 ) -> Pinned:
-    """Exact points in the middle of each group of points.
+    """Exact points in the middle of each group of points, on the same sheet.
+
+    Points on no fold have the index of their group: Newton's method may reach another sheet in less
+    than the distance within which points are believed.
 
     Parameters
     ----------
@@ -263,9 +277,9 @@ def pin(
     rows = principal_directions(deviations, span.shape[1] - fold - cap)
     around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
     aim = Aim(setting, fold, cap, span, embed(setting, z, p), rows)
-    if not fold:
-        return corrected(aim, z, p, around)
     low = np.array([points.index[list(group)].min() for group in groups], int)
+    if not fold:
+        return corrected(aim, z, p, around, index=low)
     pinned = corrected(aim, z, p, around, low)
     for steps, end in product(LED, (0, -1)) if not cap else ():
         lanes = np.flatnonzero(~pinned.found)
@@ -283,7 +297,7 @@ def _led(
     steps: int,
     states: tuple[Lanes, Parameters],
     around: Values,
-    low: Int[np.ndarray, " lanes"],
+    low: Numbers,
 ) -> Pinned:
     """Pin folds in small steps from known ones to the middle, where one step goes astray."""
     z, p = (each.copy() for each in states)

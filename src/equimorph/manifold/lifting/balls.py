@@ -48,7 +48,7 @@ def pin_confined(
     span: Span,
     frames: Frames,
 ) -> Pinned:
-    """Exact points amid groups, inside grid cells and of the right index.
+    """Exact points amid groups, inside grid cells.
 
     Where the one in the normal space through the middle is not, those through points between the
     middle and one of the group are tried: near its own points a constraint with kinks is smooth,
@@ -62,7 +62,6 @@ def pin_confined(
     frames
         Corners of the grid cells, in free parameters.
     """
-    low = np.array([points.index[list(group)].min() for group in groups], int)
     sizes = np.array([len(group) for group in groups])
     z, p, _ = middles(setting, points, groups)
     best = np.full(len(groups), -np.inf if kind == VertexKind.FOLD else ON_FACE)
@@ -75,10 +74,6 @@ def pin_confined(
         own = [groups[lane] for lane in lanes.tolist()]
         pinned = pin(setting, points, own, kind, span[lanes], (member, share))
         depth = np.where(pinned.found, depths(frames[lanes], pinned.p[:, setting.free]), -np.inf)
-        if kind in {VertexKind.CAP, VertexKind.AMID}:
-            near = np.flatnonzero(depth > best[lanes])
-            index = setting.structure.index(pinned.z[near], pinned.p[near])
-            depth[near[index != low[lanes[near]]]] = -np.inf
         better = depth > best[lanes]
         at = lanes[better]
         z[at], p[at], best[at], found[at] = pinned.z[better], pinned.p[better], depth[better], True
