@@ -22,7 +22,7 @@ from equimorph.manifold.complex.marked_complex import (
     squared_sides,
 )
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.topology import among, distinct, keys_of, rows_of
+from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of, rows_of
 from equimorph.manifold.refining.quality import POOR, determinants, smallest_angles
 from equimorph.manifold.refining.stars import Kind, Refills, Rows
 
@@ -44,10 +44,10 @@ def reconnections(
     Edges between the pairs of vertices `but` do not come into being.
     """
     base = len(fabric.vertices)
-    poor = (quality < POOR[3]) & near[fabric.cells].any(axis=1)
+    poor = (quality < POOR[3]) & (count_corners(near, fabric.cells) > 0)
     beside = np.zeros(base, bool)
     beside[fabric.cells[poor]] = True
-    around = np.flatnonzero(beside[fabric.cells].sum(axis=1) > 1)
+    around = np.flatnonzero(count_corners(beside, fabric.cells) > 1)
     barred, facets = _known(fabric, fabric.cells[around], but)
     sides = [fabric.cells[poor][:, list(k)] for k in combinations(range(4), 2)]
     edges = rows_of(distinct(np.concatenate([keys_of(side, base) for side in sides])), base, 2)
@@ -64,9 +64,9 @@ def _known(fabric: Fabric, around: Cells, but: Edges) -> tuple[Keys, Keys]:
     base = len(fabric.vertices)
     near = np.zeros(base, bool)
     near[around] = True
-    cells = fabric.cells[near[fabric.cells].sum(axis=1) > 1]
+    cells = fabric.cells[count_corners(near, fabric.cells) > 1]
     edges = [keys_of(cells[:, list(k)], base) for k in combinations(range(4), 2)]
-    cells = cells[near[cells].sum(axis=1) > 2]
+    cells = cells[count_corners(near, cells) > 2]
     facets = [keys_of(cells[:, list(k)], base) for k in combinations(range(4), 3)]
     return distinct(np.concatenate([*edges, keys_of(but, base)])), distinct(np.concatenate(facets))
 

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.manifold.complex.marked_complex import ON_CROSSING, RIM, Fabric
+from equimorph.manifold.geometry.topology import count_corners
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Pa
     """
     for _ in range(rings + 1):
         near = _in_all_sheets(fabric, near)
-        own = near[fabric.cells].any(axis=1)
+        own = count_corners(near, fabric.cells) > 0
         near = np.zeros_like(near)
         near[fabric.cells[own]] = True
     rest = fabric.only(~own)
@@ -82,7 +83,7 @@ def _pairs_between(
     cells: Int[np.ndarray, "n corners"], chosen: Bool[np.ndarray, " V"]
 ) -> Int[np.ndarray, "m 2"]:
     """Edges of cells, sorted, both of whose ends are chosen."""
-    cells = cells[np.count_nonzero(chosen[cells], axis=1) > 1]
+    cells = cells[count_corners(chosen, cells) > 1]
     pairs = [cells[:, list(pair)] for pair in combinations(range(cells.shape[1]), 2)]
     edges = np.concatenate(pairs)
     return np.unique(np.sort(edges[chosen[edges].all(axis=1)], axis=1), axis=0)

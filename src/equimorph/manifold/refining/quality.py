@@ -25,7 +25,7 @@ from equimorph.manifold.complex.marked_complex import (
     squared_sides,
 )
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.topology import labels
+from equimorph.manifold.geometry.topology import count_corners, labels
 
 SHARP = np.radians(10.0)
 """Smallest angle that every cell should have at least."""
@@ -99,8 +99,8 @@ def qualities_near(fabric: Fabric, near: Bool[np.ndarray, " V"]) -> Angles:
     Triangles are turned here where they are so on average over their corners.
     """
     beside = np.zeros_like(near)
-    beside[fabric.cells[near[fabric.cells].any(axis=1)]] = True
-    own = beside[fabric.cells].any(axis=1)
+    beside[fabric.cells[count_corners(near, fabric.cells) > 0]] = True
+    own = count_corners(beside, fabric.cells) > 0
     cells, index, out = fabric.cells[own], fabric.cell_index[own], np.full(len(own), np.inf)
     if fabric.dimension > TRIANGLES:
         out[own] = qualities(fabric.vertices, cells, index)

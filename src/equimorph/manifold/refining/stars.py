@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Cells, Edges
 from equimorph.manifold.complex.marked_complex import Fabric, squared_sides
-from equimorph.manifold.geometry.topology import among, distinct, keys_of
+from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of
 
 Rows = Int[np.ndarray, " n"]
 """Numbers of refills, vertices or cells."""
@@ -31,7 +31,7 @@ class Around:
     def __init__(self, cells: Cells, vertices: Rows, base: int) -> None:
         near = np.zeros(base, bool)
         near[vertices] = True
-        self._number = np.flatnonzero(near[cells].any(axis=1))
+        self._number = np.flatnonzero(count_corners(near, cells))
         self._cells, self._corners = cells[self._number], cells.shape[1]
         self._order = np.argsort(self._cells.ravel(), kind="stable")
         amount = np.bincount(self._cells.ravel(), minlength=base)

@@ -22,6 +22,7 @@ from equimorph.manifold.complex.marked_complex import (
     Fabric,
     edges_of,
     held,
+    squared_sides,
 )
 from equimorph.manifold.complex.shared_edges import copies
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
@@ -29,7 +30,7 @@ from equimorph.manifold.geometry.exact_points import Aim, corrected, lower_index
 from equimorph.manifold.geometry.points import CAP, CORNER, FOLD, REFINED
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import split_step
-from equimorph.manifold.geometry.topology import distinct, keys_of, rows_of
+from equimorph.manifold.geometry.topology import count_corners, distinct, keys_of, rows_of
 from equimorph.manifold.refining.quality import POOR, SHARP, determinants, smallest_angles, worst
 from equimorph.manifold.refining.stars import Around, Kind, Pairs, Refills, Rows
 
@@ -60,7 +61,7 @@ def collapses(fabric: Fabric, quality: Quality, near: Near, short: float = 0.0) 
     Of triangles also of edges beside them that are shorter than a share `short` of others there.
     """
     cells, d = fabric.cells, fabric.dimension
-    poor = np.flatnonzero((quality < POOR[d]) & near[cells].any(axis=1))
+    poor = np.flatnonzero((quality < POOR[d]) & (count_corners(near, cells) > 0))
     pairs = np.array(list(combinations(range(d + 1), 2)))
     length = np.sqrt(fabric.squared[poor])
     chosen = length < SHORT * length.max(axis=1, initial=0.0)[:, None]
@@ -96,7 +97,7 @@ def short_edges(fabric: Fabric, cells: Rows, short: float) -> Edges:
         return np.zeros((0, 2), int)
     beside = np.zeros(len(fabric.vertices), bool)
     beside[fabric.cells[cells]] = True
-    own = beside[fabric.cells].any(axis=1)
+    own = count_corners(beside, fabric.cells) > 0
     edges, of_cells = edges_of(fabric.cells[own], len(beside))
     length, reach = np.empty(len(edges)), np.zeros(len(beside))
     length[of_cells] = np.sqrt(fabric.squared[own])
@@ -185,7 +186,7 @@ def drawn(fabric: Fabric, moves: Edges, row: Rows) -> Refills:
 
 def moves(fabric: Fabric, quality: Quality, near: Near, sharp: float = SHARP) -> Refills:
     """Moves of the corners of sharp cells with a corner near to where the worst around is best."""
-    own = (quality < sharp) & near[fabric.cells].any(axis=1)
+    own = (quality < sharp) & (count_corners(near, fabric.cells) > 0)
     chosen = np.unique(fabric.cells[own])
     marks = fabric.vertex_marks[chosen]
     free = (marks & ~MOVABLE == 0) & (fabric.vertices.shared[chosen] < 0)
@@ -251,15 +252,17 @@ def _at_better_places(
 class _Stars:
     """Cells around vertices as seen from there.
 
-    row: the vertex; products: of the sides from it to the d others; along: these sides in the k
-    directions that it may take; flat: in its tangent space; turned: the directions there.
+    row: the vertex; squared: lengths of the d sides from it to the others; across: of the others,
+    squared, which stay; along: the d sides in the k directions that it may take; volume: in its
+    tangent space, times d!; slope: by how much that shrinks in the k directions.
     """
 
     row: Rows
-    products: Float[np.ndarray, "cells d d"]
-    along: Float[np.ndarray, "cells d k"]
-    flat: Float[np.ndarray, "cells d d"]
-    turned: Float[np.ndarray, "cells k d"]
+    squared: Float[np.ndarray, "d cells"]
+    across: Float[np.ndarray, "others cells"]
+    along: Float[np.ndarray, "d k cells"]
+    volume: Float[np.ndarray, " cells"]
+    slope: Float[np.ndarray, "k cells"]
 
 
 def _stars(fabric: Fabric, around: Around, chosen: Rows, directions: Directions) -> _Stars:
@@ -269,21 +272,38 @@ def _stars(fabric: Fabric, around: Around, chosen: Rows, directions: Directions)
     at = np.argmax(cells == chosen[row, None], axis=1)
     cells = np.take_along_axis(cells, TO_FRONT[fabric.dimension][at], axis=1)
     place, rows = fabric.vertices.place, fabric.vertices.rows[chosen]
-    sides = place[cells[:, 1:]] - place[cells[:, :1]]
-    flat = sides @ np.swapaxes(rows[row], 1, 2)
-    along = flat @ np.swapaxes(directions[row], 1, 2)
-    return _Stars(row, sides @ np.swapaxes(sides, 1, 2), along, flat, directions[row])
+    d, lengths = fabric.dimension, squared_sides(place, cells).T
+    flat = (place[cells[:, 1:]] - place[cells[:, :1]]) @ np.swapaxes(rows[row], 1, 2)
+    along = np.einsum("nid,nkd->ikn", flat, directions[row])
+    # a volume is linear in each side, and all sides from the vertex get shorter by its step
+    ones = np.swapaxes(directions[row], 0, 1)
+    slope = sum(
+        np.stack([determinants(_with_side(flat, i, one)) for one in ones]) for i in range(d)
+    )
+    return _Stars(
+        row, lengths[:d], lengths[d:], along,
+        determinants(flat), np.asarray(slope),
+    )  # fmt: skip
+
+
+def _with_side(
+    sides: Float[np.ndarray, "n d d"], number: int, side: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n d d"]:
+    """Sides with another one in place of one of them."""
+    out = sides.copy()
+    out[:, number] = side
+    return out
 
 
 def _best_steps(stars: _Stars, count: int) -> Float[np.ndarray, "n k"]:
     """Steps after which the worst cell around each vertex is best, as far as a search finds it."""
-    k = stars.along.shape[2]
+    k = len(stars.slope)
     ways = np.array([way for way in product((-1, 0, 1), repeat=k) if any(way)], float)
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     if k == 3:
         ways = ways[np.abs(ways).max(axis=1) != np.sqrt(0.5)]
     longest = np.full(count, np.inf)
-    np.minimum.at(longest, stars.row, np.einsum("nii->ni", stars.products).max(axis=1))
+    np.minimum.at(longest, stars.row, stars.squared.max(axis=0, initial=0.0))
     reach, step = FIRST * np.sqrt(longest), np.zeros((count, k))
     first = best = worst(_after_steps(stars, step[None])[0], stars.row, count)
     for _ in range(ROUNDS):
@@ -306,15 +326,13 @@ def _after_steps(
 
     As the volume relative to that of sides at right angles.
     """
-    s, d = steps[:, stars.row], stars.flat.shape[1]
-    dots = np.einsum("nik,wnk->wni", stars.along, s)
-    size = np.einsum("wnk,wnk->wn", s, s)
-    g = stars.products - dots[..., :, None] - dots[..., None, :] + size[..., None, None]
-    g = g.reshape(-1, d, d)
-    own = [g[:, i, i] for i in range(d)]
-    across = [own[i] + own[j] - 2.0 * g[:, i, j] for i, j in combinations(range(d), 2)]
-    angle = smallest_angles(np.stack([*own, *across], axis=1))
-    flat = stars.flat - np.einsum("wnk,nkd->wnd", s, stars.turned)[:, :, None]
-    whole = np.sqrt(np.maximum(np.prod(own, axis=0), 1e-300))
-    volume = determinants(flat.reshape(-1, d, d)) / whole
-    return np.where(volume > 0.0, angle, volume).reshape(len(steps), -1)
+    ways, d, cells = len(steps), len(stars.squared), len(stars.row)
+    s = np.moveaxis(steps[:, stars.row], 2, 0)
+    squared = np.empty((d + len(stars.across), ways, cells))
+    squared[:d] = stars.squared[:, None] - 2.0 * np.einsum("ikn,kwn->iwn", stars.along, s)
+    squared[:d] += (s * s).sum(axis=0)
+    squared[d:] = stars.across[:, None]
+    angle = smallest_angles(squared.reshape(len(squared), -1).T).reshape(ways, cells)
+    volume = stars.volume - np.einsum("kn,kwn->wn", stars.slope, s)
+    volume /= np.sqrt(np.maximum(np.prod(squared[:d], axis=0), 1e-300))
+    return np.where(volume > 0.0, angle, volume)
