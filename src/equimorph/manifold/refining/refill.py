@@ -21,14 +21,15 @@ from equimorph.manifold.geometry.topology import among, keys_of, rows_of
 from equimorph.manifold.refining.deviation import Memory, deviations
 from equimorph.manifold.refining.edge_stars import reconnections
 from equimorph.manifold.refining.kernels import flip_edges
-from equimorph.manifold.refining.quality import (
-    POOR,
-    qualities,
-    qualities_near,
-    smallest_angles,
-    worst,
+from equimorph.manifold.refining.quality import qualities, qualities_near
+from equimorph.manifold.refining.stars import (
+    GAIN,
+    Quality,
+    Refills,
+    gains,
+    hopeful,
+    with_exact,
 )
-from equimorph.manifold.refining.stars import Kind, Refills
 from equimorph.manifold.refining.vertex_stars import collapses, moves
 
 ROUNDS = {2: (2, 3), 3: (6, 12)}
@@ -36,22 +37,14 @@ ROUNDS = {2: (2, 3), 3: (6, 12)}
 for fine cells."""
 RECONNECTIONS, COLLAPSES, MOVES = 20, 3, 6
 """How often candidates of a kind are looked for in a round, as long as some help."""
-GAIN = np.radians(0.2) / np.pi
-"""Least gain of a refill: poor cells fewer, and the growth of the worst quality relative to π."""
-WORSE, MUCH_WORSE = 0.7, 0.2
-"""Least share of the worst quality that must remain; and if a short edge goes."""
 STEEPER = 1e-3
 """Least gain of a flip: minus the sum of the cotangents of both opposite angles."""
 OPPOSITE = np.array([[1, 2], [2, 0], [0, 1]])
 """The other corners of triangles."""
-LONGER = 1.5
-"""Largest ratio of the longest sides of the cells after and before."""
 SHORT = 0.05
 """Ratio of the lengths of two edges of a triangle below which the shorter one counts as poor."""
 
-
 Near = Bool[np.ndarray, " V"]
-Quality = Float[np.ndarray, " cells"]
 NewNear = Bool[np.ndarray, " new_vertices"]
 NewQuality = Float[np.ndarray, " new_cells"]
 Candidates = Callable[[Fabric, Quality, Near], Refills]
@@ -144,47 +137,15 @@ def _best(
     refills: Refills, quality: Quality, memory: Memory, limit: float
 ) -> tuple[Refills, Float[np.ndarray, " come"]]:
     """Refills that help, the best first, with stars that do not overlap; and their qualities."""
-    if refills.fabric.dimension == TRIANGLES:
-        # `qualities_near` looks at triangles on average over their corners only
-        gone = refills.gone
-        quality = quality.copy()
-        cells, index = refills.fabric.cells[gone], refills.fabric.cell_index[gone]
-        quality[gone] = qualities(refills.fabric.vertices, cells, index)
-    gain = _gains(refills, quality, smallest_angles(refills.squared))
-    refills = refills.take(gain > GAIN)  # qualities are no better than angles
+    quality = with_exact(refills, quality)
+    refills = refills.take(hopeful(refills, quality))
     come = qualities(refills.fabric.vertices, refills.come, refills.index)
-    gain = _gains(refills, quality, come)
+    gain = gains(refills, quality, come)
     kept = gain > GAIN
     come, gain, refills = come[kept[refills.come_row]], gain[kept], refills.take(kept)
     kept = _allowed(refills, memory, limit)
     kept &= _apart(refills, np.where(kept, gain, -1.0))
     return refills.take(kept), come[kept[refills.come_row]]
-
-
-def _gains(
-    refills: Refills, quality: Quality, come: Float[np.ndarray, " come"]
-) -> Float[np.ndarray, " refills"]:
-    """Number of poor cells fewer, and growth of the worst quality relative to π, if some come.
-
-    Minus one where cells get much poorer, or much longer.
-    """
-    count, poor = refills.count, POOR[refills.fabric.dimension]
-    old = quality[refills.gone]
-    before = worst(old, refills.gone_row, count)
-    after = worst(come, refills.come_row, count)
-    fewer = np.bincount(refills.gone_row[old < poor], minlength=count)
-    fewer -= np.bincount(refills.come_row[come < poor], minlength=count)
-    reach, longest = np.zeros(count), np.zeros(count)
-    sides = refills.fabric.squared[refills.gone]
-    np.maximum.at(reach, refills.gone_row, sides.max(axis=1, initial=0.0))
-    np.maximum.at(longest, refills.come_row, refills.squared.max(axis=1, initial=0.0))
-    collapse = refills.kind is Kind.COLLAPSE
-    vertices_go = np.where(refills.short, MUCH_WORSE, WORSE)
-    least = np.where((before > 0.0) & collapse, vertices_go, 1.0) * before
-    good = (after >= least) & (longest <= LONGER**2 * reach)
-    # vertices may go to have fewer poor cells; the same vertices must have a better worst one
-    fewer = collapse * (fewer + refills.short)
-    return np.where(good, fewer + (after - before) / np.pi, -1.0)
 
 
 def _allowed(refills: Refills, memory: Memory, limit: float) -> Bool[np.ndarray, " refills"]:

@@ -8,13 +8,22 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Cells, Edges
-from equimorph.manifold.complex.marked_complex import Fabric, squared_sides
+from equimorph.manifold.complex.marked_complex import TRIANGLES, Fabric, squared_sides
 from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of
+from equimorph.manifold.refining.quality import POOR, qualities, smallest_angles, worst
+
+GAIN = np.radians(0.2) / np.pi
+"""Least gain of a refill: poor cells fewer, and the growth of the worst quality relative to π."""
+WORSE, MUCH_WORSE = 0.7, 0.2
+"""Least share of the worst quality that must remain; and if a short edge goes."""
+LONGER = 1.5
+"""Largest ratio of the longest sides of the cells after and before."""
 
 Rows = Int[np.ndarray, " n"]
 """Numbers of refills, vertices or cells."""
 Pairs = tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]]
 """Two numbers for each pair of things that belong together."""
+Quality = Float[np.ndarray, " cells"]
 
 
 class Kind(Enum):
@@ -207,3 +216,47 @@ class Refills:
         facet_row, facet = _faces(self.come_row[own], self.come[own], 3, base)
         rows = np.concatenate([self.gone_row, row, facet_row])
         return rows, np.concatenate([self.gone, cells + key, cells + base**2 + facet])
+
+
+def hopeful(refills: Refills, quality: Quality) -> Bool[np.ndarray, " refills"]:
+    """Which refills may help, by the angles of the cells that come: these are no less good."""
+    return np.asarray(gains(refills, quality, smallest_angles(refills.squared)) > GAIN)
+
+
+def with_exact(refills: Refills, quality: Quality) -> Quality:
+    """Qualities with those of the triangles that go put right.
+
+    `qualities_near` looks at triangles on average over their corners only.
+    """
+    fabric, gone = refills.fabric, refills.gone
+    if fabric.dimension != TRIANGLES:
+        return quality
+    quality = quality.copy()
+    quality[gone] = qualities(fabric.vertices, fabric.cells[gone], fabric.cell_index[gone])
+    return quality
+
+
+def gains(
+    refills: Refills, quality: Quality, come: Float[np.ndarray, " come"]
+) -> Float[np.ndarray, " refills"]:
+    """Number of poor cells fewer, and growth of the worst quality relative to π, if some come.
+
+    Minus one where cells get much poorer, or much longer.
+    """
+    count, poor = refills.count, POOR[refills.fabric.dimension]
+    old = quality[refills.gone]
+    before = worst(old, refills.gone_row, count)
+    after = worst(come, refills.come_row, count)
+    fewer = np.bincount(refills.gone_row[old < poor], minlength=count)
+    fewer -= np.bincount(refills.come_row[come < poor], minlength=count)
+    reach, longest = np.zeros(count), np.zeros(count)
+    sides = refills.fabric.squared[refills.gone]
+    np.maximum.at(reach, refills.gone_row, sides.max(axis=1, initial=0.0))
+    np.maximum.at(longest, refills.come_row, refills.squared.max(axis=1, initial=0.0))
+    collapse = refills.kind is Kind.COLLAPSE
+    vertices_go = np.where(refills.short, MUCH_WORSE, WORSE)
+    least = np.where((before > 0.0) & collapse, vertices_go, 1.0) * before
+    good = (after >= least) & (longest <= LONGER**2 * reach)
+    # vertices may go to have fewer poor cells; the same vertices must have a better worst one
+    fewer = collapse * (fewer + refills.short)
+    return np.where(good, fewer + (after - before) / np.pi, -1.0)

@@ -32,7 +32,16 @@ from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import count_corners, distinct, keys_of, rows_of
 from equimorph.manifold.refining.quality import POOR, SHARP, determinants, smallest_angles, worst
-from equimorph.manifold.refining.stars import Around, Kind, Pairs, Refills, Rows
+from equimorph.manifold.refining.stars import (
+    Around,
+    Kind,
+    Pairs,
+    Quality,
+    Refills,
+    Rows,
+    hopeful,
+    with_exact,
+)
 
 SHORT = 0.5
 """Edges of poor tetrahedra that are shorter than this share of the longest one may go."""
@@ -51,7 +60,6 @@ TO_FRONT = {
 """Even permutations that bring each corner of a cell to the front, by the dimension."""
 
 Near = Bool[np.ndarray, " V"]
-Quality = Float[np.ndarray, " cells"]
 Directions = Float[np.ndarray, "n k d"]
 
 
@@ -72,10 +80,14 @@ def collapses(fabric: Fabric, quality: Quality, near: Near, short: float = 0.0) 
     base = len(fabric.vertices)
     ends = rows_of(distinct(keys_of(np.concatenate([ends, others]), base)), base, 2)
     moves = np.concatenate([ends, ends[:, ::-1]])
-    moves = moves[_goes_on(fabric, moves)]
-    moves, row = in_all_sheets(fabric, moves[_linked(fabric, moves)])
+    moves, row = in_all_sheets(fabric, moves[_goes_on(fabric, moves)])
     refills = drawn(fabric, moves, row)
-    return replace(refills, kind=Kind.COLLAPSE, short=_short(refills, moves, row, short))
+    refills = replace(refills, kind=Kind.COLLAPSE, short=_short(refills, moves, row, short))
+    # links cost more to look at than angles
+    good = hopeful(refills, with_exact(refills, quality))
+    moves, row = moves[good[row]], row[good[row]]
+    good[row[~_linked(fabric, moves)]] = False
+    return refills.take(good)
 
 
 def _short(refills: Refills, moves: Edges, row: Rows, short: float) -> Bool[np.ndarray, " refills"]:
