@@ -51,6 +51,8 @@ def reconnections(
     barred, facets = _known(fabric, fabric.cells[around], but)
     sides = [fabric.cells[poor][:, list(k)] for k in combinations(range(4), 2)]
     edges = rows_of(distinct(np.concatenate([keys_of(side, base) for side in sides])), base, 2)
+    # rings whose edge has an end that is not near are what they were
+    edges = edges[near[edges].all(axis=1)]
     part = replace(fabric, cells=fabric.cells[around], cell_index=fabric.cell_index[around])
     rings = rings_around(part, edges)
     rings = replace(rings, cells=np.where(rings.cells < 0, -1, around[rings.cells]))
