@@ -354,3 +354,21 @@ def _amount(
 
 def _unit(v: Lanes) -> Lanes:
     return np.ascontiguousarray(v / np.linalg.norm(v, axis=1, keepdims=True))
+
+
+def free_directions(structure: Structure, free: Int[np.ndarray, "*_ k"], lanes: int) -> Directions:
+    """Directions in which parameters change by their scales: the same for all lanes, or of each."""
+    places = np.broadcast_to(free, (lanes, free.shape[-1]))
+    out = np.zeros((*places.shape, len(structure.parameters)))
+    np.put_along_axis(out, places[:, :, None], structure.scales[places][:, :, None], axis=2)
+    return out
+
+
+def distances(
+    structure: Structure, here: tuple[Lanes, Parameters], there: tuple[Lanes, Parameters]
+) -> Values:
+    """Distances of points in the metric and in the scaled parameters."""
+    (z, p), (other_z, other_p), n = here, there, structure.unknowns
+    squared = (z[:, :n] - other_z[:, :n]) ** 2 @ structure.mass
+    squared += (((p - other_p) / structure.scales) ** 2).sum(axis=1)
+    return np.asarray(np.sqrt(squared))

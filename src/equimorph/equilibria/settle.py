@@ -25,6 +25,8 @@ from equimorph.equilibria.newton_step import (
     Problem,
     Step,
     Tangents,
+    distances,
+    free_directions,
     length,
     start_at,
 )
@@ -226,14 +228,6 @@ def settle(
     return _believed(structure, run.settled(), (z, p), guards)
 
 
-def free_directions(structure: Structure, free: Int[np.ndarray, "*_ k"], lanes: int) -> Directions:
-    """Directions in which parameters change by their scales: the same for all lanes, or of each."""
-    places = np.broadcast_to(free, (lanes, free.shape[-1]))
-    out = np.zeros((*places.shape, len(structure.parameters)))
-    np.put_along_axis(out, places[:, :, None], structure.scales[places][:, :, None], axis=2)
-    return out
-
-
 def embedded_planes(structure: Structure, free: Int[np.ndarray, " d"], rows: Rows) -> Planes:
     """Planes whose rows are given in the metric: √mass·u, then free parameters in their scales."""
     n = structure.unknowns
@@ -389,16 +383,6 @@ def _believed(
         bad[some] = ~(constraint.excess(z[some], p[some]) < SLACK)
         refuse(bad, Status.VIOLATED)
     return replace(settled, status=status, index=index)
-
-
-def distances(
-    structure: Structure, here: tuple[Lanes, Parameters], there: tuple[Lanes, Parameters]
-) -> Values:
-    """Distances of points in the metric and in the scaled parameters."""
-    (z, p), (other_z, other_p), n = here, there, structure.unknowns
-    squared = (z[:, :n] - other_z[:, :n]) ** 2 @ structure.mass
-    squared += (((p - other_p) / structure.scales) ** 2).sum(axis=1)
-    return np.asarray(np.sqrt(squared))
 
 
 def lower_index(structure: Structure, z: Lanes, p: Parameters) -> Numbers:
