@@ -278,7 +278,7 @@ class _Run:
         self.status = np.full(count, Status.OPEN.value)
         self.index, self.sure = np.full(count, -1), np.zeros(count, bool)
         self.frames = np.zeros((count, width if frames else 0, here.z.shape[1] + width))
-        self.slopes = np.zeros((count, 0, width))
+        self.slopes = np.zeros((count, 0, self.frames.shape[1]))
 
     def judge(self, here: Points, step: Step) -> tuple[Numbers, Values]:
         """Status of each lane after a step, and the share of the step that is taken."""
