@@ -219,6 +219,21 @@ def test_a_shape_is_moved_onto_changed_constraints_first(arch):
     assert arch.height(0.5)(landing.state) > arch.height(0.5)(rest)
 
 
+@pytest.mark.parametrize(("margin", "leaves"), [(0.8e-6, True), (1.2e-6, False)])
+def test_a_state_of_index_0_is_critical_up_to_a_margin_of_a_millionth(margin, leaves):
+    """E = x⁶/6 − x⁴/4 + m x²/2 at x = 0: its margin is m."""
+    form = Polynomial(lambda x, m: x**6 * (1 / 6) - x**4 * 0.25 + m * x**2 * 0.5, 1, ("m",))
+    state = form.state(0.0, m=margin)
+    assert (state.index, state.margin) == (0, pytest.approx(margin, rel=1e-6))
+    if leaves:
+        assert [abs(landing.state.z[0]) for landing in em.snap_landing(state)] == pytest.approx(
+            [1.0, 1.0], abs=1e-5
+        )
+    else:
+        with pytest.raises(InputError, match=r"got index 0 with a margin of 1\.2e-06"):
+            em.snap_landing(state)
+
+
 def test_a_stable_state_stays(arch):
     rest = arch.natural_state(Theta=0.9, Delta=0.0)
     with pytest.raises(InputError, match="`state` must be unstable or critical; got index 0"):

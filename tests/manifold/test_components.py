@@ -124,6 +124,48 @@ def test_pieces_over_one_and_three_parameters(box, fixed, intervals, number):
     np.testing.assert_allclose(stable.sizes, upper.sizes[0], rtol=3e-2)
 
 
+@pytest.fixture(scope="module")
+def four_branches():
+    """Stable states of the spring at x_l = 0.7 over F, without δ in (0.85, 0.95), (−0.85, −0.75)."""
+    with unchecked():
+        eset = equilibrium_set(
+            Spring(), Box(F=(-0.4, 0.2)), fixed={"x_l": 0.7}, intervals=(40,), checks=0
+        )
+        bands = [
+            combined(f"from {middle}", lambda angle, at=middle: (angle - at) ** 2, Spring().angle)
+            for middle in (0.9, -0.8)
+        ]
+        return components(eset, stable=True, within=[band >= 0.05**2 for band in bands])
+
+
+def branch_lengths() -> dict[tuple[float, float], float]:
+    """Length of every branch by its interval of δ; F = (1 − x_l/cos δ) sin δ, ds² = dδ² + dF²."""
+    delta = np.linspace(-1.2, 1.2, 2400001)
+    force = (1.0 - 0.7 / np.cos(delta)) * np.sin(delta)
+    away = (np.abs(delta - 0.9) >= 0.05) & (np.abs(delta + 0.8) >= 0.05)
+    kept = (np.cos(delta) ** 3 < 0.7) & away & (force > -0.4) & (force < 0.2)
+    ends = np.flatnonzero(np.diff(np.pad(kept.astype(int), 1)))
+    return {
+        (delta[a], delta[b - 1]): np.hypot(np.diff(delta[a:b]), np.diff(force[a:b])).sum()
+        for a, b in ends.reshape(-1, 2)
+    }
+
+
+def test_pieces_are_numbered_from_the_largest_with_their_cells_and_strata(four_branches):
+    """Closed form of each branch; tolerance: chords instead of arcs."""
+    exact = sorted(branch_lengths().items(), key=lambda item: -item[1])
+    assert len(four_branches) == len(exact) == 4
+    np.testing.assert_allclose(four_branches.sizes, [size for _, size in exact], rtol=5e-3)
+    strata = four_branches.eset.strata
+    for number, (piece, ((low, high), _)) in enumerate(zip(four_branches, exact, strict=True)):
+        delta = piece.points.z[:, 0]
+        assert (delta.min(), delta.max()) == pytest.approx((low, high), abs=1e-5)
+        assert four_branches.about[number].cells == len(piece.cells)
+        inner = piece.points[int(np.argmin(np.abs(delta - (low + high) / 2)))]
+        assert four_branches.number_of(inner) == number
+        assert sum(each.cells for each in strata if each.component == number) == len(piece.cells)
+
+
 def test_nothing_may_be_left(spring_set):
     spring = spring_set.structure
     with unchecked():

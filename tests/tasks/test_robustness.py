@@ -195,7 +195,11 @@ def test_least_snap_lands_on_the_other_side(spring_set):
     exact = np.hypot((x - 0.8) / scales[0], (1 - x ** (2 / 3)) ** 1.5 / scales[1]).min()
     assert found.status == "found"
     assert found.distance.in_parameters == pytest.approx(exact, rel=1e-4)
+    x = 0.8 + found.change["x_l"]
+    assert x > 0.8
+    assert found.change["F"] == pytest.approx(fold_load(x), rel=1e-6)
     assert found.landing.landed
+    assert found.landing.state["x_l"] == pytest.approx(x, rel=1e-12)
     assert found.landing.state.z[0] < 0.0
 
 
