@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
-from equimorph.equilibria.settle import settle
+from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
@@ -19,7 +19,10 @@ from equimorph.structures import Structure
 from equimorph.structures.quantities import descriptor_named
 
 TWICE = 2.0
-"""Ways to a corner that are gone beyond it."""
+"""Length of the path through a corner of the box, relative to that to the corner."""
+SAME_SHEET = 1e-3
+"""Distance in the structure's metric over which a given state is corrected at most: at a fold a
+longer correction leads to another sheet."""
 
 _WORST = re.compile(r"\s*worst\((.*) for (.*)\)\s*", re.DOTALL)
 _OFFSET = re.compile(r"\s*(\w+)\s*(?:±|\+-)\s*([\d.eE+-]+)\s*")
@@ -94,6 +97,12 @@ def corners_of(
     return tuple(found)
 
 
+def _stable_states(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
+    """States polished to round-off, and which of them are stable and on the sheet of the guess."""
+    near = settle(structure, z, p, guards=Guards(trust=np.full(len(z), SAME_SHEET)))
+    return near.z, np.asarray(near.found & (near.index == 0))
+
+
 def _corners(
     structure: Structure, offsets: Mapping[str, float]
 ) -> Float[np.ndarray, "corners parameters"]:
@@ -129,9 +138,8 @@ class _Ray:
 
     def _ended(self, z: Lanes, p: Parameters) -> tuple[Values, Lanes, Parameters]:
         share = np.full(len(z), -1.0)
-        near = settle(self.structure, z, p)
-        end, at = near.z, p.copy()
-        lanes = np.flatnonzero(near.found & (near.index == 0))
+        end, stable = _stable_states(self.structure, z, p)
+        at, lanes = p.copy(), np.flatnonzero(stable)
         if len(lanes):
             velocity = np.tile(TWICE * self.corner, (len(lanes), 1))
             line = ParameterLine(self.structure, p[lanes], velocity)
@@ -187,8 +195,8 @@ class _Corners:
 
     def _values(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes m"]:
         out = np.full((len(z), len(self.corners)), np.inf)
-        near = settle(self.structure, z, p)
-        here, lanes = near.z, np.flatnonzero(near.found & (near.index == 0))
+        here, stable = _stable_states(self.structure, z, p)
+        lanes = np.flatnonzero(stable)
         if len(lanes) == 0:
             return out
         out[lanes, 0] = self.descriptor.function(here[lanes], p[lanes])
@@ -253,11 +261,10 @@ class _Range:
     def worst(self, z: Lanes, p: Parameters) -> Values:
         """Worst relative excess over the range; see `held_over`."""
         out = np.full(len(z), -1.0)
-        near = settle(self.structure, z, p)
-        alive = near.found & (near.index == 0)
-        out[~alive] = 2.0
-        lanes = np.flatnonzero(alive)
-        here, p = near.z[lanes], p[lanes]
+        near, stable = _stable_states(self.structure, z, p)
+        out[~stable] = 2.0
+        lanes = np.flatnonzero(stable)
+        here, p = near[lanes], p[lanes]
         excesses: list[Values] = []
         for number, value in enumerate(self.values):
             here, p, arrived = self._moved(here, p, value)

@@ -94,6 +94,44 @@ def test_no_setting_is_better_over_the_whole_box(spring_at_load, sense):
     assert worst(inside) == pytest.approx(sign * found.guaranteed, abs=1e-5)
 
 
+@pytest.fixture(scope="module")
+def spring_over_both():
+    """Its vertices at x_l = 0.9006, on the fold, are close to the other stable sheet."""
+    with unchecked():
+        box = em.Box(x_l=(0.5, 1.2), F=(-0.3, 0.3))
+        return em.equilibrium_set(em.Spring(), box, intervals=(21, 21), checks=0)
+
+
+def test_a_fold_has_no_guarantee_from_the_other_sheet(spring_over_both):
+    """Brute force over all stable states with δ ≥ 0.1, with errors of F of ±0.005."""
+    offset = 0.005
+    found = ask(spring_over_both, spring_over_both.structure.angle, {"F": offset})
+    assert (found.state.index, found.edge) == (0, {})
+    best = np.inf
+    for x in np.linspace(0.5, 1.2, 71):
+        fold = np.arccos(np.cbrt(min(x, 1.0)))
+        delta = np.linspace(max(fold, 0.1), 1.5, 201)
+        force = (1.0 - x / np.cos(delta)) * np.sin(delta)
+        most = (1.0 - min(x, 1.0) ** (2 / 3)) ** 1.5
+        kept = (np.abs(force) <= 0.3) & ((force + offset < most) | (x > 1.0))
+        worst = [
+            brentq(lambda d, x=x, f=f: (1.0 - x / np.cos(d)) * np.sin(d) - f + offset, fold, 1.55)
+            for f in force[kept]
+        ]
+        best = min([best, *worst])
+    # δ = 0.1 at x_l = 1.2 is on both grids
+    assert found.guaranteed == pytest.approx(best, abs=1e-9)
+
+
+def test_worst_cases_at_folds_are_not_those_of_another_sheet():
+    """F/k = sin³δ at cos³δ = x_l: with errors of F either way stability is lost."""
+    spring, x = em.Spring(), np.linspace(0.5, 0.99, 400)
+    delta = np.arccos(np.cbrt(x))
+    p = np.stack([x, np.sin(delta) ** 3, np.ones_like(x)], axis=1)
+    worst = em.worst_over(spring, spring.angle, {"F": 0.005})
+    assert (worst.function(delta[:, None], p) == np.inf).all()
+
+
 def test_what_cannot_be_kept_stable_is_refused(spring_at_load):
     """With F off by 0.5 no δ > 0.1 stays stable."""
     found = ask(spring_at_load, spring_at_load.structure.angle, {"F": 0.5})
