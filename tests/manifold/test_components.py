@@ -126,7 +126,7 @@ def test_pieces_over_one_and_three_parameters(box, fixed, intervals, number):
 
 @pytest.fixture(scope="module")
 def four_branches():
-    """Stable states of the spring at x_l = 0.7 over F, without δ in (0.85, 0.95), (−0.85, −0.75)."""
+    """Stable states of the spring at x_l = 0.7, without δ in (0.85, 0.95), (−0.85, −0.75)."""
     with unchecked():
         eset = equilibrium_set(
             Spring(), Box(F=(-0.4, 0.2)), fixed={"x_l": 0.7}, intervals=(40,), checks=0
