@@ -116,6 +116,104 @@ def test_one_half_law_of_the_normal_form():
     assert law.coefficient == pytest.approx(-2.0, rel=1e-5)
 
 
+def imperfect_cubic(order: int, factor: float) -> Polynomial:
+    """−x³ + c x⁴ − a x = b^order: the normal form of a symmetric branch point, with the next order.
+
+    On its folds a = −3x² + 4c x³ and b^order = 2x³ − 3c x⁴: c changes the fall of a by c·b.
+    """
+    return Polynomial(
+        lambda x, a, b: (
+            x**4 * -0.25 + x**5 * (0.2 * factor) + a * x**2 * -0.5 + x * b**order * -1.0
+        ),
+        1,
+        ("a", "b"),
+    )
+
+
+def imperfect_parabola(order: int, factor: float) -> Polynomial:
+    """x² + c x³ − a x = b^order: the normal form of an asymmetric branch point, and more."""
+    return Polynomial(
+        lambda x, a, b: (
+            x**3 * (1 / 3) + x**4 * (0.25 * factor) + a * x**2 * -0.5 + x * b**order * -1.0
+        ),
+        1,
+        ("a", "b"),
+    )
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0, 10.0, 40.0])
+def test_higher_orders_do_not_enter_the_two_thirds_law(factor):
+    """Folds of −x³ + c x⁴ − a x = b: a → −3 (b/2)^⅔ as b → 0, whatever c; c = 40 is strong."""
+    law = imperfection_law(imperfect_cubic(1, factor).state(0.0, a=-1.0), "a", "b")
+    assert law.law.startswith("two-thirds")
+    assert law.exponent == pytest.approx(2 / 3, abs=1e-3)
+    assert law.coefficient == pytest.approx(-3 / 2 ** (2 / 3), rel=1e-4)
+
+
+@pytest.mark.parametrize("factor", [1.0, 10.0, 50.0])
+def test_higher_orders_do_not_enter_the_one_half_law(factor):
+    """Folds of x² + c x³ − a x = b: a → −2 (−b)^½; at c = 10, 50 large b have no fold at all."""
+    law = imperfection_law(imperfect_parabola(1, factor).state(0.0, a=-1.0), "a", "b")
+    assert law.law.startswith("one-half")
+    assert law.exponent == pytest.approx(0.5, abs=1e-3)
+    assert law.coefficient == pytest.approx(-2.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("structure", "name", "power", "coefficient"),
+    [
+        (imperfect_cubic(2, 0.5), "four-thirds", 4 / 3, -3 / 2 ** (2 / 3)),
+        (
+            Polynomial(lambda x, a, b: x**3 * (1 / 3) + a * x**2 * -0.5 + x * b**2, 1, ("a", "b")),
+            "|ε|: an asymmetric",
+            1.0,
+            -2.0,
+        ),
+    ],
+)
+def test_imperfections_of_the_second_order_have_twice_the_exponent(
+    structure, name, power, coefficient
+):
+    """b² instead of b: a → −3 (b²/2)^⅔ and −2 |b|; the smallest are not told from the perfect."""
+    law = imperfection_law(structure.state(0.0, a=-1.0), "a", "b")
+    assert law.law.startswith(name)
+    assert law.power == power
+    assert law.exponent == pytest.approx(power, abs=1e-3)
+    assert law.coefficient == pytest.approx(coefficient, rel=1e-3)
+
+
+def test_a_fold_may_fall_with_the_square_of_an_imperfection():
+    """x² + a = 1 − b² folds at a = 1 − b²; without b nothing is fitted."""
+    found = [
+        imperfection_law(
+            Polynomial(
+                lambda x, a, b, f=factor: x**3 * (1 / 3) + a * x + x * -1.0 + b**2 * x * f,
+                1,
+                ("a", "b"),
+            ).state(1.0, a=0.0),
+            "a",
+            "b",
+        )
+        for factor in (1.0, 0.0)
+    ]
+    assert found[0].law.startswith("quadratic")
+    assert found[0].coefficient == pytest.approx(-1.0, rel=1e-6)
+    assert found[1].status == "refused"
+    assert "do not change the limit load" in found[1].why
+
+
+@pytest.mark.parametrize("least", [1e-8, 1e-9, 1e-10, 1e-11])
+def test_an_imperfect_path_is_not_taken_for_the_perfect_one(least):
+    """−x³ − a x = b with tiny b: right, or refused; −3 (b/2)^⅔ is never zero."""
+    start = pitchfork_form(-1.0).state(0.0, a=-1.0)
+    law = imperfection_law(start, "a", "b", sizes=[30 * least, 10 * least, 3 * least, least])
+    if least < 1e-9:
+        assert law.status == "refused"
+        assert "can be told" in law.why
+    else:
+        assert law.coefficient == pytest.approx(-3 / 2 ** (2 / 3), rel=1e-6)
+
+
 def test_smooth_law_where_the_limit_is_a_fold():
     law = imperfection_law(Spring().natural_state(x_l=0.8), "F", "x_l")
     assert law.law == "smooth"

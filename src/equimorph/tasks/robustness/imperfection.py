@@ -1,27 +1,75 @@
 """How a limit load falls with an imperfection: smoothly or with a fractional power."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.equilibria import lift, limit_load
+from equimorph.equilibria import LimitLoad, lift, limit_load
 from equimorph.errors import InputError
 from equimorph.model import Constraint, position
 from equimorph.structures import State
 
+Sizes = Float[np.ndarray, " tried"]
+Falls = Float[np.ndarray, "2 tried"]
+
 SIZES = (1e-3, 3e-4, 1e-4, 3e-5)
-"""Imperfections that are tried, in scales of the parameter, both signs."""
-LAWS = {
-    1.0: "smooth",
-    0.5: "one-half power: an asymmetric branch point",
-    2.0 / 3.0: "two-thirds power: a symmetric branch point",
-}
-"""Laws [Koiter1945]_ by their exponents."""
+"""Imperfections that are tried first, in scales of the parameter, both signs."""
+FINER, MOST_SIZES = 10.0**-0.5, 10
+"""Ratio of further, smaller sizes, and how many are tried until two fits agree."""
+RESOLVED = 1e-9
+"""Change of the limit load that is told from round-off, relative to the load or to its scale."""
+UNFOLDED = 100.0
+"""Residual at a branch point, relative to that of the perfect one, which is a fold overlooked."""
+FITTED = 5
+"""Smallest sizes through which a law is fitted: the larger ones only add higher orders."""
+LIMITS = ("fold", "branch point", "constraint")
+"""Ends of paths that are limit loads."""
+ROUND_OFF = 1e-15
+"""Residual that any state may have, in the structure's scale of forces."""
 WITHIN = 0.03
 """By how much a fitted exponent may miss that of a law."""
+SETTLED = 1e-3
+"""Disagreement of fits with and without the largest size, above which smaller ones are tried."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """How the change of a limit load begins [Koiter1945]_.
+
+    The change is a power series in ``x = sign(ε)·|ε|^(1/root)`` that begins with ``|ε|^power``.
+
+    Parameters
+    ----------
+    name
+        In words.
+    power
+        Exponent of |ε|.
+    root
+        Root of the imperfection in whose powers the series proceeds.
+    both_signs
+        Whether the load changes in the same way for both signs of ε, in the leading order; None if
+        only one sign limits the load, or has to.
+    """
+
+    name: str
+    power: float
+    root: int
+    both_signs: bool | None
+
+
+LAWS = (
+    Law("smooth", 1.0, 1, False),
+    Law("one-half power: an asymmetric branch point", 0.5, 2, None),
+    Law("two-thirds power: a symmetric branch point", 2.0 / 3.0, 3, True),
+    Law("quadratic: smooth, without a first order", 2.0, 1, True),
+    Law("|ε|: an asymmetric point, imperfect in the second order", 1.0, 1, None),
+    Law("four-thirds power: a symmetric point, imperfect in the second order", 4.0 / 3.0, 3, True),
+)
+"""Known laws; of those with one exponent the first that fits is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +81,10 @@ class ImperfectionLaw:
     status
         "fitted", or "refused" with the reason in `why`.
     law
-        Name of the law [Koiter1945]_: smooth, one-half or two-thirds power; "unknown".
+        Name of the law [Koiter1945]_, see `LAWS`: smooth, one-half or two-thirds power at branch
+        points; their squares where the imperfection only counts in the second order; "unknown".
     exponent
-        As fitted.
+        As fitted, with the next orders removed.
     coefficient
         With the exponent of the law.
     perfect
@@ -56,7 +105,7 @@ class ImperfectionLaw:
     @property
     def power(self) -> float:
         """Exponent to which the coefficient belongs: of the law, or as fitted if unknown."""
-        return next((power for power, name in LAWS.items() if name == self.law), self.exponent)
+        return next((law.power for law in LAWS if law.name == self.law), self.exponent)
 
     def __repr__(self) -> str:
         """Name and formula."""
@@ -76,9 +125,12 @@ def imperfection_law(
 ) -> ImperfectionLaw:
     """Fit the law by which an imperfection lowers a limit load.
 
-    The start is lifted to each imperfection, and its limit load found. The exponent is that of the
-    two smallest ones with the next order removed; the coefficient is extrapolated to zero with the
-    exponent of the law.
+    The start is lifted to each imperfection, and its limit load found. With each known law, the
+    exponent and the coefficient are extrapolated to zero: interpolation by a power series in the
+    root of the imperfection that belongs to the law, through the smallest sizes. Where both signs
+    limit the load, their mean or difference leaves out every other order. Smaller sizes are added
+    until fits with and without the largest one agree; those whose change is lost in round-off, or
+    whose path is not told from the perfect one, do not count.
 
     Parameters
     ----------
@@ -91,11 +143,13 @@ def imperfection_law(
     within
         Constraints that end the paths.
     sizes
-        Imperfections in scales of the parameter, three or more, in descending order.
+        Imperfections in scales of the parameter that are tried first, three or more, in descending
+        order.
 
     Returns
     -------
-    The fitted law; or that no limit load was found at an imperfection.
+    The fitted law; or the reason why there is none: no limit load at imperfections, or no change of
+    it beyond round-off.
 
     Raises
     ------
@@ -110,55 +164,171 @@ def imperfection_law(
         raise InputError(f"`imperfection` must not be the load; got {load!r}.")
     if len(tried) < 3 or not (tried > 0.0).all() or not (np.diff(tried) < 0.0).all():
         raise InputError(f"`sizes` must be three or more numbers > 0 that fall; got {sizes!r}.")
-    perfect = limit_load(start, load, within=within)
-    signed = np.concatenate([tried, -tried])
-    loads = np.array([_limit(start, load, place, size, within) for size in signed])
-    falls = (loads - perfect.value).reshape(2, -1)
-    limited = np.isfinite(falls).all(axis=1)
-    if not limited.any():
-        why, nan = "no limit load was found at an imperfection, of either sign", float("nan")
-        return ImperfectionLaw("refused", why, "unknown", nan, nan, perfect.value, signed, loads)
-    # an asymmetric branch point limits the load for one sign only
-    falls = falls[limited]
-    falls = falls[int(np.argmin(falls[:, -1]))]
-    exponent = _exponent(tried, falls)
-    law = min(LAWS, key=lambda known: abs(known - exponent))
-    if abs(law - exponent) > WITHIN:
-        coefficient = float(falls[-1] / tried[-1] ** exponent)
-        return ImperfectionLaw(
-            "fitted", "", "unknown", exponent, coefficient / _unit(start, place, exponent),
-            perfect.value, signed, loads,
-        )  # fmt: skip
-    coefficient = _extrapolated(tried, falls, law) / _unit(start, place, law)
+    trials = _Trials(start, load, place, tuple(within))
+    loads = trials.loads(tried)
+    while (fit := _best_fit(tried, trials.falls(loads))).error > SETTLED:
+        if len(tried) >= MOST_SIZES or trials.lost_in_round_off(loads[:, -1]):
+            break
+        finer = FINER * tried[-1:]
+        tried, loads = np.append(tried, finer), np.append(loads, trials.loads(finer), axis=1)
+    why = "" if np.isfinite(fit.exponent) else trials.why(loads)
     return ImperfectionLaw(
-        "fitted", "", LAWS[law], exponent, coefficient, perfect.value, signed, loads
+        "refused" if why else "fitted",
+        why,
+        fit.name,
+        fit.exponent,
+        fit.coefficient / parameters[place].scale ** fit.power,
+        trials.perfect.value,
+        np.concatenate([tried, -tried]),
+        loads.ravel(),
     )
 
 
-def _unit(start: State, place: int, exponent: float) -> float:
-    return float(start.structure.scales[place] ** exponent)
+@dataclass(frozen=True)
+class _Trials:
+    """Limit loads of the structure with imperfections."""
+
+    start: State
+    load: str
+    place: int
+    within: tuple[Constraint, ...]
+
+    @cached_property
+    def perfect(self) -> LimitLoad:
+        """Limit load without imperfection."""
+        found = limit_load(self.start, self.load, within=self.within)
+        return found if found.kind in LIMITS else replace(found, value=float("nan"))
+
+    @cached_property
+    def noise(self) -> float:
+        """Change of the limit load that is told from round-off."""
+        parameters = self.start.structure.parameters
+        scale = parameters[position(parameters, self.load)].scale
+        return float(RESOLVED * max(abs(self.perfect.value), scale))
+
+    def falls(self, loads: Falls) -> Falls:
+        """Changes of the limit load; not a number where none is found, or told from round-off."""
+        falls = loads - self.perfect.value
+        return np.where(np.abs(falls) > self.noise, falls, np.nan)
+
+    def lost_in_round_off(self, loads: Float[np.ndarray, " tried"]) -> bool:
+        """Whether there are limit loads, none of which is told from that without imperfection."""
+        falls = np.abs(loads - self.perfect.value)
+        return bool(np.isfinite(falls).any() and not (falls > self.noise).any())
+
+    def why(self, loads: Falls) -> str:
+        """Why no law was fitted."""
+        if self.perfect.kind not in LIMITS:
+            return f"no limit load without the imperfection: {self.perfect.kind}"
+        if (np.isfinite(loads).sum(axis=1) < 3).all():
+            return "fewer than three imperfections of one sign have a limit load that can be told"
+        return "imperfections of these sizes do not change the limit load beyond round-off"
+
+    def loads(self, sizes: Sizes) -> Float[np.ndarray, "2 tried"]:
+        """Limit loads for both signs, positive ones first; not a number where there is none."""
+        return np.array([[self._load(sign * size) for size in sizes] for sign in (1.0, -1.0)])
+
+    def _load(self, size: float) -> float:
+        parameter = self.start.structure.parameters[self.place]
+        imperfect = float(self.start.p[self.place] + size * parameter.scale)
+        path = lift(self.start, {parameter.name: imperfect})
+        if not path.arrived:
+            return float("nan")
+        found = limit_load(path.end.state, self.load, within=self.within)
+        limited = found.kind in LIMITS and not self._overlooked(found)
+        return found.value if limited else float("nan")
+
+    def _overlooked(self, found: LimitLoad) -> bool:
+        """Whether a fold beside the perfect branch point was taken for a branch point.
+
+        Imperfections near round-off unfold it by less than a path can tell; what they leave at the
+        point, which is none of their equilibria, is a residual.
+        """
+        if not found.kind == self.perfect.kind == "branch point":
+            return False
+        return _residual(found.state) > UNFOLDED * max(_residual(self.perfect.state), ROUND_OFF)
 
 
-def _limit(start: State, load: str, place: int, size: float, within: Sequence[Constraint]) -> float:
-    """Limit load with an imperfection; not a number where there is none."""
-    parameter = start.structure.parameters[place]
-    path = lift(start, {parameter.name: float(start.p[place] + size * parameter.scale)})
-    if not path.arrived:
-        return float("nan")
-    found = limit_load(path.end.state, load, within=within)
-    return found.value if found.kind in ("fold", "branch point", "constraint") else float("nan")
+def _residual(state: State) -> float:
+    return float(np.abs(state.structure.residual(state.z[None], state.p[None])).max())
 
 
-def _exponent(sizes: Float[np.ndarray, " n"], falls: Float[np.ndarray, " n"]) -> float:
-    """Slope in logarithms, extrapolated along the sizes to a power of its own."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = np.diff(np.log(np.abs(falls))) / np.diff(np.log(sizes))
-    return float(slopes[-1])
+@dataclass(frozen=True)
+class _Fit:
+    """A law through the falls of a limit load, and by how much two of its fits disagree."""
+
+    name: str
+    power: float
+    exponent: float
+    coefficient: float
+    error: float
 
 
-def _extrapolated(
-    sizes: Float[np.ndarray, " n"], falls: Float[np.ndarray, " n"], exponent: float
+def _best_fit(sizes: Sizes, falls: Falls) -> _Fit:
+    """Fit of the law whose exponent is the nearest; not numbers where too few falls are known."""
+    enough = np.flatnonzero(np.isfinite(falls).sum(axis=1) > 2)
+    if len(enough) == 0:
+        nan = float("nan")
+        return _Fit("unknown", nan, nan, nan, np.inf)
+    # an asymmetric branch point limits the load for one sign only
+    worse = int(min(enough, key=lambda side: falls[side][np.isfinite(falls[side])][-1]))
+    fits = [_Part.of(law, falls, worse).fit(law, sizes) for law in LAWS]
+    known = [fit for fit in fits if abs(fit.exponent - fit.power) < WITHIN]
+    if known:
+        return min(known, key=lambda fit: abs(fit.exponent - fit.power))
+    last = np.flatnonzero(np.isfinite(falls[worse]))[-2:]
+    slope = _exponent(sizes[last], falls[worse, last], 1.0)
+    coefficient = float(falls[worse, last[-1]] / sizes[last[-1]] ** slope)
+    return _Fit("unknown", slope, slope, coefficient, np.inf)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What a law describes of the falls, and the power of |ε| by which its orders grow."""
+
+    falls: Float[np.ndarray, " tried"]
+    step: float
+
+    @classmethod
+    def of(cls, law: Law, falls: Falls, worse: int) -> "_Part":
+        """The part even or odd in ε, which has every other order only, or one side.
+
+        Where both signs limit the load, the larger part says which laws can hold; for others, no
+        falls are left.
+        """
+        mean, half = falls.mean(axis=0), 0.5 * (falls[worse] - falls[1 - worse])
+        both = np.flatnonzero(np.isfinite(mean))
+        if len(both) < 3 or law.both_signs is None:
+            return cls(falls[worse], 1.0 / law.root)
+        even = bool(abs(mean[both[-1]]) > abs(half[both[-1]]))
+        part = mean if even else half
+        return cls(part if even == law.both_signs else np.full(len(part), np.nan), 2.0 / law.root)
+
+    def fit(self, law: Law, sizes: Sizes) -> _Fit:
+        """Exponent and coefficient at zero; not numbers where the falls cannot be of this law."""
+        some = np.flatnonzero(np.isfinite(self.falls))[-FITTED:]
+        falls, nan = self.falls[some], float("nan")
+        if len(some) < 3 or np.ptp(np.sign(falls)) > 0.0:
+            return _Fit(law.name, law.power, nan, nan, np.inf)
+        exponents = [_exponent(sizes[k], self.falls[k], self.step) for k in (some, some[1:])]
+        coefficients = [
+            _coefficient(sizes[k], self.falls[k], law.power, self.step) for k in (some, some[1:])
+        ]
+        error = max(abs(np.diff(exponents)[0]), abs(1.0 - coefficients[1] / coefficients[0]))
+        return _Fit(law.name, law.power, exponents[0], coefficients[0], float(error))
+
+
+def _exponent(sizes: Sizes, falls: Float[np.ndarray, " tried"], step: float) -> float:
+    """``log|fall| = log|c| + exponent·log|ε| + b₁ x + b₂ x² + …`` with ``x = |ε|^step``."""
+    relative = sizes / sizes[0]
+    orders = [relative ** (step * k) for k in range(1, len(sizes) - 1)]
+    columns = np.stack([np.ones(len(sizes)), np.log(relative), *orders], axis=1)
+    return float(np.linalg.solve(columns, np.log(np.abs(falls)))[1])
+
+
+def _coefficient(
+    sizes: Sizes, falls: Float[np.ndarray, " tried"], power: float, step: float
 ) -> float:
-    """Coefficient at zero: polynomial in ε^exponent through all of them."""
-    x = sizes**exponent
-    return float(np.polynomial.polynomial.polyfit(x, falls / x, len(x) - 1)[0])
+    """Coefficient at zero: ``fall/|ε|^power`` by a polynomial in ``|ε|^step`` through all."""
+    x = (sizes / sizes[0]) ** step
+    return float(np.polynomial.polynomial.polyfit(x, falls / sizes**power, len(x) - 1)[0])
