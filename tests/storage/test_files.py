@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from equimorph.errors import InputError
-from equimorph.storage.files import fingerprint, locked, replacing, write_text
+from equimorph.storage.files import fingerprint, lock_file, replacing, write_text
 
 
 def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path: Path):
@@ -34,11 +34,11 @@ def test_a_missing_folder_is_an_input_error(tmp_path: Path):
 
 def test_a_place_in_use_is_refused_with_its_user(tmp_path: Path):
     path = tmp_path / "lock"
-    with locked(path, "results"), pytest.raises(InputError) as found, locked(path, "results"):
+    with lock_file(path, "results"), pytest.raises(InputError) as found, lock_file(path, "results"):
         pass
     assert str(found.value).startswith("`results` must not be in use by another run; got one that")
     assert f"process {os.getpid()} on " in str(found.value)
-    with locked(path, "results"):
+    with lock_file(path, "results"):
         pass
 
 

@@ -9,7 +9,7 @@ import pytest
 import equimorph as em
 from equimorph.storage.owner import Owner
 from equimorph.storage.values import read_value, write_value
-from equimorph.structures.quantities import descriptor_named
+from equimorph.structures.quantities import find_descriptor
 
 
 @pytest.fixture(scope="module")
@@ -113,8 +113,8 @@ def test_functions_are_refused_by_the_place_they_stand_at(tmp_path):
     ],
 )
 def test_descriptors_by_name(spring, text):
-    found = descriptor_named(spring, text)
-    assert descriptor_named(spring, found.name) == found
+    found = find_descriptor(spring, text)
+    assert find_descriptor(spring, found.name) == found
 
 
 @pytest.mark.parametrize(
@@ -132,4 +132,4 @@ def test_descriptors_by_name(spring, text):
 )
 def test_names_that_mean_nothing(spring, text, problem):
     with pytest.raises(em.InputError, match=problem):
-        descriptor_named(spring, text)
+        find_descriptor(spring, text)

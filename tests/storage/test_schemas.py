@@ -169,7 +169,7 @@ def test_every_record_is_as_its_version_says():
 def test_a_class_may_change_its_name(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(schemas, "CHANGES", {"StateEstimate": Change(schema="Estimate")})
     schemas.schemas.cache_clear()
-    assert schemas.schema_named("Estimate").kind is StateEstimate
+    assert schemas.find_schema("Estimate").kind is StateEstimate
     monkeypatch.undo()
     schemas.schemas.cache_clear()
-    assert replace(schemas.schema_named("StateEstimate").change, version=1).version == 1
+    assert replace(schemas.find_schema("StateEstimate").change, version=1).version == 1

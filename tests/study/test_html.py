@@ -34,7 +34,7 @@ class Seen(HTMLParser):
 
 
 def test_titles_and_refusals_show_as_they_were_written():
-    seen = Seen(html.page(NAME, [html.refused(NAME)]))
+    seen = Seen(html.page(NAME, [html.refusal_line(NAME)]))
     assert seen.texts["title"] == NAME
     assert seen.texts["p"] == f"Refused. {NAME}"
     assert "b" not in [tag for tag, _ in seen.elements]

@@ -20,7 +20,7 @@ from equimorph.charts.domain import (
     single_valued,
 )
 from equimorph.charts.location import Cells, EdgeKind, Found
-from equimorph.charts.preparation import cut_along_crossings, flip_overturned
+from equimorph.charts.preparation import cut_along_crossings, flip_inverted_triangles
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.geometry.setting import embed
@@ -151,7 +151,7 @@ class Chart(ABC):
         InputError
             For other numbers of coordinates or values that are not finite.
         """
-        points = self._checked(coords)
+        points = self._check_width(coords)
         found = self._found(points)
         count = np.bincount(found.point, minlength=len(points))
         code = np.full(len(points), PointStatus.GAP)
@@ -200,7 +200,7 @@ class Chart(ABC):
         """All states of the chart's cells over points."""
         return self.cells.find(points)
 
-    def _checked(self, coords: Points) -> Points:
+    def _check_width(self, coords: Points) -> Points:
         points = np.asarray(coords, dtype=float)
         if points.ndim != 2 or points.shape[1] != len(self.names):
             raise InputError(
@@ -315,7 +315,7 @@ class DescriptorChart(Chart):
         flipped, sheet = eset.cells.copy(), sheet_labels(plain)
         for label in range(sheet.max() + 1):
             own = sheet == label
-            flipped[own] = flip_overturned(flipped[own], plain.values, fixed)
+            flipped[own] = flip_inverted_triangles(flipped[own], plain.values, fixed)
         return Cells(replace(eset, cells=flipped), self.coordinates, numbers)
 
     @cached_property

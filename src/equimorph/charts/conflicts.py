@@ -47,7 +47,7 @@ def conflicts_of(cells: Cells) -> Conflicts:
     links = cells.whole.links[inside[cells.whole.links].all(axis=1)]
     group = labels(count, links)
     group = _split(cells, group, pairs, links)
-    return Conflicts(np.where(inside, _coloured(group, pairs)[group], -1))
+    return Conflicts(np.where(inside, _colour_groups(group, pairs)[group], -1))
 
 
 def overlapping(cells: Cells) -> Int[np.ndarray, "n 2"]:
@@ -133,7 +133,7 @@ def _split(
         group = np.where((group == which) & (ends[1] < ends[0]), group.max() + 1, group)
 
 
-def _coloured(group: Int[np.ndarray, " own"], pairs: Int[np.ndarray, "n 2"]) -> np.ndarray:
+def _colour_groups(group: Int[np.ndarray, " own"], pairs: Int[np.ndarray, "n 2"]) -> np.ndarray:
     """Colour of each group: the least that no group over or under it has, the largest first."""
     edges = np.unique(np.sort(group[pairs], axis=1), axis=0)
     size = np.bincount(group)

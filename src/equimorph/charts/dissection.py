@@ -12,7 +12,11 @@ from equimorph.charts.conflicts import conflicts_of, least_cut
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells
 from equimorph.charts.paths import Walker, Way, straightest_path
-from equimorph.charts.preparation import add_cusp_vertices, cut_along_crossings, flip_overturned
+from equimorph.charts.preparation import (
+    add_cusp_vertices,
+    cut_along_crossings,
+    flip_inverted_triangles,
+)
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of, squared_sides
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
@@ -56,12 +60,12 @@ def dissect(eset: EquilibriumSet) -> Atlas:
     eset = cut_along_crossings(eset)
     work = _Work.of(eset)
     if len(eset.names) > 1:
-        work = work.cusped()
+        work = work.insert_cusps()
         open_ = list(range(len(eset.strata)))
         for _ in range(MOST):
             if not open_:
                 break
-            work, more = work.parted(open_.pop(0))
+            work, more = work.cut_chart(open_.pop(0))
             open_ += more
     index = np.array([stratum.index for stratum in eset.strata])
     fabric = replace(work.fabric, cell_index=index[work.origin[work.fabric.cell_index]])
@@ -127,7 +131,7 @@ class _Work:
     def _coordinates(self) -> Coordinates:
         return coordinates_of(self.eset, self.eset.names)
 
-    def parted(self, chart: int) -> tuple["_Work", list[int]]:
+    def cut_chart(self, chart: int) -> tuple["_Work", list[int]]:
         """The same with a chart cut once, and the charts to look at again."""
         cells, own = self.cells(chart)
         colour = conflicts_of(cells).colour
@@ -140,30 +144,30 @@ class _Work:
         number = len(self.origin)
         label = self.fabric.cell_index.copy()
         label[own[side]] = number
-        return self._labelled(label, chart), [chart, number]
+        return self._relabel(label, chart), [chart, number]
 
-    def _labelled(self, label: Int[np.ndarray, " C"], chart: int) -> "_Work":
+    def _relabel(self, label: Int[np.ndarray, " C"], chart: int) -> "_Work":
         more = int(label.max()) + 1 - len(self.origin)
         origin = np.concatenate([self.origin, np.full(max(more, 0), self.origin[chart])])
         return replace(self, fabric=replace(self.fabric, cell_index=label), origin=origin)
 
-    def cusped(self) -> "_Work":
+    def insert_cusps(self) -> "_Work":
         """The same with vertices at the cusps, where sheets part that a cut has to part."""
         if self.fabric.dimension != 2:
             return self
         fabric, cusps = add_cusp_vertices(self.fabric)
         if len(cusps) == 0:
             return self
-        return replace(self, fabric=fabric, cusps=tuple(cusps.tolist()))._untangled()
+        return replace(self, fabric=fabric, cusps=tuple(cusps.tolist()))._untangle()
 
-    def _untangled(self) -> "_Work":
+    def _untangle(self) -> "_Work":
         """The same with fewer triangles that chords of curved folds have turned over."""
         fabric = self.fabric
         places = fabric.vertices.p[:, fabric.setting.free]
         corners = fabric.cells.copy()
         for chart in range(len(self.origin)):
             own = np.flatnonzero(fabric.cell_index == chart)
-            corners[own] = flip_overturned(corners[own], places, fabric.facets)
+            corners[own] = flip_inverted_triangles(corners[own], places, fabric.facets)
         squared = squared_sides(fabric.vertices.place, corners)
         return replace(self, fabric=replace(fabric, cells=corners, squared=squared))
 
@@ -182,9 +186,9 @@ class _Work:
         free = Walker(cells.corners, places, np.ones_like(alone))
         ways = []
         for path in _paths(cells, side):
-            drawn = _snapped(clear, free, cells, path, self.cusps)
+            drawn = _snap_to_cusps(clear, free, cells, path, self.cusps)
             ways.append(straightest_path(clear, free, drawn))
-        cut = _crossed(self.fabric, ways)
+        cut = _insert_crossings(self.fabric, ways)
         if cut is None:
             return None
         fabric, facets = cut
@@ -198,7 +202,7 @@ class _Work:
         label = fabric.cell_index.copy()
         numbers = np.concatenate([[chart], len(self.origin) + np.arange(piece.max())])
         label[own] = numbers[piece]
-        return work._labelled(label, chart), numbers.tolist()
+        return work._relabel(label, chart), numbers.tolist()
 
 
 def _paths(cells: Cells, side: Bool[np.ndarray, " own"]) -> list[list[int]]:
@@ -208,7 +212,7 @@ def _paths(cells: Cells, side: Bool[np.ndarray, " own"]) -> list[list[int]]:
     return [chain.tolist() for chain in chains(whole.facets[whole.across[side[a] != side[b]]])]
 
 
-def _snapped(
+def _snap_to_cusps(
     clear: Walker, free: Walker, cells: Cells, path: list[int], cusps: tuple[int, ...]
 ) -> list[int]:
     """The path, with its ends moved to cusps next to them."""
@@ -240,7 +244,9 @@ def _begun(
     return path
 
 
-def _crossed(fabric: Fabric, ways: list[Way]) -> tuple[Fabric, Int[np.ndarray, "n 2"]] | None:
+def _insert_crossings(
+    fabric: Fabric, ways: list[Way]
+) -> tuple[Fabric, Int[np.ndarray, "n 2"]] | None:
     """The fabric with exact vertices where straight ways cross edges, and the edges along them."""
     crossings: dict[tuple[int, int], float] = {}
     for a, b, share in (step for way in ways for step in way if not isinstance(step, int)):

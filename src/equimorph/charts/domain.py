@@ -230,16 +230,16 @@ def single_domain(cells: Cells) -> Domain:
     """Coordinates that exactly one state has."""
     names = cells.coordinates.names
     if len(names) != 2:
-        return _of_cells(cells, ~_covered(cells))
+        return _of_cells(cells, ~_overlapping(cells))
     edges, jump = outline(cells.values, cells.corners)
     regions = regions_within(cells.values, edges, jump)
-    return _bounded(cells, regions.loops(lambda n: n == 1), edges)
+    return _domain_inside(cells, regions.loops(lambda n: n == 1), edges)
 
 
 def single_valued(cells: Cells) -> bool:
     """Whether no coordinates have more than one state, as far as the cells can tell."""
     if len(cells.coordinates.names) != 2:
-        return not _covered(cells).any()
+        return not _overlapping(cells).any()
     regions = regions_within(cells.values, *outline(cells.values, cells.corners))
     return not without_slivers(regions.loops(lambda n: n > 1), typical_extent(cells))
 
@@ -254,14 +254,14 @@ def overlaps(cells: Cells) -> tuple[Overlap, ...]:
     known = [regions_within(cells.values, *each) for each in drawn]
     found = []
     for k, regions in enumerate(known):
-        domain = _bounded(cells, regions.loops(lambda n: n > 1), drawn[k][0])
+        domain = _domain_inside(cells, regions.loops(lambda n: n > 1), drawn[k][0])
         found.append(Overlap("self-overlap", (k,), domain))
     a, b = label[cells.whole.links].T
     joined = set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))
     for i, j in combinations(range(len(own)), 2):
         loops = _common(known[i], known[j])
         kind = "fold" if (i, j) in joined else "sheets"
-        domain = _bounded(cells, loops, np.concatenate([drawn[i][0], drawn[j][0]]))
+        domain = _domain_inside(cells, loops, np.concatenate([drawn[i][0], drawn[j][0]]))
         found.append(Overlap(kind, (i, j), domain))
     return tuple(each for each in found if each.domain.loops)
 
@@ -287,7 +287,7 @@ def _common(first: Regions, second: Regions) -> tuple[Loop, ...]:
     )
 
 
-def _bounded(cells: Cells, loops: tuple[Loop, ...], drawn: Int[np.ndarray, "_ 2"]) -> Domain:
+def _domain_inside(cells: Cells, loops: tuple[Loop, ...], drawn: Int[np.ndarray, "_ 2"]) -> Domain:
     """Domain inside loops, whose edges lie on those of the cells' outlines."""
     kept = without_slivers(loops, typical_extent(cells))
     facets, kinds = facet_kinds(cells)
@@ -308,7 +308,7 @@ def typical_extent(cells: Cells) -> Float[np.ndarray, " d"]:
     return np.asarray(np.maximum(np.median(extent, axis=0), 1e-300))
 
 
-def _covered(cells: Cells) -> Bool[np.ndarray, " own"]:
+def _overlapping(cells: Cells) -> Bool[np.ndarray, " own"]:
     """Cells whose middles lie in other cells, too."""
     corners = cells.values[cells.corners]
     hits = CellIndex.of(corners, np.zeros(len(corners))).near(corners.mean(axis=1))

@@ -166,7 +166,7 @@ class Cells:
     def _some(self, points: Points, first: int) -> tuple[np.ndarray, ...]:
         hits = self._index.near(points)
         hits = hits.take(hits.inside | self._edge[hits.cell])
-        z, p, good = self._polished(self._guess(hits), hits, points[hits.point])
+        z, p, good = self._polish(self._guess(hits), hits, points[hits.point])
         again = self._doubtful(hits, good, len(points))
         z, p, good = self._again(hits, (z, p, good), again, points)
         kept = np.flatnonzero(good)
@@ -188,7 +188,7 @@ class Cells:
         )
         return z, p
 
-    def _polished(
+    def _polish(
         self, guess: Guess, hits: Hits, wanted: Float[np.ndarray, "hits d"]
     ) -> tuple[Lanes, Parameters, Flags]:
         """Exact states near guesses, where there are any that the cells may have."""
@@ -203,9 +203,9 @@ class Cells:
             axis=1,
         )
         good[some] = moved <= 2.0 * self._sizes[hits.cell[some]] + SAME_STATE
-        return z, p, self._allowed(z, p, good, index, hits.cell)
+        return z, p, self._in_cells(z, p, good, index, hits.cell)
 
-    def _allowed(
+    def _in_cells(
         self,
         z: Lanes,
         p: Parameters,
@@ -281,7 +281,7 @@ class Cells:
     ) -> tuple[Lanes, Parameters, Flags]:
         start = self.eset.points[corner]
         if not self.coordinates.projecting:
-            return self._polished((start.z, start.p), hits, wanted)
+            return self._polish((start.z, start.p), hits, wanted)
         velocity = np.zeros_like(start.p)
         velocity[:, self.coordinates.places] = wanted - start.p[:, self.coordinates.places]
         line = ParameterLine(self.eset.structure, start.p.copy(), velocity)
@@ -289,7 +289,7 @@ class Cells:
         arrived = ended.code == EventCode.ARRIVED
         p = start.p + velocity
         index = np.where(arrived, ended.index, -1)
-        return ended.z, p, self._allowed(ended.z, p, arrived, index, hits.cell)
+        return ended.z, p, self._in_cells(ended.z, p, arrived, index, hits.cell)
 
     def _one_of_each(self, z: Lanes, p: Parameters, hits: Hits) -> Int[np.ndarray, " kept"]:
         """One of the equal states over each point, rather from a cell that contains the point.

@@ -45,7 +45,7 @@ def quasi_static(parameter: str) -> Rule:
         The load: a free or a fixed parameter of the set.
     """
     return _OnPath(
-        "quasi_static", parameter, _loaded, {"rule": "quasi_static", "parameter": parameter}
+        "quasi_static", parameter, _quiet_ends, {"rule": "quasi_static", "parameter": parameter}
     )
 
 
@@ -139,7 +139,7 @@ class _OnPath(Rule):
         return choose
 
 
-def _loaded(eset: EquilibriumSet, load: int, low: float) -> Ends:
+def _quiet_ends(eset: EquilibriumSet, load: int, low: float) -> Ends:
     """Ends of paths on which nothing happens."""
     del load, low
 

@@ -75,13 +75,13 @@ def path_over_cells(
     # ways may lead from sheet to sheet where these cross
     eset = replace(eset, cells=first_copies(eset)[eset.cells])
     if start[1] == goal[1]:
-        states = _stacked(eset, start[0], None, goal[0])
+        states = _chain(eset, start[0], None, goal[0])
         return AtlasPath(states, _coords(eset, states), chart[[start[1]]])
     path = _over_edges(eset, start, goal)
     if path is None:
         return None
-    way = _pulled(eset, path)
-    states = _stacked(eset, start[0], _states_on(eset, way), goal[0])
+    way = _straighten(eset, path)
+    states = _chain(eset, start[0], _states_on(eset, way), goal[0])
     charts = _charts_of(eset, chart, way)
     whole = np.concatenate([chart[[start[1]]], charts, chart[[goal[1]]]])
     return AtlasPath(states, _coords(eset, states), whole)
@@ -91,7 +91,7 @@ def _coords(eset: EquilibriumSet, states: States) -> Float[np.ndarray, "points d
     return np.stack([states[name] for name in eset.names], axis=1)
 
 
-def _stacked(eset: EquilibriumSet, start: State, middle: States | None, goal: State) -> States:
+def _chain(eset: EquilibriumSet, start: State, middle: States | None, goal: State) -> States:
     parts = [start.batch, *([] if middle is None else [middle]), goal.batch]
     z, p = (np.concatenate([getattr(part, name) for part in parts]) for name in ("z", "p"))
     return States(eset.structure, z, p)
@@ -131,7 +131,7 @@ def _at_end(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
     return at & np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER))
 
 
-def _pulled(eset: EquilibriumSet, path: list[int]) -> Way:
+def _straighten(eset: EquilibriumSet, path: list[int]) -> Way:
     """The way, straight in the parameters between its vertices on folds."""
     if eset.cells.shape[1] != 3:
         return list(path)
@@ -264,7 +264,7 @@ class Walker:
             return None
         for cell in self._around.get(start, ()):
             a, b = (v for v in self._corners(cell) if v != start)
-            entry = self._crossed(origin, ahead, a, b)
+            entry = self._crossing(origin, ahead, a, b)
             if entry is None:
                 continue
             crossing, along = entry
@@ -291,7 +291,7 @@ class Walker:
                 return None
             third = next(v for v in self._corners(cell) if v not in {a, b})
             for side, rest in ((a, b), (b, a)):
-                entry = self._crossed(*ray, side, third)
+                entry = self._crossing(*ray, side, third)
                 if entry is None or entry[1] > 1.0 + AT_VERTEX:
                     continue
                 if isinstance(entry[0], int):
@@ -303,7 +303,7 @@ class Walker:
                 return None
         return None
 
-    def _crossed(
+    def _crossing(
         self, origin: Float[np.ndarray, " 2"], ahead: Float[np.ndarray, " 2"], a: int, b: int
     ) -> tuple[int | Crossing, float] | None:
         """Where a ray crosses an edge, or which of its ends it meets; and after which share."""

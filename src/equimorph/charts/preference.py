@@ -137,7 +137,7 @@ class _Crossings:
         for mark in np.unique(marks[crossed]).tolist():
             own = np.flatnonzero(crossed & (marks == mark))
             about = (mark, lowest[own])
-            done, new = _narrowed(preference, fabric, ends[own], about, values[ends[own]])
+            done, new = _locate_changes(preference, fabric, ends[own], about, values[ends[own]])
             keys.append(keys_of(ends[own[done]], self._base))
             found = found.joined(new)
         self._keys, self._found = np.concatenate(keys), found
@@ -206,7 +206,7 @@ def _preferred_beside(preference: Preference, met: Int[np.ndarray, " n"]) -> Boo
     return out
 
 
-def _narrowed(
+def _locate_changes(
     preference: Preference,
     fabric: Fabric,
     ends: Ends,

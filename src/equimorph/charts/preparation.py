@@ -96,7 +96,7 @@ def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
     return part_of(eset, fabric, np.ones(len(fabric.cells), bool), (nothing, 0))
 
 
-def flip_overturned(
+def flip_inverted_triangles(
     corners: Int[np.ndarray, "C 3"],
     places: Float[np.ndarray, "V 2"],
     fixed: Int[np.ndarray, "n 2"],
@@ -125,12 +125,12 @@ def flip_overturned(
     for _ in range(ROUNDS):
         area = volumes(places[out])
         bad = np.flatnonzero(area < 0.0)
-        if len(bad) == 0 or not _flipped(out, places, bad[np.argsort(area[bad])], kept):
+        if len(bad) == 0 or not _flip_once(out, places, bad[np.argsort(area[bad])], kept):
             break
     return out
 
 
-def _flipped(
+def _flip_once(
     corners: Int[np.ndarray, "C 3"],
     places: Float[np.ndarray, "V 2"],
     bad: Int[np.ndarray, " n"],

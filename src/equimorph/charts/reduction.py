@@ -90,7 +90,7 @@ class Reduction(Chart):
 
     def state(self, coords: Points) -> Charted:
         """Preferred states over points; see `Chart.state`."""
-        points = self._checked(coords)
+        points = self._check_width(coords)
         found = self.preference.over(points)
         code = np.full(len(points), PointStatus.GAP)
         code[found.point] = PointStatus.INSIDE

@@ -128,7 +128,7 @@ def regions_within(
         if not len(pieces):
             return nothing
         left, right = sides(places[pieces], jumps)
-        if _balanced(pieces, left, right):
+        if _has_closed_boundaries(pieces, left, right):
             break
     places = origin + places * extent * spacing
     levels = tuple(
@@ -138,7 +138,7 @@ def regions_within(
     return Regions(levels, places, pieces, jumps, left)
 
 
-def _balanced(
+def _has_closed_boundaries(
     edges: Int[np.ndarray, "edges 2"],
     left: Int[np.ndarray, " edges"],
     right: Int[np.ndarray, " edges"],

@@ -20,7 +20,7 @@ from equimorph.study import Problem
 _MARCH = f"from {__name__} import march; march()"
 
 
-def are_compiled() -> bool:
+def kernels_are_in_cache() -> bool:
     """Whether an earlier run left the kernels that every study needs."""
     return is_kept(proceed)
 

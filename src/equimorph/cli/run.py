@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from equimorph.cli.compilation import are_compiled, compile_kernels
+from equimorph.cli.compilation import compile_kernels, kernels_are_in_cache
 from equimorph.cli.progress import ScreenProgress
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
@@ -27,7 +27,7 @@ def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
     """
     screen = Console(highlight=False)
     _, _, problem = read_problem(file)
-    if not are_compiled():
+    if not kernels_are_in_cache():
         screen.print("The first run compiles the kernels: under a minute, and only once.")
         compile_kernels(problem)
     with ScreenProgress() as progress:

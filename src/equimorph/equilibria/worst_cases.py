@@ -16,7 +16,7 @@ from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, position
 from equimorph.structures import Structure
-from equimorph.structures.quantities import descriptor_named
+from equimorph.structures.quantities import find_descriptor
 
 TWICE = 2.0
 """Length of the path through a corner of the box, relative to that to the corner."""
@@ -150,7 +150,7 @@ class _Ray:
 
 
 def worst_named(structure: Structure, text: str) -> Descriptor:
-    """Descriptor that a text means: as `descriptor_named`, or the worst of one over a box.
+    """Descriptor that a text means: as `find_descriptor`, or the worst of one over a box.
 
     ``worst(max_curvature for Theta ± 0.01, Delta ± 0.02)``, with ``+-`` for ``±`` where that cannot
     be typed; see `worst_over`.
@@ -162,7 +162,7 @@ def worst_named(structure: Structure, text: str) -> Descriptor:
     """
     found = _WORST.fullmatch(text)
     if found is None:
-        return descriptor_named(structure, text)
+        return find_descriptor(structure, text)
     parts = [_OFFSET.fullmatch(part) for part in found[2].split(",")]
     try:
         offsets = {each[1]: float(each[2]) for each in parts if each}

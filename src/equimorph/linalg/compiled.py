@@ -55,7 +55,7 @@ def is_kept(kernel: Any) -> bool:
     kernel
         A function that `njit` of this module returned.
     """
-    return bool(kernel._cache.is_filled())
+    return bool(kernel._cache.has_code())
 
 
 class _KernelCache(FunctionCache):
@@ -65,7 +65,7 @@ class _KernelCache(FunctionCache):
         super().__init__(function)
         self._cache_file = _LockedFiles(self.cache_path, self._impl.filename_base, DIGEST)
 
-    def is_filled(self) -> bool:
+    def has_code(self) -> bool:
         """Whether there is code for any types."""
         return bool(self._cache_file._load_index())
 

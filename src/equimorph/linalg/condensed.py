@@ -112,7 +112,7 @@ class CondensedLayout:
         doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
         if len(doubtful):
             refined = doubtful[ratio[doubtful] >= REFINABLE]
-            x[refined], good = self._refined([a[refined] for a in arrays], x[refined])
+            x[refined], good = self._refine([a[refined] for a in arrays], x[refined])
             pivoted[doubtful] = True
             pivoted[refined[good]] = False
         if pivoted.any():
@@ -149,7 +149,7 @@ class CondensedLayout:
         over_lanes(solve_condensed, (self.stiffness, self.ends), arrays, [x, negative, ratio])
         return x, negative, ratio
 
-    def _refined(
+    def _refine(
         self, arrays: list[np.ndarray], x: Float[np.ndarray, "lanes sides bordered"]
     ) -> tuple[Float[np.ndarray, "lanes sides bordered"], Flags]:
         """Solutions after a step of iterative refinement, and which of them can be trusted."""

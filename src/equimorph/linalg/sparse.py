@@ -64,7 +64,7 @@ class SparseLayout:
         ranks = self.ranks
         if ranks is None:
             ranks = (np.arange(self.size) >= self.size - self.multipliers).astype(int)
-        below = _eliminated(self.rows, self.columns, ranks)
+        below = _elimination(self.rows, self.columns, ranks)
         order = np.array([variable for variable, _ in below])
         place = np.empty(self.size, int)
         place[order] = np.arange(self.size)
@@ -124,7 +124,7 @@ class SparseLayout:
         return BorderedSolution(x, negative, ratio, pivoted, determinant)
 
 
-def _eliminated(
+def _elimination(
     rows: Int[np.ndarray, " entries"],
     columns: Int[np.ndarray, " entries"],
     ranks: Int[np.ndarray, " size"],

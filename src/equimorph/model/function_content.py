@@ -165,10 +165,10 @@ class _Contents:
         if release is not None:
             return "function", function.__module__, function.__qualname__, release, closed, given
         code = function.__code__
-        named = [(name, self._named(name, function, code)) for name in _names(code)]
+        named = [(name, self._global_content(name, function, code)) for name in _names(code)]
         return "function", self._code(code), named, closed, given
 
-    def _named(self, name: str, function: FunctionType, code: CodeType) -> Any:
+    def _global_content(self, name: str, function: FunctionType, code: CodeType) -> Any:
         """Global that a function names, with the attributes of modules that it may take."""
         if name not in function.__globals__:
             return None

@@ -95,10 +95,10 @@ def markdown(found: Reproduction, examples: Sequence[Example]) -> str:
         for name, caption in example.captions.items():
             lines += [f"![{caption}]({name}.png)", "", f"*{caption}*", ""]
         for table, cells in found.tables(example.name):
-            lines += [f"*{table.caption}*", "", *_piped(table.head, cells), ""]
+            lines += [f"*{table.caption}*", "", *_markdown_rows(table.head, cells), ""]
         rows = found.rows(example.name)
         if rows:
-            lines += [*_piped(HEAD, [_cells(*row) for row in rows]), ""]
+            lines += [*_markdown_rows(HEAD, [_cells(*row) for row in rows]), ""]
         ours = found.numbers[example.name].items()
         lines += [*(f"- {key}: {html.number(value, 8)}" for key, value in ours), ""]
     return "\n".join(lines)
@@ -129,7 +129,7 @@ def page(found: Reproduction, examples: Sequence[Example], folder: Path) -> str:
     return html.page(TITLE, body)
 
 
-def _piped(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+def _markdown_rows(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of a table in Markdown."""
     lines = [head, ["---"] * len(head), *rows]
     return [f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines]

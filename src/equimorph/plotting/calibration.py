@@ -10,7 +10,7 @@ from mpl_toolkits.axes_grid1 import make_axes_locatable
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.labels import with_unit
-from equimorph.plotting.shapes import framed
+from equimorph.plotting.shapes import prepare_axes
 from equimorph.tasks import Calibration, MeasuredShape
 
 _ROOM = 0.06
@@ -54,7 +54,7 @@ def calibration(found: Calibration, measured: MeasuredShape, ax: Axes | None = N
     left[there] = found.residuals
     colours = style.progress_map()(np.linspace(0.0, 0.85, len(points)))
     with style.house_style():
-        ax = framed(found.states, ax, room=_ROOM, below=_BELOW)
+        ax = prepare_axes(found.states, ax, room=_ROOM, below=_BELOW)
         for shape, dots, colour in zip(found.states.shape(), points, colours, strict=True):
             ax.plot(*shape.T, color=colour, linewidth=1.0, zorder=2)
             ax.plot(

@@ -107,7 +107,7 @@ def legs(eset: EquilibriumSet, route: Route) -> list[Float[np.ndarray, "_ 2"]]:
     return [places[first : last + 1] for first, last in pairwise(corner_steps(route))]
 
 
-def intended(eset: EquilibriumSet, route: Route) -> Float[np.ndarray, "corners 2"]:
+def way_points_of(eset: EquilibriumSet, route: Route) -> Float[np.ndarray, "corners 2"]:
     """Free parameters at the corners that a route was asked to pass, reached or not."""
     if route.path is None:
         return np.empty((0, 2))

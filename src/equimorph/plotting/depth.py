@@ -32,7 +32,7 @@ class View:
         """Columns, rows and depths of points."""
         return np.asarray(points @ self.linear + self.shift)
 
-    def moved(self, origin: Float[np.ndarray, " 2"], scale: float) -> "View":
+    def translate(self, origin: Float[np.ndarray, " 2"], scale: float) -> "View":
         """View whose pixels are `scale` times as fine and counted from `origin`."""
         return View(self.linear * scale, (self.shift - [*origin, 0.0]) * scale, self.point * scale)
 

@@ -94,7 +94,7 @@ def _draw_barriers(ax: Axes, found: Landscape) -> list[Line2D]:
     kinds = np.array(found.barriers.kind, dtype=object)
     entries = []
     for kind, look in _LOOKS.items():
-        mine = _joined(lines[kinds == kind])
+        mine = _join_lines(lines[kinds == kind])
         if mine:
             ax.add_collection(LineCollection(mine, colors=style.INK, zorder=4, **look))
             shown = {"linewidth": look["linewidths"], "linestyle": look["linestyles"]}
@@ -102,7 +102,7 @@ def _draw_barriers(ax: Axes, found: Landscape) -> list[Line2D]:
     return entries
 
 
-def _joined(
+def _join_lines(
     lines: Float[np.ndarray, "edges 2 2"],
 ) -> list[Float[np.ndarray, "points 2"]]:
     """Short lines joined at their ends, so that dashes run through."""

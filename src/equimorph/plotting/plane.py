@@ -25,12 +25,12 @@ from equimorph.plotting.curves import (
     boundary_pieces,
     crossing_pieces,
     fold_pieces,
-    intended,
     legs,
     limit_pieces,
     snap_steps,
     track,
     way_points,
+    way_points_of,
 )
 from equimorph.plotting.labels import (
     constraint_label,
@@ -128,7 +128,9 @@ def parameter_plane(
             lines += [draw_track(ax, eset, route, route.path), *_mark_snaps(ax, eset, route)]
             corners = way_points(eset, route)[: None if route.status == "arrived" else -1]
             _draw_directions(ax, legs(eset, route))
-            covered = np.concatenate([_covered(eset, route.path), number_way_points(ax, corners)])
+            covered = np.concatenate(
+                [_places_along(eset, route.path), number_way_points(ax, corners)]
+            )
         _write_counts(ax, regions, largest, covered)
         _count_bar(ax, largest, "equilibria" if count == "all" else "stable equilibria")
         if lines:
@@ -237,7 +239,7 @@ def draw_track(ax: Axes, eset: EquilibriumSet, route: Route, path: Path) -> Line
     line.set_path_effects(rim)
     if route.status != "arrived":
         line.set_label(f"route, refused (× {path.end.kind})")
-        ax.plot(*intended(eset, route).T, **_ROUTE | {"linewidth": 0.9, "linestyle": ":"})
+        ax.plot(*way_points_of(eset, route).T, **_ROUTE | {"linewidth": 0.9, "linestyle": ":"})
         (cross,) = ax.plot(*places[-1:].T, "x", color=style.ROUTE_COLOUR, ms=6, mew=1.6, zorder=8)
         cross.set_path_effects(rim)
     return line
@@ -268,7 +270,7 @@ def _draw_directions(ax: Axes, ways: Sequence[Float[np.ndarray, "_ 2"]]) -> None
             )  # fmt: skip
 
 
-def _covered(eset: EquilibriumSet, path: Path) -> Float[np.ndarray, "places 2"]:
+def _places_along(eset: EquilibriumSet, path: Path) -> Float[np.ndarray, "places 2"]:
     """Places that a path covers, where no count should be written."""
     line = track(eset, path.states)
     between = [line[:-1] + t * np.diff(line, axis=0) for t in (0.0, 0.25, 0.5, 0.75)]

@@ -85,11 +85,11 @@ class Scene(Artist):
 
     def _shot(self, view: View, fineness: float) -> "_Shot":
         """Picture and lines of a view; the last is kept for the next format of a figure."""
-        finest = view.moved(np.zeros(2), fineness)
+        finest = view.translate(np.zeros(2), fineness)
         name = (finest.linear.round(6).tobytes(), finest.shift.round(3).tobytes())
         if name not in self._shots:
             self._shots = {name: _take(finest, self._corners, self._surface, self.curves)}
-        return self._shots[name].scaled(1 / fineness)
+        return self._shots[name].rescale(1 / fineness)
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class _Shot:
     corner: Float[np.ndarray, " 2"]
     lines: list[tuple[Mapping[str, Any], list[Float[np.ndarray, "_ 2"]]]]
 
-    def scaled(self, factor: float) -> "_Shot":
+    def rescale(self, factor: float) -> "_Shot":
         """The same with places in another unit; pixels of the picture stay."""
         lines = [(look, [piece * factor for piece in pieces]) for look, pieces in self.lines]
         return _Shot(self.picture, self.corner * factor, lines)
@@ -116,10 +116,10 @@ def _take(
     reach = view.place(corners)[..., :2].reshape(-1, 2)
     low, high = np.floor(reach.min(axis=0)) - 1, np.ceil(reach.max(axis=0)) + 1
     columns, rows = (high - low).astype(int)
-    fine = view.moved(low, _SAMPLES)
+    fine = view.translate(low, _SAMPLES)
     placed = fine.place(corners)
     buffer = depth_buffer(placed, int(rows * _SAMPLES), int(columns * _SAMPLES))
-    picture = _reduced(paint(buffer, fine, corners, surface))
+    picture = _downsample(paint(buffer, fine, corners, surface))
     range_of_depth = float(np.ptp(placed[..., 2]))
     lines: list[tuple[Mapping[str, Any], list[Float[np.ndarray, "_ 2"]]]] = []
     cut = [_cut(fine.place(c.points), buffer, c.slack * range_of_depth) for c in curves]
@@ -152,7 +152,7 @@ def _runs(
     return [points[a : b + 1] for a, b in zip(starts, ends, strict=True)]
 
 
-def _reduced(picture: Float[np.ndarray, "rows columns 4"]) -> UInt8[np.ndarray, "_ _ 4"]:
+def _downsample(picture: Float[np.ndarray, "rows columns 4"]) -> UInt8[np.ndarray, "_ _ 4"]:
     """Mean colour and share of cover of blocks of pixels; colours are weighted by their cover."""
     rows, columns, _ = picture.shape
     blocks = picture.reshape(rows // _SAMPLES, _SAMPLES, columns // _SAMPLES, _SAMPLES, 4)

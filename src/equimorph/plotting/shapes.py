@@ -27,7 +27,7 @@ _MARGINS = (0.54, 0.36, 0.14, 0.06)  # inches around the frame: left, bottom, ri
 Outlines = Float[np.ndarray, "states points 2"]
 
 
-def framed(
+def prepare_axes(
     states: States,
     ax: Axes | None,
     *,
@@ -119,7 +119,7 @@ def shapes(
     states = states_along(path_of(path_or_route), count)
     outlines = states.shape()
     with style.house_style():
-        ax = framed(states, ax, room=_ROOM, below=_BAR, obstacles=obstacles)
+        ax = prepare_axes(states, ax, room=_ROOM, below=_BAR, obstacles=obstacles)
         progress = np.linspace(0.0, 1.0, count)
         colours = style.progress_map()(progress)
         widths = np.full(count, 0.9)
@@ -190,7 +190,7 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
         )
     outlines = states.shape()
     with style.house_style():
-        ax = framed(states, ax, room=_PORTRAIT_ROOM)
+        ax = prepare_axes(states, ax, room=_PORTRAIT_ROOM)
         colours = style.progress_map()(np.linspace(0.0, 0.8, len(states)))
         for k, (outline, at) in enumerate(zip(outlines, farthest_apart(outlines), strict=True)):
             look = {"color": colours[k], "linestyle": _DASHES[k % len(_DASHES)]}

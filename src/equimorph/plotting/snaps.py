@@ -130,7 +130,7 @@ def _draw_along(ax: Axes, graph: SnapGraph, descriptor: Descriptor, shades: Scal
         ax.plot(
             whole, descriptor(eset.points[snap.along]), color=style.INK, linewidth=1.4, zorder=3
         )
-        at, before = whole[_tried(snap)], descriptor(eset.points[snap.vertices])
+        at, before = whole[_tried_vertices(snap)], descriptor(eset.points[snap.vertices])
         if _kind(snap) == "held":
             ax.scatter(at, before, marker="x", color=style.INK, s=14, linewidths=0.8, zorder=5)
         for place, low, landing in zip(at, before, snap.landings, strict=True):
@@ -156,7 +156,7 @@ def _length(graph: SnapGraph, snap: Snap) -> Float[np.ndarray, " n"]:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _tried(snap: Snap) -> list[int]:
+def _tried_vertices(snap: Snap) -> list[int]:
     """Places of the tried vertices in the run; a closed one begins and ends at the same."""
     places: list[int] = []
     for vertex in snap.vertices:

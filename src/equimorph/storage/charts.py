@@ -16,7 +16,7 @@ from equimorph.charts import (
     rule_from,
 )
 from equimorph.errors import InputError
-from equimorph.storage.hdf import get, get_json, opened, put, put_json, write
+from equimorph.storage.hdf import get, get_json, open_file, put, put_json, write
 from equimorph.storage.owner import Owner
 from equimorph.storage.sets import read_set, write_set
 from equimorph.storage.values import read_states
@@ -60,7 +60,7 @@ def load_chart(path: str | Path) -> Chart | Atlas:
     InputError
         If the file is missing, no chart, newer than this release, truncated or damaged.
     """
-    with opened(Path(path), FORMAT, VERSION) as file:
+    with open_file(Path(path), FORMAT, VERSION) as file:
         return read_chart(file[CHART], Owner(from_identity(get_json(file, STRUCTURE))))
 
 

@@ -101,7 +101,7 @@ def fingerprint(content: Any) -> str:
 
 
 @contextmanager
-def locked(path: Path, what: str) -> Generator[None]:
+def lock_file(path: Path, what: str) -> Generator[None]:
     """Hold the lock on a file while the block lasts: one process at a time.
 
     The file stays where it is and names its last holder. There is no stale lock: the system frees

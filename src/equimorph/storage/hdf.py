@@ -107,11 +107,11 @@ def write(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None]
     path
         Name of the file.
     kind, version
-        What `opened` checks.
+        What `open_file` checks.
     fill
         Puts the groups into the file.
     """
-    return _write_sealed(path, _image(kind, version, fill))
+    return _write_with_checksum(path, _image(kind, version, fill))
 
 
 def extend(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None]) -> Path:
@@ -122,21 +122,21 @@ def extend(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None
     path
         Name of the file.
     kind, version
-        What `opened` checks.
+        What `open_file` checks.
     fill
         Puts more groups into the file.
 
     Raises
     ------
     InputError
-        As `opened`.
+        As `open_file`.
     """
     memory = io.BytesIO()
-    with opened(path, kind, version):
-        memory.write(_unsealed(path.read_bytes()))
+    with open_file(path, kind, version):
+        memory.write(_strip_checksum(path.read_bytes()))
     with h5py.File(memory, "r+") as file:
         fill(file)
-    return _write_sealed(path, memory.getvalue())
+    return _write_with_checksum(path, memory.getvalue())
 
 
 def _image(kind: str, version: int, fill: Callable[[h5py.File], None]) -> bytes:
@@ -147,7 +147,7 @@ def _image(kind: str, version: int, fill: Callable[[h5py.File], None]) -> bytes:
         return bytes(file.id.get_file_image())
 
 
-def _write_sealed(path: Path, image: bytes) -> Path:
+def _write_with_checksum(path: Path, image: bytes) -> Path:
     """Write content, and behind it its checksum, which another thread finds meanwhile."""
     checksum = hashlib.sha256()
     (summed,) = in_background([partial(checksum.update, image)])
@@ -160,7 +160,7 @@ def _write_sealed(path: Path, image: bytes) -> Path:
 
 
 @contextmanager
-def opened(path: Path, kind: str, version: int) -> Generator[h5py.File]:
+def open_file(path: Path, kind: str, version: int) -> Generator[h5py.File]:
     """Open a file of ours for reading.
 
     Parameters
@@ -178,7 +178,7 @@ def opened(path: Path, kind: str, version: int) -> Generator[h5py.File]:
         If it is missing, no HDF5 file, of another kind, newer, truncated or damaged.
     """
     try:
-        _unsealed(path.read_bytes())
+        _strip_checksum(path.read_bytes())
         with h5py.File(path, "r") as file:
             _check_kind(file, path, kind, version)
             yield file
@@ -193,13 +193,13 @@ def opened(path: Path, kind: str, version: int) -> Generator[h5py.File]:
         ) from error
 
 
-def is_sealed(path: Path) -> bool:
+def ends_with_checksum(path: Path) -> bool:
     """Whether a file ends with a checksum; one that another program has changed does not."""
     size = len(MARK) + hashlib.sha256().digest_size
     return path.read_bytes()[-size:].startswith(MARK)
 
 
-def _unsealed(content: bytes) -> bytes:
+def _strip_checksum(content: bytes) -> bytes:
     """Content without its checksum, if it has one, which must be right."""
     start = len(content) - len(MARK) - hashlib.sha256().digest_size
     if start < 0 or content[start : start + len(MARK)] != MARK:

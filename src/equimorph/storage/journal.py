@@ -88,7 +88,7 @@ class JournalFile:
         """
         head = MARK + checksum(question.encode()).encode() + b"\n"
         with self._writable():
-            file = self._file = self._file or _opened(self.path)
+            file = self._file = self._file or _open_privately(self.path)
             file.seek(0)
             found = file.read(len(head))
             if found != head:
@@ -160,7 +160,7 @@ class JournalFile:
             ) from error
 
 
-def _opened(path: Path) -> BinaryIO:
+def _open_privately(path: Path) -> BinaryIO:
     """File to be read and written, ours alone."""
     file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
     try:

@@ -36,8 +36,20 @@ def write_map_group(group: h5py.Group, amap: ActuatorMap) -> None:
     put(group, "curve_kind", np.array([c.kind for c in curves], dtype=object), ["curve"])
     ends = np.cumsum([len(c.points) for c in curves], dtype=np.int64)
     put(group, "curve_end", ends, ["curve"], "points before the end of each curve")
-    put(group, "curve_point", _joined(curves, "points", 2), ["point", "coordinate"], "settings")
-    put(group, "curve_value", _joined(curves, "values", 2), ["point", "side"], "lower and higher")
+    put(
+        group,
+        "curve_point",
+        _stack_curves(curves, "points", 2),
+        ["point", "coordinate"],
+        "settings",
+    )
+    put(
+        group,
+        "curve_value",
+        _stack_curves(curves, "values", 2),
+        ["point", "side"],
+        "lower and higher",
+    )
     errors = np.concatenate([np.zeros(0), *(c.errors for c in curves)])
     put(group, "curve_error", errors, ["point"], "bound of the error along the grid line")
     sizes = amap.states.z.shape[1], amap.states.p.shape[1]
@@ -85,7 +97,7 @@ def _about(amap: ActuatorMap) -> dict[str, Any]:
     return about
 
 
-def _joined(
+def _stack_curves(
     curves: tuple[MapCurve, ...], name: str, columns: int
 ) -> Float[np.ndarray, "points columns"]:
     return np.concatenate([np.zeros((0, columns)), *(getattr(c, name) for c in curves)])

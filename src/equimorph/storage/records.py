@@ -16,7 +16,7 @@ import h5py
 from equimorph.charts import Atlas, Chart
 from equimorph.manifold import EquilibriumSet
 from equimorph.storage.charts import read_chart, write_chart
-from equimorph.storage.hdf import content, get_json, opened, put_json
+from equimorph.storage.hdf import content, get_json, open_file, put_json
 from equimorph.storage.maps import read_map_group, write_map_group
 from equimorph.storage.owner import Owner
 from equimorph.storage.routes import read_route, write_route
@@ -144,5 +144,5 @@ def load_record(path: Path, structure: Structure) -> Any:
     InputError
         If the file is missing or damaged, or holds something that this release cannot read.
     """
-    with opened(path, FORMAT, VERSION) as file:
+    with open_file(path, FORMAT, VERSION) as file:
         return read_record(file[RECORD], Owner(structure))

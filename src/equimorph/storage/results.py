@@ -17,7 +17,15 @@ import h5py
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
-from equimorph.storage.hdf import DAMAGE, extend, get_json, is_sealed, opened, put_json, write
+from equimorph.storage.hdf import (
+    DAMAGE,
+    ends_with_checksum,
+    extend,
+    get_json,
+    open_file,
+    put_json,
+    write,
+)
 from equimorph.storage.owner import Owner
 from equimorph.storage.records import label, read_record, write_record
 from equimorph.storage.schemas import UnreadableError
@@ -180,7 +188,7 @@ def load_set(path: str | Path) -> EquilibriumSet:
         If it is missing, no results file, newer than this release, truncated, damaged, or without
         a set.
     """
-    with opened(Path(path), FORMAT, VERSION) as file:
+    with open_file(Path(path), FORMAT, VERSION) as file:
         if SET not in file:
             raise InputError(f"`{path}` must hold an equilibrium set; got a file without one.")
         eset: EquilibriumSet = read_record(file[SET], _owner(file), SET)
@@ -220,17 +228,17 @@ def read_results(path: str | Path) -> Results:
         If it is missing, no results file, newer than this release, truncated or damaged.
     """
     path = Path(path)
-    with opened(path, FORMAT, VERSION) as file:
-        reader = _Reader(file, is_sealed(path))
+    with open_file(path, FORMAT, VERSION) as file:
+        reader = _Reader(file, ends_with_checksum(path))
         eset = reader.read(SET, SET) if SET in file else None
-        equilibria = reader.named(EQUILIBRIA)
+        equilibria = reader.read_group(EQUILIBRIA)
         tables = list(file[ANSWERS]) if ANSWERS in file else []
         return Results(
             eset,
-            reader.named(ROUTES),
+            reader.read_group(ROUTES),
             tuple(equilibria[number] for number in sorted(equilibria, key=int)),
-            reader.named(MAPS),
-            {table: reader.named(f"{ANSWERS}/{table}") for table in tables},
+            reader.read_group(MAPS),
+            {table: reader.read_group(f"{ANSWERS}/{table}") for table in tables},
             reader.unreadable,
         )
 
@@ -242,7 +250,7 @@ class _Reader:
         self.unreadable: dict[str, str] = {}
         self._file, self._sealed, self._owner = file, sealed, _owner(file)
 
-    def named(self, place: str) -> dict[str, Any]:
+    def read_group(self, place: str) -> dict[str, Any]:
         """Read all records in a group, by name."""
         names = list(self._file[place]) if place in self._file else []
         found = {n: self.read(f"{place}/{n}", SCHEMAS.get(place, "record")) for n in names}

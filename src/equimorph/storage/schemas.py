@@ -108,7 +108,7 @@ def schema_of(record: Any) -> Schema | None:
     return found if found is not None and found.kind is type(record) else None
 
 
-def schema_named(name: str) -> Schema:
+def find_schema(name: str) -> Schema:
     """Return the schema that a file names.
 
     Raises
@@ -126,7 +126,7 @@ def schema_named(name: str) -> Schema:
 
 def build(kind: type, values: Mapping[str, Any], version: int = 1) -> Any:
     """Return a record of a kind that stands in a layout of its own; see `Schema.build`."""
-    return schema_named(_name(kind)).build(version, values)
+    return find_schema(_name(kind)).build(version, values)
 
 
 @cache

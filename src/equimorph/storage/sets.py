@@ -18,7 +18,7 @@ from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.model import Box, Descriptor, names_of
 from equimorph.storage.hdf import add_dimension, get, get_json, put, put_json
 from equimorph.storage.owner import Owner, words_of
-from equimorph.storage.schemas import schema_named
+from equimorph.storage.schemas import find_schema
 from equimorph.structures import States
 
 ABOUT = "about"
@@ -169,17 +169,17 @@ def _about(eset: EquilibriumSet) -> dict[str, object]:
         "constraints": [words_of(each) for each in eset.constraints],
         "intervals": list(eset.intervals),
         "boundary_kinds": [each.kind for each in eset.boundaries],
-        "components": [schema_named("Component").values(each) for each in eset.components],
-        "strata": [schema_named("Stratum").values(each) for each in eset.strata],
-        "audit": schema_named("Audit").values(eset.audit),
-        "versions": {name: schema_named(name).change.version for name in INSIDE},
+        "components": [find_schema("Component").values(each) for each in eset.components],
+        "strata": [find_schema("Stratum").values(each) for each in eset.strata],
+        "audit": find_schema("Audit").values(eset.audit),
+        "versions": {name: find_schema(name).change.version for name in INSIDE},
     }
 
 
 def _built(name: str, values: dict[str, Any], about: dict[str, Any]) -> Any:
     """Record inside a set; older files give no versions."""
     version = about.get("versions", {}).get(name, 1)
-    return schema_named(name).build(version, _tuples(values))
+    return find_schema(name).build(version, _tuples(values))
 
 
 def _tuples(value: Any) -> Any:

@@ -17,7 +17,7 @@ from equimorph.model import Box, Constraint, Descriptor, Grid
 from equimorph.storage.hdf import get, get_json, put, put_json
 from equimorph.storage.maps import read_map_group, write_map_group
 from equimorph.storage.owner import Owner, words_of
-from equimorph.storage.schemas import schema_named, schema_of
+from equimorph.storage.schemas import find_schema, schema_of
 from equimorph.storage.sets import read_set, write_set
 from equimorph.structures import State, States
 from equimorph.tasks import CurvatureMap, LimitLoadMap
@@ -48,7 +48,7 @@ def write_value(group: h5py.Group, value: Any) -> None:
     InputError
         If it holds something that no file can hold, like a function.
     """
-    put_json(group, ABOUT, _encoded(group, value, ""))
+    put_json(group, ABOUT, _encode(group, value, ""))
 
 
 def read_value(group: h5py.Group, owner: Owner) -> Any:
@@ -59,10 +59,10 @@ def read_value(group: h5py.Group, owner: Owner) -> Any:
     UnreadableError
         If it holds a record that this release cannot read.
     """
-    return _decoded(group, owner, get_json(group, ABOUT))
+    return _decode(group, owner, get_json(group, ABOUT))
 
 
-def _encoded(group: h5py.Group, value: Any, place: str) -> Any:
+def _encode(group: h5py.Group, value: Any, place: str) -> Any:
     """Plain data that stands for a value; what is large goes into the group at `place`."""
     if isinstance(value, np.generic):
         value = value.item()
@@ -71,14 +71,14 @@ def _encoded(group: h5py.Group, value: Any, place: str) -> Any:
     if isinstance(value, float):
         return value if np.isfinite(value) else {"float": repr(value)}
     if isinstance(value, tuple | list):
-        inner = [_encoded(group, each, _inside(place, k)) for k, each in enumerate(value)]
+        inner = [_encode(group, each, _inside(place, k)) for k, each in enumerate(value)]
         return {type(value).__name__: inner}
     if isinstance(value, Mapping):
         return {"mapping": _pairs(group, value, place)}
     schema = schema_of(value)
     if schema is not None:
         named = schema.values(value).items()
-        own = {key: _encoded(group, each, _inside(place, key)) for key, each in named}
+        own = {key: _encode(group, each, _inside(place, key)) for key, each in named}
         return {"record": [schema.name, own, schema.change.version]}
     return _put(group, value, place)
 
@@ -90,7 +90,7 @@ def _inside(place: str, name: str | int) -> str:
 
 def _pairs(group: h5py.Group, value: Mapping[Any, Any], place: str) -> list[list[Any]]:
     return [
-        [_encoded(group, key, ""), _encoded(group, each, _inside(place, k))]
+        [_encode(group, key, ""), _encode(group, each, _inside(place, k))]
         for k, (key, each) in enumerate(value.items())
     ]
 
@@ -110,11 +110,11 @@ def _put(group: h5py.Group, value: Any, place: str) -> Any:
         case EquilibriumSet():
             write_set(group.create_group(place), value)
         case _:
-            return _named(value, place)
+            return _encode_fields(value, place)
     return {type(value).__name__: place}
 
 
-def _named(value: Any, place: str) -> Any:
+def _encode_fields(value: Any, place: str) -> Any:
     """Plain data for what has names and numbers only."""
     match value:
         case Descriptor():
@@ -134,18 +134,18 @@ def _sides(box: Box) -> dict[str, tuple[float, float]]:
     return dict(zip(box.names, sides, strict=True))
 
 
-def _decoded(group: h5py.Group, owner: Owner, plain: Any) -> Any:
+def _decode(group: h5py.Group, owner: Owner, plain: Any) -> Any:
     """Return the value that plain data stands for."""
     if not isinstance(plain, dict):
         return plain
     ((kind, content),) = plain.items()
-    return _READERS[kind](lambda each: _decoded(group, owner, each), group, owner, content)
+    return _READERS[kind](lambda each: _decode(group, owner, each), group, owner, content)
 
 
 def _read_record(inner: Inner, group: h5py.Group, owner: Owner, content: Any) -> Any:
     name, values, *version = content  # the first releases wrote no version
     built = {key: inner(each) for key, each in values.items()}
-    return schema_named(name).build(version[0] if version else 1, built)
+    return find_schema(name).build(version[0] if version else 1, built)
 
 
 _READERS: dict[str, Callable[[Inner, h5py.Group, Owner, Any], Any]] = {

@@ -36,7 +36,7 @@ def nearest(arcs: Arcs, obstacle: Obstacle) -> tuple[Values, Values]:
     finds the extremum.
     """
     count = arcs.shape[1]
-    shares = _tried(arcs, obstacle)
+    shares = _starts(arcs, obstacle)
     distance = obstacle.distance(_points(arcs[:, :, None], shares)[0])
     best = distance.min(axis=2).argmin(axis=1)
     lanes = np.arange(len(arcs))
@@ -44,14 +44,14 @@ def nearest(arcs: Arcs, obstacle: Obstacle) -> tuple[Values, Values]:
     for beside in (0, -1, 1):
         arc = np.clip(best + beside, 0, count - 1)
         start = shares[lanes, arc, distance[lanes, arc].argmin(axis=1)]
-        value, share = _polished(arcs[lanes, arc], obstacle, start)
+        value, share = _polish(arcs[lanes, arc], obstacle, start)
         better = value < least - 1e-15
         least = np.where(better, value, least)
         where = np.where(better, (arc + share) / count, where)
     return least, where
 
 
-def _tried(arcs: Arcs, obstacle: Obstacle) -> Float[np.ndarray, "lanes arcs starts"]:
+def _starts(arcs: Arcs, obstacle: Obstacle) -> Float[np.ndarray, "lanes arcs starts"]:
     """Both ends, and the extremum on the chord."""
     chord = arcs[:, :, 1] - arcs[:, :, 0]
     zero = np.zeros_like(chord)
@@ -72,7 +72,7 @@ def _points(
     return place, da + t * (2.0 * c2 + 3.0 * t * c3), 2.0 * c2 + 6.0 * t * c3
 
 
-def _polished(
+def _polish(
     arcs: Float[np.ndarray, "lanes 4 2"], obstacle: Obstacle, start: Values
 ) -> tuple[Values, Values]:
     """Least distance on one arc a lane, and where."""

@@ -205,7 +205,7 @@ def _polish(
         quotient = shift + np.einsum("li,i,li->l", solved, mass, vector) / norm**2
         previous, value = value, np.where(norm > 0, quotient, value)
         vector = solved / norm[:, None]
-        if sweep > 1 and _settled(value, previous).all():
+        if sweep > 1 and _has_converged(value, previous).all():
             break
         # a shift equal to the eigenvalue would be singular: stay a little below
         near = (value > bottom) & (value < high + 0.5 * (high - low))
@@ -214,5 +214,5 @@ def _polish(
     return np.asarray(value)
 
 
-def _settled(value: Values, previous: Values) -> Flags:
+def _has_converged(value: Values, previous: Values) -> Flags:
     return np.asarray(np.abs(value - previous) <= RELATIVE * np.maximum(np.abs(value), 1e-3))

@@ -142,7 +142,7 @@ _CALL = re.compile(r"\s*(\w+)\((.*)\)\s*", re.DOTALL)
 _RANGE = re.compile(r"\s*(\w+)\s+(\S+)\s+to\s+(\S+)\s*")
 
 
-def descriptor_named(structure: Structure, text: str) -> Descriptor:
+def find_descriptor(structure: Structure, text: str) -> Descriptor:
     """Descriptor that a text means.
 
     Beside those of the structure: ``Theta`` (any parameter), ``effort(Theta)``,
@@ -158,7 +158,7 @@ def descriptor_named(structure: Structure, text: str) -> Descriptor:
     Examples
     --------
     >>> from equimorph import Spring
-    >>> descriptor_named(Spring(), "effort(x_l)").symbol
+    >>> find_descriptor(Spring(), "effort(x_l)").symbol
     '∂L/∂x_l'
     """
     name = text.strip()

@@ -110,9 +110,9 @@ class Spring(Structure):
 
     def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
         """F_p·dp."""
-        return self._polarised(z, p, (np.zeros_like(z), dp))
+        return self._residual_derivative(z, p, (np.zeros_like(z), dp))
 
-    def _polarised(self, z: Lanes, p: Parameters, v: Direction) -> Lanes:
+    def _residual_derivative(self, z: Lanes, p: Parameters, v: Direction) -> Lanes:
         """First derivative of F along a direction, by dual numbers of order one."""
         delta, x, force, k = self._split(z, p)
         dd, (dx, df, dk) = v[0][:, 0], v[1].T

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from equimorph.errors import InputError
-from equimorph.storage.files import FINGERPRINT, checksum, fingerprint, locked, move_whole
+from equimorph.storage.files import FINGERPRINT, checksum, fingerprint, lock_file, move_whole
 from equimorph.study.problem import Study
 
 MANIFEST = "equimorph.json"
@@ -122,7 +122,7 @@ def open_results_folder(
             path.mkdir(parents=True, exist_ok=True)
             _check_owner(path, folder.study, replace=replace)
             folder.checkpoints.mkdir(parents=True, exist_ok=True)
-            held.enter_context(locked(path / PRIVATE / _LOCK, f"results folder {path}"))
+            held.enter_context(lock_file(path / PRIVATE / _LOCK, f"results folder {path}"))
             _check_owner(path, folder.study, replace=replace)
             _sweep(path)
             _clear_other(path, folder.study)

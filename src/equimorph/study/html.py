@@ -84,7 +84,7 @@ def pictures(folder: Path, wide: Mapping[str, str], captions: Mapping[str, str])
     return f'<div class="figures">{"".join([*large, *small])}</div>'
 
 
-def refused(why: str) -> str:
+def refusal_line(why: str) -> str:
     """Return the line of an answer that there is none, and why."""
     return f'<p class="verdict refused"><strong>Refused.</strong> {escape(why)}</p>'
 

@@ -60,7 +60,7 @@ def run_study(
         outcome = solve(study, problem, folder, sink)
         same_words = folder.holds([INPUT_COPY]) and read_text(out / INPUT_COPY) == text
         _store(outcome, folder, text)
-        with _timed(outcome.seconds, "figures"):
+        with _measure_time(outcome.seconds, "figures"):
             draw_figures(outcome, folder, sink)
         # The page of a run that had finished tells how long the answers took.
         if not (same_words and folder.holds([REPORT])):
@@ -111,17 +111,17 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
     points: tuple[States, ...] = ()
     ground = problem.ground
     if ground.extent is not None:
-        with _timed(seconds, "equilibrium set"):
+        with _measure_time(seconds, "equilibrium set"):
             eset = _equilibrium_set(study, ground, ground.extent, checkpoints, progress)
         reused = bool(checkpoints.found)
-        with _timed(seconds, "equilibria"):
+        with _measure_time(seconds, "equilibria"):
             points = tuple(_equilibria(study, eset, at, checkpoints) for at in problem.points)
     answers = []
     count = len(problem.questions)
     for done, question in enumerate(problem.questions):
         progress.report("questions", done, count)
-        with _timed(seconds, f"{question.kind.table} {question.name}"):
-            answers.append(_answered(study, question, eset, checkpoints, progress))
+        with _measure_time(seconds, f"{question.kind.table} {question.name}"):
+            answers.append(_answer(study, question, eset, checkpoints, progress))
     progress.report("questions", count, count)
     checkpoints.forget_others()
     return Outcome(study, problem, eset, points, tuple(answers), reused, seconds)
@@ -159,7 +159,7 @@ def _equilibria(
     return checkpoints.answer(question, lambda: eset.at(**point))
 
 
-def _answered(
+def _answer(
     study: Study,
     question: Question,
     eset: EquilibriumSet | None,
@@ -206,7 +206,7 @@ def _write_results(outcome: Outcome, path: Path) -> None:
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Generator[None]:
+def _measure_time(seconds: dict[str, float], stage: str) -> Generator[None]:
     start = perf_counter()
     yield
     seconds[stage] = perf_counter() - start

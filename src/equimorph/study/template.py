@@ -22,10 +22,10 @@ def template(kind: str) -> str:
     """
     if kind not in KINDS:
         raise InputError(f"`kind` must be one of {', '.join(KINDS)}; got {kind!r}.")
-    return _shipped(f"{kind}.toml").read_text(encoding="utf-8")
+    return _template_file(f"{kind}.toml").read_text(encoding="utf-8")
 
 
-def _shipped(name: str) -> Traversable:
+def _template_file(name: str) -> Traversable:
     return files("equimorph.study").joinpath(f"templates/{name}")
 
 
@@ -40,7 +40,7 @@ def write_template(path: Path, kind: str) -> None:
     if path.suffix != ".toml":
         raise InputError(f"`study file` must end in .toml; got {path.name!r}.")
     texts = {path: template(kind)}
-    data = _shipped(f"{kind}.csv")
+    data = _template_file(f"{kind}.csv")
     if data.is_file():
         texts[path.with_name(data.name)] = data.read_text(encoding="utf-8")
     for each, text in texts.items():

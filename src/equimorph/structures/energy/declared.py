@@ -93,7 +93,7 @@ class Formulas:
         rest = (*self.natural, *points, *self.descriptors.values())
         return [self.energy, *self.constraints, *rest]
 
-    def refilled(self, flat: Sequence[Any]) -> "Formulas":
+    def fill(self, flat: Sequence[Any]) -> "Formulas":
         """Return the same with others, in the order of `flat`."""
         each = iter(flat)
         return Formulas(
@@ -216,7 +216,7 @@ class Symbols:
             expression(each, known, label)
             for each, label in zip(formulas.flat(), labels, strict=True)
         ]
-        self.formulas = formulas.refilled(graphs)
+        self.formulas = formulas.fill(graphs)
         self._check(names)
 
     def _check(self, names: Sequence[str]) -> None:
@@ -252,7 +252,7 @@ class Symbols:
     def texts(self) -> tuple[dict[str, str], Formulas]:
         """Definitions and formulas as texts."""
         definitions, flat = written(self.formulas.flat(), self.all)
-        return definitions, self.formulas.refilled(flat)
+        return definitions, self.formulas.fill(flat)
 
 
 def _check_names(names: Sequence[str]) -> None:

@@ -96,7 +96,7 @@ def _number(node: Any, names: Mapping[str, Any]) -> Any:
     return float(node.value) if type(node.value) in (int, float) else None
 
 
-def _named(node: Any, names: Mapping[str, Any]) -> Any:
+def _name(node: Any, names: Mapping[str, Any]) -> Any:
     if node.id in names:
         return names[node.id]
     if node.id in CONSTANTS:
@@ -105,12 +105,12 @@ def _named(node: Any, names: Mapping[str, Any]) -> Any:
     raise _UnreadableError(f"{known}, not in the unknown symbol {node.id}")
 
 
-def _signed(node: Any, names: Mapping[str, Any]) -> Any:
+def _unary(node: Any, names: Mapping[str, Any]) -> Any:
     operation = _UNARY.get(type(node.op))
     return None if operation is None else operation(_value(node.operand, names))
 
 
-def _combined(node: Any, names: Mapping[str, Any]) -> Any:
+def _binary(node: Any, names: Mapping[str, Any]) -> Any:
     operation = _BINARY.get(type(node.op))
     if operation is None:
         return None
@@ -120,30 +120,30 @@ def _combined(node: Any, names: Mapping[str, Any]) -> Any:
     return value
 
 
-def _compared(node: Any, names: Mapping[str, Any]) -> Any:
+def _comparison(node: Any, names: Mapping[str, Any]) -> Any:
     operation = _COMPARED.get(type(node.ops[0]))
     if operation is None or len(node.ops) > 1:
         return None
     return operation(casadi().SX(_value(node.left, names)), _value(node.comparators[0], names))
 
 
-def _applied(node: Any, names: Mapping[str, Any]) -> Any:
+def _call(node: Any, names: Mapping[str, Any]) -> Any:
     if not (isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS) or node.keywords:
         return None
-    return _called(node.func.id, [_value(each, names) for each in node.args])
+    return _function_value(node.func.id, [_value(each, names) for each in node.args])
 
 
 _READERS: dict[type, Callable[[Any, Mapping[str, Any]], Any]] = {
     ast.Constant: _number,
-    ast.Name: _named,
-    ast.UnaryOp: _signed,
-    ast.BinOp: _combined,
-    ast.Compare: _compared,
-    ast.Call: _applied,
+    ast.Name: _name,
+    ast.UnaryOp: _unary,
+    ast.BinOp: _binary,
+    ast.Compare: _comparison,
+    ast.Call: _call,
 }
 
 
-def _called(name: str, arguments: list[Any]) -> Any:
+def _function_value(name: str, arguments: list[Any]) -> Any:
     ca = casadi()
     count = {"atan2": 2, "hypot": 2, "fmin": 2, "fmax": 2, "if_else": 3}.get(name, 1)
     if len(arguments) != count:

@@ -211,9 +211,9 @@ class EnergyStructure(DiscreteStructure):
 
     def natural_guess(self, p: Parameters) -> Lanes:
         """Natural values of the unknowns, and the multipliers that balance them best."""
-        return self._balanced(self._natural(p), p)
+        return self._solve_multipliers(self._natural(p), p)
 
-    def _balanced(self, u: Float[np.ndarray, "lanes n"], p: Parameters) -> Lanes:
+    def _solve_multipliers(self, u: Float[np.ndarray, "lanes n"], p: Parameters) -> Lanes:
         n = self.unknowns
         z = np.concatenate([u, np.zeros((len(u), self.constraints))], axis=1)
         if self.constraints:
@@ -230,7 +230,7 @@ class EnergyStructure(DiscreteStructure):
         for i, unknown in enumerate(self._unknowns):
             if unknown.range is not None:
                 u[:, i] = generator.uniform(*unknown.range, len(p))
-        return self._balanced(u, p)
+        return self._solve_multipliers(u, p)
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Unknowns are numbers within the limits of their meaning."""
@@ -290,19 +290,21 @@ class EnergyStructure(DiscreteStructure):
         units = {unknown.name: unknown.unit for unknown in self._unknowns}
         if name in formulas.descriptors:
             program = self._graphs.tape(formulas.descriptors[name])
-            return self._described(name, "1", lambda z, p: program(z, p)[:, 0].copy())
+            return self._make_descriptor(name, "1", lambda z, p: program(z, p)[:, 0].copy())
         if name in units:
             at = list(units).index(name)
-            return self._described(name, units[name], lambda z, p: z[:, at].copy())
+            return self._make_descriptor(name, units[name], lambda z, p: z[:, at].copy())
         if name == "energy":
-            return self._described(name, "energy", self.energy)
+            return self._make_descriptor(name, "energy", self.energy)
         if name.startswith("effort(") and name.endswith(")"):
             column = position(self.parameters, name[7:-1])
-            return self._described(name, "1", lambda z, p: self.effort(z, p)[:, column].copy())
+            return self._make_descriptor(
+                name, "1", lambda z, p: self.effort(z, p)[:, column].copy()
+            )
         known = ", ".join((*formulas.descriptors, *units, "energy", "effort(parameter)"))
         raise InputError(f"`descriptor` must be one of {known}; got {text!r}.")
 
-    def _described(self, name: str, unit: str, function: Any) -> Descriptor:
+    def _make_descriptor(self, name: str, unit: str, function: Any) -> Descriptor:
         return Descriptor(name, unit, function, name, self.signature)
 
 

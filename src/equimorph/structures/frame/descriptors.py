@@ -130,7 +130,7 @@ def max_curvature(frame: FrameFields, member: str | None = None) -> Descriptor:
 
 def reaction(frame: FrameFields, joint: str, axis: str) -> Descriptor:
     """Force, or couple, of a support on its joint."""
-    at, along = frame.model.network.supported(joint, axis)
+    at, along = frame.model.network.support_place(joint, axis)
     force = frame.model.bending / frame.model.length**2
 
     def value(z: Lanes, p: Parameters) -> Values:

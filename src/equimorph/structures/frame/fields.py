@@ -39,7 +39,7 @@ class FrameFields(FrameMechanics):
     def _unit_loads(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
         """Force at the points and of the supports for a load of size 1 on each joint."""
         joints = len(self.model.network.joints)
-        found = [graph.carried(np.eye(joints)) for graph in self.model.graphs]
+        found = [graph.carrying_forces(np.eye(joints)) for graph in self.model.graphs]
         return tuple((each.members[:, self.model.owner], each.supports) for each in found)
 
     @property

@@ -156,7 +156,7 @@ class FrameModel:
             loads[:, end] += lines[:, m] * self.lengths[m]
         start, drop = np.zeros((2, self.scalars, len(self.lengths)))
         supports = np.zeros((self.scalars, len(made.joints)))
-        around, carried = graph.circulations(), graph.carried(loads)
+        around, carried = graph.circulations(), graph.carrying_forces(loads)
         last = first + len(around.members)
         start[first:last], supports[first:last] = around
         start[self.own], supports[self.own] = carried

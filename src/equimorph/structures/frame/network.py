@@ -71,7 +71,7 @@ class FrameNetwork(Network):
             )
         return at, list(ends).index(joint)
 
-    def supported(self, joint: Any, axis: Any) -> tuple[int, int]:
+    def support_place(self, joint: Any, axis: Any) -> tuple[int, int]:
         """Joint and axis (0, 1, 2) of a support."""
         if axis not in AXES:
             raise InputError(f"`axis` must be one of {', '.join(AXES)}; got {axis!r}.")

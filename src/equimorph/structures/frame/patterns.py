@@ -124,7 +124,7 @@ def _fill_actuator(made: FrameNetwork, into: Patterns, k: int, what: str, given:
             if kind == "move":
                 _fill_move(made, into, k, here, name, value)
             elif kind == "turn":
-                into.turns[k, made.supported(name, "angle")[0]] = _number(value, here)
+                into.turns[k, made.support_place(name, "angle")[0]] = _number(value, here)
             else:
                 member, sign = made.member(name)
                 array = into.curvature if kind == "curvature" else into.length
@@ -137,7 +137,7 @@ def _fill_move(
     vector = numbers(given, [2], what)
     for axis, value in enumerate(vector):
         if value:
-            into.moves[k, made.supported(name, "xy"[axis])[0], axis] = value
+            into.moves[k, made.support_place(name, "xy"[axis])[0], axis] = value
     if not any(vector):
         raise InputError(f"`{what}` must not be zero; got {given!r}.")
 

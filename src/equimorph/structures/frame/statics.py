@@ -63,7 +63,7 @@ class Graph:
                     queue.append(there)
         return found
 
-    def carried(self, loads: Float[np.ndarray, "flows joints"]) -> Flows:
+    def carrying_forces(self, loads: Float[np.ndarray, "flows joints"]) -> Flows:
         """Forces that carry loads on the joints to the ground along shortest paths."""
         edges = self.edges
         along = np.zeros((len(loads), len(edges)))

@@ -42,7 +42,7 @@ class ClampedMechanics(Mechanics):
 
     def __init__(self, mesh: Mesh, load: LoadShape) -> None:
         self.mesh, self.load = mesh, load
-        self.rho = load.cumulated(mesh)
+        self.rho = load.cumulate(mesh)
         self.loads = mesh.assemble(self.rho)
         scaled = mesh.stiffness / FOUR_PI_SQUARED
         self.layout = CondensedLayout(scaled, np.array([1, mesh.elements - 1]))
@@ -68,7 +68,7 @@ class ClampedMechanics(Mechanics):
 
     def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
         """Angles θ at all nodes, the prescribed ends included."""
-        z, p = self.checked((z, p))
+        z, p = self.check_widths((z, p))
         theta = np.empty((len(z), self.unknowns + 2))
         theta[:, 1:-1] = z[:, : self.unknowns]
         theta[:, 0], theta[:, -1] = p[:, 1] + p[:, 0], p[:, 1] - p[:, 0]
@@ -83,19 +83,19 @@ class ClampedMechanics(Mechanics):
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
     ) -> Float[np.ndarray, "lanes points 4"]:
         """(θ, κ, x, y) at arclengths, recovered from the vertices."""
-        z, p = self.checked((z, p))
+        z, p = self.check_widths((z, p))
         return self.recovery.fields(z, p, s)
 
     def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the first arclength where it is."""
-        z, p = self.checked((z, p))
+        z, p = self.check_widths((z, p))
         return self.recovery.largest_curvature(z, p)
 
     def kkt(
         self, z: Lanes, p: Parameters, shift: Values | None = None
     ) -> tuple[Nodal, Float[np.ndarray, "lanes 2 nodes"]]:
         """F_z − shift·mass as `layout` takes it: diagonal beside the stiffness, constraints."""
-        z, p = self.checked((z, p))
+        z, p = self.check_widths((z, p))
         lanes, nodes = len(z), self.unknowns + 2
         diagonal, gradients = np.empty((lanes, nodes)), np.empty((lanes, 2, nodes))
         moved = np.zeros(lanes) if shift is None else np.ascontiguousarray(shift)
@@ -116,21 +116,21 @@ class ClampedMechanics(Mechanics):
 
     def _residual(self, z: Lanes, p: Parameters) -> tuple[Lanes, Float[np.ndarray, "lanes 3"]]:
         """F, and ∂L/∂(θ(0), θ(1), q)."""
-        z, p = self.checked((z, p))
+        z, p = self.check_widths((z, p))
         out, ends = np.empty_like(z), np.empty((len(z), 3))
         over_lanes(residual_lanes, self._matrices, [z, p], [out, ends])
         return out, ends
 
     def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
         """F_p·dp."""
-        z, p, _, dp = self.checked((z, p), (z, dp))
+        z, p, _, dp = self.check_widths((z, p), (z, dp))
         out = np.empty_like(z)
         over_lanes(parameter_lanes, self._matrices, [z, p, dp], [out])
         return out
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
-        arrays = self.checked((z, p), v, w)
+        arrays = self.check_widths((z, p), v, w)
         out = np.empty_like(arrays[0])
         over_lanes(second_lanes, self._matrices[1:], arrays, [out])
         return out

@@ -82,7 +82,7 @@ class Description:
         return out
 
     def _profile(self, name: str, unit: float = 1.0) -> LoadShape:
-        return _scaled(profile(getattr(self, name), name, self.kinks), unit)
+        return _rescale(profile(getattr(self, name), name, self.kinks), unit)
 
     def build(self, elements: int, degree: int) -> Build:
         """The rod in non-dimensional form."""
@@ -264,7 +264,7 @@ class Description:
         return data | self.units.data()
 
 
-def _scaled(shape: LoadShape, unit: float) -> LoadShape:
+def _rescale(shape: LoadShape, unit: float) -> LoadShape:
     """The profile divided by a unit."""
     if unit == 1.0:
         return shape

@@ -37,7 +37,7 @@ def peaks(values: Float[np.ndarray, "lanes samples"], at: Float[np.ndarray, " sa
     left = np.concatenate([low, values[:, :-1]], axis=1)
     right = np.concatenate([values[:, 1:], low], axis=1)
     lane, sample = np.nonzero((values >= left) & (values > right))
-    height, place = _polished(values, at, lane, sample)
+    height, place = _polish(values, at, lane, sample)
     number = np.arange(len(lane)) - np.searchsorted(lane, lane)
     most = int(number.max(initial=0)) + 1
     out, places = np.full((len(values), most), -np.inf), np.zeros((len(values), most))
@@ -51,7 +51,7 @@ def _inverse() -> Float[np.ndarray, "powers samples"]:
     return np.asarray(np.linalg.inv(np.vander(np.arange(-HALF, HALF + 1.0), increasing=True)))
 
 
-def _polished(
+def _polish(
     values: Float[np.ndarray, "lanes samples"],
     at: Float[np.ndarray, " samples"],
     lane: Int[np.ndarray, " n"],
@@ -68,7 +68,7 @@ def _polished(
         powers, start = window @ _inverse().T, (sample - middle).astype(float)
         low = np.maximum(start - 1.0, first - middle)
         high = np.minimum(start + 1.0, first + INTERVALS - middle)
-        x = _climbed(powers, start, low, high)
+        x = _maximise(powers, start, low, high)
         better = _value(powers, x) > height
         width = at[first + 1] - at[first]
         height = np.where(better, _value(powers, x), height)
@@ -76,7 +76,7 @@ def _polished(
     return height, place
 
 
-def _climbed(
+def _maximise(
     powers: Float[np.ndarray, "n terms"],
     x: Float[np.ndarray, " n"],
     low: Float[np.ndarray, " n"],
@@ -120,7 +120,7 @@ def extreme_curvatures(
     tops = _nearest_peaks(mesh, np.abs(kappa), near)
     # a vertex belongs to two elements, and the extremum lies in one of them
     sides = [np.clip((tops - back) // DEGREE, 0, mesh.elements - 1) for back in (1, 0)]
-    left, right = (_refined(mesh, kappa, tops, element) for element in sides)
+    left, right = (_extrema_of_interpolants(mesh, kappa, tops, element) for element in sides)
     return np.asarray(np.maximum(left, right))
 
 
@@ -133,7 +133,7 @@ def _nearest_peaks(mesh: Mesh, sizes: Sizes, near: Float[np.ndarray, "lanes plac
     return np.asarray(np.where(peaks[:, None], away, np.inf).argmin(axis=2))
 
 
-def _refined(
+def _extrema_of_interpolants(
     mesh: Mesh,
     kappa: Sizes,
     tops: Nodes,

@@ -100,7 +100,7 @@ class ClampedFields:
         under tables.
         """
         fine = Mesh(self.mesh.breaks, reference_element(LOAD_DEGREE))
-        rho = self.load.cumulated(fine)
+        rho = self.load.cumulate(fine)
         series = rho @ fine.reference.to_legendre.T
         large = np.abs(series).max(axis=0) > NEGLIGIBLE * max(np.abs(rho).max(), 1e-300)
         terms = int(np.flatnonzero(large).max(initial=0)) + 1

@@ -69,7 +69,7 @@ class GeneralMechanics(Mechanics):
 
     def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
         """Angles θ at all nodes, the prescribed ends included."""
-        z, p = self.checked((z, p))
+        z, p = self.check_widths((z, p))
         return self._angles(z, self.scalars(z, p))
 
     def _angles(self, z: Lanes, y: Scalars) -> Nodal:
@@ -88,7 +88,7 @@ class GeneralMechanics(Mechanics):
         """Rule on whose nodes `recovered` gives fields."""
         return self._fields.reference
 
-    def recovered(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes elements 5 fine"]:
+    def fine_fields(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes elements 5 fine"]:
         """θ, κ, x, y and the moment at the nodes of a finer rule in every element."""
         return self._fields.everywhere(theta, y)
 
@@ -194,7 +194,7 @@ class GeneralMechanics(Mechanics):
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp, and the parts of F_z: diagonal, border, trailing block."""
-        z, p, _, dp = self.checked((z, p), (z, dp))
+        z, p, _, dp = self.check_widths((z, p), (z, dp))
         lanes, nodes, m = len(z), self.layout.nodes, self.constraints
         out = (
             np.empty_like(z),
@@ -216,7 +216,7 @@ class GeneralMechanics(Mechanics):
         theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
         moved, change = self._velocity(np.zeros_like(z), dp)
         force = area.gradient(theta)
-        turn = pull * area.turned(theta, moved) + change * force
+        turn = pull * area.gradient_derivative(theta, moved) + change * force
         residual, column = np.zeros((2, *z.shape))
         residual[:, : self.unknowns] = -(pull * force)[:, self.unknown_nodes]
         column[:, : self.unknowns] = -turn[:, self.unknown_nodes]
@@ -238,7 +238,7 @@ class GeneralMechanics(Mechanics):
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
-        arrays = self.checked((z, p), v, w)
+        arrays = self.check_widths((z, p), v, w)
         out = np.empty_like(arrays[0])
         _, points, softness, _, picks, splits, _, turned, first = self._step_data
         sizes = np.int64(self.mesh.elements), np.int64(self.constraints), first
@@ -248,8 +248,8 @@ class GeneralMechanics(Mechanics):
             theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
             (v_theta, v_pull), (w_theta, w_pull) = self._velocity(*v), self._velocity(*w)
             total = pull * self._area.second(theta, v_theta, w_theta)
-            total += v_pull * self._area.turned(theta, w_theta)
-            total += w_pull * self._area.turned(theta, v_theta)
+            total += v_pull * self._area.gradient_derivative(theta, w_theta)
+            total += w_pull * self._area.gradient_derivative(theta, v_theta)
             out[:, : self.unknowns] -= total[:, self.unknown_nodes]
         return out
 

@@ -45,7 +45,7 @@ class Mechanics(ABC):
         """Length of z."""
         return self.unknowns + self.constraints
 
-    def checked(self, *pairs: Direction) -> list[np.ndarray]:
+    def check_widths(self, *pairs: Direction) -> list[np.ndarray]:
         """States and directions (z, p) as contiguous arrays of the right widths, for the kernels.
 
         Kernels do not check what they read.
@@ -135,7 +135,7 @@ class Mechanics(ABC):
     ) -> Advance:
         """`advance` by one kernel; lanes with an unsafe pivot take the general solve."""
         lanes = len(z)
-        z, p, row, dp = self.checked((z, p), (row, dp))
+        z, p, row, dp = self.check_widths((z, p), (row, dp))
         inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
         # one block each: what is freed at once stays with the process and is not mapped anew
         dz, tangent_z = np.empty((2, lanes, self.size))

@@ -47,7 +47,7 @@ class Densities:
     rigidity: Float[np.ndarray, "elements order"]
     softness: Float[np.ndarray, "elements order"]
 
-    def mapped(self, matrix: Float[np.ndarray, "scalars others"]) -> "Densities":
+    def map_scalars(self, matrix: Float[np.ndarray, "scalars others"]) -> "Densities":
         """For other scalars that determine these as ``matrix @ others``."""
         along, across, bending, tension = (
             np.einsum("jk,jei->kei", matrix, a)
@@ -135,15 +135,15 @@ class RodModel:
         """γ: axial compliance over the quadrature weight."""
         return np.ascontiguousarray((self.nodal.softness / self.mesh.element_weights).ravel())
 
-    def mapped(
+    def map_scalars(
         self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
     ) -> "RodModel":
         """The same rod in other parameters: its scalars are ``matrix @ others``."""
         return replace(
             self,
             names=tuple(names),
-            nodal=self.nodal.mapped(matrix),
-            fine=self.fine.mapped(matrix),
+            nodal=self.nodal.map_scalars(matrix),
+            fine=self.fine.map_scalars(matrix),
             slope=matrix.T @ self.slope,
             element_slope=np.einsum("jk,jei->kei", matrix, self.element_slope),
             quadratic=matrix.T @ self.quadratic @ matrix,
@@ -221,7 +221,7 @@ def raw_model(build: Build) -> RodModel:
     )
 
 
-def _summed(terms: Sequence[Term], mesh: Mesh) -> Effects:
+def _sum_effects(terms: Sequence[Term], mesh: Mesh) -> Effects:
     """Effects of several terms with one amplitude."""
     parts = [term.effects(mesh) for term in terms]
     zero = np.zeros((mesh.elements, mesh.degree + 1))
@@ -247,7 +247,7 @@ def _densities(
         along[c], across[c] = axis.unit
     bending[-1] = rigidity * at_nodes(build.curvature, mesh)
     for name, terms in build.terms.items():
-        effects, row = _summed(terms, mesh), place[name]
+        effects, row = _sum_effects(terms, mesh), place[name]
         # a free end B takes no load: what lies beyond a cross-section hangs on end A
         hung = sum(
             (np.dot(effects.force, axis.unit) * np.array(axis.unit) for axis in axes
@@ -266,7 +266,7 @@ def _add_couples(
     build: Build, place: Mapping[str, int], slope: Float[np.ndarray, "scalars nodes"]
 ) -> None:
     for name, terms in build.terms.items():
-        for s, moment in _summed(terms, build.mesh).couples:
+        for s, moment in _sum_effects(terms, build.mesh).couples:
             node = int(np.argmin(np.abs(build.mesh.nodes - s)))
             slope[place[name], node] += moment
 
@@ -274,7 +274,7 @@ def _add_couples(
 def _pressure(build: Build, place: Mapping[str, int], count: int) -> Float[np.ndarray, " scalars"]:
     out = np.zeros(count)
     for name, terms in build.terms.items():
-        out[place[name]] = _summed(terms, build.mesh).pressure
+        out[place[name]] = _sum_effects(terms, build.mesh).pressure
     return out
 
 
@@ -286,7 +286,7 @@ def _curvature_energy(
     natural = np.zeros((count, mesh.elements, mesh.degree + 1))
     natural[-1] = at_nodes(build.curvature, mesh)
     for name, terms in build.terms.items():
-        natural[place[name]] = _summed(terms, mesh).natural
+        natural[place[name]] = _sum_effects(terms, mesh).natural
     weights = mesh.element_weights * at_nodes(build.stiffness, mesh) / FOUR_PI_SQUARED
     return np.asarray(np.einsum("jei,ei,kei->jk", natural, weights, natural))
 
@@ -308,7 +308,7 @@ def _supports(
     from_start = [True, True]
     forces = np.zeros((count, 2))
     for name, terms in build.terms.items():
-        forces[place[name]] = _summed(terms, build.mesh).force
+        forces[place[name]] = _sum_effects(terms, build.mesh).force
     for i, axis in enumerate(support_axes(build.ends)):
         unit = np.array(axis.unit)
         total = forces @ unit

@@ -71,7 +71,7 @@ def follow(
             break
         old = here[active]
         target = np.minimum(old.t + step[active], 1.0)
-        guess = old.x if part.free else _predicted(before[active], old, target)
+        guess = old.x if part.free else _predict(before[active], old, target)
         new, bend = newton(rod, part, active, target, guess)
         if not part.free:
             way, off = (np.abs(new.x - x).max(axis=1) for x in (old.x, guess))
@@ -83,7 +83,7 @@ def follow(
     return here.t, here.x
 
 
-def _predicted(before: Point, here: Point, t: Values) -> Float[np.ndarray, "lanes extended"]:
+def _predict(before: Point, here: Point, t: Values) -> Float[np.ndarray, "lanes extended"]:
     """Cubic through two points with their slopes; the line where there is one point only."""
     width = here.t - before.t
     alone = width == 0.0

@@ -63,7 +63,7 @@ class EnclosedArea:
         s, c = np.sin(theta), np.cos(theta)
         return np.asarray(s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T))
 
-    def turned(self, theta: Nodal, v: Nodal) -> Nodal:
+    def gradient_derivative(self, theta: Nodal, v: Nodal) -> Nodal:
         """Derivative of the gradient along v."""
         s, c = np.sin(theta), np.cos(theta)
         own = s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T)

@@ -31,7 +31,7 @@ class LoadShape:
     density: Shape
     kinks: Float[np.ndarray, " kinks"]
 
-    def cumulated(self, mesh: Mesh) -> Float[np.ndarray, "elements order"]:
+    def cumulate(self, mesh: Mesh) -> Float[np.ndarray, "elements order"]:
         """ρ at the nodes of each element, by a Gauss rule of 24 points between nodes."""
         t = np.concatenate([[0.0], mesh.reference.nodes])
         rho = np.empty((mesh.elements, mesh.degree + 1))

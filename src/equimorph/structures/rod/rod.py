@@ -205,7 +205,7 @@ class Rod(Described):
         self._raw = raw
         self.parameters = description.parameters
         names = names_of(self.parameters)
-        self.mechanics = GeneralMechanics(raw.model.mapped(names, self._raw_matrix))
+        self.mechanics = GeneralMechanics(raw.model.map_scalars(names, self._raw_matrix))
 
     @staticmethod
     def _checked_span(span: float) -> float:
@@ -242,7 +242,7 @@ class Rod(Described):
         degree = min(degree + 4, 16)
         if self._general is not None:
             raw, matrix = self._general.mechanics(elements, degree)
-            return GeneralMechanics(raw.model.mapped(names_of(self.parameters), matrix))
+            return GeneralMechanics(raw.model.map_scalars(names_of(self.parameters), matrix))
         assert self._load is not None
         return ClampedMechanics(mesh_with_kinks(self._load.kinks, elements, degree), self._load)
 
@@ -338,4 +338,4 @@ class Rod(Described):
         loads, units = {"q": self._arch_load}, self.units
         twin = Description(CLAMPED, 1.0, 0.0, None, loads, {}, None, DEFAULT_SPAN, 0.0, (), units)
         raw, matrix = twin.mechanics(*self._resolution)
-        return GeneralMechanics(raw.model.mapped(names_of(twin.parameters), matrix))
+        return GeneralMechanics(raw.model.map_scalars(names_of(twin.parameters), matrix))

@@ -24,12 +24,12 @@ def mirrors(model: RodModel, unknowns: int) -> tuple[Symmetry, ...]:
         matrix = _scalar_map(model, reverse=reverse, sign=sign)
         if matrix is not None:
             own = matrix[model.multipliers : -1, model.multipliers : -1]
-            apply = _applied(matrix, unknowns, reverse=reverse, sign=sign)
+            apply = _symmetry_map(matrix, unknowns, reverse=reverse, sign=sign)
             found.append(Symmetry(name, apply, own.sum(axis=0), np.abs(own).argmax(axis=0)))
     return tuple(found)
 
 
-def _applied(
+def _symmetry_map(
     matrix: Matrix, unknowns: int, *, reverse: bool, sign: float
 ) -> Callable[[Lanes, Parameters], tuple[Lanes, Parameters]]:
     def apply(z: Lanes, p: Parameters) -> tuple[Lanes, Parameters]:

@@ -147,7 +147,7 @@ class LineLoad(Term):
     def effects(self, mesh: Mesh) -> Effects:
         """Load cumulated from end A."""
         x, y = _direction(self.direction)
-        rho = self.density().cumulated(mesh)
+        rho = self.density().cumulate(mesh)
         total = float(rho[-1, -1])
         return Effects(along=x * rho, across=y * rho, force=(x * total, y * total))
 

@@ -152,7 +152,7 @@ def lateral_margin(
     """
     grid = _Grid(rod)
     theta, y = rod.nodal_angles(z, p), rod.scalars(z, p)
-    fields = rod.recovered(theta, y)
+    fields = rod.fine_fields(theta, y)
     forces = grid.forces(y, fields)
     mesh = rod.model.mesh
     fine = Mesh(mesh.breaks, grid.reference)
@@ -160,7 +160,7 @@ def lateral_margin(
         at_nodes(profile(value, name), fine) * rod.model.fine.rigidity
         for name, value in (("torsion", stiffness.torsion), ("lateral", stiffness.lateral))
     )
-    matrix = grid.assembled(twist, bend, fields, forces)
+    matrix = grid.assemble(twist, bend, fields, forces)
     basis = grid.admissible(ends)
     mass = np.tile(mesh.weights, 2)
     metric = basis.T @ (mass[:, None] * basis)
@@ -198,7 +198,7 @@ class _Grid:
         c, s = np.cos(theta), np.sin(theta)
         return along * c + across * s, across * c - along * s
 
-    def assembled(
+    def assemble(
         self, twist: Float[np.ndarray, "e fine"], bend: Float[np.ndarray, "e fine"],
         fields: Float[np.ndarray, "lanes e 5 fine"], forces: tuple[Fine, Fine],
     ) -> Float[np.ndarray, "lanes n n"]:  # fmt: skip

@@ -82,7 +82,7 @@ class TrussMechanics(DiscreteStructure):
         full[:, ~self.network.held] = u
         return np.asarray(np.diff(full[:, self.network.ends], axis=2)[:, :, 0])
 
-    def _gathered(self, forces: Float[np.ndarray, "lanes bars space"]) -> Lanes:
+    def _sum_at_joints(self, forces: Float[np.ndarray, "lanes bars space"]) -> Lanes:
         """Sum at the joints what bars exert on their second joint, and take from their first."""
         full = np.zeros((len(forces), *self.network.held.shape))
         for bar, (first, second) in enumerate(self.network.ends.tolist()):
@@ -156,7 +156,7 @@ class TrussMechanics(DiscreteStructure):
         twice = ggg * gv * gw + ggl * (gv * lw + lv * gw) + gll * lv * lw
         twice = twice + 2.0 * gg * (dv * dw).sum(axis=2)
         by_v, by_w = gg * gv + gl * lv, gg * gw + gl * lw
-        return self._gathered(
+        return self._sum_at_joints(
             2.0 * (twice[..., None] * d + by_v[..., None] * dw + by_w[..., None] * dv)
         )
 
@@ -236,7 +236,7 @@ def symmetries(truss: TrussMechanics) -> tuple[Symmetry, ...]:
     """Mirror images that leave bars, supports, loads and actuators as they are, up to signs."""
     found = []
     for name, axes, joints in images(truss.network.places):
-        places = _exchanged(truss, axes, joints)
+        places = _image_parameters(truss, axes, joints)
         if places is None:
             continue
         apply = partial(_image, truss, axes, joints, *places)
@@ -245,7 +245,7 @@ def symmetries(truss: TrussMechanics) -> tuple[Symmetry, ...]:
     return tuple(found)
 
 
-def _exchanged(
+def _image_parameters(
     truss: TrussMechanics, axes: Float[np.ndarray, " space"], joints: Int[np.ndarray, " joints"]
 ) -> tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]] | None:
     """Signs and order of the parameters in the image; None if the image is another truss."""

@@ -91,7 +91,7 @@ class CalibrationKind(Kind[Calibration]):
     def answer(self, question: Question, arguments: Arguments) -> Calibration:
         """Load the natural states as the measured ones, and fit from there."""
         data: Data = question.extra
-        start = _loaded(question.structure, data.measured)
+        start = _natural_states(question.structure, data.measured)
         return calibrate(start, data.unknown, [data.measured.shape], family=data.family)
 
     def write_tables(self, question: Question, answer: Calibration, folder: Path) -> None:
@@ -128,7 +128,7 @@ class CalibrationKind(Kind[Calibration]):
         files, data = question.files, question.section.data.file
         states = len(question.extra.measured.parameters)
         words = (
-            html.refused(f"{answer.status}: {answer.why}.")
+            html.refusal_line(f"{answer.status}: {answer.why}.")
             if not answer.fitted
             else '<p class="verdict"><strong>Fitted</strong> to '
             f"{question.extra.measured.count} coordinates "
@@ -203,7 +203,7 @@ def _datum(identity: Mapping[str, Any], path: str) -> float:
     return float(inner)
 
 
-def _loaded(structure: Structure, measured: Measured) -> States:
+def _natural_states(structure: Structure, measured: Measured) -> States:
     """Natural states under the loads of the measured ones."""
     unloaded = structure.unloaded()
     names = structure.parameters

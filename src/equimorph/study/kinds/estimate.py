@@ -40,7 +40,7 @@ class EstimateKind(Kind[StateEstimate]):
         words = {
             "known": '<p class="verdict"><strong>Known.</strong></p>',
             "ambiguous": f"<p><strong>Ambiguous.</strong> {escape(answer.why)}</p>",
-            "refused": html.refused(answer.why),
+            "refused": html.refusal_line(answer.why),
         }[answer.status]
         shown = list(question["measured"])
         more = free_columns(answer.states, question.free, shown)

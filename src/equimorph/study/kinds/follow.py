@@ -53,12 +53,12 @@ class FollowKind(Kind[FollowedOptimum]):
         head = heading(question)
         legs = len(question["to"])
         if not len(answer.states):
-            return [head, html.refused(answer.why)]
+            return [head, html.refusal_line(answer.why)]
         first = f"After {html.number(answer.at[-1])} of {legs} legs: {answer.why}."
         words = (
             f'<p class="verdict"><strong>Arrived.</strong> {escape(_ends(question, answer))}</p>'
             if answer.arrived
-            else html.refused(first)
+            else html.refusal_line(first)
         )
         caption = "Objective and actuators along the legs; dotted where the optimum jumps."
         pictures = html.pictures(folder, {}, {f"{question.files}.png": caption})

@@ -36,7 +36,7 @@ class OptimumKind(Kind[Optima]):
     def report(self, question: Question, answer: Optima, folder: Path) -> list[str]:
         """A table of them, best first, with what makes each an optimum."""
         if not answer.found:
-            return [heading(question), html.refused(answer.why)]
+            return [heading(question), html.refusal_line(answer.why)]
         certificates = [each.certificate for each in answer.all]
         shown = [question["objective"]]
         more = free_columns(answer.states, question.free, shown)

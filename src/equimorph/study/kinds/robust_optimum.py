@@ -33,7 +33,7 @@ class RobustOptimumKind(Kind[RobustOptimum]):
     def report(self, question: Question, answer: RobustOptimum, folder: Path) -> list[str]:
         """What is guaranteed and its price, and both optima in a table."""
         if not answer.found:
-            return [heading(question), html.refused(answer.why)]
+            return [heading(question), html.refusal_line(answer.why)]
         shown = [question["objective"]]
         states = _states(answer)
         more = {"": ["nominal optimum", "robust optimum"]}

@@ -27,7 +27,7 @@ Routes = tuple[Route, ...]
 """The route that was asked for, or its refusal; then others, if any were asked for."""
 
 
-def _check_unused(name: str) -> str:
+def _check_name(name: str) -> str:
     """Refuse names under which files of the set are stored."""
     if f"{name}-plane" in (STABLE_PLANE, PLANE):
         raise requirement("be another name: figures of the set begin with it")
@@ -43,7 +43,7 @@ class RouteKind(Kind[Routes]):
     left_out = ("route",)
     own = MappingProxyType(
         {
-            "name": (Annotated[Name, AfterValidator(_check_unused)], ...),
+            "name": (Annotated[Name, AfterValidator(_check_name)], ...),
             "alternatives": (MEANINGS["count"] | None, None),
             "smooth": (Positive | None, None),
         }
@@ -84,7 +84,7 @@ class RouteKind(Kind[Routes]):
 
     def write_tables(self, question: Question, answer: Routes, folder: Path) -> None:
         """Write the schedules."""
-        for name, route in _named(question, answer):
+        for name, route in _name_routes(question, answer):
             if route.schedule is not None:
                 write_schedule(route.schedule, folder / schedule_table(name))
 
@@ -104,7 +104,7 @@ class RouteKind(Kind[Routes]):
         heading = f"<h2>Route {escape(name)}</h2>"
         pictures = pictures_of_way(folder, name, "route")
         if not route.arrived:
-            return [heading, html.refused(route.why), pictures]
+            return [heading, html.refusal_line(route.why), pictures]
         snapping = "Every state between the snaps" if route.snaps else "Every state on the way"
         return [
             heading,
@@ -127,7 +127,7 @@ class RouteKind(Kind[Routes]):
         return f"{head}: [bold green]arrived[/] {how}, {size}{_cost(route)}.{others}"
 
 
-def _named(question: Question, answer: Routes) -> list[tuple[str, Route]]:
+def _name_routes(question: Question, answer: Routes) -> list[tuple[str, Route]]:
     return [(route_name(question.name, k), route) for k, route in enumerate(answer, 1)]
 
 
@@ -163,7 +163,7 @@ def _report_of_all(question: Question, answer: Routes, folder: Path) -> list[str
             html.number(route.cost),
             f'<a href="{schedule_table(name)}">{schedule_table(name)}</a>',
         ]
-        for number, (name, route) in enumerate(_named(question, answer), 1)
+        for number, (name, route) in enumerate(_name_routes(question, answer), 1)
     ]
     head = ["", "length", "smallest margin", escape(answer[0].objective), "schedule"]
     caption = "Routes that cannot be drawn into each other; the first is the best."

@@ -61,7 +61,7 @@ class SampledRouteKind(Kind[Route]):
         """Verdict, schedule and figures."""
         head = heading(question)
         if not answer.arrived:
-            return [head, html.refused(answer.why)]
+            return [head, html.refusal_line(answer.why)]
         length = html.number(answer.length)
         return [
             head,

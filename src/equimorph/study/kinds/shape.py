@@ -28,7 +28,7 @@ class ShapeKind(Kind[Shapes]):
     def report(self, question: Question, answer: Shapes, folder: Path) -> list[str]:
         """A table of them, with the way to each."""
         if not len(answer):
-            return [heading(question), html.refused(answer.why)]
+            return [heading(question), html.refusal_line(answer.why)]
         words = [] if answer.solved else [f"<p><strong>Fitted.</strong> {escape(answer.why)}</p>"]
         shown = list(question["targets"])
         more = free_columns(answer.states, question.free, shown)

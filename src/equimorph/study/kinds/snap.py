@@ -41,7 +41,7 @@ class SnapKind(Kind[tuple[State, LeastSnap]]):
         """Change, landing, and a table of state, fold and landing."""
         _, snap = answer
         words = escape(_snap_in_words(snap))
-        line = html.refused(snap.why) if snap.landing is None else f"<p>{words}</p>"
+        line = html.refusal_line(snap.why) if snap.landing is None else f"<p>{words}</p>"
         states = _stations(answer)
         more = {
             "": ["state", "edge of stability", "landing"][: len(states)],

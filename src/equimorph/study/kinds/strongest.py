@@ -66,7 +66,7 @@ class StrongestKind(Kind[Answer]):
         head = heading(question)
         lead = html.extent(amap.grid.box, amap.fixed, amap.within)
         if sure.status == "refused":
-            return [head, html.refused(f"{sure.why}.")]
+            return [head, html.refusal_line(f"{sure.why}.")]
         captions = {
             f"{question.files}.png": "Limit loads with their largest values, numbered as in the "
             f"table{'' if robust is None else ' (□: robust, with its box of errors)'}.",

@@ -44,7 +44,7 @@ class TrackKind(Kind[Tracking]):
         if not answer.arrived:
             legs = f"{html.number(answer.last_good)} of {len(question['targets'])} legs"
             done = f"After {legs}: {answer.why}"
-            return [head, html.refused(done), *_compromise(answer), pictures]
+            return [head, html.refusal_line(done), *_compromise(answer), pictures]
         turn = answer.holonomy
         back = ""
         if turn is not None:

@@ -41,7 +41,7 @@ class VerifyKind(Kind[Verification]):
         head = heading(question)
         pictures = pictures_of_way(folder, question.files, "way")
         if not answer.verified:
-            return [head, html.refused(_sentence(answer.why)), pictures]
+            return [head, html.refusal_line(_sentence(answer.why)), pictures]
         return [
             head,
             '<p class="verdict"><strong>Verified.</strong> Every state on the way is stable: '
