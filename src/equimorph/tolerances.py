@@ -6,6 +6,9 @@ A tolerance that only one algorithm uses stands beside that algorithm.
 # Identity: two things nearer than this are the same.
 SAME_STATE = 1e-6
 """Distance of two states in the structure's metric."""
+SAME_SOLUTION = 1e-5
+"""Distance, in the metric and scaled parameters, of two states that separate iterations found, such
+as descents, gradient flows and queries, which end less sharply than Newton's method."""
 SAME_NUMBER = 1e-9
 """Difference of two numbers, relative to the largest of those that are compared."""
 

@@ -18,9 +18,8 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, pieces
 from equimorph.structures import State, States
+from equimorph.tolerances import SAME_SOLUTION
 
-SAME = 1e-5
-"""Distance, in the metric and scaled parameters, within which a state belongs to a chart."""
 ON_CURVE = 1e-6
 """Distance from a transition, in ranges of the parameters, within which points lie on it."""
 
@@ -247,7 +246,7 @@ class Atlas:
         )
         order = np.lexsort((gap, found.point))
         first = order[np.diff(found.point[order], prepend=-1) > 0]
-        near: Bool[np.ndarray, " n"] = gap[first] < SAME
+        near: Bool[np.ndarray, " n"] = gap[first] < SAME_SOLUTION
         cell = np.full(len(batch), -1)
         cell[found.point[first[near]]] = found.cell[first[near]]
         return cell

@@ -34,6 +34,7 @@ ON_SET = Guards(iterations=20, longest=0.3, converged=1e-7, contraction=0.7, fre
 Square = Float[np.ndarray, "lanes d d"]
 
 CENTRAL = 1e-5
+"""Step of central differences along orthonormal tangents, in the metric."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,11 +25,10 @@ from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labe
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.queries.levels import part_of
 from equimorph.structures import States
+from equimorph.tolerances import SAME_NUMBER
 
 RINGS = 3
 """Rings of cells around the end of a cut in which a cusp is its true end."""
-SAME = 1e-9
-"""Difference of shares of an edge up to which two crossings are one."""
 MOST = 40
 """Most cuts; what still overlaps then is left, and `Atlas` shows it."""
 
@@ -252,7 +251,7 @@ def _insert_crossings(
     for a, b, share in (step for way in ways for step in way if not isinstance(step, int)):
         key, own = ((a, b), share) if a < b else ((b, a), 1.0 - share)
         # two ways over one edge would need two vertices on it
-        if abs(crossings.setdefault(key, own) - own) > SAME:
+        if abs(crossings.setdefault(key, own) - own) > SAME_NUMBER:
             return None
     number = {key: len(fabric.vertices) + k for k, key in enumerate(crossings)}
     if crossings:

@@ -14,7 +14,9 @@ from equimorph.errors import InputError
 
 PROGRAM = "equimorph"
 BAD_INPUT = 2
+"""Exit code of a command with wrong input; Python itself uses 1 for a crash."""
 LONGEST_LINE = 450
+"""Characters of an error message on the command line, beyond which it is cut."""
 INTERRUPTED = 130
 """What shells say of a program that was ended by Ctrl-C."""
 WrongUsage: Any = typer.BadParameter.__base__

@@ -19,11 +19,13 @@ WHY = {
     SLOW: "the flow did not settle within its number of steps",
 }
 STEPS = 3000
+"""Largest number of implicit Euler steps of one flow."""
 FIRST_STEP, SHORTEST_STEP = 0.1, 1e-12
 """In units of the time 1/|eigenvalue| at the start."""
 ACCURACY = 5e-3
 """Error of one step in the metric that the step control aims at."""
 ITERATIONS = 12
+"""Largest number of Newton iterations in one implicit step."""
 CONVERGED = 1e-8
 """Newton correction in the metric that is the last: the next one would be about its square."""
 ROUND_OFF = 1e-12
@@ -31,6 +33,8 @@ ROUND_OFF = 1e-12
 NEAR = 1e-2
 """Newton step to a stable state, in the metric, from which on it is solved for."""
 NEAR_SADDLE = 1e-5
+"""As `NEAR`, for an unstable state: a flow passes by most saddles, and ends only at one that it
+comes so close to."""
 FARTHEST = 100.0
 """Way in the metric after which a flow is taken to have left."""
 

@@ -34,6 +34,7 @@ SHARP = 1e-6
 """Distance between two zeros of an eigenvalue, in the metric, below which they count as one that
 touches zero: round-off, relative to the largest eigenvalues, hides what lies between."""
 TRIALS = 30
+"""Largest number of points inside a step at which the eigenvalue nearest to zero is computed."""
 
 
 @dataclass(frozen=True)

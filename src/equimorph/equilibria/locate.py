@@ -25,6 +25,7 @@ from equimorph.equilibria.steps import Bracket, Front, new_scalars
 from equimorph.structures import Advance
 
 NEWTON_STEPS = 24
+"""Largest number of Newton iterations towards a branch point."""
 POLISHED = 1e-9
 """Correction after which a point is exact to round-off: Newton is quadratic."""
 FAR = 1e6

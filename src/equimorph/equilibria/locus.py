@@ -19,6 +19,7 @@ Bases = Float[np.ndarray, "lanes d coordinates"]
 ACCEPTED = 1e-9
 """Length of the last correction; the next would be below round-off."""
 ITERATIONS = 12
+"""Largest number of Newton iterations onto a critical curve."""
 FIRST_SHARE, CONTRACTION = 0.25, 0.5
 """Longest first correction as a share of the step, and of each later one as a share of the one
 before: more could lead to another curve."""

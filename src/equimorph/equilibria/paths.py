@@ -17,7 +17,7 @@ from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import State, States
 
-SAME = 1e-8
+JOINED = 1e-8
 """Distance in the metric within which a leg ends where the next one begins."""
 
 
@@ -129,7 +129,7 @@ def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOpti
     outcome = with_multiple_points(curve, begin.z, outcome)
     n = structure.unknowns
     gap = np.sqrt((outcome.z[:, :n] - end.z[:, :n]) ** 2 @ structure.mass)
-    if not ((outcome.code == EventCode.ARRIVED) & (gap < SAME)).all():
+    if not ((outcome.code == EventCode.ARRIVED) & (gap < JOINED)).all():
         return None
     lanes = range(len(begin))
     return _joined(states[0], [_segment(curve, outcome, lane, within, lane) for lane in lanes])

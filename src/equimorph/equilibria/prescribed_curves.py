@@ -20,7 +20,9 @@ Table = Float[np.ndarray, "curves pieces _ columns"]
 Function = Callable[[float], Float[np.ndarray, "curves columns"]]
 
 DEGREE = 16
+"""Degree of the polynomials that approximate a prescribed curve piece by piece."""
 MOST_PIECES = 64
+"""Largest number of polynomial pieces; a function that needs more is refused as not smooth."""
 CLOSE = 1e-12
 """Largest miss of the polynomials, relative to the sizes of the columns."""
 

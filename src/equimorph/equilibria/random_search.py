@@ -12,11 +12,10 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Structure
+from equimorph.tolerances import SAME_STATE
 
 Groups = Int[np.ndarray, " lanes"]
 
-SAME = 1e-6
-"""Distance in the metric below which two equilibria over one point are the same."""
 LINES = 3
 """Random lines through each equilibrium, followed both ways."""
 REACH = 4.0
@@ -178,10 +177,10 @@ class Pools:
 
 
 def distinct(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
-    """Return the first of each group of points closer than `SAME` in the metric."""
+    """Return the first of each group of points closer than `SAME_STATE` in the metric."""
     kept: list[int] = []
     u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
     for i in range(len(z)):
-        if not kept or np.sqrt(((u[kept] - u[i]) ** 2).sum(axis=1)).min() > SAME:
+        if not kept or np.sqrt(((u[kept] - u[i]) ** 2).sum(axis=1)).min() > SAME_STATE:
             kept.append(i)
     return np.array(kept, dtype=int)

@@ -17,6 +17,7 @@ from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
 
 CONFIDENCE = 0.95
+"""Confidence level of the bound on the probability that one more run finds a new equilibrium."""
 REJECTED = 2.706
 """Fall of twice the log-likelihood at the end of a one-sided interval of 95 %."""
 

@@ -28,6 +28,7 @@ Names = Int[np.ndarray, " lanes"]
 LANES_PER_THREAD = 128
 """A second thread is not worth its start for fewer lanes than this on each."""
 EVENTS_AT_ONCE = 512
+"""Brackets of events, over all lanes, that are located together."""
 REPORT_EVERY = 0.2
 """Seconds."""
 

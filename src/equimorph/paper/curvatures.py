@@ -6,9 +6,11 @@ import equimorph as em
 
 GRID = {"Theta": (0.2, 2.5, 121), "Delta": (-2.0, 2.0, 160)}
 LOAD = 2.5
+"""Uniform load q of the map, in units of B/L³."""
 SETTINGS = ((0.96, 0.0), (0.64, 1.16), (0.64, -1.16))
 """Of the article's table; its Δ has another sign or scale, so that both signs are tried."""
 BESIDE = 1e-3
+"""Width of the grid cell at a setting of which the curvature is computed, in rad."""
 
 
 def main(folder: Path, grid: em.Grid | None = None) -> dict[str, float]:

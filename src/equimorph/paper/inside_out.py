@@ -6,6 +6,7 @@ import equimorph as em
 
 WAY = ({"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0})
 INTERVALS = (47, 81)
+"""Grid intervals over Θ and Δ."""
 
 
 def main(folder: Path, intervals: tuple[int, int] = INTERVALS) -> dict[str, float]:

@@ -6,6 +6,7 @@ import equimorph as em
 
 GRID = {"Theta": (0.2, 2.5, 121), "Delta": (-2.0, 2.0, 160)}
 SETTINGS = ((0.9, 0.0), (0.9, 0.02), (0.9, 0.04), (0.66, 1.36), (0.66, -1.36))
+"""Supports (Θ, Δ) in rad whose limit loads the report quotes."""
 
 
 def main(folder: Path, grid: em.Grid | None = None) -> dict[str, float]:

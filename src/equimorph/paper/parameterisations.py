@@ -5,6 +5,7 @@ from pathlib import Path
 import equimorph as em
 
 LOAD = 2.5
+"""Uniform load q, in units of B/L³."""
 WITHIN = 10.0
 """Largest max |κ|: beyond it there is a gap."""
 

@@ -9,6 +9,7 @@ import equimorph as em
 
 START = {"delta": 0.62, "x_l": 0.80}
 LEVELS = (-0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1)
+"""Loads F of the level curves that are drawn, in units of k."""
 
 
 def main(folder: Path) -> dict[str, float]:

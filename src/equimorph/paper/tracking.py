@@ -5,7 +5,9 @@ from pathlib import Path
 import equimorph as em
 
 CORNERS = ((0.10, 0.10), (0.20, 0.10), (0.20, 0.20), (0.10, 0.20), (0.10, 0.10))
+"""Heights at s = 1/3 and 2/3 at the corners of the closed motion, in units of L."""
 INTERVALS = (35, 61)
+"""Grid intervals over Θ and Δ."""
 
 
 def main(folder: Path, intervals: tuple[int, int] = INTERVALS) -> dict[str, float]:

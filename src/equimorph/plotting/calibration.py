@@ -14,8 +14,11 @@ from equimorph.plotting.shapes import prepare_axes
 from equimorph.tasks import Calibration, MeasuredShape
 
 _ROOM = 0.06
-_BELOW = 1.15  # inches for the residuals and the labels above them
+"""Empty border, as a share of the width of the outlines."""
+_BELOW = 1.15
+"""Inches for the residuals and the labels above them."""
 _GAP = 0.42
+"""Inches between the shapes and the residuals."""
 _LOOKS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("$x$", "o", {}),
     ("$y$", "s", {"mfc": "white"}),

@@ -38,10 +38,13 @@ _LABELS = {
     "barrier": "barrier", "gap": "gap", "twice": "not single-valued", "inside": "one state",
 }  # fmt: skip
 _ROOM = 0.04
+"""Empty room around the coordinates, as a share of their range."""
 _ZOOM = 0.82
 """Of the pictures above: their labels stay inside."""
-_PAD = 1  # of the label beside up to five digits, in points
-_WIDTH, _ABOVE, _BELOW, _LEGEND = 2.0, 1.8, 1.6, 0.3  # inches
+_PAD = 1
+"""Points between the label and tick labels of up to five digits."""
+_WIDTH, _ABOVE, _BELOW, _LEGEND = 2.0, 1.8, 1.6, 0.3
+"""Inches: width of a column, heights of the solid and the plane in it, and of the legend."""
 _COLUMNS, _ENTRIES = 4, 2
 """Columns in a row of panels, and entries of the legend for each of them."""
 

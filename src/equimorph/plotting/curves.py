@@ -15,6 +15,7 @@ from equimorph.tasks import Route
 
 # Relative to the width of the box: boundary vertices lie on it to rounding.
 _ON_BOX = 1e-9
+"""Distance from a side of the box, relative to its width, of points that lie on it."""
 
 
 def fold_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]:

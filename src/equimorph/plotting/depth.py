@@ -50,12 +50,14 @@ def view_of(axes: Any) -> View:
 
 Corners = Float[np.ndarray, "cells 3 3"]
 
-_BATCH = 1_000_000  # pixels written at a time: bounds the memory
+_BATCH = 1_000_000
+"""Pixels that are written at a time: this bounds the memory."""
 _LEVELS = 2.0**31 - 1
+"""Number of depths that can be told apart in the buffer: positive 32-bit integers."""
 _EMPTY = np.iinfo(np.int64).max
-# Pixels around a point that are asked whether they hide it: a curve runs along edges of the
-# surface, and is seen as soon as one side of it is.
 _AROUND = 2
+"""Pixels around a point that are asked whether they hide it: a curve runs along edges of the
+surface, and is visible as soon as one side of it is."""
 
 
 @dataclass(frozen=True)

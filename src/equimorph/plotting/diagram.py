@@ -20,8 +20,10 @@ _STABLE: dict[str, Any] = {"linewidths": 1.8, "linestyles": "solid", "zorder": 3
 _UNSTABLE: dict[str, Any] = {"linewidths": 0.9, "linestyles": [(0, (3, 1.5))], "zorder": 2}
 _FOLD: dict[str, Any] = {"marker": "o", "ms": 4, "mfc": "white", "mec": style.INK, "mew": 0.9}
 _CAP: dict[str, Any] = {"marker": "|", "ms": 7, "mec": style.INK, "mew": 0.9}
-_HEIGHT = 2.5  # inches
+_HEIGHT = 2.5
+"""Inches of the figure."""
 _MARGINS = (0.52, 0.4, 0.14, 0.08)
+"""Inches around the axes: left, bottom, right, top."""
 
 
 def diagram(eset: EquilibriumSet, height: Descriptor | None = None, ax: Axes | None = None) -> Axes:

@@ -28,15 +28,22 @@ from equimorph.structures import States
 from equimorph.tasks import Route
 
 _WIDTH, _HEIGHT, _DOTS = 6.4, 3.1, 120
+"""Inches of a frame, and pixels per inch."""
 _LARGER = {"font.size": 9, "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8}
 _CURVATURE = "max_curvature"
-# Right ends of the numbers: the free parameters above each other, margin and curvature beside them.
 _READING_PLACES = ((0.13, 0.085), (0.13, 0.025), (0.46, 0.085), (0.46, 0.025))
+"""Right ends of the numbers, as shares of the frame: the free parameters above each other, margin
+and curvature to the right of them."""
 _NUMBER_WIDTH = 0.085
+"""Width of a number, as a share of the frame."""
 _LONGEST_UNIT = 4
+"""Characters of a unit that has room behind its number."""
 _COLOURS = 64
-_PAUSE_FIRST, _PAUSE_LAST = 0.8, 1.6  # seconds
-_HUNDREDTHS = 10  # GIF counts time in hundredths of a second: milliseconds in tens
+"""Size of the palette that all frames share."""
+_PAUSE_FIRST, _PAUSE_LAST = 0.8, 1.6
+"""Seconds for which the first and the last frame are shown."""
+_HUNDREDTHS = 10
+"""Milliseconds in a hundredth of a second, the unit of time in GIF files."""
 
 
 def film(

@@ -13,8 +13,11 @@ from equimorph.plotting.labels import descriptor_label, parameter_label
 from equimorph.tasks import FollowedOptimum
 
 _ROOM = (0.6, 0.38, 0.1, 0.1)
-_PANEL, _GAP = 1.05, 0.1  # inches
+"""Inches around the panels: left, bottom, right, top."""
+_PANEL, _GAP = 1.05, 0.1
+"""Inches: height of a panel, and gap between two."""
 _ROUNDING = 1e-9
+"""Range of an actuator, relative to its size, below which its axis is that of a constant."""
 _COLOURS = {"objective": style.ROUTE_COLOUR, "actuator": style.INDEX_COLOURS[0]}
 
 

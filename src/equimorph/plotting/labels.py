@@ -72,6 +72,7 @@ def constraint_label(constraints: Sequence[Constraint]) -> str:
 Points = Float[np.ndarray, "_ 2"]
 
 _LABELS_PER_LEVEL = 2
+"""Labels on each contour, if there is room."""
 _ROOM, _SHORTEST = 0.05, 0.15
 """Distance from other things and labels, and shortest line with a label, in widths of the frame."""
 _APART = 0.35
@@ -121,16 +122,19 @@ def roomiest(choices: Points, full: Points) -> Float[np.ndarray, "2"] | None:
 
 Places = Float[np.ndarray, "_ 2"]
 
-_DISTANCES = np.array(
-    [11.0, 14.0, 17.0, 20.0, 24.0, 28.0, 33.0]
-)  # from a point to its badge, in typographic points
+_DISTANCES = np.array([11.0, 14.0, 17.0, 20.0, 24.0, 28.0, 33.0])
+"""Distances from a point to its badge that are tried, in typographic points."""
 _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
-_ENOUGH = 4.0  # room around a badge that is enough
-_DETOUR = 0.15  # room that a badge gives up to be a point nearer
+"""Directions from a point to its badge that are tried."""
+_ENOUGH = 4.0
+"""Room around a badge, in typographic points, beyond which more is no better."""
+_DETOUR = 0.15
+"""Room that a badge gives up to stand nearer to its place, relative to the distance saved."""
 _RIM = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
-_SPACING = 2.0  # of the points that stand for a curve
-# Way-points nearer to a numbered one than this, in points, get no number.
+_SPACING = 2.0
+"""Distance between the points that stand for a curve, in typographic points."""
 _CROWDED = 6.0
+"""Way-points nearer to a numbered one than this, in typographic points, get no number."""
 _COLOUR = style.ROUTE_COLOUR
 _DOT: dict[str, Any] = {"ms": 4, "color": _COLOUR, "mec": "white", "mew": 0.7}
 BOX: dict[str, Any] = {

@@ -21,14 +21,17 @@ from equimorph.plotting.labels import descriptor_label, roomiest
 from equimorph.structures import State, States
 from equimorph.tasks import Route
 
-_TINT = 0.22  # of the colours of indices: lines and words on top stay readable
+_TINT = 0.22
+"""Strength of the colours of indices: lines and words on top stay readable."""
 _STABLE: dict[str, Any] = {"color": style.INK, "linewidth": 0.8}
 _UNSTABLE: dict[str, Any] = {"color": style.INK, "linewidth": 0.6, "linestyle": (0, (3, 2))}
 _BOUNDARY: dict[str, Any] = {"color": style.INK, "linewidth": 1.8}
 _ROUTE: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.6}
 _RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.4, foreground="white")]
 _ROUTE_POINTS = 240
-_HEIGHT, _MARGINS, _LEGEND = 2.6, (0.52, 0.4, 0.12, 0.08), 0.37  # inches
+"""States at which a route is drawn."""
+_HEIGHT, _MARGINS, _LEGEND = 2.6, (0.52, 0.4, 0.12, 0.08), 0.37
+"""Inches: height of the axes, margins (left, bottom, right, top), height of the legend."""
 
 Places = Float[np.ndarray, "_ 2"]
 

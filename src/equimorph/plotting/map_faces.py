@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 Axis = Float[np.ndarray, " _"]
 
 _ON_LINE = 1e-9
+"""Distance from a grid line, in grid intervals, of points that lie on it."""
 
 
 @dataclass(frozen=True)

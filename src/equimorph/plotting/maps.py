@@ -31,15 +31,19 @@ from equimorph.tasks import CurvatureMap, LimitLoadMap
 ActuatorMap = LimitLoadMap | CurvatureMap
 Points = Float[np.ndarray, "_ 2"]
 
-_FRAME_HEIGHT = 2.3  # inches
-_LEFT, _BOTTOM, _RIGHT, _TOP = 0.5, 0.4, 0.5, 0.08  # inches around the frame
+_FRAME_HEIGHT = 2.3
+"""Inches of the frame."""
+_LEFT, _BOTTOM, _RIGHT, _TOP = 0.5, 0.4, 0.5, 0.08
+"""Inches around the frame."""
 _LEGEND_COLUMNS, _LEGEND_ROW, _LEGEND_GAP = 2, 0.15, 0.06
+"""Columns of the legend; inches of one of its rows, and of the gap above it."""
 _MARGIN = 0.06
 """Room beyond the settings that have a natural state, as a share of their range."""
 
 # From low (light) to high (dark), in even steps of lightness: it reads in grey.
 _ANCHORS = ("#f6f1e1", "#d3dfe6", "#a5c3db", "#719fc6", "#417aac", "#1d527f")
 _LEVELS = 9
+"""Largest number of contour levels."""
 GROUND: dict[str, Any] = {
     "facecolor": "#f4f4f4",
     "edgecolor": "#c9c9c9",
@@ -229,6 +233,7 @@ def write_legend(ax: Axes, entries: list[Line2D | Patch], *, room: bool) -> None
 
 
 _DASHED, _CHAIN, _DOTTED = (0, (6, 1.5)), (0, (4, 1.5, 1, 1.5)), (0, (1, 1.2))
+"""Line styles: offset, then lengths of dashes and gaps in line widths."""
 _LOOKS = {
     "cusp": CurveLook("jump: two folds merge", True, {"linewidth": 1.5}),
     "grazing": CurveLook("jump: grazing", True, {"linewidth": 1.5, "linestyle": _DASHED}),
@@ -270,7 +275,6 @@ def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
     return draw_map(lmap, panel, ax)
 
 
-_DASHED, _DOTTED = (0, (6, 1.5)), (0, (1, 1.2))
 _CURVATURE_LOOKS = {
     "fold": CurveLook("barrier: fold", True, {"linewidth": 1.5}),
     "jump": CurveLook("barrier", True, {"linewidth": 1.5, "linestyle": _DASHED}),

@@ -15,9 +15,12 @@ from equimorph.tasks import Route
 _CURVATURE = "max_curvature"
 _MARGIN_COLOUR = style.INDEX_COLOURS[0]
 _CURVATURE_COLOUR = "#a1561a"
-_GAP = 0.1  # inches
+_GAP = 0.1
+"""Inches between panels."""
 _ROOM = (0.58, 0.38, 0.1, 0.2)
+"""Inches around the panels: left, bottom, right, top."""
 _MOST_NUMBERS = 12
+"""Largest number of way points that are numbered one by one."""
 
 
 def margins(route: Route, ax: Axes | None = None) -> Axes:

@@ -62,16 +62,21 @@ _SNAP: dict[str, Any] = {
     "mew": 1.0,
 }
 
-_FRAME_HEIGHT = 2.16  # inches
-_LEFT, _BOTTOM, _RIGHT, _TOP = 0.58, 0.4, 0.4, 0.08  # inches around the frame
+_FRAME_HEIGHT = 2.16
+"""Inches of the frame."""
+_LEFT, _BOTTOM, _RIGHT, _TOP = 0.58, 0.4, 0.4, 0.08
+"""Inches around the frame."""
 _LEGEND_COLUMNS, _LEGEND_ROW, _LEGEND_GAP = 2, 0.15, 0.06
-# Slivers of the mesh smaller than this share of the picture are no region of their own.
+"""Columns of the legend; inches of one of its rows, and of the gap above it."""
 _INVISIBLE = 1e-4
+"""Area, as a share of the box, below which slivers of the mesh are no region of their own."""
 _RASTER = 160
-# A number needs this much room around it, as a share of the picture.
+"""Pixels, each way, of the raster on which the places of the counts are chosen."""
 _ROOM = 0.03
-# Legs shorter than this share of the picture get no arrow head; between two of one leg.
+"""Radius of the free disc that a number needs, as a share of the picture."""
 _LONG_LEG, _BETWEEN = 0.12, 0.6
+"""Length, as a share of the picture, from which on a leg gets arrow heads, and length between two
+of them."""
 
 
 def parameter_plane(

@@ -32,8 +32,11 @@ _LOOKS: dict[str, dict[str, Any]] = {
 }
 _MOTION: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.4, "zorder": 6}
 _RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.6, foreground="white")]
-_COLUMNS, _LINE = 2, 0.16  # of legends; inches
-_VISIBLE = 2e-3  # of the image: smaller pieces that are covered again are traces of chords
+_COLUMNS, _LINE = 2, 0.16
+"""Columns of the legend, and inches of one of its rows."""
+_VISIBLE = 2e-3
+"""Area that is covered several times, as a share of the image, below which it is a trace of
+chords."""
 
 Line = Float[np.ndarray, "_ 2"]
 

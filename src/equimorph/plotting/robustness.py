@@ -16,7 +16,9 @@ from equimorph.structures import State, Structure
 from equimorph.tasks import ImperfectionLaw, Room, Sensitivity, Trials
 
 _ROOM_AROUND = (0.72, 0.42, 0.12, 0.3)
+"""Inches around the axes: left, bottom, right, top."""
 MOST_BARS = 40
+"""Largest number of derivatives in one figure."""
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 _ENDS = ("x", "+", "1", "2", "3", "4")
 _BOX: dict[str, Any] = {"fill": False, "ec": style.ROUTE_COLOUR, "lw": 1.4, "zorder": 6}

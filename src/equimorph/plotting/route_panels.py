@@ -22,11 +22,13 @@ from equimorph.tasks import Route
 
 _HEIGHT = 108 * style.MILLIMETRE
 _ZOOM = 1.06
+"""Magnification of the solid view within its axes."""
 _SOLID, _PLANE, _SHAPES = (
     (-0.04, 0.12, 0.6, 0.88),
     (0.68, 0.575, 0.235, 0.38),
     (0.68, 0.13, 0.3, 0.34),
 )
+"""Axes of the three panels as shares of the figure: left, bottom, width, height."""
 
 
 def route_panels(
@@ -95,6 +97,7 @@ def _taken_legend(ax: Axes) -> list[Artist]:
 
 
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
+"""Line styles of successive routes."""
 _ENDS: dict[str, Any] = {"ls": "none", "ms": 5, "mec": style.ROUTE_COLOUR, "mew": 1.0, "zorder": 8}
 
 

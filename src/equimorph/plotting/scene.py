@@ -19,9 +19,11 @@ from scipy import ndimage
 from equimorph.plotting.depth import DepthBuffer, View, depth_buffer, view_of
 from equimorph.plotting.shading import Paint, paint
 
-_SAMPLES = 3  # pixels of the depth buffer per pixel of the picture, in each direction
-# Points along a curve, one a pixel, that vote whether a place on it is seen: single ones err.
+_SAMPLES = 3
+"""Pixels of the depth buffer per pixel of the picture, in each direction."""
 _VOTES = 9
+"""Neighbouring points along a curve, one a pixel, whose median decides whether it is visible:
+single ones err."""
 
 
 @dataclass(frozen=True)

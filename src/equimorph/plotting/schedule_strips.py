@@ -12,9 +12,12 @@ from equimorph.model import Schedule
 from equimorph.plotting import style
 from equimorph.plotting.labels import symbol, with_unit
 
-_STRIP, _BETWEEN, _GROUPS = 0.26, 0.05, 0.1  # inches
+_STRIP, _BETWEEN, _GROUPS = 0.26, 0.05, 0.1
+"""Inches: height of a strip, gap between strips, additional gap between groups."""
 _LEFT, _BOTTOM, _RIGHT, _TOP = 0.5, 0.38, 0.95, 0.1
+"""Inches around the strips."""
 MOST_STRIPS = 24
+"""Largest number of strips; those that move most are drawn."""
 _COLOURS = {"actuator": style.INDEX_COLOURS[0], "load": style.INK}
 
 

@@ -14,14 +14,19 @@ _LIGHT = np.array([-0.50, 0.55, 0.67])
 # Halfway between light and viewer: what faces it is glossy.
 _HALFWAY = np.array([-0.27, 0.30, 0.915])
 _AMBIENT, _GLOSS, _SHININESS = 0.42, 0.18, 10
-_LINE, _OUTLINE = 0.35, 0.4  # widths in points
+"""Brightness away from the light, strength of highlights, and their exponent (Phong)."""
+_LINE, _OUTLINE = 0.35, 0.4
+"""Widths of grid lines and outlines, in typographic points."""
 _LINE_OPACITY = 0.25
-# Lines on the surface fade where fewer than this many of their widths lie between them.
+"""Opacity of grid lines where they are not crowded."""
 _CROWDED = 8.0
-# A step in depth of this share of the scene, or to the background, is an edge of what is in front.
+"""Lines on the surface fade where fewer than this many of their widths lie between them."""
 _EDGE = 0.03
+"""Step in depth, as a share of the scene, that is an edge of what is in front."""
 _STEEPER = 3.0
-_BATCH = 400_000  # pixels painted at a time: bounds the memory
+"""Multiple of the slope next to a pixel by which the depth may change without an outline."""
+_BATCH = 400_000
+"""Pixels that are painted at a time: this bounds the memory."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ from equimorph.plotting.surroundings import Surroundings, frame_shapes, limits
 from equimorph.structures import States
 from equimorph.tasks import Route
 
-_MARGINS = (0.54, 0.36, 0.14, 0.06)  # inches around the frame: left, bottom, right, top
+_MARGINS = (0.54, 0.36, 0.14, 0.06)
+"""Inches around the frame: left, bottom, right, top."""
 
 Outlines = Float[np.ndarray, "states points 2"]
 
@@ -83,7 +84,9 @@ def farthest_apart(outlines: Outlines) -> list[int]:
 
 
 _ROOM = 0.085
-_BAR = 0.5  # inches for the colour bar and the labels above it
+"""Empty border, as a share of the width of the outlines."""
+_BAR = 0.5
+"""Inches for the colour bar and the labels above it."""
 
 
 def shapes(
@@ -158,7 +161,9 @@ def _name_ends(
 
 
 _PORTRAIT_ROOM = 0.1
+"""Empty border of single states, as a share of the width of the outlines."""
 _DASHES = ("solid", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
+"""Line styles of successive shapes."""
 
 
 def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None) -> Axes:
@@ -204,9 +209,12 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
     return ax
 
 
-_SAME = 1e-6
+_INDISTINCT = 1e-6
+"""Largest distance between corresponding points of two outlines that are drawn once."""
 _NUMBERED_ROOM = 0.09
-_AWAY = 11.0  # from a point to its number, in typographic points
+"""Empty border of numbered shapes, as a share of the width of the outlines."""
+_AWAY = 11.0
+"""Typographic points from a shape to its number."""
 
 
 def numbered_shapes(ax: Axes, states: States) -> None:
@@ -218,7 +226,7 @@ def numbered_shapes(ax: Axes, states: States) -> None:
     different = [
         k
         for k, outline in enumerate(outlines)
-        if not any(np.abs(outline - other).max() < _SAME for other in outlines[:k])
+        if not any(np.abs(outline - other).max() < _INDISTINCT for other in outlines[:k])
     ]
     colours = style.progress_map()(np.linspace(0.0, 1.0, len(states)))
     shown = outlines[different]

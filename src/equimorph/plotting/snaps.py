@@ -19,7 +19,8 @@ from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, number_points
 from equimorph.plotting.plane import draw_folds, frame_plane, shade_regions
 
-_HEIGHT = 2.75  # inches
+_HEIGHT = 2.75
+"""Inches of the figure."""
 _GAP = 0.06
 """Between runs of the boundary, as a share of all of it."""
 _LOOKS = {

@@ -16,6 +16,7 @@ _SURE: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": style.ROUTE_COLOUR, "mec
 _ROBUST: dict[str, Any] = {"marker": "s", "ms": 5.5, "mfc": "white", "mec": style.ROUTE_COLOUR}
 _ERRORS: dict[str, Any] = {"fill": False, "ec": style.ROUTE_COLOUR, "lw": 1.1, "zorder": 7}
 _ROOM = (0.62, 0.38, 0.1, 0.34)
+"""Inches around the axes: left, bottom, right, top."""
 _LOOKS = (("o", "-", True), ("s", "--", False))
 
 

@@ -22,13 +22,16 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
 MILLIMETRE = 1 / 25.4
+"""In inches."""
 SINGLE_COLUMN = 89 * MILLIMETRE
 DOUBLE_COLUMN = 183 * MILLIMETRE
 RESOLUTION = 200
+"""Pixels per inch of saved pictures."""
 
 INK = "#1a1a1a"
 FAINT = "#8c8c8c"
 HAIRLINE = 0.5
+"""Width of axes and ticks, in typographic points."""
 ROUTE_COLOUR = "#d1004b"
 LIMIT_LINE: dict[str, Any] = {"color": INK, "linewidth": 1.2, "linestyle": (0, (2.4, 1.0))}
 """Bounds that a set was not cut at: wider than its edges, longer dashes than hidden folds."""

@@ -34,16 +34,23 @@ Cells = Float[np.ndarray, "cells 3 3"]
 Pieces = Float[np.ndarray, "pieces 3 3"]
 
 _ELEVATION, _AZIMUTH = 23.0, 125.0
+"""Direction of view, in degrees."""
 ASPECT = np.array([1.2, 1.3, 1.0])
 _ZOOM = 1.17
+"""Magnification of the solid view within its axes."""
 _LINES_PER_TICK = 2
-_BEYOND = 0.55  # share of white in the colours beyond a limit
+"""Grid lines on the surface per tick of an axis."""
+_BEYOND = 0.55
+"""Share of white in the colours beyond a limit."""
 _ROUTE_POINTS = 240
-# The route runs on the exact surface, which is curved between the vertices of the drawn one.
+"""States at which a route is drawn."""
 _ROUTE_SLACK = 0.015
+"""Depth below the drawn triangles, as a share of the scene, at which a route is visible: it runs on
+the exact surface, which is curved between their vertices."""
 
 _KEY: dict[str, Any] = {"loc": "upper center", "ncols": 4, "bbox_to_anchor": (0.53, 1.0)}
-_GAP = 4.0  # below the legend, in pixels
+_GAP = 4.0
+"""Pixels below the legend."""
 _BOX: dict[str, Any] = {"color": style.INK, "linewidth": 0.5}
 _CAP: dict[str, Any] = {"color": "#4d4d4d", "linewidth": 0.9}
 _FOLD: dict[str, Any] = {"color": style.INK, "linewidth": 1.5, "capstyle": "round"}

@@ -19,15 +19,23 @@ from equimorph.plotting import style
 from equimorph.plotting.support_symbols import AWAY, HUB, SYMBOLS, UPRIGHT, Stroke
 from equimorph.structures import States
 
-_RADIUS = 0.022  # unit of the symbols of supports, as a share of the size of the structure
-_LINE_LOAD, _FORCE = 0.09, 0.15  # longest arrows, as shares of that size
-_COUPLE = 0.06  # radius of the arc of a couple
-_LEAST_ROOM = 0.02  # around symbols and arrows
-_CLEARANCE = 0.012  # between arrow heads and structure
-_MOVED = 1e-3  # change of a place or direction, relative to the size, that counts as one
+_RADIUS = 0.022
+"""Unit of the symbols of supports, as a share of the size of the structure."""
+_LINE_LOAD, _FORCE = 0.09, 0.15
+"""Longest arrows of distributed loads and of forces, as shares of the size of the structure."""
+_COUPLE = 0.06
+"""Radius of the arc of a couple, as a share of the size of the structure."""
+_LEAST_ROOM = 0.02
+"""Empty room around symbols and arrows, as a share of the size of the structure."""
+_CLEARANCE = 0.012
+"""Gap between arrow heads and structure, as a share of its size."""
+_MOVED = 1e-3
+"""Change of a place, relative to the size, or of a direction, that counts as one."""
 _GROUND, _LOAD = "#d9d9d9", "#6f6f6f"
-_SHAFT = 0.65 / 72  # inches
-_HEAD = 0.022  # length of an arrow's head
+_SHAFT = 0.65 / 72
+"""Inches of the width of an arrow's shaft."""
+_HEAD = 0.022
+"""Length of the head of a couple's arrow, as a share of the size of the structure."""
 
 Lines = Float[np.ndarray, "states points 2"]
 

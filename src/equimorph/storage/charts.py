@@ -24,6 +24,7 @@ from equimorph.structures import from_identity
 
 FORMAT = "equimorph chart"
 VERSION = 1
+"""Version of the layout that is written, the newest that can be read."""
 ABOUT, STRUCTURE, CHART = "about", "structure", "chart"
 SET, WHOLE, BARRIERS = "set", "whole", "barriers"
 

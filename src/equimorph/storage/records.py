@@ -28,6 +28,7 @@ from equimorph.tasks import ActuatorMap, Calibration, Route
 
 FORMAT = "an equimorph checkpoint"
 VERSION = 2
+"""Version of the layout that is written, the newest that can be read."""
 SCHEMA, SCHEMA_VERSION, KIND = "schema", "schema_version", "kind"
 RECORD, STRUCTURE, FOUND = "record", "structure", "found"
 

@@ -35,6 +35,7 @@ from equimorph.tasks import ActuatorMap, Route
 
 FORMAT = "equimorph results"
 VERSION = 3
+"""Version of the layout that is written, the newest that can be read."""
 SET, ROUTES, MAPS, EQUILIBRIA, ANSWERS = "set", "routes", "maps", "equilibria", "answers"
 STRUCTURE = "structure"
 SCHEMAS = {ROUTES: "route", MAPS: "map", EQUILIBRIA: "states"}

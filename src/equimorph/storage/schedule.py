@@ -22,6 +22,7 @@ from equimorph.storage.files import read_text, write_text
 
 FORMAT = "equimorph schedule"
 VERSION = 1
+"""Version of the layout of the sidecar file; others are refused."""
 PROGRESS, MARGIN = "progress", "stability_margin"
 
 

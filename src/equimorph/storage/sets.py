@@ -27,6 +27,7 @@ GRID = ("vertices", "edges", "triangles", "sides", "tetrahedra", "faces")
 INSIDE = ("Component", "Stratum", "Audit")
 """Records that a set consists of."""
 LARGEST_RESIDUAL = 1e-6
+"""Residual, in the units of the structure, beyond which a stored state is no equilibrium."""
 SAMPLE = 1000
 """States whose residuals are looked at when a set is read."""
 VTK_TYPES = {2: 3, 3: 5, 4: 10}

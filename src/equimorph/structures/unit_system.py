@@ -22,7 +22,9 @@ Quantity = float | str
 STANDARD_GRAVITY = 9.80665
 """m/s², by definition [BIPM2019]_: what turns a mass per length into a weight per length."""
 POUND, INCH = 0.45359237, 0.0254
+"""In kilograms, and in metres."""
 LENGTH, FORCE, MASS = (0, 1, 0), (1, 1, -2), (1, 0, 0)
+"""Exponents of mass, length and time."""
 UNITS: dict[str, Unit] = {
     **{name: (value, LENGTH) for name, value in {
         "m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "um": 1e-6, "in": INCH, "ft": 12.0 * INCH,

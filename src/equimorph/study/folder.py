@@ -24,6 +24,7 @@ MANIFEST = "equimorph.json"
 PRIVATE = ".equimorph"
 FORMAT = "equimorph results folder"
 VERSION = 2
+"""Version of the layout of results folders; older ones are read."""
 _CHECKPOINTS, _LOCK, _STAGING = "checkpoints", "lock", "staging-"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 

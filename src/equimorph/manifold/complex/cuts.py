@@ -13,6 +13,7 @@ from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.topology import keys_of
 
 TRIALS = 60
+"""Largest number of iterations of the bracketed root finder on one edge."""
 ELSEWHERE = (0.5, 0.25, 0.75, 0.1, 0.9)
 """Where between the bounds of a root a vertex is tried if there is none where it is expected."""
 ROUND_OFF = 1e-12

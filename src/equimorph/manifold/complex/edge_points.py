@@ -40,6 +40,7 @@ it."""
 SAME = 1e-7
 """Distance in the metric below which two vertices are one."""
 MET = (0, -2, -1)
+"""Columns of a vertex's place by which candidates for the same vertex are sorted."""
 WEIGHTS = np.array([0.36, 0.48, 0.8])
 """Coordinates, and a direction in them, along which vertices are in order."""
 BESIDE = 0.05

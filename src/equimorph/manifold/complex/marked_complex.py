@@ -39,6 +39,7 @@ TRIANGLES, TETRAHEDRA = 2, 3
 AT_ONCE = 4096
 """Cells or edges that one thread looks at in one go."""
 ON_BOX = 1e-9
+"""Distance from a side of the box, relative to the width of the box, of points that lie on it."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.geometry.kernels import match_or_add
 from equimorph.structures import Structure
+from equimorph.tolerances import SAME_STATE
 
 
 class VertexKind(IntEnum):
@@ -31,9 +32,6 @@ class VertexKind(IntEnum):
 
 
 GRID, FOLD, CAP, BETWEEN, CORNER, AMID, REFINED, CROSSING = VertexKind
-
-SAME = 1e-6
-"""Distance in the metric below which two polished equilibria over one vertex are the same."""
 
 
 @dataclass
@@ -88,7 +86,7 @@ class Points:
         self._reserve(len(vertices))
         ids, new = np.empty(len(vertices), int), np.empty(len(vertices), bool)
         self.count = match_or_add(
-            vertices, np.ascontiguousarray(z), self.structure.mass, SAME, self.head,
+            vertices, np.ascontiguousarray(z), self.structure.mass, SAME_STATE, self.head,
             self.following, self.z, self.count, ids, new,
         )  # fmt: skip
         at = ids[new]

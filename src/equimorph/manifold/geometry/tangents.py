@@ -14,7 +14,9 @@ from equimorph.manifold.geometry.kernels import square_sides
 from equimorph.manifold.geometry.setting import Setting, embed
 
 CHUNK = 2048
+"""Points whose tangent spaces are computed together: this bounds the memory."""
 DIFFERENCE = 1e-5
+"""Step of central differences along orthonormal tangents, in the metric."""
 S_SHAPE = 0.1
 """Farthest a cubic whose slopes at both ends are the same leaves its chord: √3/18, in slopes."""
 

@@ -22,6 +22,7 @@ from equimorph.structures import States
 APART = 1e-5
 """Distance in the metric above which two equilibria are two."""
 STARTS = 200
+"""Random starts of Newton's method in each independent search."""
 SCATTERED = 2000
 """Random points, with one random guess each, from which Newton starts beside the searches."""
 ITERATIONS = 40

@@ -103,6 +103,7 @@ def _step(
 
 
 EFFORTS = 4
+"""Attempts to trace a ray, each with smaller steps than the one before."""
 NOISE = 1e-6
 """Distance in the metric below which two crossings are one, and by which folds may be misplaced."""
 

@@ -16,6 +16,7 @@ from equimorph.model import Progress
 STEPS = 4
 """Into so many equal steps long edges are cut before they count as hard."""
 CHUNK = 4096
+"""Rays that are traced together: this bounds the memory."""
 ENDLESS = 250
 """More equilibria than this over one point, and the set is refused: it may wind for ever."""
 

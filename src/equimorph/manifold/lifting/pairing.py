@@ -7,8 +7,9 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import ParameterLine
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.manifold.geometry.points import SAME, Points, VertexKind
+from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.tolerances import SAME_STATE
 
 UNTRACED, ABANDONED, LONG, HARD = -1, -2, -3, -4
 """Marks of rays without a curve: long are those that one step cannot lift, hard if few neither."""
@@ -108,7 +109,7 @@ class Pairing:
         known, n = self.crossings.setdefault(edge, []), self.setting.structure.unknowns
         for point in known:
             gap = self.points.z[point, :n] - z[:n]
-            if gap**2 @ self.setting.structure.mass < SAME**2:
+            if gap**2 @ self.setting.structure.mass < SAME_STATE**2:
                 return point
         known.append(self.points.add(z, p, index, VertexKind.CROSSING, edge))
         return known[-1]

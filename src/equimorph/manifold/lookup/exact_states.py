@@ -13,6 +13,7 @@ from equimorph.model import Constraint
 from equimorph.structures import States, Structure
 
 ITERATIONS = 40
+"""Largest number of Newton iterations from a cell to the state over a point."""
 ROUND_OFF = 1e-14
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
 SETTLED = 2

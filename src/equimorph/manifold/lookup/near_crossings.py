@@ -34,9 +34,11 @@ round-off does not tell how many there are."""
 DEGREE = 10
 """Of the polynomial through r: its truncation is at round-off for the amplitudes here."""
 STEPS = 8
+"""Newton iterations for roots of r, and largest number of those for a point of given amplitude."""
 IMAGINARY = 1e-3
 """Imaginary part, relative to `WIDE`, up to which roots are tried as real ones."""
 RESIDUAL = 1e-12
+"""Absolute value of r at a root."""
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,10 @@ from equimorph.manifold.lookup.kernels import (
 from equimorph.manifold.lookup.near_crossings import NearCrossings
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
+from equimorph.tolerances import SAME_STATE
 
 OVERHANG = 0.3
 """Barycentric tolerance for using a cell as an initial guess."""
-SAME = 1e-6
-"""Distance in the metric below which two states over one point are the same."""
 CLOSEST = 1e-3
 """Least share of a cell between its fold and a guess: at the fold Newton's matrix is singular."""
 PARTNERS = 3
@@ -186,7 +185,7 @@ class Sheets:
         z, good, index = exact_states(self.structure, guess, at, wanted)
         good &= (index == wanted) & self.structure.resolved(z, at)
         mass = self.structure.mass
-        found = one_of_each((hits.point, hits.inside), (z, good), guess, room, mass, SAME)
+        found = one_of_each((hits.point, hits.inside), (z, good), guess, room, mass, SAME_STATE)
         sure = balanced((hits.point, hits.cell, hits.inside), good, found, self._of_cells, len(p))
         doubtful = None
         if not sure.all():
@@ -235,7 +234,7 @@ class Sheets:
         first, longest = u[self.cells[:, 0]], np.zeros(len(self.cells))
         for corner in self.cells.T[1:]:
             np.maximum(longest, (u[corner] - first) ** 2 @ self.structure.mass, out=longest)
-        return 2.0 * np.sqrt(longest) + SAME
+        return 2.0 * np.sqrt(longest) + SAME_STATE
 
     def _allowed(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
         good = np.ones(len(z), bool)
@@ -358,4 +357,4 @@ def rooted(
 def _firsts(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
     """States that no earlier one is the same as."""
     u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    return np.flatnonzero(~np.tril(cdist(u, u) <= SAME, -1).any(axis=1))
+    return np.flatnonzero(~np.tril(cdist(u, u) <= SAME_STATE, -1).any(axis=1))

@@ -16,10 +16,10 @@ from equimorph.manifold.geometry.exact_points import lower_index
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.structures import States
+from equimorph.tolerances import SAME_STATE
 
 REACH = 1.5
 """How far a cusp may lie from the ends of the edge beside which it is sought, in its lengths."""
-SAME = 1e-6
 CLOSE = 1e-3
 """Shares of an edge next to its ends in which a cusp is that of the end."""
 
@@ -60,7 +60,7 @@ def cusps(eset: EquilibriumSet) -> Cusps:
     for edge, low in zip(turning, lowest.tolist(), strict=True):
         found = _between(fabric, edge, low)
         # a cusp that two edges lead to leaves another one lost
-        if found and all(np.abs(found[0] - z).max() > SAME for z, _, _ in states):
+        if found and all(np.abs(found[0] - z).max() > SAME_STATE for z, _, _ in states):
             states.append((*found, low))
     lost = len(turning) - len(states)
     store = fabric.vertices

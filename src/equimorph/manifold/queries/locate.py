@@ -15,11 +15,10 @@ from equimorph.manifold.lookup.states_over import StatesOver
 from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
 from equimorph.model import Descriptor, position
 from equimorph.structures import State, States, Structure
+from equimorph.tolerances import SAME_SOLUTION
 
 CANDIDATES = 12
 """Local minima over the vertices from which the best fit is searched."""
-SAME = 1e-5
-"""Distance in the metric below which two states are the same."""
 
 Values = Float[np.ndarray, "lanes m"]
 Measured = Mapping[Descriptor | str, float] | Float[np.ndarray, "points dims"]
@@ -237,7 +236,7 @@ def different(
     for lane in np.argsort(value, kind="stable"):
         gap = (found.z[kept] - found.z[lane])[:, : structure.unknowns] ** 2 @ structure.mass
         gap += (((found.p[kept] - found.p[lane]) / structure.scales) ** 2).sum(axis=1)
-        if np.sqrt(gap).min(initial=np.inf) > SAME:
+        if np.sqrt(gap).min(initial=np.inf) > SAME_SOLUTION:
             kept.append(int(lane))
     return np.array(kept, dtype=int)
 
@@ -283,5 +282,5 @@ def _place_over(eset: EquilibriumSet, state: State) -> tuple[StatesOver, int] | 
     n, mass = eset.structure.unknowns, eset.structure.mass
     gap = np.sqrt((here.states.z - state.z)[:, :n] ** 2 @ mass)
     # next to a fold a state over rounded parameters moves by the root of round-off
-    near = np.flatnonzero(gap < 10.0 * SAME)
+    near = np.flatnonzero(gap < 10.0 * SAME_SOLUTION)
     return (here, int(near[gap[near].argmin()])) if len(near) else None

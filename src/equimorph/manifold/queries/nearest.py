@@ -22,9 +22,11 @@ Frames = Float[np.ndarray, "lanes k full"]
 Residuals = Callable[[Lanes, Parameters], Float[np.ndarray, "lanes m"]]
 
 DIFFERENCE = 1e-5
+"""Step of central differences along orthonormal tangents, in the metric."""
 CURVING = 1e-3
 """Step along the set by which the change of the gradient is measured."""
 ITERATIONS, HALVINGS = 40, 12
+"""Largest numbers of Newton steps, and of halvings of one step."""
 SHORTER = 0.5 ** np.arange(4.0)
 """Shares of a step that are tried at once."""
 LONGEST = 0.3

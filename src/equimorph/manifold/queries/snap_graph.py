@@ -13,9 +13,8 @@ from equimorph.manifold.complex.arguments import whole_number
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import adjacency, flags_of, pieces
 from equimorph.model import Progress, Silent
+from equimorph.tolerances import SAME_SOLUTION
 
-SAME = 1e-5
-"""Distance in the metric below which a landing is a state of the set."""
 NOWHERE = -1
 """Instead of a stratum: the landing is not in the set, or there is none."""
 
@@ -213,7 +212,7 @@ class _Edge:
         at = {name: np.array([landing.state[name]]) for name in eset.names}
         here = eset.over(**at)
         gap = (here.states.z - landing.state.z)[:, : structure.unknowns] ** 2 @ structure.mass
-        near: Bool[np.ndarray, " n"] = np.sqrt(gap) < SAME
+        near: Bool[np.ndarray, " n"] = np.sqrt(gap) < SAME_SOLUTION
         found = here.stratum[near]
         return int(found[0]) if len(found) else NOWHERE
 

@@ -28,6 +28,8 @@ LONGER = 1.1
 LINKS = (8, 16)
 """Links of the chains along the set whose lengths are extrapolated."""
 SWEEPS, STILL = 60, 1e-9
+"""Largest number of sweeps that straighten a chain, and the largest move of a link, in scaled
+parameters, after which it counts as straight."""
 
 
 @dataclass(frozen=True, eq=False)

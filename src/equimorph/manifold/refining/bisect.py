@@ -15,6 +15,7 @@ from equimorph.manifold.refining.refill import flip, refill
 from equimorph.model import Progress, Silent
 
 ROUNDS = 200
+"""Largest number of rounds of bisections."""
 GROWN = 1.6
 """How much more tetrahedra there are when slivers are taken away anew."""
 PLACES = (0.5, 0.3, 0.7)

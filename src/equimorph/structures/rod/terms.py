@@ -14,6 +14,7 @@ from equimorph.structures.rod.profiles import LoadShape, at_nodes, inside, load_
 
 ElementNodes = Float[np.ndarray, "elements order"]
 DOWN = (0.0, -1.0)
+"""Direction of gravity."""
 
 
 def _arclength(value: Any, name: str) -> float:

@@ -25,7 +25,7 @@ place asks for another cause: beside a pitchfork that is slightly skew a cusp an
 the path lie 1e-7 to 1e-5 apart, and one of them alone is why the map jumps."""
 SLACK = 1e-3
 """How far outside its bracket, in lengths of it, an exact place may lie."""
-SAME = 1e-7
+ONE_PLACE = 1e-7
 """Places closer than this, in units of the parameters' scales, are one."""
 NEARBY = Guards(iterations=10, longest=np.inf, too_long=0.5, converged=1e-9)
 """The guesses are close: longer corrections, in the metric, lead elsewhere."""
@@ -74,7 +74,7 @@ def candidates(paths: Paths, pairs: Brackets) -> Candidates:
         others = _first(paths, pairs, causes, first)
         open_ = open_[others.found[open_]]
         tried[open_] = others.cause[open_]
-        apart = np.abs(others.p[open_] - best.p[open_])[:, places].max(axis=1) > SAME
+        apart = np.abs(others.p[open_] - best.p[open_])[:, places].max(axis=1) > ONE_PLACE
         better = apart & ~_looks_smooth(paths, pairs.take(open_), others.p[open_])
         best.put(open_[better], others.take(open_[better]))
         open_ = open_[~better]

@@ -23,7 +23,7 @@ from equimorph.tasks.route import FINE, describe_place, schedule_of
 from equimorph.tasks.start import Start, check_stable, start_state
 
 Failure = Literal["", "snap-through", "singular Jacobian", "actuator limit", "constraint", "lost"]
-SAME = 1e-8
+REPEATED = 1e-8
 """Relative distance of targets that are the same."""
 CRITICAL = ("critical", "branch point", "index")
 """Ends at which a stable state loses its stability."""
@@ -109,7 +109,7 @@ class Tracking:
         values = np.stack([each(states[corners]) for each in self.targets], axis=1)
         columns = np.concatenate([columns, values], axis=1)
         size = 1.0 + np.abs(columns).max(axis=0)
-        same = np.flatnonzero((np.abs(columns - columns[-1]) <= SAME * size).all(axis=1))
+        same = np.flatnonzero((np.abs(columns - columns[-1]) <= REPEATED * size).all(axis=1))
         if len(same) < 2:
             return None
         change = states.p[corners[-1]] - states.p[corners[same[0]]]

@@ -18,9 +18,8 @@ from equimorph.model import Constraint, Descriptor, Grid
 from equimorph.structures import State, States
 from equimorph.tasks.maps.actuator_map import settings_of
 from equimorph.tasks.maps.brackets import grid_edges
+from equimorph.tolerances import SAME_SOLUTION
 
-SAME = 1e-5
-"""Distance in the metric below which two states are the same."""
 OVER = 1e-9
 """Relative excess over a bound that counts as none."""
 
@@ -194,7 +193,7 @@ def _barriers(
     a, b = states[ends[:, 0]], states[ends[:, 1]]
     arrived, z = _lifted(a, b)
     gap = np.sqrt((z - b.z)[:, :n] ** 2 @ structure.mass)
-    apart = np.flatnonzero(~(arrived & (gap < SAME)))
+    apart = np.flatnonzero(~(arrived & (gap < SAME_SOLUTION)))
     back, _ = _lifted(b[apart], a[apart])
     kind: tuple[BarrierKind, ...] = tuple(
         "preference" if both else "stability" for both in arrived[apart] & back

@@ -46,12 +46,10 @@ from equimorph.tasks.start import (
     check_margin_demand,
     inadmissible,
 )
-from equimorph.tolerances import FEASIBLE
+from equimorph.tolerances import FEASIBLE, SAME_SOLUTION
 
 CANDIDATES = 8
 """Local minima over the vertices from which optima are searched."""
-SAME = 1e-5
-"""Distance in the metric and scaled parameters below which two optima are one."""
 STEP_BACK = 1e-3
 """Way back from the stability boundary, in the metric, at which a route to it ends."""
 
@@ -316,7 +314,7 @@ def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum
     if not feasible:
         return []
     points = join_points([end.point for end in feasible])
-    return [feasible[k] for k in distinct(States(structure, points.z, points.p), SAME)]
+    return [feasible[k] for k in distinct(States(structure, points.z, points.p), SAME_SOLUTION)]
 
 
 def _optimum(programme: Programme, end: LocalMinimum) -> Optimum:

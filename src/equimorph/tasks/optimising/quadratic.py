@@ -11,7 +11,7 @@ Vector = Float[np.ndarray, " d"]
 
 SLACK = 1e-9
 """Violation of a linear constraint, relative to its slope, that counts as none."""
-SAME = 1e-5
+PARALLEL = 1e-5
 """Relative difference of rows that count as one."""
 NEGATIVE = 1e-9
 """Size of a negative multiplier that counts as zero."""
@@ -96,7 +96,7 @@ def _different(
     """Rows that repeat no earlier one: equal extrema of an inflectional rod, say."""
     rows = np.concatenate([value[:, None], slope], axis=1)
     gap = np.abs(rows[:, None] - rows[None]).max(axis=2)
-    close = gap <= SAME * (1.0 + np.abs(rows).max(axis=1))
+    close = gap <= PARALLEL * (1.0 + np.abs(rows).max(axis=1))
     return np.flatnonzero(~np.tril(close, -1).any(axis=1))
 
 

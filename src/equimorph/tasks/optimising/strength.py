@@ -26,7 +26,7 @@ HOPELESS = 0.9
 """Curves whose values stay below this share of what was found are left out."""
 LEVEL = 1e-3
 """Slope along a curve at which its top is reached."""
-SAME = 1e-4
+ONE_OPTIMUM = 1e-4
 """Distance in scales below which two optima are one."""
 
 
@@ -235,7 +235,7 @@ def _distinct(lmap: LimitLoadMap, found: list[Strongest]) -> list[Strongest]:
             other
             for other in kept
             if np.abs(place - list(other.setting.values())).max()
-            < (SAME if each.kind != "edge" else _steps(lmap).max())
+            < (ONE_OPTIMUM if each.kind != "edge" else _steps(lmap).max())
         ]
         if not close:
             kept.append(each)
