@@ -170,14 +170,14 @@ def estimate_state(
         raise InputError(f"`confidence` must lie between 0.5 and 1; got {confidence!r}.")
     if not unstable and not (eset.cell_index == 0).any():
         raise InputError("`eset` must have stable cells; got none.")
-    found, misfit, inside = _settled(eset, fit.residuals, unstable)
+    found, misfit, inside = _minima(eset, fit.residuals, unstable)
     order = different(eset.structure, found, misfit)
     order = order[_weights(misfit[order] ** 2) > NEGLIGIBLE]
     found, chi2 = found.take(order), misfit[order] ** 2
     states = States(eset.structure, found.z, found.p)
     weight = _weights(chi2)
     freedom = max(len(measured) - len(eset.names), 1)
-    status, why = _judged(states, chi2, weight, freedom, confidence)
+    status, why = _judge(states, chi2, weight, freedom, confidence)
     rivals = np.flatnonzero(weight > 1.0 - confidence)
     resolving = _resolving(states, rivals, could_measure) if status == "ambiguous" else None
     return StateEstimate(
@@ -204,7 +204,7 @@ def _fit(eset: EquilibriumSet, measured: Measured, errors: Measured) -> ValueFit
     return ValueFit.of(eset, measured, errors)
 
 
-def _settled(
+def _minima(
     eset: EquilibriumSet, residuals: Residuals, unstable: bool
 ) -> tuple[Spot, Values, Flags]:
     """Best fits, their misfits, and whether they are minima; those on folds are none."""
@@ -260,7 +260,7 @@ def _weights(chi2: Values) -> Values:
     return np.asarray(likely / likely.sum())
 
 
-def _judged(
+def _judge(
     states: States,
     chi2: Values,
     weight: Values,

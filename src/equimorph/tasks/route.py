@@ -86,7 +86,7 @@ def verify_route(
     path = None if corners is None else lift_legs(corners, within, FINE)
     if path is None:
         path = lift(start, way_points, within=within, options=FINE)
-    names = _moved(way_points)
+    names = _moved_names(way_points)
     end = path.end
     if end.kind != "arrived":
         return refusal(_reason(path, names, len(way_points)), way_points, path)
@@ -106,7 +106,7 @@ def verify_route(
     return Route("arrived", "", way_points, path, float(margins.min()), length, schedule)
 
 
-def _moved(way_points: Corners) -> list[str]:
+def _moved_names(way_points: Corners) -> list[str]:
     return list(dict.fromkeys(name for corner in way_points for name in corner))
 
 

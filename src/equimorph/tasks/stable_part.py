@@ -24,7 +24,7 @@ PARTS = 4
 """Parts of a side of a cell between the places whose distances are compared."""
 
 
-def cached(eset: EquilibriumSet, key: Any, compute: Callable[[], Any]) -> Any:
+def from_cache(eset: EquilibriumSet, key: Any, compute: Callable[[], Any]) -> Any:
     """Return what was computed before for a set, or compute it; forgotten with the set."""
     known = _KEPT.setdefault(eset, {})
     if key not in known:
@@ -34,7 +34,7 @@ def cached(eset: EquilibriumSet, key: Any, compute: Callable[[], Any]) -> Any:
 
 def vertex_values(eset: EquilibriumSet, descriptor: Descriptor) -> Float[np.ndarray, " V"]:
     """Values of a descriptor at the vertices of a set."""
-    found = cached(
+    found = from_cache(
         eset, ("values", descriptor), lambda: descriptor.function(eset.points.z, eset.points.p)
     )
     return np.asarray(found)
@@ -49,7 +49,7 @@ def stable_vertices(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
 
 def stable_edges(eset: EquilibriumSet) -> Int[np.ndarray, "edges 2"]:
     """Edges of stable cells."""
-    found = cached(eset, "edges", lambda: faces_of(eset.cells[eset.cell_index == 0], 2))
+    found = from_cache(eset, "edges", lambda: faces_of(eset.cells[eset.cell_index == 0], 2))
     return np.asarray(found)
 
 

@@ -60,18 +60,18 @@ class Branch:
     def residuals(self, x: Vector) -> Residuals:
         """(predicted − measured)/σ where there is a measurement."""
         p = self.unknowns.parameters(x)
-        z = self._reached(x, p)
+        z = self._states_at(x, p)
         if z is None:
             self.failures += 1
             if self.failures > FAILURES:
                 raise BranchEnds
             return np.full(np.isfinite(self.measured).sum(), np.inf)
         self.trial = z, p
-        return self._missed(self.unknowns.made(x), z, p)
+        return self._misfit(self.unknowns.made(x), z, p)
 
-    def _missed(self, structure: Structure, z: Lanes, p: Parameters) -> Residuals:
+    def _misfit(self, structure: Structure, z: Lanes, p: Parameters) -> Residuals:
         predicted = [each.predicted(structure, z, p) for each in self.measurements]
-        return self._selected(np.concatenate(predicted, axis=1) - self.measured)
+        return self._at_measurements(np.concatenate(predicted, axis=1) - self.measured)
 
     def jacobian(self, x: Vector) -> Jacobian:
         """Derivatives of the residuals at the last trial, which is thereby accepted.
@@ -85,11 +85,11 @@ class Branch:
         columns = np.stack([self._force(k) for k in range(len(x))], axis=1)
         moves = -structure.solve(z, p, columns).x
         slopes = [self._slope(k, np.ascontiguousarray(moves[:, k])) for k in range(len(x))]
-        jacobian = np.stack([self._selected(slope) for slope in slopes], axis=1)
-        self.accepted = x.copy(), self._missed(structure, z, p), jacobian
+        jacobian = np.stack([self._at_measurements(slope) for slope in slopes], axis=1)
+        self.accepted = x.copy(), self._misfit(structure, z, p), jacobian
         return jacobian
 
-    def _changed(self, k: int) -> Callable[[float], Structure]:
+    def _structures_near(self, k: int) -> Callable[[float], Structure]:
         """Structures near that of the accepted unknowns, by the change of unknown k."""
         unit = np.zeros_like(self.x)
         unit[k] = 1.0
@@ -103,7 +103,9 @@ class Branch:
             return here.parameter_derivative(z, p, self.unknowns.columns[k])
         still = np.zeros_like(z)
         size = abs(self.x[k])
-        return by_data(lambda made, at: made.residual(at, p), self._changed(k), size, z, still)
+        return by_data(
+            lambda made, at: made.residual(at, p), self._structures_near(k), size, z, still
+        )
 
     def _slope(self, k: int, moves: Lanes) -> Columns:
         """Derivative of what is predicted by unknown k, with the moves of the states."""
@@ -113,15 +115,15 @@ class Branch:
             return np.concatenate([each.predicted(made, at, p) for each in self.measurements], 1)
 
         if k in self.unknowns.data.values():
-            return by_data(predicted, self._changed(k), abs(self.x[k]), z, moves)
+            return by_data(predicted, self._structures_near(k), abs(self.x[k]), z, moves)
         here, dp = self.unknowns.made(self.x), self.unknowns.columns[k]
         parts = [derivative(each, here, z, p, moves, dp) for each in self.measurements]
         return np.concatenate(parts, axis=1)
 
-    def _selected(self, table: Columns) -> Residuals:
+    def _at_measurements(self, table: Columns) -> Residuals:
         return np.asarray((table / self.sigma)[np.isfinite(self.measured)])
 
-    def _reached(self, x: Vector, p: Parameters) -> Lanes | None:
+    def _states_at(self, x: Vector, p: Parameters) -> Lanes | None:
         """States of unknowns on the branches of the accepted ones; None if one is not reached."""
         try:
             structure = self.unknowns.made(x)
@@ -132,10 +134,10 @@ class Branch:
         if name:
             self.failure = ("limit", f"{name} leaves the limits of its meaning")
             return None
-        z = self._carried(x)
-        return None if z is None else self._lifted(structure, z, p)
+        z = self._continue_data(x)
+        return None if z is None else self._lift(structure, z, p)
 
-    def _carried(self, x: Vector) -> Lanes | None:
+    def _continue_data(self, x: Vector) -> Lanes | None:
         """States at the accepted parameters of the structure with other data, step by step."""
         own = list(self.unknowns.data.values())
         if np.array_equal(x[own], self.x[own]):
@@ -154,7 +156,7 @@ class Branch:
         self._note("lost", 0)
         return None
 
-    def _lifted(self, structure: Structure, z: Lanes, p: Parameters) -> Lanes | None:
+    def _lift(self, structure: Structure, z: Lanes, p: Parameters) -> Lanes | None:
         """States of a structure lifted to parameters from the accepted ones."""
         length = np.linalg.norm((p - self.p) / structure.scales, axis=1)
         near, far = np.flatnonzero((length > 0.0) & (length <= SHORT)), length > SHORT

@@ -148,7 +148,7 @@ def calibrate(
         check_start(state)
     free = unknowns(start, unknown, family)
     tables = [each.table(start) for each in measured]
-    values, sigma = _joined(tables)
+    values, sigma = _join_tables(tables)
     count = int(np.isfinite(values).sum())
     if count < len(free.names):
         raise InputError(
@@ -162,10 +162,12 @@ def calibrate(
             branch.residuals, free.start, branch.jacobian, x_scale="jac", ftol=1e-15,
             xtol=CONVERGED, gtol=CONVERGED, max_nfev=EVALUATIONS,
         )  # fmt: skip
-    return _judged(free, branch, known=sigma is not None)
+    return _judge(free, branch, known=sigma is not None)
 
 
-def _joined(tables: Sequence[tuple[Columns, Columns | None]]) -> tuple[Columns, Columns | None]:
+def _join_tables(
+    tables: Sequence[tuple[Columns, Columns | None]],
+) -> tuple[Columns, Columns | None]:
     if not tables:
         raise InputError("`measured` must hold at least one measurement; got none.")
     values = np.concatenate([each for each, _ in tables], axis=1)
@@ -175,7 +177,7 @@ def _joined(tables: Sequence[tuple[Columns, Columns | None]]) -> tuple[Columns, 
     return values, np.concatenate(deviations, axis=1) if deviations else None
 
 
-def _judged(free: Unknowns, branch: Branch, *, known: bool) -> Calibration:
+def _judge(free: Unknowns, branch: Branch, *, known: bool) -> Calibration:
     """Tell what became of a fit, with its covariance."""
     assert branch.accepted is not None
     values, residuals, jacobian = branch.accepted

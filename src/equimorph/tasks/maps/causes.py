@@ -104,10 +104,10 @@ class Paths(ABC):
         """Whether the map is defined at settings, so that they can be compared."""
 
     @abstractmethod
-    def unexplained(self, pairs: Brackets) -> np.ndarray:
+    def unexplained_kinds(self, pairs: Brackets) -> np.ndarray:
         """Kinds of places without a cause, by what the ends show; empty for none."""
 
-    def unloaded(self, settings: Settings) -> Samples:
+    def natural_samples(self, settings: Settings) -> Samples:
         """Natural states that obey the constraints, with the status `LOST` until a path is found.
 
         `UNDEFINED_UNLOADED` or `NO_NATURAL_STATE` where no path can start.

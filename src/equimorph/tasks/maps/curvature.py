@@ -169,7 +169,7 @@ class FirstStablePaths(Paths):
 
     def __call__(self, settings: Settings) -> Samples:
         """Values at settings, with their states and what happens on the way."""
-        start = self.unloaded(settings)
+        start = self.natural_samples(settings)
         z, p, kind = start.z, start.p, start.kind
         value, place = start.value, start.place
         ready = np.flatnonzero(kind == PathStatus.LOST)
@@ -198,8 +198,8 @@ class FirstStablePaths(Paths):
         """
         structure, sides = self.sheet.structure, (pairs.a, pairs.b)
         branches = branching(structure, structure.parameters[self.load].name)
-        found = [Cause.of("fold", (gap, self._level), _reached(side), side) for side in sides]
-        both, differs = _reached(pairs.a) & _reached(pairs.b), pairs.a.kind != pairs.b.kind
+        found = [Cause.of("fold", (gap, self._level), _is_reached(side), side) for side in sides]
+        both, differs = _is_reached(pairs.a) & _is_reached(pairs.b), pairs.a.kind != pairs.b.kind
         found += equal_extrema(self.descriptor, pairs, both, self._level)
         for side, there in (*_forks(pairs, 0), *_forks(pairs, 1)):
             for kind, test, may in (("snap", quadratic, differs), ("jump", branches, both)):
@@ -223,12 +223,12 @@ class FirstStablePaths(Paths):
         """Whether paths could start and were not lost."""
         return np.asarray(side.kind > PathStatus.LOST)
 
-    def unexplained(self, pairs: Brackets) -> np.ndarray:
+    def unexplained_kinds(self, pairs: Brackets) -> np.ndarray:
         """Where states end, values jump, snapping begins, or the extremum moves elsewhere."""
         a, b = pairs.a, pairs.b
         jump = np.abs(a.value - b.value) > JUMP * np.maximum(np.abs(a.value), np.abs(b.value))
-        known = self.known(a) & self.known(b) & (_reached(a) | _reached(b))
-        both = _reached(a) & _reached(b)
+        known = self.known(a) & self.known(b) & (_is_reached(a) | _is_reached(b))
+        both = _is_reached(a) & _is_reached(b)
         cases = [~known, ~both, jump, a.kind != b.kind]
         return np.select(cases, ["", "gap", "jump", "snap"], "place").astype(object)
 
@@ -251,5 +251,5 @@ def _forks(pairs: Brackets, back: int) -> list[tuple[Samples, Bool[np.ndarray, "
     return found
 
 
-def _reached(side: Samples) -> Flags:
+def _is_reached(side: Samples) -> Flags:
     return np.asarray((side.kind >= PathStatus.STABLE) & (side.kind <= PathStatus.BRANCHES_OFF))

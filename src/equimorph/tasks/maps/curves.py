@@ -114,10 +114,10 @@ def explain(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
     error = EXACT * paths.sheet.structure.scales[paths.sheet.places[moving]]
     setting = found.p[:, paths.sheet.places]
     places = Places(pairs, found.kind, error, setting, found.z, found.p)
-    return _confirmed(paths, pairs, places, found.found)
+    return _confirm(paths, pairs, places, found.found)
 
 
-def _confirmed(
+def _confirm(
     paths: Paths, pairs: Brackets, places: Places, found: Bool[np.ndarray, " pairs"]
 ) -> tuple[Places, Brackets, Brackets]:
     """Look at the map close to places on both sides; see `explain`."""
@@ -159,7 +159,7 @@ def places_on(paths: Paths, vertices: Samples, shape: tuple[int, int]) -> tuple[
     while len(fresh):
         tried[fresh] = True
         pairs = (vertices.take(edges[fresh, 0]), vertices.take(edges[fresh, 1]), fresh)
-        sure, open_ = _resolved(paths, Brackets(*pairs))
+        sure, open_ = _resolve(paths, Brackets(*pairs))
         found += sure
         left.append(unexplained_places(paths, open_))
         seen = np.concatenate([seen, *(each.brackets.edge for each in (*sure, left[-1]))])
@@ -170,7 +170,7 @@ def places_on(paths: Paths, vertices: Samples, shape: tuple[int, int]) -> tuple[
     return _together([nothing, *found]), _together([nothing, *left])
 
 
-def _resolved(paths: Paths, pairs: Brackets) -> tuple[list[Places], Brackets]:
+def _resolve(paths: Paths, pairs: Brackets) -> tuple[list[Places], Brackets]:
     """Look for causes and divide in turn; what is never explained is divided further."""
     structure = paths.sheet.structure
     found: list[Places] = []
@@ -192,7 +192,7 @@ def _together(parts: list[Places]) -> Places:
 
 def unexplained_places(paths: Paths, pairs: Brackets) -> Places:
     """Places in the middle of pairs, with kinds by what their ends show."""
-    kind = paths.unexplained(pairs)
+    kind = paths.unexplained_kinds(pairs)
     some = np.flatnonzero(kind != "")
     pairs = pairs.take(some)
     a, b = pairs.a, pairs.b
@@ -228,11 +228,11 @@ def curves_through(
 
 def edge_of_definition(paths: Paths, settings: Settings, shape: tuple[int, int]) -> Places:
     """Places on grid edges at only one end of which a path can start."""
-    start, edges = paths.unloaded(settings), grid_edges(shape)
+    start, edges = paths.natural_samples(settings), grid_edges(shape)
     out = start.kind[edges] != Start.LOST
     at = np.flatnonzero(out[:, 0] != out[:, 1])
     pairs = Brackets(start.take(edges[at, 0]), start.take(edges[at, 1]), at)
-    found = narrow(paths.sheet.structure, paths.unloaded, pairs, EDGE_DIVISIONS)
+    found = narrow(paths.sheet.structure, paths.natural_samples, pairs, EDGE_DIVISIONS)
     middle = 0.5 * (found.a.setting + found.b.setting)
     inside = found.a.where(found.a.kind == Start.LOST, found.b)
     kind = np.full(len(found), "edge", dtype=object)

@@ -154,7 +154,7 @@ class LimitLoadRays(Paths):
 
     def __call__(self, settings: Settings) -> Samples:
         """Limit loads at settings, with their states."""
-        start = self.unloaded(settings)
+        start = self.natural_samples(settings)
         z, p, kind = start.z, start.p, start.kind
         value, place = start.value, start.place
         ready = np.flatnonzero(kind == RayStatus.LOST)
@@ -220,7 +220,7 @@ class LimitLoadRays(Paths):
         """Whether there is a limit load."""
         return np.asarray(np.isfinite(side.value))
 
-    def unexplained(self, pairs: Brackets) -> np.ndarray:
+    def unexplained_kinds(self, pairs: Brackets) -> np.ndarray:
         """Jumps, kinks, and other places of the extremum that meets a constraint."""
         a, b = pairs.a, pairs.b
         known = self.known(a) & self.known(b)

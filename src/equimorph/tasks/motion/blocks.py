@@ -138,7 +138,7 @@ def _block(
     structure, free = course.structure, course.free
     p, targets = course.split(course.at(ahead))
     p[:, free] = here.p[free]
-    guess = _predicted(course, here, course.at(np.array([time])), p, targets)
+    guess = _predict(course, here, course.at(np.array([time])), p, targets)
     begin = np.repeat(here.z[None], len(p), axis=0), np.repeat(here.p[None], len(p), axis=0)
     way = distances(structure, guess, begin)
     found = correct_onto_targets(structure, *guess, free, course.descriptors, targets)
@@ -160,7 +160,7 @@ def _leading(flags: Int[np.ndarray, " n"] | np.ndarray) -> int:
     return len(flags) if flags.all() else int(np.argmin(flags))
 
 
-def _predicted(
+def _predict(
     course: Course,
     here: State,
     now: Float[np.ndarray, "1 columns"],

@@ -83,7 +83,7 @@ def follow_redundant(
         corner = min(np.floor(here.time) + 1.0, course.legs)
         step = min(step, corner - here.time)
         last = step >= corner - here.time
-        there, error = _stepped(course, here, step, corner if last else here.time + step)
+        there, error = _step(course, here, step, corner if last else here.time + step)
         why = _fault(course, here, there, error, within, limits)
         if not why:
             here = replace(there, held=_held(course, there, limits))
@@ -94,10 +94,10 @@ def follow_redundant(
         step *= _share(here, there, why, limits)
         if step < CLOSEST * max(1.0, here.time):
             break
-    return Motion(_joined(course, track), _end(course, track, why, limits))
+    return Motion(_join_track(course, track), _end(course, track, why, limits))
 
 
-def _joined(course: Course, track: list[_Here]) -> Stretch:
+def _join_track(course: Course, track: list[_Here]) -> Stretch:
     z, p = (np.concatenate([getattr(here, name) for here in track]) for name in "zp")
     return Stretch(States(course.structure, z, p), np.array([here.time for here in track]))
 
@@ -124,7 +124,7 @@ def _velocity(
     return (moves @ tangents.dz[0])[None], (moves @ tangents.dp[0])[None]
 
 
-def _stepped(course: Course, here: _Here, step: float, time: float) -> tuple[_Here, float]:
+def _step(course: Course, here: _Here, step: float, time: float) -> tuple[_Here, float]:
     """One step, corrected, and an estimate of its error."""
     rates: list[tuple[np.ndarray, np.ndarray]] = []
     inner = np.nextafter(here.time + step, here.time)

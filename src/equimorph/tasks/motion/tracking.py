@@ -175,8 +175,8 @@ def track(  # the knobs of the public face, all by keyword
     limits = dict(actuators) if isinstance(actuators, Mapping) else {}
     bounds = actuator_bounds(state.structure, limits)
     check_stable("start", state)
-    legs = _listed(targets)
-    asked = _descriptors([_checked(leg(0.0) if callable(leg) else leg, names) for leg in legs])
+    legs = _list_legs(targets)
+    asked = _descriptors([_check_values(leg(0.0) if callable(leg) else leg, names) for leg in legs])
     motion = _Motion(state, legs, names, tuple(within), limits, bounds)
     path = motion.path()
     failure = _failure(path.end, bounds)
@@ -226,7 +226,7 @@ class _Motion:
         if len(self.legs) >= DENSE and same_descriptors(self.legs):
             check_start(self.start, every)
             return path_by_blocks(self.course, self.start, every, FINE)
-        freed = [_freed(leg, self.names) for leg in self.legs]
+        freed = [_free_actuators(leg, self.names) for leg in self.legs]
         path = lift(self.start, freed, within=every)
         return lift(self.start, freed, within=every, options=FINE) if path.arrived else path
 
@@ -258,18 +258,18 @@ class _Motion:
         return follow_minimum(problem, begin, float(path.at[-1]))
 
 
-def _listed(targets: Leg | Sequence[Leg]) -> list[Leg]:
+def _list_legs(targets: Leg | Sequence[Leg]) -> list[Leg]:
     return [targets] if isinstance(targets, Mapping) or callable(targets) else list(targets)
 
 
-def _freed(leg: Leg, actuators: tuple[str, ...]) -> Leg:
+def _free_actuators(leg: Leg, actuators: tuple[str, ...]) -> Leg:
     """Leg with the actuators left unknown."""
     if callable(leg):
-        return lambda t: {**_checked(leg(t), actuators), **dict.fromkeys(actuators)}
-    return {**_checked(leg, actuators), **dict.fromkeys(actuators)}
+        return lambda t: {**_check_values(leg(t), actuators), **dict.fromkeys(actuators)}
+    return {**_check_values(leg, actuators), **dict.fromkeys(actuators)}
 
 
-def _checked(values: Waypoint, actuators: tuple[str, ...]) -> Waypoint:
+def _check_values(values: Waypoint, actuators: tuple[str, ...]) -> Waypoint:
     if not isinstance(values, Mapping):
         raise InputError(f"`targets` must give {{descriptor: value}}; got {values!r}.")
     asked = [key for key in values if isinstance(key, Descriptor)]

@@ -76,7 +76,7 @@ def feasible_points_in_cells(
         Stable cells.
     """
     promising, weights = _promising(eset, constraints, cells)
-    found, kept = _restored(programme, _inside(eset, promising, weights))
+    found, kept = _restore_feasibility(programme, _inside(eset, promising, weights))
     if not kept.any():
         return found.take(kept)
     own = promising[kept]
@@ -185,7 +185,7 @@ def _inside(
     return SetPoints(z, p, rows)
 
 
-def _restored(programme: Programme, guess: SetPoints) -> tuple[SetPoints, Flags]:
+def _restore_feasibility(programme: Programme, guess: SetPoints) -> tuple[SetPoints, Flags]:
     """States that obey all constraints, near points; and where there are any."""
     here, alive = project_onto_set(programme.setting, guess.z, guess.p, guess.rows)
     kept = np.zeros(len(guess), bool)
@@ -195,7 +195,7 @@ def _restored(programme: Programme, guess: SetPoints) -> tuple[SetPoints, Flags]
         if len(todo) == 0:
             break
         frames, at = tangents_at(programme.setting, SetPoints(z[todo], p[todo], rows[todo]))
-        excess, slopes = programme.linearised(at, frames)
+        excess, slopes = programme.linearise(at, frames)
         good = excess.max(axis=1) <= MET
         kept[todo[good]] = True
         step = _towards(excess[~good], slopes[~good])

@@ -142,7 +142,7 @@ def landscape(  # the knobs of the public face, most by keyword
         raise InputError(f"`sense` must be min or max; got {sense!r}.")
     settings, shape = settings_of(grid)
     over = eset.over(**dict(zip(grid.names, settings.T, strict=True)))
-    allowed = _allowed(eset, over, within, start)
+    allowed = _admissible(eset, over, within, start)
     value = objective(over.states) * (1.0 if sense == "min" else -1.0)
     best = _best(np.where(allowed, value, np.inf), over.point, len(settings))
     known = best >= 0
@@ -154,7 +154,7 @@ def landscape(  # the knobs of the public face, most by keyword
     return Landscape(grid, out.reshape(shape), states, ~known.reshape(shape), barriers)
 
 
-def _allowed(
+def _admissible(
     eset: EquilibriumSet, over: StatesOver, within: Sequence[Constraint], start: State | None
 ) -> Flags:
     """Stable states that obey the constraints, on the piece of the start."""
@@ -191,17 +191,17 @@ def _barriers(
     ends = place.ravel()[pairs]
     structure, n = states.structure, states.structure.unknowns
     a, b = states[ends[:, 0]], states[ends[:, 1]]
-    arrived, z = _lifted(a, b)
+    arrived, z = _lift_straight(a, b)
     gap = np.sqrt((z - b.z)[:, :n] ** 2 @ structure.mass)
     apart = np.flatnonzero(~(arrived & (gap < SAME_SOLUTION)))
-    back, _ = _lifted(b[apart], a[apart])
+    back, _ = _lift_straight(b[apart], a[apart])
     kind: tuple[BarrierKind, ...] = tuple(
         "preference" if both else "stability" for both in arrived[apart] & back
     )
     return Barriers(settings[pairs[apart]], value[pairs[apart]], kind)
 
 
-def _lifted(a: States, b: States) -> tuple[Flags, Lanes]:
+def _lift_straight(a: States, b: States) -> tuple[Flags, Lanes]:
     """Whether states stay stable on the way to the parameters of others, and where they end."""
     line = ParameterLine(a.structure, a.p.copy(), b.p - a.p)
     ended = trace(line, a.z.copy(), (), TraceOptions(record=False))

@@ -239,7 +239,7 @@ class _Track:
         bends = (pair[0].certificate.curvature, pair[1].certificate.curvature)
         return expected_end((pair[0].time, pair[1].time), bends)
 
-    def predicted(self, ahead: float, end: float) -> SetPoints | None:
+    def predict(self, ahead: float, end: float) -> SetPoints | None:
         """State of the set at a time ahead, extrapolated from the last two optima."""
         course, here = self.problem.course, self.last.end.point
         z, p = here.z.copy(), here.p.copy()
@@ -265,7 +265,7 @@ def follow_minimum(problem: MovingProblem, start: State, time: float) -> Followe
     begin = SetPoints(start.z[None], start.p[None], plane)
     first = None
     for later in LATER:
-        first = first or _solved(problem, begin, min(time + later, legs))
+        first = first or _solve(problem, begin, min(time + later, legs))
     if first is None:
         why = "the descent from the start ends at no optimum"
         return _result(_Track(problem, []), why, start)
@@ -285,8 +285,8 @@ def _advance(track: _Track) -> None:
     if here.time < end < track.failure:
         ahead = next_trial(here.time, end, track.failure)
     ahead = min(ahead, np.floor(here.time) + 1.0, track.problem.course.legs)
-    guess = track.predicted(ahead, end)
-    there = None if guess is None else _solved(track.problem, guess, ahead, SHORT)
+    guess = track.predict(ahead, end)
+    there = None if guess is None else _solve(track.problem, guess, ahead, SHORT)
     if there is None or guess is None or not _goes_on(here, there, guess):
         track.failure, track.step = ahead, SHORTER * (ahead - here.time)
         return
@@ -309,7 +309,7 @@ def _jump_over(track: _Track) -> bool:
     return True
 
 
-def _solved(
+def _solve(
     problem: MovingProblem, guess: SetPoints, time: float, rounds: int = ITERATIONS
 ) -> _Found | None:
     """Optimum near a guess; None where the descent does not end at one."""
@@ -344,7 +344,7 @@ def _beyond(problem: MovingProblem, here: _Found, ahead: float) -> _Found | None
         at = given.copy()
         at[:, free] = p[:, free]
         guess, good = project_onto_set(setting, z, at, here.end.point.rows)
-        found = _solved(problem, guess, ahead) if good[0] else None
+        found = _solve(problem, guess, ahead) if good[0] else None
         if found is not None:
             return found
     return None

@@ -197,9 +197,9 @@ def optimise(  # the knobs of the public face, all by keyword
     goal = Objective(objective, sign)
     fault = "" if start is None else inadmissible("start", start, constraints, margin, FEASIBLE)
     if fault:
-        return _refused(fault, sense, eset)
+        return _refusal(fault, sense, eset)
     programme = Programme.over(eset, goal, (*constraints, stability(eset.structure, margin)))
-    watched = _watched(programme, constraints, margin)
+    watched = _vertex_constraints(programme, constraints, margin)
     ground, least = None, None
     if start is None:
         starts, least = _starts(eset, programme, watched)
@@ -215,18 +215,18 @@ def optimise(  # the knobs of the public face, all by keyword
             _in_the_box(eset, _before_the_edge(programme, end) or each.state)
             for end, each in zip(ends, found, strict=True)
         ]
-        reached = _first_reached(eset, ground, start, goals, within, margin)
+        reached = _first_reachable(eset, ground, start, goals, within, margin)
         if reached is None:
-            return _refused(f"no route was found to {found[0]}", sense, eset)
+            return _refusal(f"no route was found to {found[0]}", sense, eset)
         number, route = reached
         found = [replace(found[number], route=route), *found[number + 1 :]]
     if not found:
-        return _refused(_nothing(within, least), sense, eset)
+        return _refusal(_nothing(within, least), sense, eset)
     z, p = (np.array([getattr(each.state, key) for each in found]) for key in "zp")
     return Optima("found", "", sense, tuple(found), States(eset.structure, z, p))
 
 
-def _refused(why: str, sense: Sense, eset: EquilibriumSet) -> Optima:
+def _refusal(why: str, sense: Sense, eset: EquilibriumSet) -> Optima:
     return Optima("refused", why, sense, (), eset.points[:0])
 
 
@@ -252,7 +252,7 @@ def _nothing(within: Sequence[Constraint], least: FeasibleStarts | None) -> str:
     return f"{why}; the least largest excess over the bounds is {least.least:.3g}"
 
 
-def _watched(
+def _vertex_constraints(
     programme: Programme, constraints: tuple[Constraint, ...], margin: float
 ) -> tuple[Constraint, ...]:
     """Constraints for the vertices, all of which are stable."""
@@ -323,7 +323,7 @@ def _optimum(programme: Programme, end: LocalMinimum) -> Optimum:
     return Optimum(state, value, certificate(programme, end))
 
 
-def _first_reached(
+def _first_reachable(
     eset: EquilibriumSet,
     piece: EquilibriumSet | None,
     start: State,

@@ -164,7 +164,7 @@ class Programme:
         each = [c.excess(z, p) / max(1.0, abs(c.bound)) for c in self.all]
         return np.stack(each, axis=1)
 
-    def expanded(self, at: SetPoints, frames: Frames) -> Expansion:
+    def expand(self, at: SetPoints, frames: Frames) -> Expansion:
         """Values, first and second derivatives along orthonormal tangents.
 
         Slopes are central differences along the tangent space: what lies off the set cancels. Bends
@@ -172,9 +172,11 @@ class Programme:
         """
         lanes, d = len(at), frames.shape[1]
         near, far = np.concatenate([np.eye(d), -np.eye(d)]), _directions(d)
-        flat = self._moved(at, frames, DIFFERENCE * near)
+        flat = self._tangent_points(at, frames, DIFFERENCE * near)
         curved, found = project_onto_set(
-            self.setting, *self._moved(at, frames, CURVING * far), np.repeat(at.rows, len(far), 0)
+            self.setting,
+            *self._tangent_points(at, frames, CURVING * far),
+            np.repeat(at.rows, len(far), 0),
         )
         z = np.concatenate([at.z, flat[0], curved.z])
         p = np.concatenate([at.p, flat[1], curved.p])
@@ -198,17 +200,19 @@ class Programme:
             _slopes(g[1]), _bends(g[0], g[2], known), known,
         )  # fmt: skip
 
-    def linearised(
+    def linearise(
         self, at: SetPoints, frames: Frames
     ) -> tuple[Float[np.ndarray, "lanes k"], Float[np.ndarray, "lanes k d"]]:
         """Excess over all bounds, and its slopes along orthonormal tangents."""
         d = frames.shape[1]
-        flat = self._moved(at, frames, DIFFERENCE * np.concatenate([np.eye(d), -np.eye(d)]))
+        flat = self._tangent_points(
+            at, frames, DIFFERENCE * np.concatenate([np.eye(d), -np.eye(d)])
+        )
         excess = self.excess(np.concatenate([at.z, flat[0]]), np.concatenate([at.p, flat[1]]))
         around = excess[len(at) :].reshape(len(at), 2 * d, -1)
         return excess[: len(at)], _slopes(around)
 
-    def _moved(
+    def _tangent_points(
         self, at: SetPoints, frames: Frames, steps: Float[np.ndarray, "n d"]
     ) -> tuple[Float[np.ndarray, "many size"], Float[np.ndarray, "many parameters"]]:
         """Points of the tangent spaces, lane by lane."""

@@ -93,7 +93,7 @@ def _beside(lmap: LimitLoadMap, spot: Spots) -> Float[np.ndarray, " 2"]:
     return np.asarray(np.nan_to_num(values, nan=-np.inf))
 
 
-def _moved(locus: Locus, spot: Spots, step: float) -> Spots | None:
+def _step_along(locus: Locus, spot: Spots, step: float) -> Spots | None:
     """Point of a curve at a step along it; None if it is not found."""
     there, found = advance(locus, spot, np.array([step]))
     return there if found[0] else None
@@ -107,7 +107,7 @@ def _top_of_ridge(lmap: LimitLoadMap, locus: Locus, spot: Spots | None) -> Ridge
         slope = _rise(spot)
         if abs(slope) < LEVEL:
             break
-        ahead = _moved(locus, spot, SLOPE)
+        ahead = _step_along(locus, spot, SLOPE)
         if ahead is None:
             return None
         change = (_rise(ahead) - slope) / SLOPE
@@ -115,7 +115,7 @@ def _top_of_ridge(lmap: LimitLoadMap, locus: Locus, spot: Spots | None) -> Ridge
         step = float(np.clip(step, -LONGEST, LONGEST))
         if abs(step) < STILL:
             break
-        spot = _moved(locus, spot, step)
+        spot = _step_along(locus, spot, step)
     if spot is None:
         return None
     value, slope = float(spot.x[0, -1]), abs(_rise(spot))
@@ -131,7 +131,7 @@ def _top_of_cliff(lmap: LimitLoadMap, locus: Locus, spot: Spots, side: float) ->
             width *= 0.2
         else:
             top, unsure = _top_of(values)
-            ahead = _moved(locus, spot, top * width) if top != 0.0 else spot
+            ahead = _step_along(locus, spot, top * width) if top != 0.0 else spot
             if ahead is None:
                 return None
             spot = ahead
@@ -148,11 +148,11 @@ def _along(
     lmap: LimitLoadMap, locus: Locus, spot: Spots, side: float, width: float
 ) -> Float[np.ndarray, " stencil"] | None:
     """Limit loads close to a curve, on one side of it, at steps of a width along it."""
-    spots = [spot if step == 0.0 else _moved(locus, spot, step * width) for step in STENCIL]
+    spots = [spot if step == 0.0 else _step_along(locus, spot, step * width) for step in STENCIL]
     known = [each for each in spots if each is not None]
     if len(known) < len(spots):
         return None
-    places = [each.x[0, -3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
+    places = [each.x[0, -3:-1] + side * CLOSE * _align(lmap, each, spot) for each in known]
     values = lmap.rays(np.array(places))
     return values if np.isfinite(values).all() else None
 
@@ -173,11 +173,11 @@ def _top_of(values: Float[np.ndarray, " stencil"]) -> tuple[float, float]:
 def _cliff_at(lmap: LimitLoadMap, locus: Locus, spot: Spots, side: float) -> Ridge | None:
     """Value, slope and sides of a cliff at a point of its curve."""
     setting, across = spot.x[0, -3:-1], normal_of(lmap, spot)
-    ends = [_moved(locus, spot, step) for step in (-NARROW, NARROW)]
+    ends = [_step_along(locus, spot, step) for step in (-NARROW, NARROW)]
     known = [each for each in ends if each is not None]
     if len(known) < len(ends):
         return None
-    along = [each.x[0, -3:-1] + side * CLOSE * _aligned(lmap, each, spot) for each in known]
+    along = [each.x[0, -3:-1] + side * CLOSE * _align(lmap, each, spot) for each in known]
     near = setting + side * CLOSE * np.array([[1.0], [2.0]]) * across
     values = lmap.rays(np.concatenate([near, along, settings_across(setting, across)]))
     one, two, left, right = values[:4].tolist()
@@ -191,7 +191,7 @@ def settings_across(setting: Pair, across: Pair) -> Float[np.ndarray, "settings 
     return np.concatenate([setting - steps, setting + steps])
 
 
-def _aligned(lmap: LimitLoadMap, spot: Spots, other: Spots) -> Pair:
+def _align(lmap: LimitLoadMap, spot: Spots, other: Spots) -> Pair:
     """Direction across the curve that points to the same side as at another of its points."""
     own, theirs = normal_of(lmap, spot), normal_of(lmap, other)
     return np.asarray(own * (1.0 if own @ theirs > 0.0 else -1.0))

@@ -74,7 +74,7 @@ class _Iterate:
     def at(cls, programme: Programme, points: SetPoints) -> "_Iterate":
         """Expand the programme at points."""
         frames, points = tangents_at(programme.setting, points)
-        return cls(points, frames, programme.expanded(points, frames))
+        return cls(points, frames, programme.expand(points, frames))
 
     def minimum(self, k: int, answer: Answer, converged: bool) -> LocalMinimum:
         """Lane `k` as a point from which no step is made."""
@@ -166,12 +166,12 @@ def _answer(expansion: Expansion, k: int, lane: _Lane) -> Answer | None:
         # multipliers of the plain model weigh the second derivatives
         known = solve(model, lane.reach)
     if known is None:
-        return _restored(model, lane.reach)
+        return _restoration_step(model, lane.reach)
     bend = np.einsum("m,mij->ij", known.weights, expansion.f_bend[k])
     bend += np.einsum("k,kij->ij", known.multipliers, expansion.g_bend[k])
     if expansion.known[k]:
         model = replace(model, hessian=_positive(bend))
-    return solve(model, lane.reach) or _restored(model, lane.reach)
+    return solve(model, lane.reach) or _restoration_step(model, lane.reach)
 
 
 def _positive(bend: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
@@ -181,7 +181,7 @@ def _positive(bend: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
     return np.asarray((vectors * size) @ vectors.T)
 
 
-def _restored(model: Quadratic, reach: float) -> Answer:
+def _restoration_step(model: Quadratic, reach: float) -> Answer:
     """Shortest step that meets the violated constraints, or a part of it."""
     bad = model.g > 0.0
     step = np.linalg.lstsq(model.b[bad], -model.g[bad], rcond=None)[0]

@@ -293,7 +293,7 @@ def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -
         for count in (3, 21)
     )
     for _ in range(EXCHANGES):
-        setting, guaranteed = _raised(lmap, around)
+        setting, guaranteed = _raise_minimum(lmap, around)
         values = np.nan_to_num(lmap.rays(setting + everywhere), nan=0.0)
         lowest = int(values.argmin())
         if values[lowest] >= guaranteed - LEVEL:
@@ -311,7 +311,7 @@ def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -
     )
 
 
-def _raised(
+def _raise_minimum(
     lmap: LimitLoadMap, around: Float[np.ndarray, "offsets 2"]
 ) -> tuple[Float[np.ndarray, " 2"], float]:
     """Setting whose smallest limit load at some offsets is largest, and that."""

@@ -99,7 +99,7 @@ def _move_corners(
         for _ in range(rounds):
             before = chain
             for odd in (1, 2):
-                chain = _moved(chain, odd, size, demands, room)
+                chain = _move_every_other(chain, odd, size, demands, room)
             if chain is before:
                 break
     return chain.corners.states
@@ -124,15 +124,15 @@ def _chords(
     return good, cost
 
 
-def _moved(chain: _Chain, odd: int, size: float, demands: Demands, room: Room) -> _Chain:
+def _move_every_other(chain: _Chain, odd: int, size: float, demands: Demands, room: Room) -> _Chain:
     """Chain with every other corner moved, if that makes its two legs cheaper."""
     tried, new = _candidates(chain.corners.states, odd, size, room)
     some = np.flatnonzero(demands.admissible(new)) if len(tried) else tried
     if len(some) == 0:
         return chain
     tried, places = tried[some], demands.objective.places(new[some])
-    before = _joined(chain.corners[tried - 1], places)
-    after = _joined(places, chain.corners[tried + 1])
+    before = _interleave(chain.corners[tried - 1], places)
+    after = _interleave(places, chain.corners[tried + 1])
     good, cost = _chords(before, after, demands)
     moves = _Moves(tried, places, cost.reshape(2, -1))
     gain = _gain(chain.legs, tried, good, cost)
@@ -149,7 +149,7 @@ def _moved(chain: _Chain, odd: int, size: float, demands: Demands, room: Room) -
     return _taken(chain, moves, np.where(gain > least, gain, 0.0))
 
 
-def _joined(first: Places, second: Places) -> Places:
+def _interleave(first: Places, second: Places) -> Places:
     return Places(
         States(
             first.states.structure,
@@ -205,14 +205,14 @@ def _taken(chain: _Chain, moves: _Moves, gain: Float[np.ndarray, " n"]) -> _Chai
     if len(chosen) == 0:
         return chain
     took = moves[chosen]
-    corners = chain.corners.replaced(took.tried, took.new)
-    legs, lifts = _changed(chain.legs, took.tried, took.legs), chain.lifts
+    corners = chain.corners.replace_at(took.tried, took.new)
+    legs, lifts = _replace_costs(chain.legs, took.tried, took.legs), chain.lifts
     if lifts is not None and took.lifts is not None:
-        lifts = _changed(lifts, took.tried, took.lifts)
+        lifts = _replace_costs(lifts, took.tried, took.lifts)
     return _Chain(corners, legs, lifts)
 
 
-def _changed(legs: Values, tried: Some, new: Float[np.ndarray, "2 n"]) -> Values:
+def _replace_costs(legs: Values, tried: Some, new: Float[np.ndarray, "2 n"]) -> Values:
     out = legs.copy()
     out[tried - 1], out[tried] = new
     return out

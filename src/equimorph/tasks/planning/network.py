@@ -19,7 +19,7 @@ from equimorph.model import Constraint, eased
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
-from equimorph.tasks.stable_part import cached
+from equimorph.tasks.stable_part import from_cache
 from equimorph.tasks.start import check_margin_demand
 
 EXACT, RESERVES = (1.0, 0.0), ((1.01, 1e-3), (1.05, 1e-2), (1.15, 1e-2))
@@ -65,7 +65,7 @@ class Demands:
         constraints = tuple(eased(each) for each in dict.fromkeys(within))
         return cls(objective_of(objective, structure), constraints, margin)
 
-    def reserved(self, least: float) -> Iterator["Demands"]:
+    def with_reserves(self, least: float) -> Iterator["Demands"]:
         """Demands with growing reserves of margin, for dips between the points that are watched.
 
         What leaves no room for a reserve is searched without one, too; without a demanded margin
@@ -197,7 +197,7 @@ class Network:
         self._lifted: dict[tuple[tuple[Constraint, ...], float, bool], Flags] = {}
         self._costs: dict[str, Values] = {}
 
-    def allowed(self, eset: EquilibriumSet, demands: Demands) -> Bool[np.ndarray, " V"]:
+    def admissible(self, eset: EquilibriumSet, demands: Demands) -> Bool[np.ndarray, " V"]:
         """Vertices of stable cells, off the folds, that obey the demands."""
         key = demands.constraints, demands.margin
         if key not in self._allowed:
@@ -240,7 +240,7 @@ class Network:
 
 def network_of(eset: EquilibriumSet) -> Network:
     """The network of a set, made on first use and kept as long as the set."""
-    network: Network = cached(eset, "network", lambda: Network(eset))
+    network: Network = from_cache(eset, "network", lambda: Network(eset))
     return network
 
 
@@ -250,7 +250,7 @@ def cheapest_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States 
     Links are lifted only when a path uses them; what was found is remembered.
     """
     network = network_of(eset)
-    allowed = network.allowed(eset, demands)[network.pairs].all(axis=1)
+    allowed = network.admissible(eset, demands)[network.pairs].all(axis=1)
     broken, _ = network.verdicts(demands)
     costs = network.costs(eset, demands.objective)
     states, (own, own_costs) = nodes_with_ends(eset, ends), end_links(eset, ends, demands)
@@ -286,7 +286,7 @@ def nodes_with_ends(eset: EquilibriumSet, ends: Ends) -> States:
 def end_links(eset: EquilibriumSet, ends: Ends, demands: Demands) -> tuple[Pairs, Values]:
     """Links of start and goal to the vertices around them, and to each other."""
     count = len(eset.points)
-    allowed = network_of(eset).allowed(eset, demands)
+    allowed = network_of(eset).admissible(eset, demands)
     pairs, costs = [], []
     for number, end in enumerate(ends):
         near, cost = neighbours(eset, allowed, end, demands)
@@ -315,7 +315,7 @@ def neighbours(
 def explain_no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:
     """Say whether instability alone or the other demands separate start and goal."""
     network, free = network_of(eset), Demands(demands.objective)
-    allowed = network.allowed(eset, free)
+    allowed = network.admissible(eset, free)
     own, _ = end_links(eset, ends, free)
     pairs = np.concatenate([network.pairs[allowed[network.pairs].all(axis=1)], own])
     count = len(eset.points) + 2

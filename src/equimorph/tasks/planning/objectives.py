@@ -40,7 +40,7 @@ class Places:
         """Some of them."""
         return Places(self.states[key], self.efforts[key], self.nearness[key])
 
-    def replaced(self, at: Int[np.ndarray, " some"], new: "Places") -> "Places":
+    def replace_at(self, at: Int[np.ndarray, " some"], new: "Places") -> "Places":
         """Others in some places."""
         z, p = self.states.z.copy(), self.states.p.copy()
         efforts, nearness = self.efforts.copy(), self.nearness.copy()

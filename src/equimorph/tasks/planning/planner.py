@@ -127,7 +127,7 @@ def _with_reserves(
 ) -> Route | None:
     """Route, the last one that was refused, or None where no path leads to the goal."""
     route = None
-    for tightened in demands.reserved(min(end.margin for end in ends)):
+    for tightened in demands.with_reserves(min(end.margin for end in ends)):
         path = cheapest_path(eset, ends, tightened)
         if path is not None:
             route = route_over_corners(

@@ -93,7 +93,7 @@ def alternatives(
     if why:
         return (refusal(why),)
     best, failed = list[Route](), list[Route]()
-    for tightened in demands.reserved(min(end.margin for end in ends)):
+    for tightened in demands.with_reserves(min(end.margin for end in ends)):
         paths = _Classes(eset, ends, tightened).paths(count)
         corners = [straight_corners(eset, path, tightened, same_class=True) for path in paths]
         routes = [route_over_corners(eset, each, demands, monitor) for each in corners]
@@ -122,7 +122,7 @@ class _Classes:
         self.eset, self.ends, self.demands = eset, ends, demands
         self.states = nodes_with_ends(eset, ends)
         network = network_of(eset)
-        allowed = network.allowed(eset, demands)
+        allowed = network.admissible(eset, demands)
         self.network, (self.broken, _) = network, network.verdicts(demands)
         self.inner = np.flatnonzero(allowed[network.pairs].all(axis=1))
         pairs = np.sort(network.pairs[self.inner], axis=1)
@@ -164,7 +164,7 @@ class _Classes:
             done[node, own] = len(before)
             before.append((node, parent))
             if node == goal:
-                found.append((own, _traced(before, len(before) - 1)))
+                found.append((own, _trace_back(before, len(before) - 1)))
                 continue
             for other, step, change in beside[node]:
                 new = (
@@ -191,7 +191,7 @@ class _Classes:
         return beside
 
 
-def _traced(before: list[tuple[int, int]], last: int) -> Int[np.ndarray, " n"]:
+def _trace_back(before: list[tuple[int, int]], last: int) -> Int[np.ndarray, " n"]:
     way = []
     while last >= 0:
         node, last = before[last]

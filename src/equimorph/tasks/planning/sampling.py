@@ -224,14 +224,14 @@ class _Search:
         a, s = course.towards(tree, near, a, s, self.options.reach)
         states = States(self.structure, tree.z[near], tree.p[near])
         if self.demands.constraints:
-            a = self._pushed(states, tree.s[near], a, s)
+            a = self._push_inside(states, tree.s[near], a, s)
         p = course.parameters(a, s)
         z, there, _ = lift_straight(states, p, self.demands)
         there &= np.abs(p - states.p).max(axis=1, initial=0.0) > 0.0
         self.lifts += len(near)
         return tree.add(z[there], p[there], s[there], near[there])
 
-    def _pushed(
+    def _push_inside(
         self,
         states: States,
         now: Values,

@@ -68,8 +68,8 @@ def smoothed(
     corners = states.p[_corners(route)] / structure.scales
     why = ""
     for _ in range(HALVINGS):
-        curve = _rounded(corners, tolerance) * structure.scales
-        found = _verified(route, curve, tuple(within), margin, tuple(monitor))
+        curve = _round_corners(corners, tolerance) * structure.scales
+        found = _verify(route, curve, tuple(within), margin, tuple(monitor))
         if found.arrived:
             return found
         why, tolerance = found.why, 0.5 * tolerance
@@ -83,18 +83,18 @@ def _corners(route: Route) -> list[int]:
     )
 
 
-def _rounded(corners: Places, tolerance: float) -> Places:
+def _round_corners(corners: Places, tolerance: float) -> Places:
     """Points of the rounded polygon, as far from it as allowed."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     window = 0.5 * np.diff(length).min()
     while True:
-        curve = _averaged(corners, length, window)
+        curve = _average(corners, length, window)
         if _off(curve, corners) <= tolerance or window < 1e-6 * length[-1]:
             return curve
         window *= 0.7
 
 
-def _averaged(corners: Places, length: Float[np.ndarray, " corners"], window: float) -> Places:
+def _average(corners: Places, length: Float[np.ndarray, " corners"], window: float) -> Places:
     """Polygon averaged with the weights of a parabolic spline of half-width `window`."""
     at = np.linspace(0.0, length[-1], KNOTS)
     # Gauss points of the convolution of three boxes, which is a parabola in pieces
@@ -124,7 +124,7 @@ def _off(curve: Places, corners: Places) -> float:
     return float(np.min(gaps, axis=0).max())
 
 
-def _verified(
+def _verify(
     route: Route,
     curve: Places,
     within: tuple[Constraint, ...],

@@ -30,7 +30,7 @@ from equimorph.tasks.planning.straightening import (
     way_points_of,
 )
 from equimorph.tasks.route import FINE, Corners, Route, refusal, schedule_of
-from equimorph.tasks.stable_part import cached
+from equimorph.tasks.stable_part import from_cache
 from equimorph.tolerances import SAME_STATE
 
 SAMPLES = 9
@@ -69,8 +69,8 @@ class SnapPath:
 def gates_of(eset: EquilibriumSet, demands: Demands) -> list[Gate]:
     """Snaps that land on stable strata of the set, each with an admissible vertex before it."""
     network = network_of(eset)
-    allowed = network.allowed(eset, demands)
-    graph = cached(eset, "snap graph", lambda: snap_graph(eset, samples=SAMPLES))
+    allowed = network.admissible(eset, demands)
+    graph = from_cache(eset, "snap graph", lambda: snap_graph(eset, samples=SAMPLES))
     gates = []
     for snap in graph.snaps:
         for vertex, landing in zip(snap.vertices.tolist(), snap.landings, strict=True):
@@ -100,7 +100,7 @@ def route_with_snaps(
         path = search.path()
         if path is None:
             return refusal("not even by snaps does the goal lie on a piece that can be reached")
-        route = _verified(eset, ends, path, demands, monitor)
+        route = _verify(eset, ends, path, demands, monitor)
         tried += 1
         if route.arrived:
             return replace(route, cost=route.cost + price * len(route.snaps))
@@ -124,7 +124,7 @@ class _Search:
             np.concatenate([states.p, *(state.p[None] for state in landed)]),
         )
         self.first = len(states)
-        allowed = self.network.allowed(eset, demands)
+        allowed = self.network.admissible(eset, demands)
         own, costs = end_links(eset, ends, demands)
         pairs, weights = [own], [costs]
         for number, state in enumerate(landed):
@@ -142,7 +142,7 @@ class _Search:
     def path(self) -> SnapPath | None:
         """The cheapest path all of whose links can be lifted; None if there is none."""
         network = self.network
-        allowed = network.allowed(self.eset, self.demands)[network.pairs].all(axis=1)
+        allowed = network.admissible(self.eset, self.demands)[network.pairs].all(axis=1)
         broken, _ = network.verdicts(self.demands)
         costs = network.costs(self.eset, self.demands.objective)
         while True:
@@ -153,7 +153,7 @@ class _Search:
                 return None
             used = inner[on_paths(network.pairs[inner], [path])]
             if network.lift_links(used, self.states, self.demands):
-                return self._divided(path)
+                return self._divide_at_snaps(path)
 
     def _cheapest(
         self, both: Int[np.ndarray, "links 2"], weights: Float[np.ndarray, " links"]
@@ -171,7 +171,7 @@ class _Search:
         _, before = dijkstra(graph, indices=start, return_predecessors=True)
         return walk_back(before, start, goal)
 
-    def _divided(self, path: Int[np.ndarray, " n"]) -> SnapPath:
+    def _divide_at_snaps(self, path: Int[np.ndarray, " n"]) -> SnapPath:
         """Parts of a path between its snaps."""
         sources = {gate.source for gate in self.gates}
         cuts = [
@@ -190,7 +190,7 @@ class _Search:
         return gate.source == a and not linked
 
 
-def _verified(
+def _verify(
     eset: EquilibriumSet,
     ends: Ends,
     path: SnapPath,
@@ -226,7 +226,7 @@ def _verified(
     leg = lift(here, last, within=demands.constraints, options=FINE)
     if not leg.arrived or distance(leg.end.state, ends[1]) > SAME_STATE:
         return refusal(f"the part after the last snap ends otherwise: {leg.end.kind}")
-    return _joined([*paths, leg], tuple(snaps), [*way_points, *last], demands, monitor)
+    return _join_paths([*paths, leg], tuple(snaps), [*way_points, *last], demands, monitor)
 
 
 def _corners(eset: EquilibriumSet, part: States, demands: Demands) -> Corners:
@@ -251,7 +251,7 @@ def _landing(fold: State, gate: Gate) -> Landing | None:
     return min(landings, key=lambda each: distance(each.state, gate.landing.state))
 
 
-def _joined(
+def _join_paths(
     paths: list[Path],
     snaps: tuple[Landing, ...],
     way_points: Corners,

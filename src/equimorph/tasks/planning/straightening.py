@@ -94,17 +94,17 @@ def relax_corners(
     moves become smaller and smaller. Costs along chords tell enough for that, unless what comes out
     cannot be lifted. Then corners that are of no use are left out.
     """
-    corners = _divided(corners, demands)
+    corners = _divide_long_legs(corners, demands)
     if same_class:
         corners = move_by_lifts(corners, demands, room, quick=False)
     else:
-        corners, whole = _linked(corners, move_by_chords(corners, demands, room), demands)
+        corners, whole = _keep_liftable(corners, move_by_chords(corners, demands, room), demands)
         if not whole:
             corners = move_by_lifts(corners, demands, room, quick=True)
-    return _thinned(corners, demands, same_class)
+    return _thin_out(corners, demands, same_class)
 
 
-def _linked(before: States, after: States, demands: Demands) -> tuple[States, bool]:
+def _keep_liftable(before: States, after: States, demands: Demands) -> tuple[States, bool]:
     """Corners after their moves, but for those whose legs cannot be lifted; whether all can."""
     back = np.zeros(len(before), bool)
     while True:
@@ -117,7 +117,7 @@ def _linked(before: States, after: States, demands: Demands) -> tuple[States, bo
         back[bad], back[bad + 1] = True, True
 
 
-def _divided(corners: States, demands: Demands) -> States:
+def _divide_long_legs(corners: States, demands: Demands) -> States:
     """Corners with others between them on long legs."""
     scales = corners.structure.scales
     gap = np.linalg.norm(np.diff(corners.p, axis=0) / scales, axis=1)
@@ -128,7 +128,7 @@ def _divided(corners: States, demands: Demands) -> States:
         if len(long) == 0:
             break
         middle = 0.5 * (corners.p[long] + corners.p[long + 1])
-        z, there = _lifted(corners[long], middle, demands)
+        z, there = _lift_straight(corners[long], middle, demands)
         if not there.all():
             break
         p = np.insert(corners.p, long + 1, middle, axis=0)
@@ -136,7 +136,7 @@ def _divided(corners: States, demands: Demands) -> States:
     return corners
 
 
-def _lifted(states: States, p: Parameters, demands: Demands) -> tuple[Lanes, Flags]:
+def _lift_straight(states: States, p: Parameters, demands: Demands) -> tuple[Lanes, Flags]:
     """States lifted straight to parameters, and whether they arrived."""
     line = ParameterLine(states.structure, states.p.copy(), p - states.p)
     outcome = trace(line, states.z.copy(), demands.constraints, TraceOptions(record=False))
@@ -144,7 +144,7 @@ def _lifted(states: States, p: Parameters, demands: Demands) -> tuple[Lanes, Fla
     return there.z, (outcome.code == EventCode.ARRIVED) & there.found
 
 
-def _thinned(corners: States, demands: Demands, same_class: bool) -> States:
+def _thin_out(corners: States, demands: Demands, same_class: bool) -> States:
     """Fewest corners whose chain costs hardly more."""
     first, second = np.triu_indices(len(corners), 1)
     near = second - first <= (3 if demands.objective.needs_margins else MERGED)

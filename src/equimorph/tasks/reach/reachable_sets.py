@@ -146,7 +146,7 @@ def reachable(
         cut = divided(piece, descriptors)
         if not cut.lost:
             break
-    label = _parted(cut)
+    label = _pieces_beside_level(cut)
     own = label[cell_near(cut.eset, state)]
     order = [own, *(k for k in range(label.max() + 1) if k != own)]
     regions = tuple(
@@ -210,7 +210,7 @@ def _stable_piece(
     return piece
 
 
-def _parted(cut: Division) -> Int[np.ndarray, " C"]:
+def _pieces_beside_level(cut: Division) -> Int[np.ndarray, " C"]:
     """Pieces of a set between facets on the level; cells on different sides never belong together.
 
     The latter matters only where the set could not be cut.

@@ -179,7 +179,7 @@ def _outer(
         elif side:
             names.append(("actuator limit", side))
         else:
-            names.append(_constrained(eset, facet))
+            names.append(_active_constraint(eset, facet))
     return facets, names
 
 
@@ -194,7 +194,7 @@ def _sides(eset: EquilibriumSet, facets: Int[np.ndarray, "F d"]) -> list[str]:
     return [str(each) for each in out]
 
 
-def _constrained(eset: EquilibriumSet, facet: Int[np.ndarray, " d"]) -> tuple[Kind, str]:
+def _active_constraint(eset: EquilibriumSet, facet: Int[np.ndarray, " d"]) -> tuple[Kind, str]:
     """Which constraint is active on a facet."""
     states = eset.points[facet]
     if not eset.constraints:

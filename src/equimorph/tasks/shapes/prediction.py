@@ -13,7 +13,7 @@ from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Descriptor
 from equimorph.tasks.optimising.tangent_steps import SetPoints, unconstrained_setting
-from equimorph.tasks.stable_part import cached, vertex_values
+from equimorph.tasks.stable_part import from_cache, vertex_values
 
 CLOSE = 0.5
 """Distance of two predictions, in sizes of their cell, below which one of them will do."""
@@ -26,7 +26,7 @@ GUARDS = Guards(iterations=30, longest=0.3, converged=1e-7)
 
 def predictor(eset: EquilibriumSet, descriptors: tuple[Descriptor, ...]) -> "Predictor":
     """Predictor of a set for some descriptors, kept with the set."""
-    found = cached(eset, ("predictor", descriptors), lambda: Predictor(eset, descriptors))
+    found = from_cache(eset, ("predictor", descriptors), lambda: Predictor(eset, descriptors))
     assert isinstance(found, Predictor)
     return found
 
@@ -116,11 +116,11 @@ class Predictor:
         place = np.concatenate([u * np.sqrt(structure.mass), p / self.setting.scales], axis=1)
         gap = np.linalg.norm(place[:, None] - place[None], axis=2)
         close = (gap < CLOSE * size[cells]) & (side[cells][:, None] == side[cells][None])
-        cached: list[int] = []
+        kept: list[int] = []
         for k in range(len(cells)):
-            if not close[k, cached].any():
-                cached.append(k)
-        return np.array(cached, int)
+            if not close[k, kept].any():
+                kept.append(k)
+        return np.array(kept, int)
 
     def guesses(
         self, share: Float[np.ndarray, "some corners"], cells: Int[np.ndarray, " some"]

@@ -221,9 +221,9 @@ def solve_shapes(
     known = predictor(eset, tuple(targets))
     constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
     if wanted.shape[1] > len(eset.names):
-        groups = [_fitted(known, each, constraints) for each in wanted]
+        groups = [_fit(known, each, constraints) for each in wanted]
     else:
-        groups = _solved(known, wanted, constraints)
+        groups = _solve(known, wanted, constraints)
     answers = []
     for values, (states, misfit) in zip(wanted, groups, strict=True):
         routes = [] if start is None else [plan(eset, start, s, within=within) for s in states]
@@ -281,7 +281,7 @@ def _answer(
     )  # fmt: skip
 
 
-def _solved(
+def _solve(
     known: Predictor, wanted: Float[np.ndarray, "many k"], within: tuple[Constraint, ...]
 ) -> list[tuple[States, Values]]:
     """Exact solutions of each question in the box and within constraints, each once."""
@@ -315,7 +315,7 @@ def _members(
     known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
 ) -> tuple[States, Values]:
     """Members of a family within the box and constraints."""
-    states, misfit = _fitted(known, wanted, within)
+    states, misfit = _fit(known, wanted, within)
     return states[misfit <= EXACT], misfit[misfit <= EXACT]
 
 
@@ -335,7 +335,7 @@ def _guesses(
     return known.guesses(shares, cells), owner
 
 
-def _fitted(
+def _fit(
     known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
 ) -> tuple[States, Values]:
     """Different fits of least squares."""

@@ -77,7 +77,7 @@ class Bounds:
         return Bounds(*(column[at] for column in vars(self).values()))
 
     @classmethod
-    def joined(cls, parts: list["Bounds"]) -> "Bounds":
+    def join(cls, parts: list["Bounds"]) -> "Bounds":
         """All segments of some parts."""
         return cls(
             *(np.concatenate(c) for c in zip(*(vars(b).values() for b in parts), strict=True))
@@ -99,8 +99,8 @@ def segment_bounds(first: States, last: States, wanted: float = 0.0) -> Bounds:
     bound = _majorant(structure, middle, (half[0] + reach[:, None] * weights, half[1]))
     still = np.zeros_like(half[1])
     off = _norm(np.abs(_unity_gap(inverse, matrix)) @ weights[:, :, None], weights)
-    turn = off + _norm(_applied(inverse, bound(half, (weights, still))), weights)
-    grow = _norm(_applied(inverse, bound((weights, still), (weights, still))), weights)
+    turn = off + _norm(_apply(inverse, bound(half, (weights, still))), weights)
+    grow = _norm(_apply(inverse, bound((weights, still), (weights, still))), weights)
     room = (1.0 - turn) ** 2 - 4.0 * defect * grow
     root = np.sqrt(np.maximum(room, 0.0))
     error = 2.0 * defect / np.maximum(1.0 - turn + root, 1e-300)
@@ -147,7 +147,7 @@ def _unity_gap(inverse: Matrices, matrix: Matrices) -> Matrices:
     return np.asarray(np.eye(matrix.shape[1]) - inverse @ matrix)
 
 
-def _applied(inverse: Matrices, rows: Lanes) -> Lanes:
+def _apply(inverse: Matrices, rows: Lanes) -> Lanes:
     """|A⁻¹| times rows ≥ 0."""
     return np.asarray((np.abs(inverse) @ rows[:, :, None])[:, :, 0])
 
@@ -161,7 +161,7 @@ def _weights(inverse: Matrices, bound: Majorant, half: Direction) -> Lanes:
     weights = np.ones_like(half[0])
     still = np.zeros_like(half[1])
     for _ in range(SWEEPS):
-        new = _applied(inverse, bound(half, (weights, still)))
+        new = _apply(inverse, bound(half, (weights, still)))
         size = new.max(axis=1, keepdims=True)
         weights = np.where(size > 0.0, new / np.maximum(size, 1e-300), 1.0)
         weights = np.maximum(weights, LEAST_WEIGHT)
@@ -182,9 +182,9 @@ def _defect(
         residual = end.structure.residual(end.z, end.p)
         rounding = ROUNDING * (np.abs(matrix) @ np.abs(end.z)[:, :, None])[:, :, 0]
         moved = (inverse @ residual[:, :, None])[:, :, 0]
-        rows.append(np.abs(moved) + _applied(inverse, rounding))
+        rows.append(np.abs(moved) + _apply(inverse, rounding))
     # a function with second derivative f″ leaves its chord by max|f″|/8; the whole step is 2 half
-    bend = 0.5 * _applied(inverse, bound(half, half))
+    bend = 0.5 * _apply(inverse, bound(half, half))
     return np.stack(rows, axis=1), bend
 
 
@@ -226,7 +226,7 @@ def _keeps(
     weights = _weights(inverse, bound, tube)
     moved = matrix - np.eye(structure.size) * mass * shift[:, None, None]
     off = np.abs(_unity_gap(inverse, moved)) @ weights[:, :, None]
-    change = _applied(inverse, bound(tube, (weights, still)))
+    change = _apply(inverse, bound(tube, (weights, still)))
     return np.asarray((_norm(off, weights) + _norm(change, weights) < 1.0) & (index == 0))
 
 
@@ -251,7 +251,7 @@ def sampled_bound(structure: Structure, z: Lanes, p: Parameters, reach: Directio
     return bound
 
 
-def can_be_sampled(structure: Structure) -> bool:
+def allows_sampling(structure: Structure) -> bool:
     """Whether the second derivatives are few enough."""
     return structure.size + len(structure.parameters) <= MOST_ENTRIES
 

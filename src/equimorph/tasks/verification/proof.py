@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.equilibria import settle
 from equimorph.structures import States, Structure
-from equimorph.tasks.verification.newton_kantorovich import Bounds, can_be_sampled, segment_bounds
+from equimorph.tasks.verification.newton_kantorovich import Bounds, allows_sampling, segment_bounds
 
 MOST_BISECTIONS = 12
 """Bisections of a segment before it counts as unproved."""
@@ -78,15 +78,15 @@ def prove(states: States, margin: float = 0.0) -> Proof:
     for _ in range(MOST_BISECTIONS):
         bad = np.flatnonzero(_wrong(bounds, margin))
         if len(bad) == 0:
-            return _concluded(states, bounds, kind)
-        divided = _bisected(states, bad)
+            return _conclude(states, bounds, kind)
+        divided = _bisect(states, bad)
         if divided is None:
             break
         states, new = divided
-        bounds = _renewed(bounds, states, bad, new, margin)
+        bounds = _renew(bounds, states, bad, new, margin)
     bad = np.flatnonzero(_wrong(bounds, margin))
     if len(bad) == 0:
-        return _concluded(states, bounds, kind)
+        return _conclude(states, bounds, kind)
     k = int(bad[0])
     why = _why(bounds, k, margin)
     return Proof("unproved", why, states, _errors(bounds), 0.0, kind, states[k : k + 2])
@@ -97,7 +97,7 @@ def _kind(states: States) -> Literal["structural", "sampled", "unknown"]:
     z, p = states.z[:1], states.p[:1]
     if structure.second_derivative_bound(z, p, (np.zeros_like(z), np.zeros_like(p))) is not None:
         return "structural"
-    return "sampled" if can_be_sampled(structure) else "unknown"
+    return "sampled" if allows_sampling(structure) else "unknown"
 
 
 def _without_repeats(states: States) -> States:
@@ -115,7 +115,7 @@ def _all_bounds(first: States, last: States, margin: float) -> Bounds:
         segment_bounds(first[k : k + count], last[k : k + count], margin)
         for k in range(0, len(first), count)
     ]
-    return Bounds.joined(parts)
+    return Bounds.join(parts)
 
 
 def _wrong(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
@@ -135,7 +135,7 @@ def _keeps(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
     return np.asarray((bounds.margin >= margin) & (bounds.margin > 0.0))
 
 
-def _bisected(
+def _bisect(
     states: States, bad: Int[np.ndarray, " bad"]
 ) -> tuple[States, Int[np.ndarray, " bad"]] | None:
     """States with exact ones in the middle of the bad segments, and where these stand; else None.
@@ -160,7 +160,7 @@ def _bisected(
     return joined, bad + 1 + np.arange(len(bad))
 
 
-def _renewed(
+def _renew(
     bounds: Bounds,
     states: States,
     bad: Int[np.ndarray, " bad"],
@@ -173,14 +173,14 @@ def _renewed(
     kept = np.setdiff1d(np.arange(len(bounds.proved)), bad)
     place = np.setdiff1d(np.arange(len(states) - 1), halves)
     order = np.argsort(np.concatenate([place, halves]))
-    return Bounds.joined([bounds.take(kept), fresh]).take(order)
+    return Bounds.join([bounds.take(kept), fresh]).take(order)
 
 
 def _errors(bounds: Bounds) -> Float[np.ndarray, " segments"]:
     return np.asarray(bounds.error * bounds.weights.max(axis=1))
 
 
-def _concluded(states: States, bounds: Bounds, kind: Literal["structural", "sampled"]) -> Proof:
+def _conclude(states: States, bounds: Bounds, kind: Literal["structural", "sampled"]) -> Proof:
     return Proof("proved", "", states, _errors(bounds), float(bounds.margin.min()), kind)
 
 

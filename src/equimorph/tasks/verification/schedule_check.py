@@ -71,14 +71,14 @@ def follow_polyline(
     done, here = 0, start
     while done < len(rows):
         nodes = _by_newton(here, rows[done:])
-        lifts = _lifted(nodes[:-1], nodes.p[1:], within, options)
+        lifts = _lift(nodes[:-1], nodes.p[1:], within, options)
         good = _true(lifts, nodes[1:])
         legs.append(_part(nodes[0], lifts, good + 1, done))
         done += min(good + 1, len(nodes) - 1)
         here = legs[-1].end.state
         if legs[-1].end.kind != "arrived":
             break
-    return _joined(start, legs)
+    return _join_parts(start, legs)
 
 
 def _by_newton(start: State, rows: Rows) -> States:
@@ -95,9 +95,7 @@ def _by_newton(start: State, rows: Rows) -> States:
     return States(structure, np.array(z), np.concatenate([start.p[None], rows[: len(z) - 1]]))
 
 
-def _lifted(
-    states: States, to: Rows, within: tuple[Constraint, ...], options: TraceOptions
-) -> Lifts:
+def _lift(states: States, to: Rows, within: tuple[Constraint, ...], options: TraceOptions) -> Lifts:
     names = names_of(states.structure.parameters)
     columns = {name: to[:, k].copy() for k, name in enumerate(names)}
     return lift(states, columns, within=within, options=options)
@@ -136,7 +134,7 @@ def _part(start: State, lifts: Lifts, legs: int, before: int) -> LiftedPolyline:
     return LiftedPolyline(states, before + (lane + at)[order], corner, ended)
 
 
-def _joined(start: State, parts: list[LiftedPolyline]) -> LiftedPolyline:
+def _join_parts(start: State, parts: list[LiftedPolyline]) -> LiftedPolyline:
     z = np.concatenate([start.z[None], *(part.states.z for part in parts)])
     p = np.concatenate([start.p[None], *(part.states.p for part in parts)])
     at = np.concatenate([np.zeros(1), *(part.at for part in parts)])
@@ -354,7 +352,7 @@ def _violation(
     low = np.flatnonzero(margins < margin) if margin > 0.0 else np.flatnonzero(margins <= 0.0)
     # the end at a fold has no margin, but the fold is what is to be told
     low = low[low < len(margins) - (done.end.kind != "arrived")]
-    names = _moved(done.states)
+    names = _moved_names(done.states)
     if len(low):
         k = int(low[0])
         where = describe_place(done.states[k], names)
@@ -365,7 +363,7 @@ def _violation(
     return f"step {leg} of {legs} meets {describe_obstacle(done.end, names)}", len(margins) - 1
 
 
-def _moved(states: States) -> list[str]:
+def _moved_names(states: States) -> list[str]:
     names = names_of(states.structure.parameters)
     moves = np.ptp(states.p, axis=0) > 0.0
     return [name for name, moving in zip(names, moves, strict=True) if moving]
