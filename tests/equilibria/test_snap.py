@@ -127,7 +127,7 @@ def test_the_flow_runs_in_the_metric_at_its_own_pace():
     """Bead on a circle: φ̇ = sin φ cos φ, so that tan φ grows like eᵗ. Steps are of first order."""
     bead, start = bead_on_a_circle(), 0.1
     z = np.array([[np.cos(start), np.sin(start), -(np.cos(start) ** 2)]])
-    flow = gradient_flow(bead, z, np.zeros((1, 2)), np.ones(1))
+    flow = gradient_flow(bead, z, np.zeros((1, 2)), np.ones(1), np.full(1, start))
     angle = np.arctan2(flow.points[:, 1], flow.points[:, 0])
     some = (angle > 0.2) & (angle < 1.4)
     exact = np.log(np.tan(angle[some]) / np.tan(start))

@@ -1,49 +1,103 @@
 """Gradient flow in the structure's metric, projected on the constraints, until it settles."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria.settle import Guards, settle
-from equimorph.linalg import multiply
+from equimorph.equilibria.soft_modes import extent_of_guesses, metric_length
 from equimorph.structures import Structure
+from equimorph.tolerances import CONVERGED, SAME_STATE
 
-LANDED, SADDLE, ESCAPED, STUCK, SLOW = range(5)
-WHY = {
-    LANDED: "the flow settled at a stable state",
-    SADDLE: "the flow settled at a saddle",
-    ESCAPED: "the flow left for infinity",
-    STUCK: "no step of the flow, however short, could be solved",
-    SLOW: "the flow did not settle within its number of steps",
+
+class Ending(IntEnum):
+    """How a flow ended."""
+
+    OPEN = -1
+    """Not yet."""
+    LANDED = 0
+    SADDLE = 1
+    ESCAPED = 2
+    STUCK = 3
+    SLOW = 4
+    HELD = 5
+    """It never began: the energy rises."""
+
+    @property
+    def reason(self) -> str:
+        """One line."""
+        return REASONS[self]
+
+
+REASONS = {
+    Ending.OPEN: "the flow goes on",
+    Ending.LANDED: "the flow settled at a stable state",
+    Ending.SADDLE: "the flow settled at a saddle",
+    Ending.ESCAPED: "the flow left for infinity",
+    Ending.STUCK: "no step of the flow, however short, could be solved",
+    Ending.SLOW: "the flow did not settle within its number of steps",
+    Ending.HELD: "the energy rises in this direction",
 }
-STEPS = 3000
-"""Largest number of implicit Euler steps of one flow."""
-FIRST_STEP, SHORTEST_STEP = 0.1, 1e-12
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How long the steps of a flow may be, and where it ends; no length is absolute.
+
+    Parameters
+    ----------
+    change
+        Largest change of the velocity in one step, relative to the larger one of both.
+    near
+        Newton step to a stable state, relative to the way so far, from which on it is solved for.
+    steps
+        Most steps of one flow.
+    """
+
+    change: float
+    near: float
+    steps: int
+
+
+FAITHFUL = Pace(change=0.4, near=1e-2, steps=3000)
+"""Follows the flow in time, until it is close to its end."""
+QUICK = Pace(change=0.8, near=100.0, steps=400)
+"""Looks for the end only: no energy barrier is stepped over."""
+FIRST_STEP = 0.1
 """In units of the time 1/|eigenvalue| at the start."""
-ACCURACY = 5e-3
-"""Error of one step in the metric that the step control aims at."""
+AIM = 0.6
+"""Change of the velocity that the next step aims at, relative to the largest one."""
+LONGEST = 0.5
+"""Length of a step, relative to the way so far."""
+FAILURES = 20
+"""Steps, each a quarter of the one before, that may fail one after the other."""
 ITERATIONS = 12
 """Largest number of Newton iterations in one implicit step."""
-CONVERGED = 1e-8
+SOLVED = 1e-8
 """Newton correction in the metric that is the last: the next one would be about its square."""
+CLOSE, EXACT = 1e-2, 0.003 * SAME_STATE
+"""The same, relative to the step of the flow, and where it is small enough whatever the step."""
+FINEST = 0.03 * SAME_STATE
+"""Length in the metric of steps that have no direction: round-off rules there, beside folds."""
 ROUND_OFF = 1e-12
 """Rise of the energy, relative to it, that is no rise."""
-NEAR = 1e-2
-"""Newton step to a stable state, in the metric, from which on it is solved for."""
+CONTRACTION = 0.25
+"""Of Newton's steps where they lead to the state at the end of the flow."""
 NEAR_SADDLE = 1e-5
-"""As `NEAR`, for an unstable state: a flow passes by most saddles, and ends only at one that it
-comes so close to."""
-FARTHEST = 100.0
-"""Way in the metric after which a flow is taken to have left."""
+"""Newton step to a saddle, relative to the way so far, at which a flow has settled there."""
+FARTHEST, EXTENTS = 100.0, 10.0
+"""Way in the metric after which a flow has left, and the same in extents of the guesses; the larger
+one counts."""
 
 
 @dataclass(frozen=True)
 class Flow:
     """How flows ended, and the way there.
 
-    code: how each lane ended; z: where; lanes, time, points: configurations on the way, sorted by
+    code: `Ending` of each lane; z: where; lanes, time, points: configurations on the way, sorted by
     lane and then by time.
     """
 
@@ -65,7 +119,7 @@ class Flow:
 
 @dataclass(frozen=True)
 class _Front:
-    """Where flows are: lane, point, next step in time, last velocity, time, way, whether moved."""
+    """Where flows are: lane, point, next step in time, last velocity, time, way, failed steps."""
 
     lanes: Some
     z: Float[np.ndarray, "some size"]
@@ -73,23 +127,23 @@ class _Front:
     velocity: Float[np.ndarray, "some unknowns"]
     time: Float[np.ndarray, " some"]
     travelled: Float[np.ndarray, " some"]
-    moved: Bool[np.ndarray, " some"]
+    failed: Int[np.ndarray, " some"]
+
+    @property
+    def moved(self) -> Bool[np.ndarray, " some"]:
+        """Whether the last step was taken."""
+        return np.asarray((self.failed == 0) & (self.time > 0.0))
 
     @classmethod
-    def of(cls, z: Lanes, h: Values, unknowns: int) -> "_Front":
+    def of(cls, z: Lanes, h: Values, length: Values, unknowns: int) -> "_Front":
         """At the start."""
         count = len(z)
         nothing, still = np.zeros(count), np.zeros((count, unknowns))
-        return cls(np.arange(count), z, h, still, nothing, nothing, np.zeros(count, bool))
+        return cls(np.arange(count), z, h, still, nothing, length, np.zeros(count, int))
 
     def take(self, at: Bool[np.ndarray, " some"]) -> "_Front":
         """Return some of the flows."""
         return _Front(*(column[at] for column in vars(self).values()))
-
-
-def metric_length(structure: Structure, du: Float[np.ndarray, "lanes unknowns"]) -> Values:
-    """Length of changes of the unknowns."""
-    return np.asarray(np.sqrt(multiply(du**2, structure.mass)))
 
 
 def implicit_step(
@@ -107,6 +161,7 @@ def implicit_step(
     """
     n, new = structure.unknowns, z.copy() if guess is None else guess.copy()
     solved, todo = np.zeros(len(z), bool), np.arange(len(z))
+    before = np.full(len(z), np.inf)
     for _ in range(ITERATIONS):
         here, pull = new[todo], 1.0 / h[todo]
         rhs = -structure.residual(here, p[todo])
@@ -115,92 +170,130 @@ def implicit_step(
         dz = solution.x[:, 0]
         alive = np.isfinite(dz).all(axis=1)
         new[todo[alive]] += dz[alive]
-        small = alive & (metric_length(structure, dz[:, :n]) < CONVERGED)
+        size = metric_length(structure, dz[:, :n])
+        step = metric_length(structure, new[todo, :n] - z[todo, :n])
+        small = alive & (size < SOLVED) & (size <= np.maximum(CLOSE * step, EXACT))
         solved[todo[small]] = solution.negative[small] == structure.constraints
+        # corrections that grow lead to another minimum, if to any
+        alive &= size <= before[todo]
+        before[todo] = size
         todo = todo[alive & ~small]
         if len(todo) == 0:
             break
     return new, solved
 
 
-def gradient_flow(structure: Structure, z: Lanes, p: Parameters, rate: Values) -> Flow:
+def gradient_flow(
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    rate: Values,
+    length: Values,
+    pace: Pace = FAITHFUL,
+) -> Flow:
     """Follow ``M u̇ = −∂L/∂u``, ``c(u) = 0`` until it settles, from points with c(u) = 0.
 
-    Implicit Euler steps, as long as their error allows; only steps along which the energy falls are
-    taken. Near a stable state Newton ends the flow there, if that costs no energy.
+    Implicit Euler steps, as long as the change of the velocity allows, and shorter than the way
+    so far; only steps along which the energy falls are taken. Newton ends the flow where it
+    contracts to a state of the same kind.
 
     Parameters
     ----------
     rate
         |eigenvalue| that rules the beginning of the flow: its inverse is the scale of time.
+    length
+        Way in the metric along which the energy is known to be smooth at the beginning.
+    pace
+        How long the steps may be, and how near the end must be.
     """
-    front = _Front.of(z.copy(), FIRST_STEP / rate, structure.unknowns)
-    code, last = np.full(len(z), SLOW), z.copy()
+    front = _Front.of(z.copy(), FIRST_STEP / rate, length, structure.unknowns)
+    code, last = np.full(len(z), Ending.SLOW.value), z.copy()
+    far = max(FARTHEST, EXTENTS * extent_of_guesses(structure, p)) if len(z) else 0.0
     way = [front]
-    for _ in range(STEPS):
-        front = _advanced(structure, front, p[front.lanes])
-        way.append(front.take(front.moved))
-        end, point = _ends(structure, front, p[front.lanes], rate[front.lanes])
-        ended = end >= 0
-        code[front.lanes[ended]], last[front.lanes] = end[ended], point
-        front = front.take(~ended)
+    for _ in range(pace.steps):
         if len(front.lanes) == 0:
             break
+        front = _advanced(structure, front, p[front.lanes], pace)
+        way.append(front.take(front.moved))
+        end, last[front.lanes] = _ends(structure, front, p[front.lanes], pace)
+        end[(end < 0) & (front.travelled > far)] = Ending.ESCAPED
+        end[(end < 0) & (front.failed > FAILURES)] = Ending.STUCK
+        ended = end >= 0
+        code[front.lanes[ended]] = end[ended]
+        front = front.take(~ended)
     points = zip(*((each.lanes, each.time, each.z) for each in way), strict=True)
     lanes, time, configurations = (np.concatenate(column) for column in points)
     order = np.lexsort((time, lanes))
     return Flow(code, last, lanes[order], time[order], configurations[order])
 
 
-def _advanced(structure: Structure, front: _Front, p: Parameters) -> _Front:
-    """One step of every flow, where it is solved, accurate and downhill; and the next length."""
+def _advanced(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> _Front:
+    """One step of every flow, where it is solved, downhill and short enough; the next length."""
     n, h = structure.unknowns, front.h
     guess = front.z.copy()
     guess[:, :n] += h[:, None] * front.velocity
     new, solved = implicit_step(structure, front.z, p, h, guess=guess)
     du = new[:, :n] - front.z[:, :n]
     size = metric_length(structure, du)
-    # ½ h² ü, from the velocities of this step and the one before
-    error = 0.5 * metric_length(structure, du - h[:, None] * front.velocity)
+    velocity = du / h[:, None]
+    speed, speed_before = size / h, metric_length(structure, front.velocity)
+    faster = np.maximum(np.maximum(speed, speed_before), FINEST / h)
+    change = metric_length(structure, velocity - front.velocity) / faster
+    change[~front.velocity.any(axis=1)] = 0.0  # the first step has none to compare with
     before, after = structure.energy(front.z, p), structure.energy(new, p)
     slack = ROUND_OFF * (1.0 + np.abs(before))
     # not a number is not downhill
     downhill = after + 0.5 * size**2 / h <= before + slack
-    moved = solved & downhill & (error <= 2.0 * ACCURACY)
-    factor = np.clip(np.sqrt(ACCURACY / np.maximum(error, 1e-300)), 0.25, 2.0)
+    # else states could be stepped over that lie closer together than the step is long
+    short = size <= LONGEST * front.travelled
+    moved = solved & downhill & short & (change <= pace.change)
+    # where the flow speeds up, the energy bends down ever more
+    growing = np.where(speed > speed_before, 1.0 - change, 1.0)
+    factor = np.clip(AIM * pace.change * growing / np.maximum(change, 1e-300), 0.25, 2.0)
+    factor[front.failed > 0] = np.minimum(factor[front.failed > 0], 1.0)
     keep = moved[:, None]
     return _Front(
         front.lanes,
         np.where(keep, new, front.z),
-        h * np.where(solved & downhill, factor, 0.25),
-        np.where(keep, du / h[:, None], front.velocity),
+        h * np.where(solved & downhill, np.where(short, factor, 0.5), 0.25),
+        np.where(keep, velocity, front.velocity),
         front.time + np.where(moved, h, 0.0),
         front.travelled + np.where(moved, size, 0.0),
-        moved,
+        np.where(moved, 0, front.failed + 1),
     )
 
 
 def _ends(
-    structure: Structure, front: _Front, p: Parameters, rate: Values
+    structure: Structure, front: _Front, p: Parameters, pace: Pace
 ) -> tuple[Int[np.ndarray, " lanes"], Lanes]:
     """How flows end here, −1 where they go on; and the points, settled ones polished."""
     n, z = structure.unknowns, front.z.copy()
-    code = np.full(len(z), -1)
-    code[front.h * rate < SHORTEST_STEP] = STUCK
-    code[front.travelled > FARTHEST] = ESCAPED
+    code = np.full(len(z), Ending.OPEN.value)
     solution = structure.solve(z, p, -structure.residual(z, p)[:, None])
     size = metric_length(structure, solution.x[:, 0, :n])
     index = solution.negative - structure.constraints
-    near = np.flatnonzero(front.moved & (size < np.where(index == 0, NEAR, NEAR_SADDLE)))
-    if len(near) == 0:
+    near = np.where(index == 0, pace.near, NEAR_SADDLE) * front.travelled
+    some = np.flatnonzero(front.moved & (size <= near))
+    if len(some) == 0:
         return code, z
-    newton = settle(structure, z[near], p[near], guards=Guards(iterations=12))
-    there = newton.z
-    close = metric_length(structure, there[:, :n] - z[near, :n]) < 2.0 * NEAR
-    energy = structure.energy(z[near], p[near])
-    lower = structure.energy(there, p[near]) <= energy + ROUND_OFF * (1.0 + np.abs(energy))
-    same = newton.index == index[near]
-    good = newton.found & close & same & (lower | (index[near] > 0))
-    code[near[good]] = np.where(index[near[good]] == 0, LANDED, SADDLE)
-    z[near[good]] = there[good]
+    # the Newton point belongs to the flow if the landscape is of one kind all along the step
+    there, own, step = z[some] + solution.x[some, 0], index[some], size[some]
+    again = structure.solve(there, p[some], -structure.residual(there, p[some])[:, None])
+    left = metric_length(structure, again.x[:, 0, :n])
+    contracts = left <= np.maximum(CONTRACTION * step, CONVERGED)
+    energy = structure.energy(z[some], p[some])
+    falls = structure.energy(there, p[some]) <= energy + ROUND_OFF * (1.0 + np.abs(energy))
+    good = contracts & (again.negative - structure.constraints == own) & (falls | (own > 0))
+    halfway = 0.5 * (z[some[good]] + there[good])
+    good[good] = structure.index(halfway, p[some[good]]) == own[good]
+    newton = settle(structure, there[good], p[some[good]], guards=Guards(iterations=15))
+    away = metric_length(structure, newton.z[:, :n] - there[good, :n])
+    same = (
+        newton.found
+        & (newton.index == own[good])
+        & (away <= 2.0 * np.maximum(CONTRACTION * step[good], CONVERGED))
+    )
+    done = some[good][same]
+    code[done] = np.where(index[done] == 0, Ending.LANDED, Ending.SADDLE)
+    z[done] = newton.z[same]
     return code, z

@@ -9,34 +9,29 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Lanes
-from equimorph.equilibria import gradient_flow as flows
-from equimorph.equilibria.gradient_flow import Flow, gradient_flow, implicit_step, metric_length
+from equimorph.equilibria.descents import descend
+from equimorph.equilibria.gradient_flow import (
+    FAITHFUL,
+    Ending,
+    Flow,
+    gradient_flow,
+    implicit_step,
+)
 from equimorph.equilibria.lift import check_start
+from equimorph.equilibria.soft_modes import soft_modes
 from equimorph.errors import InputError
 from equimorph.model import parameter_vector
-from equimorph.structures import State, States, Structure
-
-Mode = Float[np.ndarray, " unknowns"]
+from equimorph.structures import State, States
 
 CRITICAL = 1e-6
 """Stability margin up to which a state without negative eigenvalues may be left."""
-NUDGES = (1e-2, 1e-3, 1e-4)
-"""Distances from the start along its eigenvector, in the metric, from which the flow is tried."""
-SHORTER = (1.0, 0.1, 0.01, 0.001)
-"""Lengths of steps there, relative to the longest."""
-RELAXATIONS = 4
-"""Steps in which stiff modes come to rest before it is asked whether a nudge grows."""
-INVERSE_ITERATIONS = 4
-"""Inverse iterations for the mode of the smallest eigenvalue; the shift is close to it, so that
-each reduces the error by several orders of magnitude."""
 
 STATUS = {
-    flows.LANDED: "landed",
-    flows.SADDLE: "saddle",
-    flows.ESCAPED: "escaped",
-    flows.STUCK: "lost",
-    flows.SLOW: "lost",
+    Ending.LANDED: "landed",
+    Ending.SADDLE: "saddle",
+    Ending.ESCAPED: "escaped",
+    Ending.STUCK: "lost",
+    Ending.SLOW: "lost",
 }
 
 
@@ -121,123 +116,35 @@ def snap_landing(state: State, *, at: Mapping[str, float] | None = None) -> tupl
             f"`state` must be unstable or critical; got index 0 with a margin of "
             f"{state.margin:.3g}. Change parameters by `at` to leave a stable state."
         )
-    soft = _Softest.of(state)
-    starts = {direction: _start(state, soft, direction) for direction in (1, -1)}
-    leaving = {direction: z for direction, (z, _) in starts.items() if z is not None}
-    landings = {way: _still(state, way, told=told) for way, (_, told) in starts.items()}
-    if leaving:
-        p = np.tile(state.p, (len(leaving), 1))
-        rate = np.full(len(leaving), soft.rate)
-        flow = gradient_flow(structure, np.concatenate(list(leaving.values())), p, rate)
-        for lane, direction in enumerate(leaving):
-            landings[direction] = _landing(flow.lane(lane), state, direction)
-    return tuple(landings.values())
-
-
-@dataclass(frozen=True)
-class _Softest:
-    """Smallest eigenvalue of the constrained Hessian, its mode of length one, and the next.
-
-    stiffness: about the size of the other eigenvalues.
-    """
-
-    eigenvalue: float
-    mode: Mode
-    stiffness: float
-
-    @classmethod
-    def of(cls, state: State) -> "_Softest":
-        """By inverse iteration just below the eigenvalue; the sign of the mode is fixed."""
-        structure, n = state.structure, state.structure.unknowns
-        generic = np.cos(1.7 * np.arange(n)) + 1.3
-        eigenvalue = state.margin
-        # a shift equal to the eigenvalue would be singular
-        shift = eigenvalue - 1e-4 * max(abs(eigenvalue), 1e-3)
-        mode = generic
-        for _ in range(INVERSE_ITERATIONS):
-            mode = _unit(structure, _applied(state, mode, shift))
-        mode = mode * np.copysign(1.0, generic @ (structure.mass * mode))
-        rest = generic - (generic @ (structure.mass * mode)) * mode
-        response = _applied(state, rest, shift)
-        response -= (response @ (structure.mass * mode)) * mode
-        size, answer = (metric_length(structure, v[None])[0] for v in (rest, response))
-        # nothing is left beside the mode if it is the only way to move
-        stiffness = size / answer if answer > 1e-6 * size else 0.0
-        return cls(eigenvalue, mode, float(max(stiffness, abs(eigenvalue))))
-
-    @property
-    def rate(self) -> float:
-        """Scale of the inverse of time."""
-        return self.stiffness if self.stiffness > CRITICAL else 1.0
-
-
-def _applied(state: State, vector: Mode, shift: float) -> Mode:
-    """Solve (F_z − shift·M) x = M·vector for the unknowns."""
-    structure, n = state.structure, state.structure.unknowns
-    rhs = np.zeros((1, 1, structure.size))
-    rhs[0, 0, :n] = structure.mass * vector
-    solution = structure.solve(state.z[None], state.p[None], rhs, shift=np.array([shift]))
-    return np.asarray(solution.x[0, 0, :n])
-
-
-def _unit(structure: Structure, vector: Mode) -> Mode:
-    return np.asarray(vector / metric_length(structure, vector[None])[0])
-
-
-def _start(state: State, soft: _Softest, direction: int) -> tuple[Lanes | None, bool]:
-    """Configuration from which the flow leaves along, or against, the softest mode, if it does.
-
-    Also whether a flow beside the state could be followed at all. Steps that cannot be solved,
-    because the energy bends down within them, are tried again shorter.
-    """
-    # stiff modes relax, the soft one is not amplified much
-    longest = min(10.0 / soft.rate, 0.3 / max(abs(soft.eigenvalue), 1e-300))
-    told = False
-    for size in NUDGES:
-        moved = (_nudged(state, soft, direction * size, longest * each) for each in SHORTER)
-        z, away = next((found for found in moved if found is not None), (None, 0.0))
-        if away > 0.0:
-            return z, True
-        told = told or z is not None
-    return None, told
-
-
-def _still(state: State, direction: int, *, told: bool) -> Landing:
-    """Nothing moves, as far as can be told."""
-    status, detail = (
-        ("held", "the energy rises in this direction")
-        if told
-        else ("lost", "no step beside the state, however short, could be solved")
+    led = descend(structure, state.z[None], state.p[None], FAITHFUL)
+    ways = zip((1, -1), led.code[:, 0].tolist(), led.lane[:, 0].tolist(), strict=True)
+    return tuple(
+        _still(state, direction, code)
+        if lane < 0
+        else _landing(led.flow.lane(lane), state, direction)
+        for direction, code, lane in ways
     )
+
+
+def _still(state: State, direction: int, code: int) -> Landing:
+    """Nothing moves, as far as can be told."""
+    if code == Ending.HELD:
+        status, detail = "held", Ending.HELD.reason
+    else:
+        status, detail = "lost", "no step beside the state, however short, could be solved"
     return Landing(status, direction, state, 0.0, state.batch, np.zeros(1), detail)
-
-
-def _nudged(state: State, soft: _Softest, size: float, h: float) -> tuple[Lanes, float] | None:
-    """Configuration beside the state on the constraints, and how fast the flow leads away there.
-
-    None if a step of length h cannot be solved.
-    """
-    structure, n, p = state.structure, state.structure.unknowns, state.p[None]
-    z = state.z[None].copy()
-    z[0, :n] += size * soft.mode
-    for _ in range(RELAXATIONS):
-        before = z
-        z, solved = implicit_step(structure, z, p, np.array([h]))
-        if not solved[0]:
-            return None
-    away = (z - before)[0, :n] @ (structure.mass * soft.mode)
-    return z, float(np.sign(size) * away)
 
 
 def _after_change(state: State, p: Float[np.ndarray, " parameters"]) -> Landing:
     """Landing of the shape of a state at other parameters."""
-    structure, rate = state.structure, np.array([_Softest.of(state).rate])
-    z, found = implicit_step(structure, state.z[None], p[None], 1e-4 / rate)
+    structure = state.structure
+    soft = soft_modes(structure, state.z[None], state.p[None])
+    z, found = implicit_step(structure, state.z[None], p[None], 1e-4 / soft.stiffness)
     start = State(structure, z[0] if found[0] else state.z, p)
     if not found[0]:
         detail = "the shape could not be moved onto the constraints"
         return Landing("lost", 0, start, 0.0, start.batch, np.zeros(1), detail)
-    return _landing(gradient_flow(structure, z, p[None], rate), start, 0)
+    return _landing(gradient_flow(structure, z, p[None], soft.stiffness, soft.length), start, 0)
 
 
 def _landing(flow: Flow, start: State, direction: int) -> Landing:
@@ -245,7 +152,7 @@ def _landing(flow: Flow, start: State, direction: int) -> Landing:
     structure, p = start.structure, start.p
     end = State(structure, flow.z[0], p)
     code = int(flow.code[0])
-    status, detail = STATUS[code], flows.WHY[code]
+    status, detail = STATUS[code], Ending(code).reason
     if status in {"landed", "saddle"} and not structure.resolved(end.z[None], end.p[None])[0]:
         status, detail = "unresolved", "the discretisation does not represent the state"
     way = States(structure, flow.points, np.tile(p, (len(flow.points), 1)))

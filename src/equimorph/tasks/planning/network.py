@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.gradient_flow import metric_length
+from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
