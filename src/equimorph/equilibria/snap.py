@@ -151,8 +151,8 @@ def _landing(flow: Flow, start: State, direction: int) -> Landing:
     """Put together what the flow of a single lane brought."""
     structure, p = start.structure, start.p
     end = State(structure, flow.z[0], p)
-    code = int(flow.code[0])
-    status, detail = STATUS[code], Ending(code).reason
+    code = Ending(int(flow.code[0]))
+    status, detail = STATUS[code], code.reason
     if status in {"landed", "saddle"} and not structure.resolved(end.z[None], end.p[None])[0]:
         status, detail = "unresolved", "the discretisation does not represent the state"
     way = States(structure, flow.points, np.tile(p, (len(flow.points), 1)))
