@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.equilibria.curves import Curve
-from equimorph.structures import Structure
+from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters
+from equimorph.structures import Equations
 
 THIRD_STEP = 2e-3
 """Step of differences for F_zzz, in the metric: of fourth order, with errors near 1e-11."""
@@ -24,7 +24,7 @@ class Critical:
     long as no second eigenvalue vanishes.
     """
 
-    structure: Structure
+    structure: Equations
     z: Lanes
     p: Parameters
     b: Lanes
@@ -111,7 +111,7 @@ Test = Callable[[Critical], Values]
 """Scalar of nearly singular states that vanishes where something happens."""
 
 
-def null_border(structure: Structure, z: Lanes, p: Parameters) -> Lanes:
+def null_border(structure: Equations, z: Lanes, p: Parameters) -> Lanes:
     """Unit vectors near the null vectors of F_z, by bordered solves that stay regular there."""
     b = np.tile(np.cos(1.3 * np.arange(z.shape[1])) + 1.1, (len(z), 1))
     for _ in range(4):
@@ -171,13 +171,8 @@ class NormalForm:
         return [str(kind) for kind in np.where(skew, crossing, kinds)]
 
 
-def normal_form(
-    structure: Structure, z: Lanes, p: Parameters, dp: Parameters, bend: Parameters | None = None
-) -> NormalForm:
-    """Coefficients at simple branch points of paths along `dp`; F_zzz by differences, to 1e-10.
-
-    `bend`: second derivative of the parameters along curved paths.
-    """
+def normal_form(structure: Equations, z: Lanes, p: Parameters, dp: Parameters) -> NormalForm:
+    """Coefficients at simple branch points of paths along `dp`; F_zzz by differences, to 1e-10."""
     n, still = structure.unknowns, np.zeros_like(p)
     b = null_border(structure, z, p)
     norm = np.sqrt(b[:, :n] ** 2 @ structure.mass)
@@ -188,8 +183,6 @@ def normal_form(
     rhs[:, 0, :-1] = -structure.parameter_derivative(z, p, dp)
     psi = np.ascontiguousarray(at.solve(rhs)[:, 0, :-1])
     twice = structure.second_derivative(z, p, (psi, dp), (psi, dp))
-    if bend is not None:
-        twice = twice + structure.parameter_derivative(z, p, bend)
     return NormalForm(
         phi,
         psi,
@@ -203,4 +196,5 @@ def normal_form(
 
 def criticality(curve: Curve, z: Lanes, t: Values) -> list[str]:
     """Classify simple branch points of curves in parameter space; see `NormalForm.kinds`."""
-    return normal_form(curve.structure, z, curve.parameters(t), curve.rate(t), curve.bend(t)).kinds
+    equations, p = AlongCurve(curve), along_parameters(t)
+    return normal_form(equations, z, p, np.tile([1.0, 0.0], (len(z), 1))).kinds

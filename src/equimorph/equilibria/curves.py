@@ -8,7 +8,9 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT, squared_lengths
+from equimorph.linalg import Border, BorderedSolution
 from equimorph.structures import Advance, Structure, bordered_advance
+from equimorph.structures.contract import Direction
 
 
 @runtime_checkable
@@ -169,6 +171,95 @@ class NewtonHomotopy:
         residual = self.structure.residual(z, self.p) - (1.0 - t)[:, None] * self.defect
         given = (self.structure, z, self.p, residual, self.defect)
         return bordered_advance(*given, row, corner, defect)
+
+
+@dataclass(frozen=True)
+class AlongCurve:
+    """The equations of curves in z and t, in which `settle` finds points of these curves.
+
+    Parameters are t and the number of the curve, see `along_parameters`.
+    """
+
+    curve: Curve
+
+    @property
+    def unknowns(self) -> int:
+        """Entries of z that the metric measures."""
+        return self.curve.metric.unknowns
+
+    @property
+    def constraints(self) -> int:
+        """The other entries of z."""
+        return self.size - self.unknowns
+
+    @property
+    def size(self) -> int:
+        """Length of z."""
+        return self.curve.metric.size
+
+    @property
+    def mass(self) -> Float[np.ndarray, " unknowns"]:
+        """Diagonal of the mass matrix."""
+        return self.curve.metric.mass
+
+    @property
+    def scales(self) -> Float[np.ndarray, " parameters"]:
+        """One unit of t, and one curve."""
+        return np.ones(2)
+
+    def _at(self, p: Parameters) -> tuple[Curve, Values]:
+        """Curves and places on them."""
+        return self.curve.take(p[:, 1].astype(int)), np.ascontiguousarray(p[:, 0])
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z, p(t))."""
+        here, t = self._at(p)
+        return here.structure.residual(*here.states(z, t))
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p p' dt."""
+        (here, t), dt = self._at(p), dp[:, :1]
+        return here.structure.parameter_derivative(*here.states(z, t), dt * here.rate(t))
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F along (dz, p' dt) for both directions, and F_p p'' times both dt."""
+        (here, t), (by_v, by_w) = self._at(p), (v[1][:, :1], w[1][:, :1])
+        state, rate = here.states(z, t), here.rate(t)
+        twice = here.structure.second_derivative(*state, (v[0], by_v * rate), (w[0], by_w * rate))
+        bend = by_v * by_w * here.bend(t)
+        if bend.any():
+            twice = twice + here.structure.parameter_derivative(*state, bend)
+        return np.asarray(twice)
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with F_z − shift·mass, bordered."""
+        here, t = self._at(p)
+        return here.structure.solve(*here.states(z, t), rhs, border, shift)
+
+    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian."""
+        here, t = self._at(p)
+        return here.structure.index(*here.states(z, t))
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """Newton step of the curves; the tangent is that for one unit of t."""
+        del dp
+        here, t = self._at(p)
+        return here.advance(z, t, row, corner, defect)
+
+
+def along_parameters(t: Values) -> Parameters:
+    """Parameters of `AlongCurve` at t, one lane a curve."""
+    return np.column_stack([t, np.arange(len(t))])
 
 
 def squared_length(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> Values:

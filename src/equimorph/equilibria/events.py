@@ -9,7 +9,6 @@ from equimorph.arrays import Lanes, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.locate import (
     Located,
-    locate_branch_point,
     locate_critical,
     locate_fold,
     locate_goal,
@@ -65,10 +64,9 @@ def locate_all(
     constraints: tuple[Constraint, ...],
     options: TraceOptions,
 ) -> Events:
-    """Locate the events in all brackets that have to be located, all of a kind at once."""
+    """Locate the events in all brackets, all of a kind at once; branch points already are."""
     bits = [
         EventCode.FOLD,
-        EventCode.BRANCH_POINT,
         EventCode.CRITICAL,
         EventCode.ARRIVED,
         EventCode.RETURNED,
@@ -81,19 +79,15 @@ def locate_all(
         bracket = _join(brackets, bit)
         if bracket is None:
             continue
-        place = _locate(curve, bracket, bit, constraints)
-        parts.append(
-            Events(
-                bracket.lanes,
-                np.full(len(bracket.lanes), bit),
-                place.z,
-                place.t,
-                bracket.travelled + place.step,
-                np.stack([bracket.before.index, bracket.after.index], 1),
-                place.found,
-            )
-        )
+        parts.append(located(bracket, bit, _locate(curve, bracket, bit, constraints)))
     return Events.joined(parts, curve.metric.size)
+
+
+def located(bracket: Bracket, code: EventCode, place: Located) -> Events:
+    """Events of one kind at places inside steps."""
+    kind, way = np.full(len(bracket.lanes), code), bracket.travelled + place.step
+    index = np.stack([bracket.before.index, bracket.after.index], 1)
+    return Events(bracket.lanes, kind, place.z, place.t, way, index, place.found)
 
 
 def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
@@ -123,8 +117,6 @@ def _locate(
     here = curve.take(bracket.lanes)
     if bit == EventCode.FOLD:
         return locate_fold(here, bracket)
-    if bit == EventCode.BRANCH_POINT:
-        return locate_branch_point(here, bracket)
     if bit == EventCode.CRITICAL:
         return locate_critical(here, bracket)
     if bit in {EventCode.ARRIVED, EventCode.RETURNED}:

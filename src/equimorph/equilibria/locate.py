@@ -1,10 +1,8 @@
 """Exact places of events inside bracketing steps, many at a time.
 
-Branch points are regular solutions of minimally augmented systems [Govaerts2000]_: with
-``[F_z b; bᵀ 0] [v; g] = [0; 1]`` the matrix F_z is singular exactly where g = 0, and
-``∂g = −∂(vᵀF_z v)`` at fixed v. Folds, constraints and other scalars are roots along the curve,
-found by inverse quadratic interpolation where the last three points allow it, else by bisection
-[Chandrupatla1997]_; every trial point is corrected onto the curve.
+Branch points are points with the condition `Crossing` along the curve. Folds, constraints and other
+scalars are roots along the curve, found by inverse quadratic interpolation where the last three
+points allow it, else by bisection [Chandrupatla1997]_; every trial point is corrected onto it.
 
 See docs/decisions.md, "Events are roots of scalars along the curve".
 """
@@ -15,21 +13,30 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Some, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria import event_kernels as roots
 from equimorph.equilibria import kernels
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.curves import Curve, correction_size, dual, squared_length
+from equimorph.equilibria.curves import (
+    AlongCurve,
+    Curve,
+    along_parameters,
+    dual,
+    squared_length,
+)
 from equimorph.equilibria.kernels import cubic_shares
+from equimorph.equilibria.newton_step import Planes
+from equimorph.equilibria.point_conditions import Crossing
+from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.steps import Bracket, Front, new_scalars
 from equimorph.structures import Advance
 
-NEWTON_STEPS = 24
-"""Largest number of Newton iterations towards a branch point."""
-POLISHED = 1e-9
-"""Correction after which a point is exact to round-off: Newton is quadratic."""
-FAR = 1e6
-"""A larger correction, in any unknown, is no step towards an event near by: the lane has failed."""
+AT_ROUND_OFF = Guards(iterations=24, converged=1e-9)
+"""A point is exact after a correction below 1e-9 in the metric: Newton squares what is left."""
+UNFOLDED = 1e-9
+"""Unfolding β, a residual, from which on a branch point does not exist."""
+TINY = 1e-300
+"""Least length of a curve in the metric: curves without length have no branch points."""
 
 
 @dataclass(frozen=True)
@@ -74,23 +81,9 @@ def locate_goal(curve: Curve, bracket: Bracket, goal: float) -> Located:
 
 
 def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:
-    """Newton at fixed t until the correction stops shrinking; whether it reached round-off."""
-    z, size = z.copy(), np.full(len(z), np.inf)
-    todo = np.arange(len(z))
-    for _ in range(NEWTON_STEPS):
-        here, lanes = curve.take(todo), len(todo)
-        still, one, none = np.zeros((lanes, z.shape[1])), np.ones(lanes), np.zeros(lanes)
-        step = here.advance(z[todo], t[todo], still, one, none)
-        new = correction_size(curve.metric, here.weight, step.dz, none)
-        better = new < size[todo]
-        todo = todo[better]
-        z[todo] += step.dz[better]
-        size[todo] = new[better]
-        # the last correction of a quadratic iteration is squared by applying it
-        todo = todo[new[better] > POLISHED]
-        if len(todo) == 0:
-            break
-    return z, np.asarray(size <= POLISHED)
+    """Points at fixed t near guesses, exact to round-off, and which were found."""
+    found = settle(AlongCurve(curve), z, along_parameters(t), guards=AT_ROUND_OFF)
+    return found.z, found.found
 
 
 def _inside(curve: Curve, bracket: Bracket, z: Lanes, t: Values) -> Flags:
@@ -107,39 +100,6 @@ def _along(curve: Curve, front: Front, z: Lanes, t: Values) -> Values:
     """Distance of points along the tangents of `front`."""
     row, corner = dual(curve.metric, curve.weight, front.tangent_z, front.tangent_t)
     return np.asarray(np.einsum("li,li->l", row, z - front.z) + corner * (t - front.t))
-
-
-@dataclass(frozen=True)
-class _Singular:
-    """Null vector v, test function g, and the gradients (z, t) of g."""
-
-    v: Lanes
-    g: Values
-    g_z: Lanes
-    g_t: Values
-
-
-def _test_function(curve: Curve, z: Lanes, t: Values, b: Lanes) -> _Singular:
-    structure, p = curve.structure, curve.parameters(t)
-    dp = curve.rate(t)
-    rhs = np.zeros((len(z), 1, structure.size + 1))
-    rhs[:, 0, -1] = 1.0
-    border = (b[:, None], b[:, None], np.zeros((len(z), 1, 1)))
-    solved = structure.solve(z, p, rhs, border).x[:, 0]
-    v, g = np.ascontiguousarray(solved[:, :-1]), solved[:, -1]
-    none_z, none_p = np.zeros_like(z), np.zeros_like(p)
-    g_z = -structure.second_derivative(z, p, (v, none_p), (v, none_p))
-    mixed = structure.second_derivative(z, p, (v, none_p), (none_z, dp))
-    return _Singular(v, g, g_z, -np.einsum("li,li->l", v, mixed))
-
-
-def _null_guess(curve: Curve, z: Lanes, t: Values) -> Lanes:
-    """Approximate null vector of F_z: two steps of inverse iteration."""
-    b = np.tile(np.cos(1.3 * np.arange(z.shape[1])) + 1.1, (len(z), 1))
-    for _ in range(3):
-        b = curve.structure.solve(z, curve.parameters(t), b[:, None]).x[:, 0]
-        b = b / np.linalg.norm(b, axis=1, keepdims=True)
-    return np.ascontiguousarray(b)
 
 
 def locate_fold(curve: Curve, bracket: Bracket) -> Located:
@@ -161,58 +121,25 @@ def locate_fold(curve: Curve, bracket: Bracket) -> Located:
 
 def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
     """Branch point of the path: ``F + βb = 0, g = 0, vᵀF_t = 0`` in (z, t, β)."""
-    lanes = len(bracket.lanes)
-    share = np.full(lanes, 0.5)
+    share = np.full(len(bracket.lanes), 0.5)
     z, t = hermite(bracket, share)
-    beta, size = np.zeros(lanes), np.full(lanes, np.inf)
-    b = _null_guess(curve, z, t)
-    todo = np.arange(lanes)
-    for _ in range(NEWTON_STEPS):
-        here = curve.take(todo)
-        step = _branch_step(here, z[todo], t[todo], b[todo], beta[todo])
-        z[todo] += step[:, :-2]
-        t[todo] += step[:, -2]
-        beta[todo] += step[:, -1]
-        size[todo] = correction_size(curve.metric, here.weight, step[:, :-2], step[:, -2])
-        todo = todo[size[todo] >= 1e-13]
-        if len(todo) == 0:
-            break
-    found = np.asarray((size < 1e-9) & (np.abs(beta) < 1e-9)) & _inside(curve, bracket, z, t)
-    return Located(z, t, _arclength(curve, bracket, z, t, share), found)
+    equations, p = AlongCurve(curve), along_parameters(t)
+    directions = np.zeros((len(t), 1, 2))
+    directions[:, 0, 0] = 1.0 / np.maximum(curve.weight, TINY)
+    crossing, frame = (Crossing(directions),), _across(curve, z, p)
+    found = settle(equations, z, p, directions, crossing, AT_ROUND_OFF, frame, frames=False)
+    z, t = found.z, found.p[:, 0].copy()
+    exists = found.found & (np.abs(found.unfolding) < UNFOLDED)
+    good = np.asarray(exists & _inside(curve, bracket, z, t))
+    return Located(z, t, _arclength(curve, bracket, z, t, share), good)
 
 
-def _branch_step(
-    curve: Curve, z: Lanes, t: Values, b: Lanes, beta: Values
-) -> Float[np.ndarray, "lanes unknowns"]:
-    """Newton step (dz, dt, dβ) of the extended system of branch points."""
-    structure, lanes = curve.structure, len(z)
-    p, dp = curve.parameters(t), curve.rate(t)
-    none_z, none_p = np.zeros_like(z), np.zeros_like(p)
-    test = _test_function(curve, z, t, b)
-    column = structure.parameter_derivative(z, p, dp)
-    rhs = np.zeros((lanes, 1, structure.size + 1))
-    rhs[:, 0, :-1] = column
-    border = (b[:, None], b[:, None], np.zeros((lanes, 1, 1)))
-    y = np.ascontiguousarray(structure.solve(z, p, rhs, border).x[:, 0, :-1])
-    v = test.v
-    mixed = structure.second_derivative(z, p, (v, none_p), (none_z, dp))
-    h_z = mixed - structure.second_derivative(z, p, (v, none_p), (y, none_p))
-    twice = structure.second_derivative(z, p, (none_z, dp), (none_z, dp))
-    twice += structure.parameter_derivative(z, p, curve.bend(t))
-    h_t = np.einsum("li,li->l", v, twice) - np.einsum("li,li->l", y, mixed)
-    residual = structure.residual(z, p) + beta[:, None] * b
-    h = np.einsum("li,li->l", v, column)
-    rhs = np.concatenate([-residual, -test.g[:, None], -h[:, None]], axis=1)[:, None]
-    corner = np.zeros((lanes, 2, 2))
-    corner[:, 0, 0], corner[:, 1, 0] = test.g_t, h_t
-    border = (np.stack([column, b], 1), np.stack([test.g_z, h_z], 1), corner)
-    return _bounded(structure.solve(z, p, rhs, border).x[:, 0])
-
-
-def _bounded(step: Lanes) -> Lanes:
-    """Corrections, with those that lead nowhere replaced by large ones that cannot overflow."""
-    near = (np.abs(step) < FAR).all(axis=1)
-    return np.asarray(np.where(near[:, None], step, FAR))
+def _across(curve: Curve, z: Lanes, p: Parameters) -> Planes:
+    """Coordinates of all paths near branch points: the share of the null vector, and t."""
+    b = null_border(AlongCurve(curve), z, p)
+    by_z, by_p = np.zeros((len(z), 2, z.shape[1])), np.zeros((len(z), 2, 2))
+    by_z[:, 0], by_p[:, 1, 0] = b, curve.weight
+    return Planes(by_z, by_p, np.zeros((len(z), 2)), b)
 
 
 def _arclength(curve: Curve, bracket: Bracket, z: Lanes, t: Values, share: Values) -> Values:

@@ -12,7 +12,7 @@ from equimorph.arrays import Flags, Lanes, Some, Values
 from equimorph.equilibria import kernels
 from equimorph.equilibria import step_kernels as stepping
 from equimorph.equilibria.curves import Curve, squared_length
-from equimorph.equilibria.events import Events
+from equimorph.equilibria.events import Events, located
 from equimorph.equilibria.inside_steps import NARROW, inside_step
 from equimorph.equilibria.kernels import (
     ARRIVAL,
@@ -36,7 +36,7 @@ from equimorph.equilibria.steps import (
     least_inside,
     new_scalars,
 )
-from equimorph.equilibria.trace_options import TraceOptions
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Advance
 
@@ -158,12 +158,13 @@ class Block:
             move.index, move.determinant, *state, smallest, locates, plain
         )
         if good:
-            if doubtful and locates:
-                self._refuse_jumps(move)
+            branched = self._refuse_jumps(move) if doubtful and locates else None
             if self.constraints:
                 self._constrain(move)
             if close and locates:
                 self._look_inside(move)
+            if branched is not None:
+                self._note_branch_points(branched)
             record = (self._places, self._scalars, active)
             self.events.add(move.tangent_z, self.options.stops, *record)
             if self.options.record:
@@ -222,18 +223,30 @@ class Block:
         wanted = np.clip(share, 0.1, 0.9) * length / kernels.BACK
         numbers[kernels.LENGTH, at[grazing]] = wanted[grazing]
 
-    def _refuse_jumps(self, move: Advance) -> None:
-        """Refuse changes of index or direction without a fold or branch point.
+    def _refuse_jumps(self, move: Advance) -> Events:
+        """Refuse changes of index or direction without a fold or branch point; the branch points.
 
         Such a step jumped to another branch, as it does past the narrow gap of a slightly imperfect
         pitchfork, or passed two folds: a shorter one will not.
         """
-        _, counts = self._scalars
+        counts = self._scalars[1]
         doubtful: Flags = counts[kernels.STAGE, : self.active] == CONVERGED
         doubtful &= (counts[kernels.WHAT, : self.active] & BRANCH) != 0
         at = np.flatnonzero(doubtful)
-        found = locate_branch_point(self._here.take(at), self._bracket(at, move)).found
-        counts[kernels.STAGE, at[~found]] = REFUSED
+        bracket = self._bracket(at, move)
+        place = locate_branch_point(self._here.take(at), bracket)
+        counts[kernels.STAGE, at[~place.found]] = REFUSED
+        return located(bracket, EventCode.BRANCH_POINT, place).take(place.found)
+
+    def _note_branch_points(self, events: Events) -> None:
+        """Note located branch points of steps that were not refused for another reason."""
+        counts = self._scalars[1]
+        at = np.flatnonzero(counts[kernels.STAGE, : self.active] == CONVERGED)
+        at = at[np.isin(counts[kernels.LANE, at], events.lanes)]
+        ends = bool(self.options.stops & BRANCH)
+        counts[kernels.WHAT, at] = counts[kernels.WHAT, at] & ~BRANCH | (ENDING if ends else 0)
+        if len(at):
+            self.hidden.append(events.take(np.isin(events.lanes, counts[kernels.LANE, at])))
 
     def _look_inside(self, move: Advance) -> None:
         """Search steps that come close to a singular state, lane by lane: they are rare and short.

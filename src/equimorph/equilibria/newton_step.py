@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.point_conditions import Condition, Directions, Move, Some
-from equimorph.structures import Structure
+from equimorph.structures import Equations, Structure
 
 DOUBTFUL = 1e-4
 """Pivot ratio below which the index is counted anew."""
@@ -87,7 +87,7 @@ Frame = Tangents | Planes | Held
 class Problem:
     """What is solved for: directions, conditions, coordinates along the set."""
 
-    structure: Structure
+    structure: Equations
     directions: Directions
     conditions: tuple[Condition, ...]
     frame: Frame
@@ -273,7 +273,7 @@ def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
 
 
 def _dual(
-    structure: Structure, along: Float[np.ndarray, "lanes k bordered"]
+    structure: Equations, along: Float[np.ndarray, "lanes k bordered"]
 ) -> Float[np.ndarray, "lanes k bordered"]:
     """Rows whose products with steps are coordinates in orthonormal directions of the same space.
 
@@ -289,14 +289,14 @@ def _dual(
 
 
 def _gram(
-    structure: Structure, along: Float[np.ndarray, "lanes k bordered"]
+    structure: Equations, along: Float[np.ndarray, "lanes k bordered"]
 ) -> Float[np.ndarray, "lanes k k"]:
     """Products of directions in the metric."""
     return np.asarray((along * _weights(structure, along)) @ np.swapaxes(along, 1, 2))
 
 
 def _weights(
-    structure: Structure, along: Float[np.ndarray, "lanes k bordered"]
+    structure: Equations, along: Float[np.ndarray, "lanes k bordered"]
 ) -> Float[np.ndarray, " bordered"]:
     """Metric of (z, steps along the directions); multipliers do not count."""
     weights = np.ones(along.shape[2])
@@ -307,7 +307,7 @@ def _weights(
     return weights
 
 
-def length(structure: Structure, step: Step, multipliers: float) -> Values:
+def length(structure: Equations, step: Step, multipliers: float) -> Values:
     """Length of steps in the metric and in the scaled parameters."""
     n = structure.unknowns
     squared = step.dz[:, :n] ** 2 @ structure.mass
@@ -365,7 +365,7 @@ def free_directions(structure: Structure, free: Int[np.ndarray, "*_ k"], lanes: 
 
 
 def distances(
-    structure: Structure, here: tuple[Lanes, Parameters], there: tuple[Lanes, Parameters]
+    structure: Equations, here: tuple[Lanes, Parameters], there: tuple[Lanes, Parameters]
 ) -> Values:
     """Distances of points in the metric and in the scaled parameters."""
     (z, p), (other_z, other_p), n = here, there, structure.unknowns

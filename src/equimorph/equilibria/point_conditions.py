@@ -16,6 +16,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Lanes, Parameters, Scalars
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.model.descriptor import Evaluate
+from equimorph.structures.contract import Direction
 
 Directions = Float[np.ndarray, "lanes k parameters"]
 Some = Int[np.ndarray, " some"]
@@ -32,6 +33,11 @@ class Move:
     onto_p: Parameters
     along_z: Float[np.ndarray, "lanes k size"]
     along_p: Float[np.ndarray, "lanes k parameters"]
+
+    @property
+    def along(self) -> list[Direction]:
+        """Directions one by one."""
+        return [(self.along_z[:, i], self.along_p[:, i]) for i in range(self.along_z.shape[1])]
 
 
 @dataclass(frozen=True)
@@ -65,8 +71,9 @@ class Fold:
 
     def linear(self, at: Critical, move: Move) -> Linear:
         """By the exact second derivatives."""
-        value = at.g - at.second(move.onto_z, move.onto_p)
-        return Linear(value[:, None], -_seconds(at, (at.v, np.zeros_like(at.p)), move)[:, None])
+        onto = (move.onto_z, move.onto_p)
+        seconds = _seconds(at, [(at.v, np.zeros_like(at.p))], [*move.along, onto])
+        return Linear(at.g[:, None] - seconds[:, :, -1], -seconds[:, :, :-1])
 
     def take(self, some: Some) -> "Fold":
         """Return the same: nothing differs between lanes."""
@@ -100,13 +107,11 @@ class Crossing:
             rhs[:, i, :-1] = -structure.parameter_derivative(at.z, at.p, dp)
         answers = at.solve(rhs)
         tangents = [(at.v, np.zeros_like(at.p))]
-        tangents += [(np.ascontiguousarray(answers[:, i, :-1]), dp) for i, dp in enumerate(moves)]
-        gradient = -np.column_stack([at.g, answers[:, :, -1]])
-        slopes = np.stack([_seconds(at, tangent, move) for tangent in tangents], axis=1)
+        tangents += [(answers[:, i, :-1], dp) for i, dp in enumerate(moves)]
         onto = (move.onto_z, move.onto_p)
-        for i, tangent in enumerate(tangents):
-            twice = structure.second_derivative(at.z, at.p, tangent, onto)
-            gradient[:, i] += np.einsum("li,li->l", at.v, twice)
+        seconds = _seconds(at, tangents, [*move.along, onto])
+        gradient = seconds[:, :, -1] - np.column_stack([at.g, answers[:, :, -1]])
+        slopes = seconds[:, :, :-1]
         scale = np.maximum(np.abs(slopes).max(axis=(1, 2)), 1e-300)
         return Linear(gradient / scale[:, None], slopes / scale[:, None, None])
 
@@ -245,16 +250,21 @@ class Vanishing:
 
 
 def _seconds(
-    at: Critical, tangent: tuple[Lanes, Parameters], move: Move
-) -> Float[np.ndarray, "lanes k"]:
-    """vᵀD²F[tangent, direction] for each of the directions along the set."""
-    lanes, k = move.along_z.shape[:2]
-    out = np.empty((lanes, k))
-    for i in range(k):
-        dz, dp = (np.ascontiguousarray(each[:, i]) for each in (move.along_z, move.along_p))
-        twice = at.structure.second_derivative(at.z, at.p, tangent, (dz, dp))
-        out[:, i] = np.einsum("li,li->l", at.v, twice)
-    return out
+    at: Critical, tangents: Sequence[Direction], directions: Sequence[Direction]
+) -> Float[np.ndarray, "lanes tangents directions"]:
+    """vᵀD²F[tangent, direction] for all pairs, by one call for all: calls cost more than lanes."""
+    m, k = len(tangents), len(directions)
+    one = _stacked([each for each in tangents for _ in range(k)])
+    other = _stacked(m * list(directions))
+    z, p = np.tile(at.z, (m * k, 1)), np.tile(at.p, (m * k, 1))
+    twice = at.structure.second_derivative(z, p, one, other).reshape(m, k, *at.z.shape)
+    return np.asarray(np.einsum("li,mkli->lmk", at.v, twice))
+
+
+def _stacked(directions: Sequence[Direction]) -> Direction:
+    """All directions, one after the other."""
+    dz, dp = zip(*directions, strict=True)
+    return np.concatenate(dz), np.concatenate(dp)
 
 
 def _differences(

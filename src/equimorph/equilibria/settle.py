@@ -32,7 +32,7 @@ from equimorph.equilibria.newton_step import (
 )
 from equimorph.equilibria.point_conditions import Condition, Directions, Some
 from equimorph.model import Constraint
-from equimorph.structures import Structure
+from equimorph.structures import Equations, Structure
 from equimorph.tolerances import CONVERGED
 
 __all__ = [
@@ -181,7 +181,7 @@ class Settled:
 
 
 def settle(
-    structure: Structure,
+    structure: Equations,
     z: Lanes,
     p: Parameters,
     directions: Directions | None = None,
@@ -238,7 +238,7 @@ def embedded_planes(structure: Structure, free: Int[np.ndarray, " d"], rows: Row
     return Planes(by_z, by_p)
 
 
-def _at_fixed_parameters(structure: Structure, z: Lanes, p: Parameters, guards: Guards) -> Settled:
+def _at_fixed_parameters(structure: Equations, z: Lanes, p: Parameters, guards: Guards) -> Settled:
     """The same without directions, conditions and most guards: for few lanes twice as fast."""
     count, n = len(z), structure.unknowns
     z, status = z.copy(), np.full(count, Status.UNFINISHED.value)
@@ -356,7 +356,7 @@ def _lengthening(
 
 
 def _believed(
-    structure: Structure, settled: Settled, start: tuple[Lanes, Parameters], guards: Guards
+    structure: Equations, settled: Settled, start: tuple[Lanes, Parameters], guards: Guards
 ) -> Settled:
     """The points, with those that are not believed marked."""
     z, p, status, index = settled.z, settled.p, settled.status.copy(), settled.index.copy()
@@ -385,7 +385,7 @@ def _believed(
     return replace(settled, status=status, index=index)
 
 
-def lower_index(structure: Structure, z: Lanes, p: Parameters) -> Numbers:
+def lower_index(structure: Equations, z: Lanes, p: Parameters) -> Numbers:
     """Index on the lower side of folds: eigenvalues below the one that vanishes."""
     nothing, shift = np.zeros((len(z), 0, structure.size)), np.full(len(z), -SMALL_EIGENVALUE)
     return np.asarray(structure.solve(z, p, nothing, shift=shift).negative - structure.constraints)

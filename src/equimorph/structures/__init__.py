@@ -7,6 +7,7 @@ from equimorph.errors import InputError
 from equimorph.structures.contract import (
     Advance,
     Direction,
+    Equations,
     Majorant,
     Structure,
     Symmetry,
@@ -54,6 +55,7 @@ __all__ = [
     "Direction",
     "End",
     "EnergyStructure",
+    "Equations",
     "Frame",
     "LineLoad",
     "Majorant",

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -55,6 +55,58 @@ class Symmetry:
     ) -> Float[np.ndarray, "*lanes parameters"]:
         """Parameters of the image: ``signs · p[order]``."""
         return np.asarray(self.signs * (p if self.order is None else p[..., self.order]))
+
+
+@runtime_checkable
+class Equations(Protocol):
+    """F(z; p) = 0 with its derivatives: the part of a structure's contract that Newton uses."""
+
+    @property
+    def unknowns(self) -> int:
+        """Entries of z that the metric measures."""
+
+    @property
+    def constraints(self) -> int:
+        """The other entries of z."""
+
+    @property
+    def size(self) -> int:
+        """Length of z."""
+
+    @property
+    def mass(self) -> Float[np.ndarray, " unknowns"]:
+        """Diagonal of the mass matrix."""
+
+    @property
+    def scales(self) -> Float[np.ndarray, " parameters"]:
+        """Change of each parameter that counts as one unit of length."""
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w], second derivative of F along two directions (dz, dp)."""
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with F_z − shift·mass, bordered; see `Structure.solve`."""
+
+    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian."""
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
 
 
 class Structure(ABC):
