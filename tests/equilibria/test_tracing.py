@@ -5,7 +5,10 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
-from equimorph.equilibria.steps import initial_front
+from equimorph.equilibria.curves import AlongCurve, along_parameters, dual
+from equimorph.equilibria.point_conditions import Plane
+from equimorph.equilibria.settle import settle
+from equimorph.equilibria.steps import initial_front, step_along
 from equimorph.equilibria.trace import Batching
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.structures import States
@@ -179,3 +182,25 @@ def test_lanes_whose_steps_end_next_to_the_goal_arrive_there():
     there = em.lift(rest, {"F": first * (1.0 + 5e-11)}, options=options).end.state
     assert there["F"] == first * (1.0 + 5e-11)
     assert there.residual < 1e-14
+
+
+def test_points_at_a_length_are_those_of_the_corrector_for_points_with_conditions():
+    """The compiled corrector of lifts: F = 0 on the plane at a length along the tangent."""
+    rod = em.Rod(load="uniform")
+    p = np.stack(
+        [np.linspace(0.6, 1.4, 9), np.full(9, 0.1), np.zeros(9), np.full(9, np.sin(1.0))], 1
+    )
+    z, _ = rod.natural(p)
+    line = ParameterLine(rod, p, np.tile([0.0, 0.0, 2.0, 0.0], (9, 1)))
+    front, length = initial_front(line, z, np.zeros(9)), np.full(9, 0.05)
+    there, good = step_along(line, front, length)
+    assert good.all()
+
+    row, corner = dual(rod, line.weight, front.tangent_z, front.tangent_t)
+    ahead = front.z + length[:, None] * front.tangent_z, along_parameters(length * front.tangent_t)
+    by_t = np.stack([corner, np.zeros(9)], 1)[:, None]
+    plane, directions = Plane(*ahead, row[:, None], by_t), np.tile([[[1.0, 0.0]]], (9, 1, 1))
+    found = settle(AlongCurve(line), *ahead, directions, [plane])
+    assert found.found.all()
+    assert np.abs(found.z - there.z).max() < 1e-13
+    assert np.abs(found.p[:, 0] - there.t).max() < 1e-13

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+import equimorph as em
+from equimorph.equilibria import Guards, settle
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex
-from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.manifold.lookup.exact_states import ROUND_OFF, exact_states
 from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
 from equimorph.manifold.lookup.over import CLOSEST, rooted
 from equimorph.structures import Spring
@@ -120,6 +122,20 @@ def test_points_beyond_a_brim_or_within_a_nudge_of_it_are_tried():
     weights = np.stack([[0.2, -0.1, 0.6, 0.5, 0.5], across, np.full(5, 0.5)], axis=1)
     brims, maps = np.array([[False, True, False]]), np.ones((1, 3, 3))
     assert worth_trying((cell, weights), inside, brims, maps, 1e-9).tolist() == [0, 2, 3]
+
+
+def test_exact_states_equal_those_of_the_general_corrector():
+    """One method, compiled for queries; the bound of the next correction is its round-off."""
+    rod = em.Rod(load="uniform")
+    p = np.tile([0.9, 0.1, 0.5, np.sin(1.0)], (40, 1))
+    start, _ = rod.natural(p * [1, 1, 0, 1])
+    z = start + np.random.default_rng(4).uniform(-1.5, 1.5, start.shape)
+    guards = Guards(40, longest=np.inf, too_long=1.0, converged=ROUND_OFF, following=ROUND_OFF)
+    general, (found, good, index) = settle(rod, z, p, guards=guards), exact_states(rod, z, p)
+    assert 0 < good.sum() < len(z)
+    assert np.array_equal(good, general.found)
+    assert np.array_equal(index[good], general.index[good])
+    assert np.abs(found - general.z)[good].max() < 1e-13
 
 
 def test_exact_states_do_not_depend_on_those_beside_them():

@@ -9,6 +9,7 @@ from equimorph.arrays import Lanes, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.locate import (
     Located,
+    locate_branch_point,
     locate_critical,
     locate_fold,
     locate_goal,
@@ -64,9 +65,10 @@ def locate_all(
     constraints: tuple[Constraint, ...],
     options: TraceOptions,
 ) -> Events:
-    """Locate the events in all brackets, all of a kind at once; branch points already are."""
+    """Locate the events in all brackets that have to be located, all of a kind at once."""
     bits = [
         EventCode.FOLD,
+        EventCode.BRANCH_POINT,
         EventCode.CRITICAL,
         EventCode.ARRIVED,
         EventCode.RETURNED,
@@ -117,6 +119,8 @@ def _locate(
     here = curve.take(bracket.lanes)
     if bit == EventCode.FOLD:
         return locate_fold(here, bracket)
+    if bit == EventCode.BRANCH_POINT:
+        return locate_branch_point(here, bracket)
     if bit == EventCode.CRITICAL:
         return locate_critical(here, bracket)
     if bit in {EventCode.ARRIVED, EventCode.RETURNED}:

@@ -254,17 +254,12 @@ def _seconds(
 ) -> Float[np.ndarray, "lanes tangents directions"]:
     """vᵀD²F[tangent, direction] for all pairs, by one call for all: calls cost more than lanes."""
     m, k = len(tangents), len(directions)
-    one = _stacked([each for each in tangents for _ in range(k)])
-    other = _stacked(m * list(directions))
+    pairs = [(*one, *other) for one in tangents for other in directions]
+    dz, dp, other_z, other_p = (np.concatenate(column) for column in zip(*pairs, strict=True))
     z, p = np.tile(at.z, (m * k, 1)), np.tile(at.p, (m * k, 1))
-    twice = at.structure.second_derivative(z, p, one, other).reshape(m, k, *at.z.shape)
+    twice = at.structure.second_derivative(z, p, (dz, dp), (other_z, other_p))
+    twice = twice.reshape(m, k, *at.z.shape)
     return np.asarray(np.einsum("li,mkli->lmk", at.v, twice))
-
-
-def _stacked(directions: Sequence[Direction]) -> Direction:
-    """All directions, one after the other."""
-    dz, dp = zip(*directions, strict=True)
-    return np.concatenate(dz), np.concatenate(dp)
 
 
 def _differences(
