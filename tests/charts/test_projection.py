@@ -236,5 +236,5 @@ def test_wrong_coordinates_are_refused(spring_set):
     chart = em.Projection(spring_set)
     with pytest.raises(InputError, match=r"`coords` must be rows of 2 numbers \(x_l, F\)"):
         chart.state(np.zeros((3, 1)))
-    with pytest.raises(InputError, match="`coords` must be finite"):
+    with pytest.raises(InputError, match="`coords` must be an array of finite numbers"):
         chart.state(np.array([[np.nan, 0.0]]))

@@ -101,5 +101,5 @@ def test_states_without_crossing_paths_are_refused():
     isola = Polynomial(lambda x, a: x**3 * (1 / 3) + a**2 * x, 1, ("a",)).state(0.0)
     with pytest.raises(InputError, match=r"simple branch point .* got kind 'isola'"):
         em.branches(isola, "a")
-    with pytest.raises(InputError, match=r"`distance` must be positive; got 0"):
+    with pytest.raises(InputError, match=r"`distance` must be positive and finite; got 0"):
         em.branches(pitchfork_form(1.0).state(0.0), "a", distance=0)

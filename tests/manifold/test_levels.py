@@ -155,7 +155,7 @@ def test_cusps_of_the_arch(even_arch_set):
 
 def test_wrong_requests_are_refused(ball):
     x = ball.structure.descriptor("0")
-    with pytest.raises(InputError, match="`value` must be finite"):
+    with pytest.raises(InputError, match="`value` must be a finite number"):
         level_set(ball, x, np.nan)
     with pytest.raises(InputError, match="`descriptors` must be 2, one per free parameter"):
         singular_set(ball, [x])

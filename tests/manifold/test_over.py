@@ -185,8 +185,8 @@ def test_no_points_give_no_states(spring_set):
         ({"x_l": [0.5]}, "`at` must give x_l and F; got x_l"),
         ({"x_l": [0.5], "F": [0.1, 0.2]}, "equally many values"),
         ({"x_l": [0.5, 2.0], "F": [0.1, 0.2]}, r"must lie in Box\(.*\(point 1\)"),
-        ({"x_l": [np.nan], "F": [0.1]}, "must lie in"),
-        ({"x_l": 0.5, "F": 0.1}, "one number for each point"),
+        ({"x_l": [np.nan], "F": [0.1]}, "must be an array of finite numbers"),
+        ({"x_l": 0.5, "F": 0.1}, "must be an array of finite numbers"),
     ],
 )
 def test_wrong_points_are_refused(spring_set, at, message):

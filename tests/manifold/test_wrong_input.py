@@ -47,7 +47,7 @@ from typecheck import unchecked
         (
             Box(F=(-1, 1), x_l=(0.5, 1)),
             {"intervals": (1, 5)},
-            "`intervals` must be two whole numbers >= 2; got (1, 5).",
+            "`intervals` must be a list of whole numbers >= 2; got 1.",
         ),
         (
             Box(F=(-1, 1)),
@@ -57,7 +57,7 @@ from typecheck import unchecked
         (
             Box(F=(-1, 1)),
             {"intervals": 4.5},
-            "`intervals` must be one whole number >= 2; got 4.5.",
+            "`intervals` must be a list of whole numbers >= 2; got 4.5.",
         ),
         (
             {"F": (-1, 1)},
@@ -67,9 +67,13 @@ from typecheck import unchecked
         (
             Box(F=(-1, 1)),
             {"fixed": 0.5},
-            '`fixed` must give values by name, like `{"q": 2.5}`; got 0.5.',
+            '`fixed` must be finite numbers by name, like `{"q": 2.5}`; got 0.5.',
         ),
-        (Box(F=(-1, 1)), {"checks": -1}, "`checks` must be a whole number >= 0; got -1."),
+        (
+            Box(F=(-1, 1)),
+            {"checks": -1},
+            "`checks` must be a whole number from 0 to 1000000; got -1.",
+        ),
         (Box(F=(-1, 1)), {"seed": 0.5}, "`seed` must be a whole number >= 0; got 0.5."),
         (
             Box(F=(-1, 1)),
@@ -86,19 +90,23 @@ def test_wrong_problem_is_refused_by_name(box, options, message):
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda e: e.at(x_l="wide", F=0.1), "`x_l` must be a number; got 'wide'."),
-        (lambda e: e.at(x_l=0.8, F=None), "`at` must lie in Box(x_l=(0.3, 1.3), F=(-0.5, 0.5)); "),
+        (
+            lambda e: e.at(x_l="wide", F=0.1),
+            "`x_l` must be a finite number greater than 0; got 'wide'.",
+        ),
+        (lambda e: e.at(x_l=0.8, F=None), "`F` must be a finite number; got None."),
         (
             lambda e: e.at(x_l=[0.8, 0.9], F=[0.1, 0.1]),
-            "`at` must give one number each; got {'x_l': [0.8, 0.9], 'F': [0.1, 0.1]}. Use `over` ",
+            "`x_l` must be a finite number greater than 0; got [0.8, 0.9]. Use `over` for many ",
         ),
         (
             lambda e: e.over(x_l=["wide"], F=[0.1]),
-            "`x_l` must be an array with one number for each point; got ['wide'].",
+            "`x_l` must be a finite number greater than 0; got ['wide'].",
         ),
         (
             lambda e: locate(e, [0.1, 0.2]),
-            "`measured` must be values by descriptor, or points (n, 2); got [0.1, 0.2].",
+            "`measured` must be finite numbers by descriptor, like `{rod.max_curvature: 6.0}` or "
+            "an array of finite numbers (points, dims); got [0.1, 0.2].",
         ),
         (
             lambda e: level_set(e, "angle", 0.1),
@@ -106,7 +114,7 @@ def test_wrong_problem_is_refused_by_name(box, options, message):
         ),
         (
             lambda e: singular_set(e, ["angle", "length"]),
-            "`descriptors` must be a descriptor, like `rod.max_curvature`; got 'angle'.",
+            "`descriptors` must be a list of descriptors, like `[rod.max_curvature]`; got 'angle'.",
         ),
         (
             lambda e: restricted(e, Spring().angle),

@@ -50,7 +50,9 @@ def test_the_slowest_parameter_sets_the_time():
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, np.inf, np.nan])
 def test_rates_are_positive(limit):
-    with pytest.raises(InputError, match=f"`limits` must be positive; got a: {limit!r}"):
+    with pytest.raises(
+        InputError, match=f"`limits` must be positive numbers by name, .*; got a = {limit!r}"
+    ):
         Rates({"a": limit})
 
 

@@ -87,7 +87,7 @@ def test_without_a_route_there_is_no_alternative(short_spring_set):
 
 
 def test_alternatives_need_a_surface(ends, arch_set):
-    with pytest.raises(InputError, match=r"^`count` must be at least 1; got 0"):
+    with pytest.raises(InputError, match=r"^`count` must be a whole number from 1 to 10000; got 0"):
         alternatives(arch_set, *ends, 0)
 
 
@@ -122,7 +122,7 @@ def test_sides_of_the_spring_are_joined_by_a_snap(short_spring_set):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"snap_price": 0.0}, "`snap_price` must be a positive number; got 0.0."),
+        ({"snap_price": 0.0}, "`snap_price` must be positive and finite; got 0.0."),
         ({"snap_price": 1.0, "via": [{"Theta": 1.1}]}, "`via` must not be given with `snap_price`"),
     ],
 )
@@ -172,7 +172,7 @@ def test_only_routes_that_arrived_can_be_smoothed(cornered, arch_set, ends):
     refused = plan(arch_set, *ends, margin=50.0)
     with pytest.raises(InputError, match=r"^`route` must have arrived without a snap"):
         smoothed(refused, 0.1)
-    with pytest.raises(InputError, match=r"^`tolerance` must be a positive number; got -1"):
+    with pytest.raises(InputError, match=r"^`tolerance` must be positive and finite; got -1"):
         smoothed(cornered, -1.0)
 
 

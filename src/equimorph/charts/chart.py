@@ -21,6 +21,7 @@ from equimorph.charts.domain import (
 )
 from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.preparation import cut_along_crossings, flip_inverted_triangles
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.geometry.setting import embed
@@ -133,6 +134,7 @@ class Chart(ABC):
         """Whether all states of the set have different coordinates."""
         return single_valued(self.cells)
 
+    @door
     def state(self, coords: Points) -> Charted:
         """Exact states with given coordinates.
 
@@ -161,11 +163,13 @@ class Chart(ABC):
         code[empty[self._beyond(points[empty])]] = PointStatus.BEYOND_THE_BOX
         return self._answers(found.take(count[found.point] == 1), code)
 
+    @door
     def coords(self, states: States | State) -> Points:
         """Coordinates of states, one row each."""
         batch = states.batch if isinstance(states, State) else states
         return self.coordinates(batch.z, batch.p)
 
+    @door
     def jacobian(self, states: States | State) -> Float[np.ndarray, "points d d"]:
         """Derivatives of the free parameters (rows) by the coordinates (columns) at states.
 
@@ -184,6 +188,7 @@ class Chart(ABC):
         out[regular] = np.swapaxes(solved, 1, 2)
         return out
 
+    @door
     def contains(self, states: States | State) -> Bool[np.ndarray, " points"]:
         """Whether the chart gives just these states for their coordinates."""
         batch = states.batch if isinstance(states, State) else states
@@ -238,6 +243,7 @@ class Chart(ABC):
         return Charted(States(structure, z, p), code, cell)
 
 
+@door
 @dataclass(frozen=True, eq=False, repr=False)
 class Projection(Chart):
     """The free parameters as coordinates.
@@ -266,6 +272,7 @@ class Projection(Chart):
         return coordinates_of(self.eset, self.eset.names)
 
 
+@door
 @dataclass(frozen=True, eq=False, repr=False)
 class DescriptorChart(Chart):
     """Descriptors, or some of them and some free parameters, as coordinates.

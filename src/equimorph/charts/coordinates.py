@@ -22,6 +22,7 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import border_of, placed_frames, split_step
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Descriptor, position
+from equimorph.structures import value_of
 
 Values = Float[np.ndarray, "lanes d"]
 
@@ -212,22 +213,12 @@ def coordinates_of(eset: EquilibriumSet, chosen: Sequence[Descriptor | str]) -> 
     return Coordinates(eset.setting, tuple(scalars), np.array(places))
 
 
-def parameter_descriptor(eset: EquilibriumSet, name: str) -> Descriptor:
-    """Return a parameter as a descriptor."""
-    structure = eset.structure
-    place = position(structure.parameters, name)
-    unit = structure.parameters[place].unit
-    return Descriptor(
-        name, unit, lambda z, p: p[:, place].copy(), name, ("parameter", structure.signature)
-    )
-
-
 def _scalar(eset: EquilibriumSet, each: Descriptor | str) -> tuple[Descriptor, int]:
     structure = eset.structure
     if isinstance(each, Descriptor):
         return each, -1
     if each in eset.names:
-        return parameter_descriptor(eset, each), position(structure.parameters, each)
+        return value_of(structure, each), position(structure.parameters, each)
     if each in [parameter.name for parameter in structure.parameters]:
         raise InputError(
             f"`coordinates` must be free parameters ({', '.join(eset.names)}) or descriptors; "

@@ -17,6 +17,7 @@ from equimorph.charts.preparation import (
     cut_along_crossings,
     flip_inverted_triangles,
 )
+from equimorph.door import door
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of, squared_sides
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
@@ -33,6 +34,7 @@ MOST = 40
 """Most cuts; what still overlaps then is left, and `Atlas` shows it."""
 
 
+@door
 def dissect(eset: EquilibriumSet) -> Atlas:
     """Cut a set, or a part of one, into few charts over the free parameters.
 

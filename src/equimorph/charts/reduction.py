@@ -19,6 +19,7 @@ from equimorph.charts.location import Cells
 from equimorph.charts.preference import Preference, preferred_part
 from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
 from equimorph.charts.rules import Rule, Scores, rule_of
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -116,6 +117,7 @@ class Reduction(Chart):
         return on
 
 
+@door
 def reduce(
     eset: EquilibriumSet,
     *,

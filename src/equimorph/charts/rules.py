@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from equimorph.arrays import Points
 from equimorph.charts.location import Found
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
@@ -92,6 +93,7 @@ def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np
     return out
 
 
+@door
 def lowest(descriptor: Descriptor) -> Rule:
     """Prefer the lowest value of a descriptor, like the energy.
 
@@ -107,6 +109,7 @@ def lowest(descriptor: Descriptor) -> Rule:
     )
 
 
+@door
 def highest(descriptor: Descriptor) -> Rule:
     """Prefer the highest value of a descriptor.
 
@@ -122,6 +125,7 @@ def highest(descriptor: Descriptor) -> Rule:
     )
 
 
+@door
 def nearest(to: State | int) -> Rule:
     """Prefer what is nearest, in the metric, to a state or to a stratum of the set.
 

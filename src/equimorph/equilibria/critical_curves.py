@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Values
+from equimorph.door import door
 from equimorph.equilibria.critical import normal_form
 from equimorph.equilibria.critical_tests import (
     bound,
@@ -175,6 +176,7 @@ def _event(locus: Locus, mark: Landmark) -> Event:
     return Event(mark.kind, State(locus.structure, z[0], p[0]), mark.length, critical, detail)
 
 
+@door
 def fold_curve(
     state: State,
     parameters: Sequence[str],
@@ -217,6 +219,7 @@ def fold_curve(
     return both_ways("fold", locus, state, [*watches, *limits(state, free, box, within)], options)
 
 
+@door
 def branch_curve(
     state: State,
     parameters: Sequence[str],
@@ -258,6 +261,7 @@ def branch_curve(
     return both_ways("branch point", locus, state, watches, options)
 
 
+@door
 def cusp_curve(
     state: State,
     parameters: Sequence[str],
@@ -292,6 +296,7 @@ def cusp_curve(
     return both_ways("cusp", locus, state, [*watches, *limits(state, free, box, within)], options)
 
 
+@door
 def constraint_curve(
     state: State,
     parameters: Sequence[str],
@@ -329,6 +334,7 @@ def constraint_curve(
     return both_ways("constraint", locus, state, limits(state, free, box, within), options)
 
 
+@door
 def grazing_curve(
     state: State,
     parameters: Sequence[str],

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -23,7 +23,10 @@ from equimorph.structures import State, States, Structure
 Value = float | np.ndarray | None
 Waypoint = Mapping[Any, Value]
 """Values by the names of parameters, and by descriptors."""
-Leg = Waypoint | Callable[[float], Waypoint]
+Leg = Annotated[
+    Waypoint | Callable[[float], Waypoint],
+    "values by name, a `Spline` or a function of t from 0 to 1",
+]
 
 AT_START = 1e-8
 """Relative distance by which a curve may miss where it has to begin."""

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Shaped
 
 from equimorph.arrays import Values
+from equimorph.door import door
 from equimorph.equilibria.legs import check_starts, violated
 from equimorph.equilibria.lift import Path, lift
 from equimorph.equilibria.trace_options import TraceOptions
@@ -98,6 +99,7 @@ def limit_load(
     options: TraceOptions | None = None,
     progress: Progress | None = None,
 ) -> LimitLoads: ...
+@door
 def limit_load(
     state: State | States,
     load: str,

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import gammaln, xlogy
 
+from equimorph.door import door
 from equimorph.equilibria.random_search import Ground, Pools, distinct
-from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
 
@@ -134,6 +134,7 @@ class FoundStates(States):
         return f"FoundStates({kind}: {len(self)}, {stable} of them stable; {self.completeness})"
 
 
+@door
 def find_equilibria(
     structure: Structure,
     at: Mapping[str, float],
@@ -196,9 +197,6 @@ def search_points(
     InputError
         For less than one start or run.
     """
-    for name, count in (("starts", starts), ("runs", runs)):
-        if count < 1:
-            raise InputError(f"`{name}` must be at least 1; got {count!r}.")
     generator, guesses = np.random.default_rng(seed), -(-starts // runs)
     catches = [_Catch.empty(structure, point, tuple(within)) for point in points]
     todo = np.arange(len(points))

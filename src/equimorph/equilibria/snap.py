@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import (
     FAITHFUL,
@@ -78,6 +79,7 @@ class Landing:
         return f"Landing({self.status}: {self.state}; released {self.released:.6g})"
 
 
+@door
 def snap_landing(state: State, *, at: Mapping[str, float] | None = None) -> tuple[Landing, ...]:
     """Stable states that a structure reaches from a state that it cannot keep.
 

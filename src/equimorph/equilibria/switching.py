@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.equilibria.critical import NormalForm, normal_form
 from equimorph.equilibria.curves import ParameterLine, dual
 from equimorph.equilibria.lift import Path, check_start
@@ -40,6 +41,7 @@ class Branch:
     slope: float
 
 
+@door
 def branches(
     state: State, along: str, *, path: Path | None = None, distance: float = 0.05
 ) -> tuple[Branch, ...]:
@@ -72,8 +74,6 @@ def branches(
     velocity = np.zeros((1, len(state.p)))
     velocity[0, position(structure.parameters, along)] = 1.0
     check_start(state)
-    if not 0.0 < distance < np.inf:
-        raise InputError(f"`distance` must be positive; got {distance!r}.")
     line = ParameterLine(structure, state.p[None].copy(), velocity)
     form = normal_form(structure, state.z[None], state.p[None], velocity)
     _check(state, along, form)

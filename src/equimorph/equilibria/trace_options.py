@@ -6,6 +6,7 @@ from enum import IntEnum, StrEnum
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.equilibria import kernels
 
 
@@ -60,6 +61,7 @@ class EventCode(IntEnum):
         return EventKind[self.name]
 
 
+@door
 @dataclass(frozen=True)
 class TraceOptions:
     """Options of the tracer.

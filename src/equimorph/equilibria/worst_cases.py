@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.door import door
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace
@@ -28,6 +29,7 @@ _WORST = re.compile(r"\s*worst\((.*) for (.*)\)\s*", re.DOTALL)
 _OFFSET = re.compile(r"\s*(\w+)\s*(?:±|\+-)\s*([\d.eE+-]+)\s*")
 
 
+@door
 def worst_over(
     structure: Structure, descriptor: Descriptor, offsets: Mapping[str, float]
 ) -> Descriptor:
@@ -75,6 +77,7 @@ class Corner:
     limit: Descriptor
 
 
+@door
 def corners_of(
     structure: Structure, descriptor: Descriptor, offsets: Mapping[str, float]
 ) -> tuple[Corner, ...]:
@@ -109,9 +112,6 @@ def _corners(
     """Errors of all parameters: none, then those at the corners of the box."""
     if not offsets:
         raise InputError("`offsets` must name at least one parameter; got none.")
-    for name, size in offsets.items():
-        if not (np.isfinite(size) and size > 0.0):
-            raise InputError(f"`offsets` must be positive; got {name}: {size!r}.")
     places = [position(structure.parameters, name) for name in offsets]
     corners = np.zeros((1 + 2 ** len(places), len(structure.parameters)))
     signs = np.array(list(product((-1.0, 1.0), repeat=len(places))))
@@ -149,6 +149,7 @@ class _Ray:
         return share, end, at
 
 
+@door
 def worst_named(structure: Structure, text: str) -> Descriptor:
     """Descriptor that a text means: as `find_descriptor`, or the worst of one over a box.
 
@@ -215,6 +216,7 @@ SAMPLES = 9
 """Values at which a range is looked at; between them parabolas tell the extremum."""
 
 
+@door
 def held_over(
     structure: Structure,
     name: str,

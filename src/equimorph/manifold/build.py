@@ -7,14 +7,8 @@ from functools import partial
 import numpy as np
 from jaxtyping import Int
 
+from equimorph.door import door
 from equimorph.errors import InputError
-from equimorph.manifold.complex.arguments import (
-    check_accuracy,
-    check_box,
-    check_kind,
-    constraints,
-    whole_number,
-)
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.description import Frame
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -61,6 +55,7 @@ INTERVALS = {1: (200,), 2: (47, 81), 3: (24, 24, 24)}
 """Of the grid, by the number of free parameters, if not given."""
 
 
+@door
 def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     structure: Structure,
     box: Box,
@@ -121,13 +116,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         journal of something else.
     """
     progress = progress or Silent()
-    check_kind("structure", structure, Structure, "a structure, like `Rod()`")
-    check_box(box, fixed)
-    if accuracy is not None:
-        check_accuracy(accuracy)
-    seed, checks = whole_number("seed", seed, 0), whole_number("checks", checks, 0)
     intervals = _intervals(box, intervals)
-    setting = _setting(structure, box, fixed or {}, constraints(within))
+    setting = _setting(structure, box, fixed or {}, tuple(within))
     known = dict(fixed or {})
     compute = partial(_on_grids, setting, box, known, intervals, seed, checks, accuracy, progress)
     if journal is None:
@@ -206,14 +196,10 @@ def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:
         )
     if intervals is None:
         return INTERVALS[d]
-    try:
-        whole = tuple(whole_number("intervals", n, 2) for n in intervals)
-    except (TypeError, InputError):
-        whole = ()
-    if len(whole) != d:
+    if len(intervals) != d:
         number = ("one whole number", "two whole numbers", "three whole numbers")[d - 1]
         raise InputError(f"`intervals` must be {number} >= 2; got {intervals!r}.")
-    return whole
+    return tuple(intervals)
 
 
 def _setting(

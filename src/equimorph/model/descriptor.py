@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model.obstacle import Obstacle
 
@@ -54,6 +55,7 @@ class ManyStates(Protocol):
         """Return the number of states."""
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class Descriptor:
     """A scalar of a state, with its name, unit and symbol for axes.
@@ -134,6 +136,7 @@ def _number(name: str, bound: Any) -> float:
     return number
 
 
+@door
 @dataclass(frozen=True)
 class Constraint:
     """A descriptor held on one side of a bound, which it may exceed by `ease`."""
@@ -152,11 +155,13 @@ class Constraint:
         sign = 1.0 if self.sense == "<=" else -1.0
         return sign * (self.descriptor.function(z, p) - self.bound) - self.ease
 
+    @door
     def holds(self, states: ManyStates) -> Flags:
         """Whether states obey the constraint."""
         return self.excess(states.z, states.p) <= 0.0
 
 
+@door
 def combined(
     name: str, function: Callable[..., Any], *descriptors: Descriptor, unit: str = "1"
 ) -> Descriptor:
@@ -190,6 +195,7 @@ def combined(
     return Descriptor(name, unit, value, name)
 
 
+@door
 def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
     """Largest of several smooth descriptors; its minima, kinks among them, can be found exactly.
 
@@ -210,6 +216,7 @@ def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
     return Descriptor(name, unit, whole.function, name, branches=branches)
 
 
+@door
 def eased(constraint: Constraint) -> Constraint:
     """Constraint that rounding does not violate: optima lie on bounds."""
     return replace(constraint, ease=EASE * max(1.0, abs(constraint.bound)))

@@ -7,11 +7,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.errors import InputError, suggestion
 
 Role = Literal["actuator", "load", "fixed"]
 
 
+@door
 @dataclass(frozen=True)
 class Parameter:
     """One parameter of a structure.
@@ -117,6 +119,7 @@ class Box:
         ranges = zip(self.names, self.lower, self.upper, strict=True)
         return f"Box({', '.join(f'{name}=({low:g}, {high:g})' for name, low, high in ranges)})"
 
+    @door
     def contains(
         self, points: Float[np.ndarray, "*lanes d"], slack: float = 0.0
     ) -> "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]":

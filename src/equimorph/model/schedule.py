@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.door import door
 from equimorph.errors import InputError
 
 
@@ -51,6 +52,7 @@ class Schedule:
         return f"Schedule({names or 'at rest'}: {len(self.values)} steps; margin {smallest:.4g})"
 
 
+@door
 @dataclass(frozen=True)
 class Rates:
     """Largest rates of parameters, in their units per unit of time: ``Rates({"Theta": 0.1})``.
@@ -86,6 +88,7 @@ class Rates:
         bounds = np.array(list(self.limits.values()), dtype=float)
         return np.asarray((np.abs(np.diff(values[:, at], axis=0)) / bounds).max(axis=1))
 
+    @door
     def times(self, schedule: Schedule) -> Float[np.ndarray, " steps"]:
         """Earliest time of each step of a schedule, from zero on."""
         spent = self.durations(schedule.names, schedule.values)

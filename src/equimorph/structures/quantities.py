@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Box, Descriptor, position
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
@@ -18,6 +19,7 @@ from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
 
 
+@door
 def value_of(structure: Structure, name: str) -> Descriptor:
     """Value of a parameter, to bound an actuator: ``value_of(arch, "Theta") <= 2``.
 
@@ -34,6 +36,7 @@ def value_of(structure: Structure, name: str) -> Descriptor:
     return Descriptor(name, structure.parameters[at].unit, value, name, structure.signature)
 
 
+@door
 def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
     """Coordinate of the drawn shape at a share of its points: ``shape_coordinate(arch, "y", 0.3)``.
 
@@ -55,6 +58,7 @@ def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
     return Descriptor(f"shape_{axis}({s:g})", structure.length_unit, value, "", structure.signature)
 
 
+@door
 def effort_of(structure: Structure, name: str) -> Descriptor:
     """Effort ∂L/∂p of a parameter: the couple or force of an actuator, the way of a load.
 
@@ -72,6 +76,7 @@ def effort_of(structure: Structure, name: str) -> Descriptor:
     return Descriptor(f"effort({name})", label, value, f"∂L/∂{name}", structure.signature)
 
 
+@door
 def margin_of(structure: Structure) -> Descriptor:
     """Stability margin: smallest eigenvalue of the constrained Hessian in the metric."""
 
@@ -81,6 +86,7 @@ def margin_of(structure: Structure) -> Descriptor:
     return Descriptor("stability_margin", "1", value, "margin", structure.signature)
 
 
+@door
 def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
     """Signed distance of the shape from an obstacle: negative where it enters what is forbidden.
 
@@ -114,6 +120,7 @@ def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
     return Descriptor(name, unit, value, "distance", origin, place, obstacle=obstacle)
 
 
+@door
 def outside(structure: Structure, box: Box) -> Descriptor:
     """How far parameters are outside a box, in their scales; negative inside.
 

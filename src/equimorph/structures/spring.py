@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.door import door
 from equimorph.errors import InputError, suggestion
 from equimorph.linalg import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.model import (
@@ -48,6 +49,7 @@ def _slopes(term: Term, names: str = "") -> list[tuple[str, Term]]:
     return out
 
 
+@door
 class Spring(Structure):
     """Spring of natural length 1 from A = (x_l, 0) to B on the line x = 0, force F on B.
 

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.door import door
 from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
@@ -94,6 +95,7 @@ class States:
         """Whether the discretisation represents the states."""
         return self.structure.resolved(self.z, self.p)
 
+    @door
     def shape(
         self, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points space"]:
@@ -173,6 +175,7 @@ class State:
         """Whether the discretisation represents the state."""
         return bool(self.batch.resolved[0])
 
+    @door
     def shape(
         self, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "points space"]:

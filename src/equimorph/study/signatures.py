@@ -233,4 +233,6 @@ def alternatives(annotation: Any) -> tuple[Any, ...]:
     """Types that a value may have, without None."""
     if get_origin(annotation) in (Union, UnionType):
         return tuple(kind for each in get_args(annotation) for kind in alternatives(each))
+    if get_origin(annotation) is Annotated:
+        return alternatives(get_args(annotation)[0])
     return () if annotation is NoneType else (annotation,)

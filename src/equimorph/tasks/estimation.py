@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from scipy.stats import chi2 as chi_squared
 
 from equimorph.arrays import Flags, Values
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.tangents import fold_slopes, split_step
@@ -115,6 +116,7 @@ class StateEstimate:
         return self.states[0]
 
 
+@door
 def estimate_state(
     eset: EquilibriumSet,
     measured: Measured,

@@ -53,12 +53,6 @@ def check_fixed_parameters(name: str, state: State, eset: EquilibriumSet) -> Non
         )
 
 
-def check_margin_demand(margin: float) -> None:
-    """Raise `InputError` for a smallest stability margin that is negative or not a number."""
-    if not margin >= 0.0:
-        raise InputError(f"`margin` must be a number >= 0; got {margin!r}.")
-
-
 def inadmissible(
     name: str,
     state: State,

@@ -178,7 +178,7 @@ def test_compromise_beyond_a_singular_jacobian_of_the_arch():
         ({PLACE: 0.3}, {}, "must prescribe fewer descriptors than there are actuators"),
         ({"a": 0.3}, {}, "leave the actuator a free; got 0.3"),
         ({"l": 0.3}, {"sense": "most"}, "`sense` must be min or max"),
-        ({"l": 0.3}, {"margin": -1.0}, "`margin` at least 0"),
+        ({"l": 0.3}, {"margin": -1.0}, "`margin` must be a number >= 0"),
         ({"l": 0.3}, {"actuators": {"a": (1.0, 0.0)}}, "limits in order"),
     ],
 )

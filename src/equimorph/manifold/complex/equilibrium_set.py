@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.door import door
 from equimorph.errors import InputError
-from equimorph.manifold.complex.arguments import numbers
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.setting import Setting
@@ -135,6 +135,7 @@ class EquilibriumSet:
         free = [position(self.structure.parameters, name) for name in self.names]
         return Setting(self.structure, base, np.array(free), self.constraints)
 
+    @door
     def parameters_at(self, at: Mapping[str, float]) -> Float[np.ndarray, " P"]:
         """All parameters over a point of the box.
 
@@ -144,20 +145,18 @@ class EquilibriumSet:
             For names that are not free, missing ones, or a point outside the box.
         """
         _check_names(self.names, at)
-        point = np.array([numbers(name, at[name], each="a number") for name in self.names])
-        if point.ndim > 1:
-            raise InputError(
-                f"`at` must give one number each; got {dict(at)}. Use `over` for many."
-            )
+        point = np.array([float(at[name]) for name in self.names])
         if not self.box.contains(point, slack=1e-12):
             raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
         return np.asarray(self.setting.parameters(point[None])[0])
 
+    @door
     def at(self, **at: float) -> States:
         """Exact states over one point of the box, sorted by energy; see `over`."""
         states = self._sheets.over(self.parameters_at(at)[None])[0]
         return states[np.argsort(states.energy, kind="stable")] if len(states) > 1 else states
 
+    @door
     def over(self, **at: Float[np.ndarray, " points"]) -> StatesOver:
         """Exact states over many points of the box, with the pieces of the set that they lie on.
 
@@ -193,9 +192,8 @@ class EquilibriumSet:
     ) -> Float[np.ndarray, "points P"]:
         """All parameters over points of the box."""
         _check_names(self.names, at)
-        each = "an array with one number for each point"
-        columns = [numbers(name, at[name], each=each) for name in self.names]
-        if any(column.ndim != 1 or len(column) != len(columns[0]) for column in columns):
+        columns = [np.asarray(at[name], float) for name in self.names]
+        if any(len(column) != len(columns[0]) for column in columns):
             shapes = ", ".join(f"{name} {np.shape(at[name])}" for name in self.names)
             raise InputError(
                 "`at` must give one number for each point, equally many values of each parameter; "

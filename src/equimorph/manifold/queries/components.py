@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.door import door
 from equimorph.errors import InputError
-from equimorph.manifold.complex.arguments import constraints
 from equimorph.manifold.complex.equilibrium_set import Component, EquilibriumSet
 from equimorph.manifold.queries.levels import cell_sizes, part, restricted
 from equimorph.manifold.queries.locate import cell_of
@@ -56,6 +56,7 @@ class Components:
         """Cells, Euler characteristic, loops and indices of each piece."""
         return self.eset.components
 
+    @door
     def number_of(self, state: State) -> int | None:
         """Number of the piece that a state lies on; None if it is in no piece.
 
@@ -64,8 +65,6 @@ class Components:
         InputError
             If the state has other fixed parameters than the set, or lies beyond its box.
         """
-        if state.structure.signature != self.eset.structure.signature:
-            raise InputError(f"`state` must be of the set's structure; got {state!r}.")
         here = {name: state[name] for name in self.eset.names}
         if not np.allclose(self.eset.parameters_at(here), state.p, rtol=0, atol=1e-9):
             raise InputError(
@@ -77,6 +76,7 @@ class Components:
         cell = cell_of(self.eset, state)
         return int(self.eset.component[cell]) if cell >= 0 else None
 
+    @door
     def joined(self, one: State, other: State) -> bool:
         """Whether two states lie on the same piece.
 
@@ -104,6 +104,7 @@ class Components:
         return "\n".join([head, *self._lines])
 
 
+@door
 def components(
     eset: EquilibriumSet, *, stable: bool = False, within: Sequence[Constraint] = ()
 ) -> Components:
@@ -137,10 +138,9 @@ def components(
     >>> len(components(eset, stable=True, within=[spring.angle >= 0]))
     1
     """
-    rules = constraints(within)
     known = part(eset, eset.cell_index == 0) if stable else eset
     before = known.audit.unrefined
-    for each in dict.fromkeys(rules):
+    for each in dict.fromkeys(within):
         if each not in known.constraints and len(known.cells):
             known = restricted(known, each)
     sizes = np.bincount(known.component, cell_sizes(known), len(known.components))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.door import door
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Locus, nearest
 from equimorph.errors import InputError
@@ -36,6 +37,7 @@ class Cusps:
     lost: int
 
 
+@door
 def cusps(eset: EquilibriumSet) -> Cusps:
     """Cusps on the folds of a set over two parameters, polished.
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.door import door
 from equimorph.errors import InputError
-from equimorph.manifold.complex.arguments import check_descriptors, check_kind
 from equimorph.manifold.complex.cuts import (
     ROUND_OFF,
     About,
@@ -47,6 +47,7 @@ class Level:
     lost: int
 
 
+@door
 def level_set(eset: EquilibriumSet, descriptor: Descriptor, value: float) -> Level:
     """States of a set at which a descriptor has a value, polished to round-off.
 
@@ -55,12 +56,10 @@ def level_set(eset: EquilibriumSet, descriptor: Descriptor, value: float) -> Lev
     InputError
         If `value` is not finite, or what is no descriptor is given.
     """
-    check_kind("descriptor", descriptor, Descriptor, "a descriptor, like `rod.max_curvature`")
-    if not np.isfinite(value):
-        raise InputError(f"`value` must be finite; got {value!r}.")
     return _level(eset, lambda v: descriptor.function(v.z, v.p) - value)
 
 
+@door
 def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Level:
     """States at which as many descriptors as there are free parameters do not steer the set.
 
@@ -77,7 +76,6 @@ def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Lev
 
 
 def _check_count(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> None:
-    check_descriptors("descriptors", descriptors)
     d = len(eset.names)
     if len(descriptors) != d:
         raise InputError(
@@ -99,6 +97,7 @@ class Division:
     lost: int
 
 
+@door
 def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division:
     """Cut a set exactly where descriptors do not steer it; see `singular_set`.
 
@@ -112,6 +111,7 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
     return _divided(eset, _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors)))
 
 
+@door
 def divided_by(eset: EquilibriumSet, constraint: Constraint) -> Division:
     """Cut a set exactly along the bound of a constraint; the side is -1 where it is obeyed."""
     return _divided(eset, _cut(fabric_of(eset), lambda v: constraint.excess(v.z, v.p)))
@@ -139,6 +139,7 @@ def jacobian(setting: Setting, at: Vertices, descriptors: Sequence[Descriptor]) 
     return np.asarray(np.linalg.det(np.moveaxis(np.stack(columns), 2, 0)))
 
 
+@door
 def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
     """Part of a set that obeys a further constraint, cut exactly along it.
 
@@ -149,8 +150,6 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
     InputError
         If it is no constraint.
     """
-    wanted = "a constraint, like `rod.max_curvature <= 6`"
-    check_kind("constraint", constraint, Constraint, wanted)
     fabric = fabric_of(eset)
     cut = _cut(fabric, lambda v: constraint.excess(v.z, v.p))
     inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
@@ -168,6 +167,7 @@ def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
     return np.asarray(share * np.sqrt(np.maximum(np.linalg.det(gram), 0.0)))
 
 
+@door
 def part(eset: EquilibriumSet, cells: Bool[np.ndarray, " C"]) -> EquilibriumSet:
     """Some of the cells as a set of its own, like the stable ones: ``eset.cell_index == 0``."""
     fabric = fabric_of(eset)

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters
+from equimorph.door import door
 from equimorph.errors import InputError
-from equimorph.manifold.complex.arguments import check_kind
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.lookup.states_over import StatesOver
@@ -83,6 +83,7 @@ class Location:
         )
 
 
+@door
 def locate(
     eset: EquilibriumSet,
     measured: Measured,
@@ -112,7 +113,6 @@ def locate(
         descriptors of other structures, shapes with other numbers of points than the structure
         draws, or an empty set.
     """
-    check_kind("measured", measured, Mapping | np.ndarray, "values by descriptor, or points (n, 2)")
     if len(eset.cells) == 0:
         raise InputError("`eset` must have states to compare with; got an empty set.")
     fit = _Shape.of(eset, measured, s) if isinstance(measured, np.ndarray) else ValueFit.of(
@@ -203,7 +203,7 @@ def _check_values(eset: EquilibriumSet, measured: Mapping[Descriptor | str, floa
             f"got {len(measured)}. With fewer, whole curves fit."
         )
     names = [each.name for each in eset.structure.parameters]
-    for what, value in measured.items():
+    for what in measured:
         if isinstance(what, str) and what not in names:
             raise InputError(
                 f"`measured` must name parameters ({', '.join(names)}) or have descriptors; "
@@ -214,14 +214,6 @@ def _check_values(eset: EquilibriumSet, measured: Mapping[Descriptor | str, floa
                 f"`measured` must name free parameters ({', '.join(eset.names)}); got {what!r}, "
                 "which is fixed in the set."
             )
-        signature = eset.structure.signature
-        if isinstance(what, Descriptor) and what.origin not in (None, signature):
-            raise InputError(
-                f"`measured` must have descriptors of the set's structure; got {what.name} of "
-                "another one."
-            )
-        if not isinstance(value, int | float | np.number) or not np.isfinite(value):
-            raise InputError(f"`measured` must give finite numbers; got {_name(what)}: {value!r}.")
 
 
 def _name(what: Descriptor | str) -> str:

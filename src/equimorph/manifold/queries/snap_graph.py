@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Int
 
+from equimorph.door import door
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.errors import InputError
-from equimorph.manifold.complex.arguments import whole_number
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import adjacency, flags_of, pieces
 from equimorph.model import Progress, Silent
@@ -70,6 +70,7 @@ class SnapGraph:
     strata: tuple[int, ...]
     snaps: tuple[Snap, ...]
 
+    @door
     def leaving(self, stratum: int) -> tuple[Snap, ...]:
         """Snaps that leave a stratum.
 
@@ -92,6 +93,7 @@ class SnapGraph:
         return "\n".join(lines)
 
 
+@door
 def snap_graph(
     eset: EquilibriumSet, *, samples: int = 9, progress: Progress | None = None
 ) -> SnapGraph:
@@ -113,7 +115,6 @@ def snap_graph(
     InputError
         If `samples` is not a whole number of at least two.
     """
-    samples = whole_number("samples", samples, 2)
     progress = progress or Silent()
     stable = tuple(k for k, stratum in enumerate(eset.strata) if stratum.index == 0)
     edges = [(k, piece) for k in stable for piece in _pieces(eset, k)]

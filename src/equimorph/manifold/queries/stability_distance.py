@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from equimorph.arrays import Lanes, Parameters
+from equimorph.door import door
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -63,6 +64,7 @@ class StabilityDistance:
         )
 
 
+@door
 def stability_distance(eset: EquilibriumSet, state: State) -> StabilityDistance:
     """How far a stable state is from the edge of stability, within the box of a set.
 

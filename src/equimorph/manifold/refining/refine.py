@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from equimorph.manifold.complex.arguments import check_accuracy
+from equimorph.door import door
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.description import Frame, Lifting, described
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -39,6 +39,7 @@ SHARE = {1: 1.0, 2: 0.75, 3: 2.0 / 3.0}
 of the largest."""
 
 
+@door
 def refine(
     eset: EquilibriumSet,
     accuracy: float,
@@ -69,7 +70,6 @@ def refine(
     InputError
         If `accuracy` is not positive, or the journal is of something else.
     """
-    check_accuracy(accuracy)
     compute = partial(refined, eset, accuracy, progress or Silent())
     if journal is None:
         return compute()

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.profiles import LoadShape, at_nodes, inside, load_shape, profile
@@ -108,6 +109,7 @@ def _interior(points: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(s) for s in points if 0.0 < s < 1.0)
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class LineLoad(Term):
     """Dead load along the rod: the amplitude times ``shape(s) · direction`` per arclength.
@@ -153,6 +155,7 @@ class LineLoad(Term):
         return Effects(along=x * rho, across=y * rho, force=(x * total, y * total))
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class PointForce(Term):
     """Dead force at arclength s: the amplitude times `direction`.
@@ -187,6 +190,7 @@ class PointForce(Term):
         return Effects(along=x * step, across=y * step, force=(x, y))
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class Couple(Term):
     """Couple at arclength s, positive counterclockwise: its work is the amplitude times θ(s)."""
@@ -209,6 +213,7 @@ class Couple(Term):
         return Effects(couples=((float(self.s), 1.0),))
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class Curvature(Term):
     """Intrinsic curvature: the amplitude times ``pattern(s)`` from `start` to `stop`.
@@ -249,6 +254,7 @@ class Curvature(Term):
         return Effects(natural=there * at_nodes(self._profile(), mesh))
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class Tendon(Term):
     """Cable guided along the rod at an offset from its axis, pulled with a given tension.

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import least_squares
 
+from equimorph.door import door
 from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.structures import States
@@ -94,6 +95,7 @@ class Calibration:
         return float(self.residuals @ self.residuals)
 
 
+@door
 def calibrate(
     start: States,
     unknown: Wanted,

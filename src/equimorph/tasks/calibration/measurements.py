@@ -9,6 +9,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from equimorph.arrays import Lanes, Parameters
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import States, Structure
@@ -32,6 +33,7 @@ class Measurement(Protocol):
         """Return what a measurement without errors would give."""
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class MeasuredValues:
     """Measured values of a descriptor, one for each state; not a number where there is none.
@@ -65,6 +67,7 @@ class MeasuredValues:
         return np.asarray(own.function(z, p)[:, None])
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class MeasuredShape:
     """Measured points of the shape, the same material points in each state.

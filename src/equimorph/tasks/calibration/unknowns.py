@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Parameters
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import position
 from equimorph.structures import States, Structure
@@ -17,6 +18,7 @@ Wanted = Mapping[str | tuple[str, ...], Kind]
 Vector = Float[np.ndarray, " k"]
 
 
+@door
 @dataclass(frozen=True, eq=False)
 class Family:
     """Structures that differ in data which are no parameters: a stiffness, a length, a rise.

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from equimorph.arrays import Flags, Settings, Values
+from equimorph.door import door
 from equimorph.equilibria import TraceOptions
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
@@ -76,6 +77,7 @@ class CurvatureMap(ActuatorMap):
         return self.where("snaps")
 
 
+@door
 def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     structure: Structure,
     grid: Grid,

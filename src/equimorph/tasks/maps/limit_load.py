@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
+from equimorph.door import door
 from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, limit_load, trace
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
@@ -60,6 +61,7 @@ class LimitLoadMap(ActuatorMap):
 
     kinds: ClassVar[tuple[str, ...]] = labels(RayStatus)
 
+    @door
     def at(self, **setting: float) -> LimitLoad:
         """Limit load at one setting of the box, with its path.
 
@@ -71,6 +73,7 @@ class LimitLoadMap(ActuatorMap):
         """
         return limit_load(self.rest(setting), self.load, within=self.within, bound=self.bound)
 
+    @door
     def rays(self, settings: Settings) -> Values:
         """Limit loads at many settings; not numbers where there is none."""
         place = position(self.structure.parameters, self.load)
@@ -78,6 +81,7 @@ class LimitLoadMap(ActuatorMap):
         return LimitLoadRays(self.sheet, place, self.within, self.bound, options)(settings).value
 
 
+@door
 def limit_load_map(
     structure: Structure,
     grid: Grid,

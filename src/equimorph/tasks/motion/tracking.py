@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.door import door
 from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, position
@@ -116,6 +117,7 @@ class Tracking:
         return dict(zip(self.actuators, change[free].tolist(), strict=True))
 
 
+@door
 def track(  # the knobs of the public face, all by keyword
     start: Start,
     targets: Leg | Sequence[Leg],

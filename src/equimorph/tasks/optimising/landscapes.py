@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes, Values
+from equimorph.door import door
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
@@ -98,6 +99,7 @@ class Landscape:
         )
 
 
+@door
 def landscape(  # the knobs of the public face, most by keyword
     eset: EquilibriumSet,
     objective: Descriptor,
@@ -138,8 +140,6 @@ def landscape(  # the knobs of the public face, most by keyword
             f"`grid` must be over the two free parameters of the set ({', '.join(eset.names)}); "
             f"got {', '.join(grid.names)}."
         )
-    if sense not in ("min", "max"):
-        raise InputError(f"`sense` must be min or max; got {sense!r}.")
     settings, shape = settings_of(grid)
     over = eset.over(**dict(zip(grid.names, settings.T, strict=True)))
     allowed = _admissible(eset, over, within, start)

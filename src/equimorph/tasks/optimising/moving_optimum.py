@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.equilibria import Event, EventKind, Leg
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.setting import Setting, embed
@@ -59,6 +60,7 @@ Goal = Callable[[Float[np.ndarray, " columns"]], Objective]
 """Objective at given parameters and targets."""
 
 
+@door
 def follow_optimum(
     start: Start,
     objective: Descriptor,
@@ -117,10 +119,6 @@ def follow_optimum(
     ('stability boundary', 0.021)
     """
     state, names = start_state(start), tuple(actuators)
-    if sense not in ("min", "max") or not margin >= 0.0:
-        raise InputError(
-            f"`sense` must be min or max and `margin` at least 0; got {sense!r}, {margin!r}."
-        )
     check_stable("start", state)
     legs = [to] if isinstance(to, Mapping) or callable(to) else list(to)
     course = Course.of(state, legs, names)

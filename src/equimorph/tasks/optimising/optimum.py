@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool
 
+from equimorph.door import door
 from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -43,7 +44,6 @@ from equimorph.tasks.stable_part import (
 from equimorph.tasks.start import (
     check_equilibrium,
     check_fixed_parameters,
-    check_margin_demand,
     inadmissible,
 )
 from equimorph.tolerances import FEASIBLE, SAME_SOLUTION
@@ -140,6 +140,7 @@ class Optima:
         return self.best.route.schedule if self.all and self.best.route else None
 
 
+@door
 def optimise(  # the knobs of the public face, all by keyword
     eset: EquilibriumSet,
     objective: Descriptor,
@@ -231,9 +232,6 @@ def _refusal(why: str, sense: Sense, eset: EquilibriumSet) -> Optima:
 
 
 def _check(eset: EquilibriumSet, sense: str, margin: float, start: State | None) -> None:
-    if sense not in ("min", "max"):
-        raise InputError(f"`sense` must be min or max; got {sense!r}.")
-    check_margin_demand(margin)
     if not len(eset.cells):
         raise InputError("`eset` must have cells; got an empty set.")
     if start is None:

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.door import door
 from equimorph.equilibria import Corner, corners_of, worst_over
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -100,6 +101,7 @@ class RobustOptimum:
         return np.nan if self.state is None else self.state.margin
 
 
+@door
 def robust_optimum(
     eset: EquilibriumSet,
     objective: Descriptor,

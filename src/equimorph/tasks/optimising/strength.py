@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Settings, Values
+from equimorph.door import door
 from equimorph.equilibria import LimitLoad
 from equimorph.errors import InputError
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
@@ -129,6 +130,7 @@ class StrongestSettings:
         return self.guaranteed - self.at_risk
 
 
+@door
 def strongest(
     lmap: LimitLoadMap, *, offsets: Mapping[str, float] | None = None
 ) -> StrongestSettings:

@@ -20,7 +20,6 @@ from equimorph.structures import State, States, Structure
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
 from equimorph.tasks.stable_part import from_cache
-from equimorph.tasks.start import check_margin_demand
 
 EXACT, RESERVES = (1.0, 0.0), ((1.01, 1e-3), (1.05, 1e-2), (1.15, 1e-2))
 """Factors on the demanded margin, and shares of the smaller margin of the ends added to it."""
@@ -59,9 +58,8 @@ class Demands:
         Raises
         ------
         InputError
-            For a negative margin, or an objective without meaning.
+            For an objective without meaning.
         """
-        check_margin_demand(margin)
         constraints = tuple(eased(each) for each in dict.fromkeys(within))
         return cls(objective_of(objective, structure), constraints, margin)
 

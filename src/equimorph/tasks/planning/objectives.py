@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_kinds import ELSEWHERE
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Rates, names_of
 from equimorph.structures import States, Structure, stability_margin
@@ -16,7 +17,7 @@ Values = Float[np.ndarray, " pairs"]
 Numbers = Int[np.ndarray, " pairs"]
 Name = Literal["length", "travel", "work", "clearance"]
 Term = Name | Rates
-Wish = Term | Sequence[tuple[float, Term]]
+Wish = Annotated[Term | Sequence[tuple[float, Term]], ELSEWHERE]
 
 NAMES: tuple[Name, ...] = get_args(Name)
 LEAST_MARGIN = 1e-6

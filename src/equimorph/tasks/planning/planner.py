@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from equimorph.door import door
 from equimorph.equilibria import way_points
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -27,6 +28,7 @@ from equimorph.tasks.route import Corners, Route, refusal
 from equimorph.tasks.start import Start, start_state
 
 
+@door
 def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     eset: EquilibriumSet,
     start: Start,
@@ -100,11 +102,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
 
 
 def _check_price(snap_price: float | None, via: Sequence[Mapping[str, float]] | None) -> None:
-    if snap_price is None:
-        return
-    if not (np.isfinite(snap_price) and snap_price > 0.0):
-        raise InputError(f"`snap_price` must be a positive number; got {snap_price!r}.")
-    if via is not None:
+    if snap_price is not None and via is not None:
         raise InputError("`via` must not be given with `snap_price`; got both.")
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Edges
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -38,6 +39,7 @@ LABELS = 8
 Class = tuple[int, ...]
 
 
+@door
 def alternatives(
     eset: EquilibriumSet,
     start: State,
@@ -84,8 +86,6 @@ def alternatives(
     """
     if len(eset.names) != 2:
         raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
-    if count < 1:
-        raise InputError(f"`count` must be at least 1; got {count!r}.")
     demands = Demands.of(eset.structure, objective, (*eset.constraints, *within), margin)
     ends = (start, goal)
     check_ends(eset, ends)

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Values
+from equimorph.door import door
 from equimorph.equilibria import way_points
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, Descriptor, position
@@ -33,6 +34,7 @@ CONNECTIONS = 4
 """Nodes of the other tree that are tried for each new one."""
 
 
+@door
 @dataclass(frozen=True)
 class SamplingOptions:
     """Knobs of the sampling planner.
@@ -46,15 +48,8 @@ class SamplingOptions:
     reach: float = 0.5
     seed: int = 0
 
-    def __post_init__(self) -> None:
-        """Check the knobs."""
-        for name in ("lifts", "batch"):
-            if getattr(self, name) < 1:
-                raise InputError(f"`{name}` must be at least 1; got {getattr(self, name)!r}.")
-        if not (np.isfinite(self.reach) and self.reach > 0.0):
-            raise InputError(f"`reach` must be a positive number; got {self.reach!r}.")
 
-
+@door
 def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     start: State,
     goal: State | None,

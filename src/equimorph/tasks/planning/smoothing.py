@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Spline, names_of
@@ -22,6 +23,7 @@ HALVINGS = 6
 """How often the roundings are halved before a route is refused."""
 
 
+@door
 def smoothed(
     route: Route,
     tolerance: float,
@@ -61,8 +63,6 @@ def smoothed(
     """
     if route.path is None or not route.arrived or route.snaps:
         raise InputError(f"`route` must have arrived without a snap; got {route!r}.")
-    if not (np.isfinite(tolerance) and tolerance > 0.0):
-        raise InputError(f"`tolerance` must be a positive number; got {tolerance!r}.")
     states = route.path.states
     structure = states.structure
     corners = states.p[_corners(route)] / structure.scales

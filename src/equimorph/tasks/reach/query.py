@@ -105,9 +105,6 @@ def _check(home: Region, targets: Mapping[Descriptor, float]) -> None:
             f"({len(home.eset.names)}), those of the set: {names or 'none'}; got "
             f"{', '.join(each.name for each in targets) or 'nothing'}."
         )
-    for descriptor, value in targets.items():
-        if not np.isfinite(value):
-            raise InputError(f"`targets` must be finite; got {descriptor.name} = {value!r}.")
 
 
 def jacobian_of(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.equilibria import LimitLoad, check_start
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, names_of, position
@@ -49,6 +50,7 @@ class Sensitivity:
         return float(self.descriptors[descriptor][self.names.index(name)])
 
 
+@door
 def sensitivity(
     state: State, descriptors: Sequence[Descriptor] = (), names: Sequence[str] | None = None
 ) -> Sensitivity:
@@ -87,6 +89,7 @@ def sensitivity(
     return Sensitivity(chosen, dz, slopes)
 
 
+@door
 def limit_sensitivity(
     limit: LimitLoad,
     load: str,

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.equilibria import LimitLoad, lift, limit_load
 from equimorph.errors import InputError
 from equimorph.model import Constraint, position
@@ -115,6 +116,7 @@ class ImperfectionLaw:
         return f"ImperfectionLaw({formula}; {self.law})"
 
 
+@door
 def imperfection_law(
     start: State,
     load: str,
@@ -162,7 +164,7 @@ def imperfection_law(
     tried = np.array(sizes, dtype=float)
     if load == imperfection:
         raise InputError(f"`imperfection` must not be the load; got {load!r}.")
-    if len(tried) < 3 or not (tried > 0.0).all() or not (np.diff(tried) < 0.0).all():
+    if len(tried) < 3 or not (np.diff(tried) < 0.0).all():
         raise InputError(f"`sizes` must be three or more numbers > 0 that fall; got {sizes!r}.")
     trials = _Trials(start, load, place, tuple(within))
     loads = trials.loads(tried)

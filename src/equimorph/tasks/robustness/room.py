@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Parameters, Values
+from equimorph.door import door
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.legs import check_starts
 from equimorph.equilibria.trace_options import EventCode
@@ -78,6 +79,7 @@ class Room:
         return float(self.scale.min())
 
 
+@door
 def stable_room(  # all but two by keyword
     states: State | States,
     tolerances: Mapping[str, float],
@@ -121,12 +123,8 @@ def stable_room(  # all but two by keyword
     structure = batch.structure
     places = np.array([position(structure.parameters, name) for name in tolerances], dtype=int)
     widths = np.array([float(value) for value in tolerances.values()])
-    if len(widths) == 0 or not (np.isfinite(widths).all() and (widths > 0.0).all()):
+    if len(widths) == 0:
         raise InputError(f"`tolerances` must be positive numbers; got {dict(tolerances)!r}.")
-    if shape not in ("box", "ellipsoid"):
-        raise InputError(f"`shape` must be box or ellipsoid; got {shape!r}.")
-    if not (np.isfinite(most) and most > 0.0):
-        raise InputError(f"`most` must be a positive number; got {most!r}.")
     check_starts(batch)
     if (batch.index != 0).any():
         raise InputError("`states` must be stable; got unstable ones.")

@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from equimorph.door import door
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.manifold import EquilibriumSet, StabilityDistance, stability_distance
 from equimorph.structures import State, States
@@ -51,6 +52,7 @@ class LeastSnap:
         return f"LeastSnap({moves}: {self.landing})"
 
 
+@door
 def least_snap(eset: EquilibriumSet, state: State) -> LeastSnap:
     """Find the least straight change of the free parameters that makes a stable state snap.
 

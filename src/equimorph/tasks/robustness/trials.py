@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
 from equimorph.arrays import Parameters, Values
+from equimorph.door import door
 from equimorph.equilibria import lift, way_points
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Schedule, names_of, position
@@ -82,6 +83,7 @@ class Trials:
         return float(middle - half), float(middle + half)
 
 
+@door
 def random_trials(  # all but three by keyword
     start: State,
     schedule: Schedule | Sequence[Mapping[str, float]],
@@ -125,10 +127,8 @@ def random_trials(  # all but three by keyword
     names = tuple(spreads)
     places = np.array([position(structure.parameters, name) for name in names], dtype=int)
     widths = np.array([float(value) for value in spreads.values()])
-    if len(widths) == 0 or not (np.isfinite(widths).all() and (widths > 0.0).all()):
+    if len(widths) == 0:
         raise InputError(f"`spreads` must be positive numbers; got {dict(spreads)!r}.")
-    if trials < 1:
-        raise InputError(f"`trials` must be at least 1; got {trials!r}.")
     rows = _rows(start, schedule)
     offsets = np.random.default_rng(seed).normal(size=(trials, len(names))) * widths
     shift = np.zeros((trials, len(start.p)))

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Values
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.queries.nearest import local_minima
@@ -135,6 +136,7 @@ class Shapes:
         return self.known
 
 
+@door
 def solve_shape(
     eset: EquilibriumSet,
     targets: Mapping[Descriptor, float],
@@ -178,6 +180,7 @@ def solve_shape(
     return solve_shapes(eset, columns, within=within, start=start, rank=rank)[0]
 
 
+@door
 def solve_shapes(
     eset: EquilibriumSet,
     targets: Mapping[Descriptor, Float[np.ndarray, " many"]],
@@ -214,7 +217,7 @@ def solve_shapes(
     """
     wanted = _numbers(eset, targets)
     rank = rank or ("energy" if start is None else "route")
-    if rank not in ("route", "energy", "margin") or (rank == "route" and start is None):
+    if rank == "route" and start is None:
         raise InputError(
             f"`rank` must be energy or margin, or route if there is a start; got {rank!r}."
         )
@@ -236,12 +239,6 @@ def _numbers(
 ) -> Float[np.ndarray, "many k"]:
     if not targets:
         raise InputError("`targets` must give at least one descriptor; got none.")
-    for descriptor, value in targets.items():
-        bad = np.asarray(value)[~np.isfinite(value)]
-        if len(bad):
-            raise InputError(
-                f"`targets` must be finite; got {descriptor.name} = {float(bad[0])!r}."
-            )
     if len({np.shape(value) for value in targets.values()}) != 1:
         raise InputError(
             "`targets` must give equally many values of each descriptor; got "

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags
+from equimorph.door import door
 from equimorph.equilibria import (
     Event,
     Lifts,
@@ -24,7 +25,7 @@ from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure, from_identity
 from equimorph.tasks.distances import path_lengths
 from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
-from equimorph.tasks.start import check_margin_demand, inadmissible
+from equimorph.tasks.start import inadmissible
 from equimorph.tasks.verification.proof import Proof, prove
 from equimorph.tolerances import SAME_STATE
 
@@ -202,6 +203,7 @@ class Verification:
         return Path(states, self.at, path_lengths(states), np.zeros(len(states), int), (end,))
 
 
+@door
 def verify(
     schedule: Schedule | Sequence[Mapping[str, float]],
     start: State | None = None,
@@ -256,7 +258,6 @@ def verify(
     >>> em.verify([{"F": 0.2}, {"x_l": 1.2}], rest, proof=True).proof.status
     'proved'
     """
-    check_margin_demand(margin)
     begin, rows = _legs(schedule, start, structure)
     constraints = tuple(within)
     why = inadmissible("start", begin, constraints, margin)

@@ -1,0 +1,412 @@
+"""Kinds of arguments: what the annotation and the name of a parameter allow, and in which words.
+
+`door` checks the arguments of public functions by them. Nothing here knows a structure: classes
+are named in `CLASSES`, numbers whose names mean the same in all functions in `RANGES`.
+"""
+
+import sys
+import types
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import numpy as np
+
+LARGEST = sys.float_info.max
+"""Largest finite number."""
+MANY = 1_000_000
+"""Largest count of random starts, checks and the like: more would run for days."""
+SHOWN = 80
+"""Characters of a refused value that a message shows."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Numbers that are allowed, and how they are called: one, and several."""
+
+    least: float
+    most: float
+    words: str
+    several: str
+    above: bool = False
+    """Whether `least` itself is excluded."""
+
+    def holds(self, value: Any) -> bool:
+        """Whether a real number is in the range; not a number is in none."""
+        return bool(self.least < value if self.above else self.least <= value) and bool(
+            value <= self.most
+        )
+
+
+FINITE = Range(-LARGEST, LARGEST, "a finite number", "finite numbers")
+NOT_NEGATIVE = Range(0.0, np.inf, "a number >= 0", "numbers >= 0")
+POSITIVE = Range(0.0, LARGEST, "positive and finite", "positive numbers", above=True)
+EXTENDED = Range(-np.inf, np.inf, "a number", "numbers")
+
+
+def _count(least: int, most: float = MANY) -> Range:
+    limits = f">= {least}" if np.isinf(most) else f"from {least} to {most}"
+    return Range(least, most, f"a whole number {limits}", f"whole numbers {limits}")
+
+
+WHOLE = _count(0, np.inf)
+RANGES: Mapping[str, Range] = {
+    **dict.fromkeys(("accuracy", "snap_price", "tolerance", "most", "reach", "distance"), POSITIVE),
+    **dict.fromkeys(
+        ("tolerances", "spreads", "offsets", "could_measure", "sizes", "limits"), POSITIVE
+    ),
+    **dict.fromkeys(("first_step", "largest_step", "smallest_step", "turning"), POSITIVE),
+    **dict.fromkeys(("bound", "lower", "upper"), EXTENDED),
+    "margin": NOT_NEGATIVE,
+    "radius": Range(0.0, LARGEST, "a finite number >= 0", "finite numbers >= 0"),
+    "intervals": _count(2, np.inf),
+    "confidence": Range(0.5, 1.0 - 1e-12, "between 0.5 and 1", "between 0.5 and 1", above=True),
+    "seed": WHOLE,
+    "checks": _count(0),
+    "retries": _count(0, 20),
+    "samples": _count(2),
+    **dict.fromkeys(("starts", "runs", "trials", "batch", "frames", "fps"), _count(1)),
+    "count": _count(1, 10_000),
+    "lifts": _count(1, 100 * MANY),
+    "steps": _count(1, 1000 * MANY),
+}
+"""Ranges of numbers whose names mean the same in all functions, alone or in lists and mappings."""
+
+CLASSES: Mapping[str, tuple[str, str]] = {
+    "Structure": ("a structure, like `Rod()`", "structures"),
+    "State": ("a state, like `rod.natural_state(Theta=1.0)`", "states"),
+    "States": ("states, like `equilibrium_set(...).at(...)`", "batches of states"),
+    "EquilibriumSet": ("an equilibrium set, like `equilibrium_set(rod, Box(...))`", "sets"),
+    "Box": ("a box, like `Box(q=(0.0, 2.5))`", "boxes"),
+    "Grid": ("a grid, like `Grid(Theta=(0.2, 2.5, 93), Delta=(-2, 2, 81))`", "grids"),
+    "Constraint": (
+        "a constraint, like `rod.max_curvature <= 6`",
+        "constraints, like `[rod.max_curvature <= 6]`",
+    ),
+    "Descriptor": (
+        "a descriptor, like `rod.max_curvature`",
+        "descriptors, like `[rod.max_curvature]`",
+    ),
+    "Progress": ("a sink with the method `report(stage, done, total)`", "sinks"),
+    "Journal": ("a journal, like `storage.open_journal(path)`", "journals"),
+    "Schedule": ("a schedule, like `route.schedule` of a route that arrived", "schedules"),
+    "Rule": ("a rule, like `lowest(descriptor)`", "rules"),
+    "LimitLoadMap": ("a map of limit loads, like `limit_load_map(...)`", "maps of limit loads"),
+    "LimitLoad": ("a limit load, like `limit_load(...)`", "limit loads"),
+    "StateEstimate": ("an answer of `estimate_state`", "answers of `estimate_state`"),
+    "Location": ("an answer of `locate`", "answers of `locate`"),
+    "Route": ("a route, like `plan(...)`", "routes"),
+    "Path": ("a path, like `lift(...)`", "paths"),
+    "Axes": ("axes of matplotlib", "axes"),
+}
+"""What objects of a class are called: one of them, and several."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What an argument may be.
+
+    Parameters
+    ----------
+    words, several
+        What is allowed, for one value and for a list of such.
+    fits
+        Whether a value is allowed as it is.
+    convert
+        Value that fits, made of one of another form, like an array of a list; None if there is no
+        such form. It raises TypeError or ValueError for anything else.
+    culprit
+        The part of a value that does not fit, in words.
+    holds
+        Names of the classes whose objects may occur in it.
+    by_name
+        Whether it may give values of parameters by their names.
+    """
+
+    words: str
+    several: str
+    fits: Callable[[Any], bool]
+    convert: Callable[[Any], Any] | None = None
+    culprit: Callable[[Any], str] | None = None
+    holds: frozenset[str] = frozenset()
+    by_name: bool = False
+
+    def refused(self, value: Any) -> str:
+        """The part of a value that does not fit, in one line."""
+        return short(value) if self.culprit is None else self.culprit(value)
+
+
+def short(value: Any) -> str:
+    """Value in one line of at most `SHOWN` characters."""
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # a value may be anything; so may its representation
+        text = f"an object of {type(value).__name__}"
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 4]} ..."
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a real number: no text, no truth value, no complex number."""
+    kind = type(value)
+    return kind is float or (kind is not bool and isinstance(value, Real))
+
+
+ELSEWHERE = "what its reader allows"
+"""Note, by ``Annotated[T, ELSEWHERE]``, on a type with a language that its reader checks. Any other
+text there tells what is allowed, in place of words made from the type."""
+ANYTHING = Kind("anything", "anything", lambda _: True)
+TEXT = Kind("a text", "names", lambda value: isinstance(value, str))
+TRUTH = Kind("True or False", "truth values", lambda value: isinstance(value, bool | np.bool_))
+NOTHING = Kind("None", "None", lambda value: value is None)
+
+
+def kind_of(annotation: Any, name: str) -> Kind:
+    """Kind of the parameter called `name` with an annotation; `ANYTHING` where it says nothing."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        plain, note, *_ = get_args(annotation)
+        kind = ANYTHING if note == ELSEWHERE else kind_of(plain, name)
+        return replace(kind, words=note, several=note) if isinstance(note, str) else kind
+    if origin in (Union, types.UnionType):
+        return _either([kind_of(each, name) for each in get_args(annotation)])
+    for applies, make in MAKERS:
+        if applies(annotation, origin):
+            return make(annotation, name)
+    return ANYTHING
+
+
+def _number(annotation: Any, name: str) -> Kind:
+    whole = annotation is int
+    allowed = RANGES.get(name, WHOLE if whole else FINITE)
+
+    def fits(value: Any) -> bool:
+        if whole and not isinstance(value, Integral):
+            return False
+        return is_number(value) and allowed.holds(value)
+
+    def convert(value: Any) -> float:
+        number = value.item() if isinstance(value, np.ndarray) else value
+        if not is_number(number):
+            raise TypeError
+        return int(number) if whole and number == int(number) else float(number)
+
+    return Kind(allowed.words, allowed.several, fits, convert)
+
+
+def _word(annotation: Any, _: str) -> Kind:
+    options = get_args(annotation)
+    listed = "one of " + ", ".join(map(str, options))
+    words = listed if len(options) > 3 else " or ".join(map(str, options))
+    return Kind(words, words, lambda value: isinstance(value, str) and value in options)
+
+
+def _object(annotation: Any, _: str) -> Kind:
+    name = annotation.__name__
+    word = f"an object of {name}"
+    one, several = CLASSES.get(name, (word, f"objects of {name}"))
+    if getattr(annotation, "_is_protocol", False):
+        methods = [each for each in vars(annotation) if not each.startswith("_")]
+        return Kind(one, several, lambda value: all(hasattr(value, each) for each in methods))
+    if issubclass(annotation, Enum):
+        one = several = " or ".join(each.value for each in annotation)
+    return Kind(one, several, lambda value: isinstance(value, annotation), holds=frozenset([name]))
+
+
+def _array(annotation: Any, _: str) -> Kind:
+    dims = annotation.dim_str.split()
+    axes = None if any(each.startswith(("*", "...")) for each in dims) else len(dims)
+    numeric = "biu" if "int" in str(annotation.dtypes) else "iuf"
+    if all("bool" in each for each in annotation.dtypes):
+        numeric = "b"
+
+    def fits(value: Any) -> bool:
+        if not isinstance(value, np.ndarray) or value.dtype.kind not in numeric:
+            return False
+        return (axes is None or value.ndim == axes) and bool(np.isfinite(value).all())
+
+    words = f"an array of finite numbers ({', '.join(dims)})"
+    return Kind(words, "arrays of numbers", fits, lambda value: _as_array(value, numeric))
+
+
+def _as_array(value: Any, numeric: str) -> np.ndarray:
+    if isinstance(value, str | Mapping):
+        raise TypeError
+    array = np.asarray(value)
+    if array.dtype.kind not in numeric or array.dtype.kind == "b" != numeric:
+        raise TypeError
+    return array.astype(float) if "f" in numeric else array
+
+
+def _numbers(_: Any, __: str) -> Kind:
+    """Kind of an array of any shape."""
+
+    def fits(value: Any) -> bool:
+        numeric = isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
+        return numeric and bool(np.isfinite(value).all())
+
+    return Kind("an array of finite numbers", "arrays of finite numbers", fits)
+
+
+def _row(annotation: Any, name: str) -> Kind:
+    """Kind of a tuple of unlike things."""
+    kinds = [kind_of(each, name) for each in get_args(annotation)]
+
+    def fits(value: Any) -> bool:
+        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(kinds):
+            return False
+        return all(kind.fits(each) for kind, each in zip(kinds, value, strict=True))
+
+    words = ", ".join(kind.words for kind in kinds)
+    holds = frozenset[str]().union(*(kind.holds for kind in kinds))
+    return Kind(f"a tuple ({words})", f"tuples ({words})", fits, holds=holds)
+
+
+def _sequence(annotation: Any, name: str) -> Kind:
+    arguments = get_args(annotation)
+    fixed = len(arguments) if get_origin(annotation) is tuple and ... not in arguments else None
+    entry = kind_of(arguments[0], name) if arguments else ANYTHING
+
+    def listed(value: Any) -> bool:
+        return (isinstance(value, Sequence) and not isinstance(value, str | bytes)) or (
+            isinstance(value, np.ndarray) and value.ndim > 0
+        )
+
+    def fits(value: Any) -> bool:
+        if not listed(value) or (fixed is not None and len(value) != fixed):
+            return False
+        return all(map(entry.fits, value))
+
+    def culprit(value: Any) -> str:
+        wrong = (each for each in value if not entry.fits(each)) if listed(value) else iter(())
+        return next(map(entry.refused, wrong), short(value))
+
+    number = "a list of" if fixed is None else f"{fixed}"
+    words = f"{number} {entry.several}"
+    return Kind(words, f"lists of {entry.several}", fits, culprit=culprit, holds=entry.holds)
+
+
+def _iterable(_: Any, __: str) -> Kind:
+    def fits(value: Any) -> bool:
+        return isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
+
+    return Kind("a list", "lists", fits)
+
+
+def _mapping(annotation: Any, name: str) -> Kind:
+    keys, values = (kind_of(each, name) for each in get_args(annotation) or (Any, Any))
+    by = "descriptor" if "Descriptor" in keys.holds else "name"
+    example = "{rod.max_curvature: 6.0}" if by == "descriptor" else '{"q": 2.5}'
+
+    def fits(value: Any) -> bool:
+        return (
+            isinstance(value, Mapping)
+            and all(map(keys.fits, value))
+            and all(map(values.fits, value.values()))
+        )
+
+    def culprit(value: Any) -> str:
+        if not isinstance(value, Mapping):
+            return short(value)
+        strange = [key for key in value if not keys.fits(key)]
+        if strange:
+            return f"the key {short(strange[0])}"
+        wrong = [key for key, each in value.items() if not values.fits(each)]
+        label = getattr(wrong[0], "name", wrong[0])
+        return f"{label} = {values.refused(value[wrong[0]])}"
+
+    numeric = by == "name" and values.fits(0.5)
+    plain = values.several if values.words != ANYTHING.words else "values"
+    example = f", like `{example}`" if values.fits(0.5) else ""
+    words = f"{plain} by {by}{example}"
+    return Kind(
+        words,
+        f"{plain} by {by}",
+        fits,
+        culprit=culprit,
+        holds=keys.holds | values.holds,
+        by_name=numeric,
+    )
+
+
+def _function(_: Any, __: str) -> Kind:
+    return Kind("a function", "functions", callable)
+
+
+def _either(kinds: Sequence[Kind]) -> Kind:
+    """Kind of what has one of several kinds; None is allowed without being said."""
+    said = [kind for kind in kinds if kind is not NOTHING]
+    words = list(dict.fromkeys(kind.words for kind in said))
+    several = list(dict.fromkeys(kind.several for kind in said))
+
+    def fits(value: Any) -> bool:
+        return any(kind.fits(value) for kind in kinds)
+
+    def convert(value: Any) -> Any:
+        for kind in said:
+            try:
+                made = converted(kind, value)
+            except (TypeError, ValueError, OverflowError):
+                continue
+            return made
+        raise TypeError
+
+    def culprit(value: Any) -> str:
+        parts = (kind.refused(value) for kind in said)
+        return next((part for part in parts if part != short(value)), short(value))
+
+    holds = frozenset[str]().union(*(kind.holds for kind in kinds))
+    by_name = any(kind.by_name for kind in said)
+    return Kind(" or ".join(words), " or ".join(several), fits, convert, culprit, holds, by_name)
+
+
+def converted(kind: Kind, value: Any) -> Any:
+    """Value in a form that fits; TypeError or ValueError if there is none."""
+    made = kind.convert(value) if kind.convert is not None else value
+    if not kind.fits(made):
+        raise TypeError
+    return made
+
+
+def _is(*wanted: Any) -> Callable[[Any, Any], bool]:
+    return lambda annotation, origin: annotation in wanted or origin in wanted
+
+
+Make = Callable[[Any, str], Kind]
+
+
+def _always(kind: Kind) -> Make:
+    return lambda _annotation, _name: kind
+
+
+def _is_class(annotation: Any, origin: Any) -> bool:
+    return origin is None and isinstance(annotation, type) and annotation is not object
+
+
+MAKERS: tuple[tuple[Callable[[Any, Any], bool], Make], ...] = (
+    (lambda annotation, _: annotation in (None, types.NoneType), _always(NOTHING)),
+    (_is(bool), _always(TRUTH)),
+    (_is(float, int), _number),
+    (_is(str), _always(TEXT)),
+    (_is(Path), _object),
+    (_is(Literal), _word),
+    (lambda annotation, _: hasattr(annotation, "dim_str"), _array),
+    (_is(Any), _always(ANYTHING)),
+    (_is(np.ndarray), _numbers),
+    (
+        lambda annotation, origin: (
+            origin is tuple
+            and len(set(get_args(annotation))) > 1
+            and ... not in get_args(annotation)
+        ),
+        _row,
+    ),
+    (_is(Sequence, tuple, list), _sequence),
+    (_is(Mapping, dict), _mapping),
+    (_is(Iterable), _iterable),
+    (_is(Callable), _function),
+    (_is_class, _object),
+)
+"""How kinds are made, by the first test of an annotation and its origin that applies."""
