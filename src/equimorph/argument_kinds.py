@@ -56,7 +56,7 @@ WHOLE = _count(0, np.inf)
 RANGES: Mapping[str, Range] = {
     **dict.fromkeys(("accuracy", "snap_price", "tolerance", "most", "reach", "distance"), POSITIVE),
     **dict.fromkeys(
-        ("tolerances", "spreads", "offsets", "could_measure", "sizes", "limits"), POSITIVE
+        ("tolerances", "spreads", "offsets", "could_measure", "sizes", "limits", "errors"), POSITIVE
     ),
     **dict.fromkeys(("first_step", "largest_step", "smallest_step", "turning"), POSITIVE),
     **dict.fromkeys(("bound", "lower", "upper"), EXTENDED),
@@ -154,13 +154,22 @@ def is_number(value: Any) -> bool:
     return kind is float or (kind is not bool and isinstance(value, Real))
 
 
-ELSEWHERE = "what its reader allows"
-"""Note, by ``Annotated[T, ELSEWHERE]``, on a type with a language that its reader checks. Any other
-text there tells what is allowed, in place of words made from the type."""
 ANYTHING = Kind("anything", "anything", lambda _: True)
+"""By ``Annotated[T, ANYTHING]``, types with a language of their own, which its reader checks. A text
+there tells what is allowed, in place of words made from the type."""
 TEXT = Kind("a text", "names", lambda value: isinstance(value, str))
 TRUTH = Kind("True or False", "truth values", lambda value: isinstance(value, bool | np.bool_))
 NOTHING = Kind("None", "None", lambda value: value is None)
+
+
+def _holds_numbers(value: Any) -> bool:
+    try:
+        return np.asarray(value).dtype.kind in "iuf" and not isinstance(value, str)
+    except ValueError:  # rows of different lengths
+        return False
+
+
+NUMBERS = Kind("numbers, nan where there is none", "lists of numbers", _holds_numbers)
 
 
 def kind_of(annotation: Any, name: str) -> Kind:
@@ -168,7 +177,9 @@ def kind_of(annotation: Any, name: str) -> Kind:
     origin = get_origin(annotation)
     if origin is Annotated:
         plain, note, *_ = get_args(annotation)
-        kind = ANYTHING if note == ELSEWHERE else kind_of(plain, name)
+        if isinstance(note, Kind):
+            return note
+        kind = kind_of(plain, name)
         return replace(kind, words=note, several=note) if isinstance(note, str) else kind
     if origin in (Union, types.UnionType):
         return _either([kind_of(each, name) for each in get_args(annotation)])

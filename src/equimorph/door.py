@@ -168,7 +168,8 @@ class Entry:
         except (TypeError, ValueError, OverflowError):
             pass
         named = [{name: value}] if name not in self._kinds else _mappings(value) * kind.by_name
-        said = _refused_by_parameters(named, args)
+        owners = [each for key, each in zip(self._names, args, strict=False) if key in self._owning]
+        said = _refused_by_parameters(named, owners)
         said = said or f"`{name}` must be {kind.words}; got {kind.refused(value)}."
         raise InputError(f"{said}{self._remedy(name, value)}")
 

@@ -62,7 +62,7 @@ def position(parameters: Sequence[Parameter], name: str) -> int:
     if name not in names:
         raise InputError(
             f"`{name}` must be a parameter ({', '.join(names)}); got {name!r}."
-            f"{suggestion(name, names)}"
+            f"{suggestion(str(name), names)}"
         )
     return names.index(name)
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from equimorph.argument_kinds import NUMBERS
 from equimorph.arrays import Lanes, Parameters
 from equimorph.door import door
 from equimorph.errors import InputError
@@ -15,6 +16,7 @@ from equimorph.model import Descriptor
 from equimorph.structures import States, Structure
 
 Columns = Float[np.ndarray, "lanes columns"]
+Numbers = Annotated[ArrayLike, NUMBERS]
 
 STEP = 1e-3
 """Of differences along a direction of length one: fourth order, so that they err by 1e-12."""
@@ -50,8 +52,8 @@ class MeasuredValues:
     """
 
     descriptor: Descriptor
-    values: ArrayLike
-    sigma: ArrayLike | None = None
+    values: Numbers
+    sigma: Numbers | None = None
 
     def table(self, start: States) -> tuple[Columns, Columns | None]:
         """Measured numbers and standard deviations."""
@@ -84,9 +86,9 @@ class MeasuredShape:
         (states, points, 2).
     """
 
-    points: ArrayLike
+    points: Numbers
     s: Sequence[float] | None = None
-    sigma: ArrayLike | None = None
+    sigma: Numbers | None = None
 
     def table(self, start: States) -> tuple[Columns, Columns | None]:
         """Measured numbers and standard deviations."""
@@ -148,7 +150,7 @@ def _fitting(name: str, given: np.ndarray, shape: tuple[int, ...]) -> np.ndarray
     return numbers
 
 
-def _deviations(sigma: ArrayLike | None, shape: tuple[int, ...], axes: int) -> Columns | None:
+def _deviations(sigma: Numbers | None, shape: tuple[int, ...], axes: int) -> Columns | None:
     if sigma is None:
         return None
     given = np.asarray(sigma, float)

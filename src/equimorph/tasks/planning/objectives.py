@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.argument_kinds import ELSEWHERE
+from equimorph.argument_kinds import ANYTHING, short
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Rates, names_of
 from equimorph.structures import States, Structure, stability_margin
@@ -17,7 +17,7 @@ Values = Float[np.ndarray, " pairs"]
 Numbers = Int[np.ndarray, " pairs"]
 Name = Literal["length", "travel", "work", "clearance"]
 Term = Name | Rates
-Wish = Annotated[Term | Sequence[tuple[float, Term]], ELSEWHERE]
+Wish = Annotated[Term | Sequence[tuple[float, Term]], ANYTHING]
 
 NAMES: tuple[Name, ...] = get_args(Name)
 LEAST_MARGIN = 1e-6
@@ -122,7 +122,7 @@ def objective_of(wish: Wish, structure: Structure) -> Objective:
     InputError
         For an unknown name, a weight that is not positive, or rates of unknown parameters.
     """
-    single = isinstance(wish, str | Rates)
+    single = isinstance(wish, str | Rates) or not isinstance(wish, Sequence)
     terms = [(1.0, wish)] if single else list(wish)  # type: ignore[arg-type]
     checked: list[tuple[float, Term]] = []
     for entry in terms:
@@ -136,7 +136,7 @@ def objective_of(wish: Wish, structure: Structure) -> Objective:
                 )
         elif term not in NAMES:
             raise InputError(
-                f"`objective` must be made of {', '.join(NAMES)} or Rates; got {term!r}."
+                f"`objective` must be made of {', '.join(NAMES)} or Rates; got {short(term)}."
                 f"{suggestion(str(term), NAMES)}"
             )
         checked.append((weight, term))
@@ -147,7 +147,7 @@ def objective_of(wish: Wish, structure: Structure) -> Objective:
 
 def _pair(entry: object) -> tuple[float, Term]:
     if not (isinstance(entry, Sequence) and len(entry) == 2 and not isinstance(entry, str)):
-        raise InputError(f"`objective` must be a term or pairs (weight, term); got {entry!r}.")
+        raise InputError(f"`objective` must be a term or pairs (weight, term); got {short(entry)}.")
     weight, term = entry
     try:
         number = float(weight)
