@@ -18,6 +18,7 @@ import equimorph as em
 from equimorph.argument_kinds import NUMBERS
 from equimorph.door import Entry
 from equimorph.errors import InputError
+from oracles.specimens import arch_truss, toggle
 from typecheck import unchecked
 
 LEAST_CALLS = 3000
@@ -45,6 +46,8 @@ class Things:
         self.estimate = em.estimate_state(
             self.set, {spring.angle: 0.3, "F": 0.1}, {spring.angle: 0.1, "F": 0.1}
         )
+        self.truss = arch_truss("green")
+        self.frame = toggle()
         self.chart = em.Projection(em.manifold.part(self.set, self.set.cell_index == 0))
 
     def right(self, name: str, annotation: Any) -> Any:
@@ -66,8 +69,9 @@ class Things:
             "parameters": ["F", "x_l"], "names": ["x_l"], "actuators": ["x_l"],
             "at": {"F": 0.1, "x_l": 1.0}, "fixed": {}, "offsets": {"F": 0.01},
             "spreads": {"F": 0.01}, "tolerances": {"F": 0.01}, "to": {"F": 0.2},
-            "measured": {angle: 0.3, "F": 0.1}, "errors": {angle: 0.1, "F": 0.1}, "intervals": (3, 3),
-            "targets": {angle: 0.3}, "descriptors": [angle, self.spring.height],
+            "measured": {angle: 0.3, "F": 0.1}, "errors": {angle: 0.1, "F": 0.1},
+            "targets": {angle: 0.3}, "intervals": (3, 3),
+            "descriptors": [angle, self.spring.height],
             "chosen": [angle, self.spring.height], "via": [{"F": 0.1}], "loads": [{"F": 0.1}],
             "grid": em.Grid(x_l=(0.6, 1.3, 2), F=(-0.5, 0.5, 2)), "ends": (0.0, 0.2),
             "schedule": [{"F": 0.2}], "path": Path("nowhere.h5"), "text": "angle",
@@ -110,7 +114,26 @@ def flat(annotation: Any) -> list[Any]:
     return [annotation]
 
 
-ODD = (object(), 3 + 4j, b"bytes", np.array(["text"]), {1: 2}, [[None]], {"nothing": "text"})
+ODD = (object(), 3 + 4j, b"bytes", np.array([1j]), {1: 2}, [[None]], {"nothing": "text"})
+NONE = types.NoneType
+NOT_NUMBERS = (np.nan, "2", [2], {}, np.array([1.0, 2.0]))
+NEGATIVE = (-1.0, -1e-300)
+WHERE: Sequence[tuple[set[Any], set[Any], Sequence[Any]]] = (
+    (set(), {NONE, None}, (None,)),
+    (set(), {str, Path, Literal}, ("text", "", "0.5")),
+    (set(), {int, float, bool, Callable}, (0.5, 7, np.nan, True)),
+    (set(), {Callable}, (np.sin,)),
+    ({int, float}, {str}, NOT_NUMBERS),
+    ({int}, {str}, (-1, 2.5, -(10**9), np.inf)),
+    ({bool}, set(), (1, 0.0, "yes", np.nan, [True])),
+)
+"""Values that are wrong where one of some types is allowed, and none of others."""
+NAMED: Mapping[str, Sequence[Any]] = {
+    **dict.fromkeys(("margin", "accuracy", "tolerance", "most", "snap_price"), NEGATIVE),
+    **dict.fromkeys(("distance", "reach"), NEGATIVE),
+    **dict.fromkeys(("starts", "runs", "trials", "checks", "samples", "count"), (10**15, 10**400)),
+}
+UNBOUNDED = {"lower", "upper", "margin"}
 
 
 def wrong(name: str, annotation: Any, things: Things) -> Iterator[Any]:
@@ -122,39 +145,17 @@ def wrong(name: str, annotation: Any, things: Things) -> Iterator[Any]:
     yield from ODD
     if NUMBERS in bare:
         return
-    if not bare & {None, types.NoneType}:
-        yield None
-    if not bare & {str, Path, Literal}:
-        yield from ("text", "", "0.5")
-    if not bare & {int, float, bool} and Callable not in bare:
-        yield from (0.5, 7, np.nan, True)
-    if not bare & {Callable}:
-        yield np.sin
-    if not bare & {em.EquilibriumSet}:
-        yield things.set
-    if not bare & {em.State}:
-        yield things.state
-    if bare & {int, float} and str not in bare:
-        yield from (np.nan, "2", [2], {}, np.array([1.0, 2.0]), -np.nan)
-    if int in bare:
-        yield from (-1, 2.5, -(10**9), np.inf)
-        if name not in ("seed", "to"):
-            yield from (10**15, 10**400)
-    if float in bare and name not in ("bound", "lower", "upper", "margin"):
+    for some, but, values in WHERE:
+        if (not some or bare & some) and not bare & but:
+            yield from values
+    if float in bare and name not in UNBOUNDED:
         yield from (np.inf, -np.inf, 10**400)
-    if name in ("margin", "accuracy", "tolerance", "most", "snap_price", "distance", "reach"):
-        yield from (-1.0, -1e-300)
-    if bool in bare:
-        yield from (1, 0.0, "yes", np.nan, [True])
-    yield from wrong_collections(name, kinds, things)
-    other = {
-        em.State: things.other_state,
-        em.States: things.other_state.batch,
-        em.EquilibriumSet: things.other_set,
-        em.Descriptor: things.rod.max_curvature,
-        em.Constraint: things.rod.max_curvature <= 1.0,
-    }
-    yield from (OfAnother(other[kind]) for kind in kinds if kind in other)
+    yield from NAMED.get(name, ())
+    yield from (value for kind, value in ((em.EquilibriumSet, things.set), (em.State, things.state))
+                if kind not in bare)  # fmt: skip
+    yield from wrong_lists(kinds, things)
+    yield from wrong_mappings(name, kinds, things)
+    yield from of_another_structure(kinds, things)
 
 
 class OfAnother:
@@ -164,42 +165,57 @@ class OfAnother:
         self.value = value
 
 
-def wrong_collections(name: str, kinds: Sequence[Any], things: Things) -> Iterator[Any]:
-    """Lists and mappings with a wrong entry."""
+def wrong_lists(kinds: Sequence[Any], things: Things) -> Iterator[Any]:
+    """Lists with a wrong entry."""
+    angle = things.spring.angle
     for kind in kinds:
-        inner = get_args(kind)
         if get_origin(kind) is Sequence:
             yield from ([object()], [None], [1j], 3, [things.set])
-            if inner == (em.Constraint,):
-                angle = things.spring.angle
+            if get_args(kind) == (em.Constraint,):
                 yield from (angle <= 1.0, "angle <= 1", ["angle <= 1"], [angle])
-                yield OfAnother([things.rod.max_curvature <= 1.0])
-            if inner == (em.Descriptor,):
-                yield from (things.spring.angle, ["angle"])
-                yield OfAnother([things.rod.max_curvature])
-        if get_origin(kind) is Mapping and float in flat(inner[1]):
-            key = things.spring.angle if em.Descriptor in flat(inner[0]) else "F"
-            for value in ("0.5", 1j, np.nan, np.inf, None, [0.1], object()):
-                if value is not None or name not in ("to", "targets"):
-                    yield {key: value}
+            if get_args(kind) == (em.Descriptor,):
+                yield from (angle, ["angle"])
+
+
+def wrong_mappings(name: str, kinds: Sequence[Any], things: Things) -> Iterator[Any]:
+    """Mappings with a wrong key or value."""
+    for kind in kinds:
+        keys, values = get_args(kind) if get_origin(kind) is Mapping else (None, None)
+        if float in flat(values):
+            key = things.spring.angle if em.Descriptor in flat(keys) else "F"
+            yield from ({key: value} for value in ("0.5", 1j, np.nan, np.inf, [0.1], object()))
             yield from ([("F", 0.1)], {things.state: 0.1})
-            if name not in ("limits", "nominal"):
-                yield {"no such name": 0.1}
+            yield from [{"no such name": 0.1}] if name not in ("limits", "nominal") else []
+
+
+def of_another_structure(kinds: Sequence[Any], things: Things) -> Iterator[OfAnother]:
+    """Right values of another structure."""
+    other = {
+        em.State: things.other_state,
+        em.States: things.other_state.batch,
+        em.EquilibriumSet: things.other_set,
+        em.Descriptor: things.rod.max_curvature,
+        em.Constraint: things.rod.max_curvature <= 1.0,
+    }
+    yield from (OfAnother(other[kind]) for kind in kinds if kind in other)
+    lists = (get_args(kind)[0] for kind in kinds if get_origin(kind) is Sequence)
+    yield from (
+        OfAnother([other[kind]]) for kind in lists if isinstance(kind, type) and kind in other
+    )
 
 
 def public_functions(things: Things) -> Iterator[tuple[str, Callable[..., Any]]]:
     """Functions, classes and methods that users call."""
     layers = ("charts", "equilibria", "manifold", "model", "structures", "tasks", "storage")
     for layer in (*layers, "plotting"):
-        module = getattr(em, layer)
-        for name in module.__all__:
-            thing = getattr(module, name)
-            if inspect.isfunction(thing) and is_checked(thing) and name not in LEFT_OUT:
+        for name in getattr(em, layer).__all__:
+            thing = getattr(getattr(em, layer), name)
+            called = thing.__init__ if inspect.isclass(thing) else thing
+            if is_checked(called) and name not in LEFT_OUT:
                 yield f"{layer}.{name}", thing
-            elif inspect.isclass(thing) and is_checked(thing.__init__):
-                yield f"{layer}.{name}", thing
-    for owner in (things.set, things.chart, things.map, things.state, things.path.states,
-                  em.components(things.set), things.spring, things.rod):  # fmt: skip
+    pieces = em.components(things.set)
+    for owner in (things.set, things.chart, things.map, things.state, things.path.states, pieces,
+                  things.spring, things.rod, things.truss, things.frame):  # fmt: skip
         for name, method in inspect.getmembers(owner, inspect.ismethod):
             if is_checked(method) and name != "__init__":
                 yield f"{type(owner).__name__}.{name}", method
@@ -265,8 +281,9 @@ def things():
     return Things()
 
 
-def test_every_single_fault_is_refused_in_one_line(things):
+def test_every_single_fault_is_refused_in_one_line(things, tmp_path, monkeypatch):
     """No raw error, nothing wrong is accepted silently."""
+    monkeypatch.chdir(tmp_path)
     leaks, calls = [], 0
     for label, function in public_functions(things):
         for name, value, arguments in single_faults(things, function):
@@ -274,5 +291,6 @@ def test_every_single_fault_is_refused_in_one_line(things):
             outcome = call(function, arguments)
             if outcome:
                 leaks.append(f"{label}({name}={value!r:.60}): {outcome:.120}")
+    assert list(tmp_path.iterdir()) == []
     assert not leaks, f"{len(leaks)} of {calls}:\n" + "\n".join(leaks[:100])
     assert calls >= LEAST_CALLS

@@ -59,7 +59,7 @@ RANGES: Mapping[str, Range] = {
         ("tolerances", "spreads", "offsets", "could_measure", "sizes", "limits", "errors"), POSITIVE
     ),
     **dict.fromkeys(("first_step", "largest_step", "smallest_step", "turning"), POSITIVE),
-    **dict.fromkeys(("bound", "lower", "upper"), EXTENDED),
+    **dict.fromkeys(("lower", "upper"), EXTENDED),
     "margin": NOT_NEGATIVE,
     "radius": Range(0.0, LARGEST, "a finite number >= 0", "finite numbers >= 0"),
     "intervals": _count(2, np.inf),
@@ -155,8 +155,8 @@ def is_number(value: Any) -> bool:
 
 
 ANYTHING = Kind("anything", "anything", lambda _: True)
-"""By ``Annotated[T, ANYTHING]``, types with a language of their own, which its reader checks. A text
-there tells what is allowed, in place of words made from the type."""
+"""By ``Annotated[T, ANYTHING]``, types with a language of their own, which its reader checks. A
+text there tells what is allowed, in place of words made from the type."""
 TEXT = Kind("a text", "names", lambda value: isinstance(value, str))
 TRUTH = Kind("True or False", "truth values", lambda value: isinstance(value, bool | np.bool_))
 NOTHING = Kind("None", "None", lambda value: value is None)

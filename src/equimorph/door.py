@@ -181,8 +181,7 @@ class Entry:
 
     def _check_structures(self, given: Mapping[str, Any]) -> None:
         """Refuse arguments that belong to another structure than the first that belongs to one."""
-        homes = [(name, structure_of(given.get(name))) for name in self._owning]
-        homes = [(name, home) for name, home in homes if home is not None]
+        homes = [(name, home) for name in self._owning for home in structures_in(given.get(name))]
         if not homes:
             return
         first, home = homes[0]
@@ -208,9 +207,17 @@ KEYWORD = inspect.Parameter.KEYWORD_ONLY
 def structure_of(value: Any) -> Any:
     """Structure to which an object belongs; None if it belongs to none."""
     for base in type(value).__mro__:
-        if base.__name__ in OWNERS:
+        if base.__name__ in OWNERS and base.__module__.startswith("equimorph."):
             return OWNERS[base.__name__](value)
     return None
+
+
+def structures_in(value: Any) -> Iterator[Any]:
+    """Structures to which an argument belongs: an object, or the entries of a list."""
+    for each in value if isinstance(value, list | tuple) else [value]:
+        structure = structure_of(each)
+        if structure is not None:
+            yield structure
 
 
 def descriptors_in(value: Any) -> Iterator[Any]:

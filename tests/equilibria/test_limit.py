@@ -61,7 +61,12 @@ def test_limit_is_the_largest_load_met_when_the_path_cannot_go_on(arch):
 
 def test_bound_below_the_present_load_is_refused(arch):
     rest = arch.natural_state(Theta=0.9)
-    for bound, allowed in ((0.0, "exceed q = 0"), (-1.0, "exceed q = 0"), (np.nan, "be a number")):
+    for bound, allowed in (
+        (0.0, "exceed q = 0"),
+        (-1.0, "exceed q = 0"),
+        (np.inf, "be a finite number"),
+        (np.nan, "be a finite number"),
+    ):
         with pytest.raises(InputError, match=f"`bound` must {allowed}; got {bound}"):
             em.limit_load(rest, "q", bound=bound)
 

@@ -131,7 +131,7 @@ def test_meaningless_obstacles_are_refused():
         em.HalfPlane((0, 0), (0, 0))
     with pytest.raises(InputError, match="`radius` must be a finite number"):
         em.Disc((0, 0), -1.0)
-    with pytest.raises(InputError, match="`centre` must be two finite numbers"):
+    with pytest.raises(InputError, match="`centre` must be 2 finite numbers"):
         em.Disc((0, np.nan), 1.0)
     with pytest.raises(InputError, match="must be a parameter"):
         em.effort_of(ARCH, "theta")

@@ -121,7 +121,7 @@ def test_heights_out_of_reach_end_with_a_class_and_a_place(middle):
         ({ANGLE: 0.4, "x_l": 0.9}, ["x_l"], "leave the actuator x_l free; got 0.9"),
         ({ANGLE: 0.4}, {"x_l": (1.0, 0.5)}, "limits in order"),
         ({ANGLE: 0.4}, ["y"], "`y` must be a parameter"),
-        ([0.4], ["x_l"], "must be values by name, a `Spline` or a function of t"),
+        ([0.4], ["x_l"], "must be finite values by name, a `Spline` or a function of t"),
     ],
 )
 def test_bad_questions_are_refused(start, targets, actuators, words):

@@ -25,7 +25,7 @@ Waypoint = Mapping[Any, Value]
 """Values by the names of parameters, and by descriptors."""
 Leg = Annotated[
     Waypoint | Callable[[float], Waypoint],
-    "values by name, a `Spline` or a function of t from 0 to 1",
+    "finite values by name, a `Spline` or a function of t from 0 to 1",
 ]
 
 AT_START = 1e-8

@@ -31,6 +31,7 @@ class Parameter:
     lower: float = -np.inf
     upper: float = np.inf
 
+    @door
     def check(self, value: float) -> float:
         """Return `value` as a float, or raise `InputError` if it has no meaning."""
         try:

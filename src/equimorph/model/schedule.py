@@ -11,6 +11,7 @@ from equimorph.door import door
 from equimorph.errors import InputError
 
 
+@door
 @dataclass(frozen=True)
 class Schedule:
     """All parameters of a structure, step by step along a verified route.
@@ -75,6 +76,7 @@ class Rates:
             if not (np.isfinite(limit) and limit > 0.0):
                 raise InputError(f"`limits` must be positive; got {name}: {limit!r}.")
 
+    @door
     def durations(
         self, names: tuple[str, ...], values: Float[np.ndarray, "steps parameters"]
     ) -> Float[np.ndarray, " pieces"]:

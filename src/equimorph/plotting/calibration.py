@@ -7,6 +7,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.labels import with_unit
@@ -25,6 +26,7 @@ _LOOKS: tuple[tuple[str, str, dict[str, Any]], ...] = (
 )
 
 
+@door
 def calibration(found: Calibration, measured: MeasuredShape, ax: Axes | None = None) -> Axes:
     """Shapes at the fitted unknowns under the measured points; below, the residuals.
 

@@ -15,6 +15,7 @@ from PIL import Image
 
 from equimorph.arrays import Values
 from equimorph.charts.regions import count_regions
+from equimorph.door import door
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -46,6 +47,7 @@ _HUNDREDTHS = 10
 """Milliseconds in a hundredth of a second, the unit of time in GIF files."""
 
 
+@door
 def film(
     route: Route,
     path: str | FilePath,

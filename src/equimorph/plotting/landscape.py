@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
+from equimorph.door import door
 from equimorph.manifold.geometry.topology import chains
 from equimorph.model import Descriptor
 from equimorph.plotting import style
@@ -27,6 +28,7 @@ _LOOKS: dict[str, dict[str, Any]] = {
 _LABELS = {"stability": "barrier: stability", "preference": "barrier: preference"}
 
 
+@door
 def landscape(
     structure: Structure, found: Landscape, objective: Descriptor, ax: Axes | None = None
 ) -> Axes:

@@ -17,6 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
+from equimorph.door import door
 from equimorph.plotting import style
 from equimorph.plotting.labels import (
     constraint_label,
@@ -246,6 +247,7 @@ _LOOKS = {
 }
 
 
+@door
 def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
     """Limit loads over two actuators, with the curves on which they jump or bend.
 
@@ -285,6 +287,7 @@ _CURVATURE_LOOKS = {
 }
 
 
+@door
 def curvature_map(cmap: CurvatureMap, ax: Axes | None = None) -> Axes:
     """Largest curvature, or another descriptor, of the first stable state at a load.
 

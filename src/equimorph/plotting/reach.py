@@ -14,6 +14,7 @@ from matplotlib.path import Path as Outline
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 
 from equimorph.charts.regions import count_regions
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, number_way_points, parameter_label
@@ -41,6 +42,7 @@ chords."""
 Line = Float[np.ndarray, "_ 2"]
 
 
+@door
 def reach_plane(
     reach: Reach,
     motion: Tracking | None = None,
@@ -99,6 +101,7 @@ def reach_plane(
     return ax
 
 
+@door
 def reach_parameters(reach: Reach, motion: Tracking | None = None, ax: Axes | None = None) -> Axes:
     """Region of the start in the plane of two parameters, with its boundary by kinds.
 
@@ -144,6 +147,7 @@ def reach_parameters(reach: Reach, motion: Tracking | None = None, ax: Axes | No
     return ax
 
 
+@door
 def reach_panels(reach: Reach, motion: Tracking) -> Figure:
     """Reachable set and a motion in it: image, set, parameter plane and shapes.
 

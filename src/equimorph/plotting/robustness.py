@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse, Patch, Rectangle
 
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.plotting import style
@@ -24,6 +25,7 @@ _ENDS = ("x", "+", "1", "2", "3", "4")
 _BOX: dict[str, Any] = {"fill": False, "ec": style.ROUTE_COLOUR, "lw": 1.4, "zorder": 6}
 
 
+@door
 def sensitivities(structure: Structure, found: Sensitivity, ax: Axes | None = None) -> Axes:
     """Change of each descriptor with each parameter, for one scale of the parameter.
 
@@ -79,6 +81,7 @@ def _knows(structure: Structure, name: str) -> bool:
     return True
 
 
+@door
 def imperfection_laws(
     structure: Structure, laws: Mapping[str, ImperfectionLaw], load: str, ax: Axes | None = None
 ) -> Axes:
@@ -125,6 +128,7 @@ def imperfection_laws(
     return ax
 
 
+@door
 def room(
     state: State, found: Room, eset: EquilibriumSet | None = None, ax: Axes | None = None
 ) -> Axes:
@@ -184,6 +188,7 @@ def room(
     return ax
 
 
+@door
 def trials(structure: Structure, found: Trials, ax: Axes | None = None) -> Axes:
     """Random trials by their first two offsets, or by one offset and where they ended.
 

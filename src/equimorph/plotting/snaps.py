@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from equimorph.charts.regions import count_regions
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import Snap, SnapGraph
 from equimorph.model import Descriptor
@@ -31,6 +32,7 @@ _LOOKS = {
 _MARK: dict[str, Any] = {"zorder": 5, "linewidths": 0.5, "edgecolors": style.INK, "s": 16}
 
 
+@door
 def snap_panels(graph: SnapGraph, descriptor: Descriptor | None = None) -> Figure:
     """Stability boundary of a set with the energy that snaps free, and where they land.
 

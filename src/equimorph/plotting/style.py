@@ -21,6 +21,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
+from equimorph.door import door
+
 MILLIMETRE = 1 / 25.4
 """In inches."""
 SINGLE_COLUMN = 89 * MILLIMETRE
@@ -81,6 +83,7 @@ _SETTINGS: dict[str, Any] = {
 }
 
 
+@door
 @contextmanager
 def house_style(changes: Mapping[str, Any] | None = None) -> Generator[None]:
     """Apply the settings of the house, with `changes`, inside a ``with`` block and only there."""
@@ -164,6 +167,7 @@ def count_shades(largest: int) -> list[tuple[float, float, float, float]]:
     return [shades(k / max(largest, 1)) for k in range(largest + 1)]
 
 
+@door
 def save(
     drawing: Axes | Figure,
     folder: str | FilePath,

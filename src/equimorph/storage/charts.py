@@ -15,6 +15,7 @@ from equimorph.charts import (
     Reduction,
     rule_from,
 )
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.storage.hdf import get, get_json, open_file, put, put_json, write
 from equimorph.storage.owner import Owner
@@ -29,6 +30,7 @@ ABOUT, STRUCTURE, CHART = "about", "structure", "chart"
 SET, WHOLE, BARRIERS = "set", "whole", "barriers"
 
 
+@door
 def save_chart(path: str | Path, chart: Chart | Atlas) -> Path:
     """Write a chart or an atlas, with the set that it parameterises, barriers and cuts.
 
@@ -53,6 +55,7 @@ def save_chart(path: str | Path, chart: Chart | Atlas) -> Path:
     return write(Path(path), FORMAT, VERSION, fill)
 
 
+@door
 def load_chart(path: str | Path) -> Chart | Atlas:
     """Read what `save_chart` wrote.
 

@@ -14,6 +14,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Findings
 from equimorph.storage.files import checksum
@@ -23,6 +24,7 @@ LENGTH, DIGEST = 16, 64
 """Hexadecimal digits before each entry: of its length, and of its checksum."""
 
 
+@door
 @contextmanager
 def open_journal(path: Path | str, *, replace: bool = False) -> Generator["JournalFile"]:
     """Open a journal while the block lasts; its file is made when it is first written to.

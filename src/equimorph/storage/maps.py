@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.door import door
 from equimorph.model import Grid
 from equimorph.storage.files import write_text
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json
@@ -118,6 +119,7 @@ def _split(group: h5py.Group, name: str, ends: Int[np.ndarray, " curves"]) -> li
     return np.split(get(group, f"curve_{name}"), ends[:-1])
 
 
+@door
 def write_map(amap: ActuatorMap, path: str | Path) -> tuple[Path, Path]:
     """Write the values of a map, setting by setting, and its curves, point by point.
 

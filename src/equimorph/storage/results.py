@@ -14,6 +14,7 @@ from typing import Any
 
 import h5py
 
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
@@ -59,6 +60,7 @@ class Results:
     unreadable: dict[str, str] = field(default_factory=dict)
 
 
+@door
 def write_results(
     path: str | Path,
     eset: EquilibriumSet | None,
@@ -118,6 +120,7 @@ def write_results(
     return write(Path(path), FORMAT, VERSION, fill)
 
 
+@door
 def append_results(
     path: str | Path,
     *,
@@ -159,6 +162,7 @@ def append_results(
     return extend(path, FORMAT, VERSION, fill)
 
 
+@door
 def save_set(path: str | Path, eset: EquilibriumSet, height: Descriptor | None = None) -> Path:
     """Write an equilibrium set alone; see `write_results`.
 
@@ -180,6 +184,7 @@ def save_set(path: str | Path, eset: EquilibriumSet, height: Descriptor | None =
     return write_results(path, eset, height or eset.structure.elevation)
 
 
+@door
 def load_set(path: str | Path) -> EquilibriumSet:
     """Read the equilibrium set of a results file.
 
@@ -211,6 +216,7 @@ def _add(
         write_record(file.create_group(f"{MAPS}/{name}"), amap)
 
 
+@door
 def read_results(path: str | Path) -> Results:
     """Read what `write_results` wrote.
 

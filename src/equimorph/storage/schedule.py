@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.storage.files import read_text, write_text
@@ -26,6 +27,7 @@ VERSION = 1
 PROGRESS, MARGIN = "progress", "stability_margin"
 
 
+@door
 def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, Path]:
     """Write a schedule to `path` (CSV) and to its sidecar with the suffix ``.json``.
 
@@ -58,6 +60,7 @@ def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, Path]:
     return table_path, sidecar_path
 
 
+@door
 def read_schedule(path: str | Path) -> Schedule:
     """Read a schedule from its table and sidecar.
 

@@ -199,6 +199,7 @@ class Spring(Structure):
         """F = 0."""
         return {"F": 0.0}
 
+    @door
     def natural_state(self, **values: float) -> State:
         """Unloaded state with B above A."""
         p = self.natural_parameters(values)

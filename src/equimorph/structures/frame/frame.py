@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Drawing, Parameter
 from equimorph.structures.contract import Symmetry
@@ -215,22 +216,27 @@ class Frame(FrameFields):
 
     # --- descriptors ----------------------------------------------------------------------------
 
+    @door
     def displacement(self, joint: str, axis: str) -> Descriptor:
         """Move of a joint along x or y, from where it is drawn."""
         return descriptors.displacement(self, joint, axis)
 
+    @door
     def rotation(self, where: str, joint: str | None = None) -> Descriptor:
         """Turn of a joint, or of the end of a member there, in radians."""
         return descriptors.rotation(self, where, joint)
 
+    @door
     def axial(self, member: str, joint: str) -> Descriptor:
         """Axial force in a member at a joint, positive in tension."""
         return descriptors.end_force(self, "axial", member, joint)
 
+    @door
     def shear(self, member: str, joint: str) -> Descriptor:
         """Shear force in a member at a joint, to the left of the way from its start to its end."""
         return descriptors.end_force(self, "shear", member, joint)
 
+    @door
     def moment(self, member: str, joint: str) -> Descriptor:
         """Bending moment in a member at a joint, positive where it bends to its left."""
         return descriptors.moment(self, member, joint)
@@ -240,10 +246,12 @@ class Frame(FrameFields):
         """Largest |κ| in all members."""
         return descriptors.max_curvature(self)
 
+    @door
     def reaction(self, joint: str, axis: str) -> Descriptor:
         """Force (axis "x" or "y"), or couple ("angle"), of a support on its joint."""
         return descriptors.reaction(self, joint, axis)
 
+    @door
     def travel(self, load: str) -> Descriptor:
         """Displacement along a load, work per unit of its parameter."""
         return descriptors.travel(self, load)

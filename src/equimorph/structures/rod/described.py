@@ -4,6 +4,7 @@ from abc import abstractmethod
 from functools import cached_property
 from typing import Any
 
+from equimorph.door import door
 from equimorph.model import Descriptor
 from equimorph.structures.rod import descriptors, validity
 from equimorph.structures.rod.ends import End
@@ -25,18 +26,22 @@ class Described(Measured):
     def general_mechanics(self) -> GeneralMechanics:
         """The rod as a general one: in its parameters, and further ones that are zero."""
 
+    @door
     def height(self, s: float) -> Descriptor:
         """y(s), in units of L."""
         return descriptors.coordinate(self, s, 1)
 
+    @door
     def position(self, s: float) -> tuple[Descriptor, Descriptor]:
         """(x(s), y(s)), in units of L."""
         return descriptors.coordinate(self, s, 0), descriptors.coordinate(self, s, 1)
 
+    @door
     def angle(self, s: float) -> Descriptor:
         """θ(s) in radians."""
         return descriptors.angle(self, s)
 
+    @door
     def curvature(self, s: float) -> Descriptor:
         """κ(s) in units of 1/L."""
         return descriptors.curvature(self, s)
@@ -51,10 +56,12 @@ class Described(Measured):
         """Potential energy E, in units of 4π²B/L."""
         return descriptors.total_energy(self)
 
+    @door
     def support_force(self, component: str) -> Descriptor:
         """Force of the support at A on the rod: "lambda" (horizontal) or "mu" (vertical)."""
         return descriptors.support_force(self, component)
 
+    @door
     def end_moment(self, end: int) -> Descriptor:
         """Couple of the actuator at end 0 or 1: ∂L/∂θ(end), in units of 4π²B/L."""
         return descriptors.end_moment(self, end)
@@ -64,6 +71,7 @@ class Described(Measured):
         """y(½)."""
         return self.height(0.5)
 
+    @door
     def clearance(self, apart: float = 0.1) -> Descriptor:
         """Smallest distance between points whose arclengths differ by `apart` at least.
 
@@ -71,6 +79,7 @@ class Described(Measured):
         """
         return validity.clearance(self, apart)
 
+    @door
     def lateral_margin(self, torsion: Any, lateral: Any) -> Descriptor:
         """Smallest eigenvalue of the second variation for movements out of the plane.
 
@@ -80,6 +89,7 @@ class Described(Measured):
         stiffness = validity.LateralStiffness(torsion, lateral)
         return validity.lateral(self, self.general_mechanics, self.ends, stiffness)
 
+    @door
     def warnings(
         self, state: State, thickness: float = 0.0, torsion: Any = None, lateral: Any = None
     ) -> tuple[str, ...]:

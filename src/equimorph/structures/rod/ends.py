@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from equimorph.door import door
 from equimorph.errors import InputError
 
 Holding = str | float
@@ -18,6 +19,7 @@ WORDS: dict[str, tuple[Holding, Holding, Holding]] = {
 }
 
 
+@door
 @dataclass(frozen=True)
 class End:
     """Support of one end of a rod: what happens to its angle and its two coordinates.

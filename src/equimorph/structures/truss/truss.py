@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters
+from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
@@ -211,10 +212,12 @@ class Truss(TrussMechanics):
     def _symmetries(self) -> tuple[Symmetry, ...]:
         return symmetries(self)
 
+    @door
     def force(self, bar: str) -> Descriptor:
         """Force in a bar, positive in tension."""
         return descriptors.force(self, bar)
 
+    @door
     def utilisation(self, bar: str) -> Descriptor:
         """Compression of a bar over its Euler load π² EI/l₀²."""
         return descriptors.utilisation(self, bar)
@@ -224,10 +227,12 @@ class Truss(TrussMechanics):
         """Largest utilisation of the bars that have a bending stiffness."""
         return descriptors.max_utilisation(self)
 
+    @door
     def displacement(self, joint: str, axis: str) -> Descriptor:
         """Displacement of a joint along an axis, from where it is drawn."""
         return descriptors.displacement(self, joint, axis)
 
+    @door
     def travel(self, load: str) -> Descriptor:
         """Displacement along a load, work per unit of its parameter."""
         return descriptors.travel(self, load)
