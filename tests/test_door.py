@@ -223,8 +223,12 @@ def public_functions(things: Things) -> Iterator[tuple[str, Callable[..., Any]]]
 
 def is_checked(function: Any) -> bool:
     """Whether a function stands behind the door."""
-    cells = getattr(function, "__closure__", None) or ()
-    return any(isinstance(cell.cell_contents, Entry) for cell in cells)
+    while function is not None:
+        cells = getattr(function, "__closure__", None) or ()
+        if any(isinstance(cell.cell_contents, Entry) for cell in cells):
+            return True
+        function = getattr(function, "__wrapped__", None)
+    return False
 
 
 def single_faults(
@@ -281,6 +285,7 @@ def things():
     return Things()
 
 
+@pytest.mark.slow
 def test_every_single_fault_is_refused_in_one_line(things, tmp_path, monkeypatch):
     """No raw error, nothing wrong is accepted silently."""
     monkeypatch.chdir(tmp_path)
@@ -294,3 +299,40 @@ def test_every_single_fault_is_refused_in_one_line(things, tmp_path, monkeypatch
     assert list(tmp_path.iterdir()) == []
     assert not leaks, f"{len(leaks)} of {calls}:\n" + "\n".join(leaks[:100])
     assert calls >= LEAST_CALLS
+
+
+def test_the_schedule_of_a_refused_route_is_named():
+    with unchecked(), pytest.raises(InputError, match="A refused route has no schedule") as refused:
+        em.verify(None)
+    assert str(refused.value).startswith("`schedule` must be a schedule")
+
+
+def test_what_belongs_to_another_structure_is_refused():
+    """States and descriptors of equal structures are those of the same, whenever made."""
+    rod, spring = em.Rod(), em.Spring()
+    state = spring.natural_state(x_l=1.2)
+    with pytest.raises(InputError, match=r"`within` must describe the structure Spring"):
+        em.lift(state, {"F": 0.1}, within=[rod.max_curvature <= 1.0])
+    with pytest.raises(InputError, match=r"`structure` must be of the same structure as `start`"):
+        em.verify([{"F": 0.1}], state, structure=rod)
+    assert em.lift(state, {"F": 0.1}, within=[em.Spring().angle <= 9.0]).arrived
+
+
+@pytest.mark.parametrize("value", [1, np.float32(0.5), np.int64(2), np.array(0.5)])
+def test_real_numbers_of_all_types_are_numbers(value):
+    """Zero-dimensional arrays become numbers."""
+    assert em.lift(em.Spring().natural_state(x_l=1.2), {"F": 0.1 * value}).arrived
+    assert em.TraceOptions(largest_step=value).largest_step == value
+
+
+def test_lists_are_taken_where_arrays_are_asked_for():
+    state = em.Spring().natural_state(x_l=1.2)
+    with unchecked():
+        np.testing.assert_array_equal(state.shape([0.0, 1.0]), state.shape(np.array([0.0, 1.0])))
+
+
+def test_arguments_are_refused_under_the_name_of_their_parameter():
+    """A parameter says what it allows in its own words, at the door as elsewhere."""
+    said = r"^`k` must be a finite number greater than 0; got 'stiff'\.$"
+    with unchecked(), pytest.raises(InputError, match=said):
+        em.find_equilibria(em.Spring(), {"F": 0.1, "k": "stiff"})

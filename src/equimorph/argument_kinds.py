@@ -36,9 +36,9 @@ class Range:
 
     def holds(self, value: Any) -> bool:
         """Whether a real number is in the range; not a number is in none."""
-        return bool(self.least < value if self.above else self.least <= value) and bool(
-            value <= self.most
-        )
+        number = value.item() if isinstance(value, np.generic) else value
+        above = self.least < number if self.above else self.least <= number
+        return bool(above and number <= self.most)
 
 
 FINITE = Range(-LARGEST, LARGEST, "a finite number", "finite numbers")
@@ -67,8 +67,8 @@ RANGES: Mapping[str, Range] = {
     "seed": WHOLE,
     "checks": _count(0),
     "retries": _count(0, 20),
-    "samples": _count(2),
-    **dict.fromkeys(("starts", "runs", "trials", "batch", "frames", "fps"), _count(1)),
+    **dict.fromkeys(("samples", "frames"), _count(2)),
+    **dict.fromkeys(("starts", "runs", "trials", "batch", "fps"), _count(1)),
     "count": _count(1, 10_000),
     "lifts": _count(1, 100 * MANY),
     "steps": _count(1, 1000 * MANY),
@@ -152,6 +152,20 @@ def is_number(value: Any) -> bool:
     """Whether a value is a real number: no text, no truth value, no complex number."""
     kind = type(value)
     return kind is float or (kind is not bool and isinstance(value, Real))
+
+
+def is_listed(value: Any) -> bool:
+    """Whether a value is a list, a tuple or an array, no text."""
+    if type(value) in (tuple, list):
+        return True
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
+
+
+def is_mapping(value: Any) -> bool:
+    """Whether a value is a mapping."""
+    return type(value) is dict or isinstance(value, Mapping)
 
 
 ANYTHING = Kind("anything", "anything", lambda _: True)
@@ -280,18 +294,13 @@ def _sequence(annotation: Any, name: str) -> Kind:
     fixed = len(arguments) if get_origin(annotation) is tuple and ... not in arguments else None
     entry = kind_of(arguments[0], name) if arguments else ANYTHING
 
-    def listed(value: Any) -> bool:
-        return (isinstance(value, Sequence) and not isinstance(value, str | bytes)) or (
-            isinstance(value, np.ndarray) and value.ndim > 0
-        )
-
     def fits(value: Any) -> bool:
-        if not listed(value) or (fixed is not None and len(value) != fixed):
+        if not is_listed(value) or (fixed is not None and len(value) != fixed):
             return False
         return all(map(entry.fits, value))
 
     def culprit(value: Any) -> str:
-        wrong = (each for each in value if not entry.fits(each)) if listed(value) else iter(())
+        wrong = (each for each in value if not entry.fits(each)) if is_listed(value) else iter(())
         return next(map(entry.refused, wrong), short(value))
 
     number = "a list of" if fixed is None else f"{fixed}"
@@ -313,7 +322,7 @@ def _mapping(annotation: Any, name: str) -> Kind:
 
     def fits(value: Any) -> bool:
         return (
-            isinstance(value, Mapping)
+            is_mapping(value)
             and all(map(keys.fits, value))
             and all(map(values.fits, value.values()))
         )

@@ -8,14 +8,22 @@ is checked by its parameters, see `model.parameter`.
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property, wraps
+from functools import cache, cached_property, wraps
 from operator import attrgetter
 from types import NoneType
 from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 
-from equimorph.argument_kinds import ANYTHING, Kind, converted, kind_of, short
+from equimorph.argument_kinds import (
+    ANYTHING,
+    Kind,
+    converted,
+    is_listed,
+    is_mapping,
+    kind_of,
+    short,
+)
 from equimorph.errors import InputError
 
 Thing = TypeVar("Thing", bound=Callable[..., Any])
@@ -206,15 +214,20 @@ KEYWORD = inspect.Parameter.KEYWORD_ONLY
 
 def structure_of(value: Any) -> Any:
     """Structure to which an object belongs; None if it belongs to none."""
-    for base in type(value).__mro__:
-        if base.__name__ in OWNERS and base.__module__.startswith("equimorph."):
-            return OWNERS[base.__name__](value)
-    return None
+    find = _finder(type(value))
+    return None if find is None else find(value)
+
+
+@cache
+def _finder(kind: type) -> Callable[[Any], Any] | None:
+    """How the structure of objects of a type is found."""
+    ours = (each for each in kind.__mro__ if each.__module__.startswith("equimorph."))
+    return next((OWNERS[each.__name__] for each in ours if each.__name__ in OWNERS), None)
 
 
 def structures_in(value: Any) -> Iterator[Any]:
     """Structures to which an argument belongs: an object, or the entries of a list."""
-    for each in value if isinstance(value, list | tuple) else [value]:
+    for each in value if type(value) in (list, tuple) else (value,):
         structure = structure_of(each)
         if structure is not None:
             yield structure
@@ -222,13 +235,12 @@ def structures_in(value: Any) -> Iterator[Any]:
 
 def descriptors_in(value: Any) -> Iterator[Any]:
     """Descriptors in an argument: alone, in constraints, in lists or as keys."""
-    if type(value).__name__ == "Descriptor":
-        yield value
-    elif type(value).__name__ == "Constraint":
-        yield value.descriptor
-    elif isinstance(value, Mapping | Sequence) and not isinstance(value, str):
-        for each in value:
-            yield from descriptors_in(each) if not isinstance(each, str) else ()
+    for each in value if is_mapping(value) or is_listed(value) else (value,):
+        name = type(each).__name__
+        if name == "Constraint":
+            yield each.descriptor
+        elif name == "Descriptor":
+            yield each
 
 
 def _mappings(value: Any) -> list[Mapping[Any, Any]]:

@@ -106,10 +106,10 @@ def test_wrong_measurements_are_refused(spring_set):
         locate(spring_set, {Rod().height(0.5): 0.1, "F": 0.0})
     with (
         unchecked(),
-        pytest.raises(InputError, match="must be finite numbers by descriptor.*got F = 'none'"),
+        pytest.raises(InputError, match="got F = 'none'"),
     ):
         locate(spring_set, {spring.angle: 0.1, "F": "none"})
-    with pytest.raises(InputError, match=r"`errors` must be positive.*got F: 0"):
+    with pytest.raises(InputError, match=r"`errors` must be positive.*got F = 0"):
         locate(spring_set, {spring.angle: 0.1, "F": 0.0}, errors={"F": 0.0})
     with pytest.raises(InputError, match=r"shape \(5, 2\)"):
         locate(spring_set, np.zeros((5, 2)))

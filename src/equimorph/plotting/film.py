@@ -17,7 +17,6 @@ from equimorph.arrays import Values
 from equimorph.charts.regions import count_regions
 from equimorph.door import door
 from equimorph.equilibria import Path
-from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import position
 from equimorph.plotting import style
@@ -82,10 +81,6 @@ def film(
     InputError
         If the route has no path, or `frames` or `fps` is too small.
     """
-    if frames < 2 or fps < 1:
-        raise InputError(
-            f"`frames` must be at least 2 and `fps` at least 1; got {frames!r} and {fps!r}."
-        )
     states = states_along(path_of(route), frames)
     with style.house_style(_LARGER):
         stage = _set_stage(states, route, eset)

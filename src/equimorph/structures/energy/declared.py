@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Parameter
 from equimorph.structures.energy.expressions import CONSTANTS, FUNCTIONS, expression, written
@@ -16,7 +15,6 @@ from equimorph.structures.energy.tape import casadi, rough_operations
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
-@door
 @dataclass(frozen=True)
 class Unknown:
     """One unknown of an energy.

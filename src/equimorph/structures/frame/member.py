@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.structures.unit_system import Quantity, UnitSystem, check_positive
 
@@ -22,7 +21,6 @@ SLENDER = 0.5
 """Largest radius of gyration √(EI/EA) of a member, relative to its length."""
 
 
-@door
 @dataclass(frozen=True)
 class Member:
     """An elastic rod between two joints, straight or a circular arc where it is free of stress.

@@ -7,7 +7,6 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.structures.unit_system import Quantity, UnitSystem, check_positive
 
@@ -15,7 +14,6 @@ QUANTITIES = {"EA": "force", "EI": "force·length²", "rest": "length"}
 """What each number of a bar measures."""
 
 
-@door
 @dataclass(frozen=True)
 class Bar:
     """A straight bar between two joints, which it does not bend.
