@@ -219,7 +219,7 @@ def structure_of(value: Any) -> Any:
 
 
 @cache
-def _finder(kind: type) -> Callable[[Any], Any] | None:
+def _finder(kind: Any) -> Callable[[Any], Any] | None:
     """How the structure of objects of a type is found."""
     ours = (each for each in kind.__mro__ if each.__module__.startswith("equimorph."))
     return next((OWNERS[each.__name__] for each in ours if each.__name__ in OWNERS), None)

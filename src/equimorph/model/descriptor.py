@@ -7,6 +7,7 @@ from typing import Any, Literal, Protocol, overload, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_kinds import LARGEST, is_number
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.door import door
 from equimorph.errors import InputError
@@ -127,10 +128,7 @@ class Descriptor:
 
 
 def _number(name: str, bound: Any) -> float:
-    try:
-        number = float(bound)
-    except (TypeError, ValueError):
-        number = np.nan
+    number = float(bound) if is_number(bound) and abs(bound) <= LARGEST else np.nan
     if not np.isfinite(number):
         raise InputError(f"`{name}` must be compared with a finite number; got {bound!r}.")
     return number

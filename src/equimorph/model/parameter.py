@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_kinds import LARGEST, is_number
 from equimorph.door import door
 from equimorph.errors import InputError, suggestion
 
@@ -31,13 +32,9 @@ class Parameter:
     lower: float = -np.inf
     upper: float = np.inf
 
-    @door
     def check(self, value: float) -> float:
         """Return `value` as a float, or raise `InputError` if it has no meaning."""
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            number = np.nan
+        number = float(value) if is_number(value) and abs(value) <= LARGEST else np.nan
         if not (np.isfinite(number) and self.lower < number < self.upper):
             raise InputError(
                 f"`{self.name}` must be a finite number{self._limits()}; got {value!r}."
