@@ -214,7 +214,8 @@ KEYWORD = inspect.Parameter.KEYWORD_ONLY
 
 def structure_of(value: Any) -> Any:
     """Structure to which an object belongs; None if it belongs to none."""
-    find = _finder(type(value))
+    kind: Any = type(value)
+    find = _finder(kind)
     return None if find is None else find(value)
 
 
