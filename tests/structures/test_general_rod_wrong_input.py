@@ -55,10 +55,10 @@ WRONG = {
         {"loads": {"P": {"term": "point force", "at": 1.0}}},
         r"`loads\.P` must have the data of a point force \(s, direction\); got at",
     ),
-    "name taken": ({"loads": {"nu": em.Couple(0.5)}}, r"`loads\.nu` must have a name of its own"),
+    "name taken": ({"loads": {"nu": em.Couple(0.5)}}, r"`loads\.nu` must have a different name"),
     "name twice": (
         {"loads": {"P": em.Couple(0.5)}, "actuators": {"P": em.Couple(0.2)}},
-        r"`loads\.P` must have a name of its own",
+        r"`loads\.P` must have a different name",
     ),
     "terms of two kinds": (
         {"loads": {"P": [em.Couple(0.5), em.PointForce(0.5)]}},

@@ -128,7 +128,7 @@ def test_replacing_does_not_take_a_folder_that_was_never_ours(study: Study, tmp_
 def test_a_foreign_file_of_the_same_name_is_kept(study: Study, tmp_path: Path):
     _run(tmp_path, study, x_txt="x")
     (tmp_path / "index.html").write_text("mine")
-    with pytest.raises(InputError, match=r"must not hold a file of its own at .*index\.html"):
+    with pytest.raises(InputError, match=r"must not hold a foreign file at .*index\.html"):
         _run(tmp_path, study, index_html="ours")
     assert (tmp_path / "index.html").read_text() == "mine"
     assert _names(tmp_path) == [PRIVATE, MANIFEST, "index.html", "x.txt"]

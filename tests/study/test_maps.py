@@ -176,7 +176,7 @@ def test_what_needs_a_set_is_not_asked_for_without_one(text, message):
         (LIMIT, 'load = "F"', 'load = "k"', "`load` must be neither in `grid` nor in `fixed`"),
         (LIMIT, 'load = "F"', 'load = "G"', "in `map[0]`: `G` must be a parameter"),
         (LIMIT, "[4, 3]", "[4]", "`map[0].intervals` must have at least 2 entries"),
-        (LIMIT + LIMIT, "", "", "must give every map a name of its own"),
+        (LIMIT + LIMIT, "", "", "must give every map a different name"),
         (ANGLES, '"angle"', '"depth"', "in `map[0]`: "),
     ],
 )

@@ -99,7 +99,7 @@ WRONG = {
     "way-point along a fixed parameter": (
         "{ Delta = 1.3 }",
         "{ q = 3.0 }",
-        r"`route\[0\]\.via\[1\]` must name some of Theta, Delta; got q",
+        r"`route\[0\]\.via\[1\]` must name only free parameters \(Theta, Delta\); got q",
     ),
     "load that jumps backward": (
         '"uniform"',

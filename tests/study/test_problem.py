@@ -150,7 +150,7 @@ def test_further_mistakes_are_counted(arch_text: str):
 
 def test_two_routes_need_two_names(arch_text: str):
     route = arch_text[arch_text.index("[[route]]") :]
-    with pytest.raises(InputError, match="a name of its own"):
+    with pytest.raises(InputError, match="every route a different name"):
         parse_study(arch_text + "\n" + route, "arch.toml")
 
 

@@ -158,7 +158,7 @@ def test_alternatives_need_two_parameters():
     narrow = SET.replace("F = [-0.2, 0.2]", "").replace("[9, 9]", "[9]").replace("1.3],", "1.3]")
     ends = ENDS.replace(", F = 0.01", "")
     text = f'{narrow}[[route]]\nname = "way"\nalternatives = 2\n{ends}'
-    with pytest.raises(InputError, match=r"`route\[0\]\.alternatives` must be asked of a set over"):
+    with pytest.raises(InputError, match=r"`route\[0\]\.alternatives` needs a set over"):
         prepare(parse_study(text, "spring.toml"))
 
 

@@ -1,7 +1,7 @@
 """Cut directed plane edges, across which a count jumps, where they cross or touch each other.
 
 All places are whole multiples of a small grid spacing (snap rounding): what coincides, coincides
-exactly. An edge that passes a vertex within one spacing is led through it.
+exactly. An edge that passes a vertex within one spacing is bent to pass through it.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from equimorph.arrays import Edges
 Places = Float[np.ndarray, "places 2"]
 Jumps = Int[np.ndarray, " edges"]
 Drawing = tuple[Places, Edges, Jumps]
-# Before merging or cutting there are others, and another number of them.
+# Before merging and cutting, places differ in number and position.
 OldPlaces = Float[np.ndarray, "old_places 2"]
 OldEdges = Int[np.ndarray, "old_edges 2"]
 OldJumps = Int[np.ndarray, " old_edges"]
@@ -79,7 +79,7 @@ def sides(ends: Float[np.ndarray, "edges 2 2"], jump: Jumps) -> tuple[Jumps, Jum
     """Count on the left and on the right of every arranged edge, by a ray from its middle."""
     along = ends[:, 1] - ends[:, 0]
     flat = np.abs(along[:, 0]) > np.abs(along[:, 1])
-    # The ray runs across the edge, not along it: flat edges are looked at with x and y exchanged,
+    # The ray runs across the edge, not along it: flat edges are treated with x and y exchanged,
     # which also exchanges left and right.
     right = np.where(
         flat,

@@ -98,13 +98,13 @@ class Transition:
         Raises
         ------
         InputError
-            If `source` is none of both charts, or points do not lie on the curve.
+            If `source` is neither of the two charts, or points do not lie on the curve.
         """
         if source not in self.charts:
             raise InputError(f"`source` must be one of {self.charts}; got {source!r}.")
         ours, theirs = self.coords if source == self.charts[0] else self.coords[::-1]
         if ours.shape[1] != 2:
-            raise InputError("`cross` must be asked over two parameters.")
+            raise InputError("`cross` needs an atlas over two parameters.")
         a, b = ours[:-1], ours[1:]
         size = np.maximum(np.ptp(ours, axis=0).max(), 1e-300)
         along = b - a

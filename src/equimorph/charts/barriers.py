@@ -1,4 +1,4 @@
-"""Barriers, across which the preferred state jumps, and gaps, where there is none."""
+"""Barriers, across which the preferred state jumps, and gaps, where no state is preferred."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,7 +16,7 @@ from equimorph.model import Box
 from equimorph.structures import States
 
 ASIDE = 1e-7
-"""Distance across an edge, in ranges of the parameters, at which the other side is looked at."""
+"""Distance across an edge, in ranges of the parameters, at which the other side is examined."""
 JUMP = 1e-3
 """Distance in the metric from which on states on both sides are no neighbours."""
 SHORT = 2e-4
@@ -119,7 +119,7 @@ def _across(
     used: Int[np.ndarray, " some"],
     preference: Preference,
 ) -> tuple[Float[np.ndarray, "some size"], Float[np.ndarray, "some P"], Float[np.ndarray, " some"]]:
-    """Preferred states just across vertices of the boundary, and how far they are; ∞ if none."""
+    """Preferred states just across vertices of the boundary, and their distances; ∞ if none."""
     eset, structure = cells.eset, cells.eset.structure
     size = eset.box.upper - eset.box.lower
     outward = _within(eset.box, cells.values[used], _outward(cells, facets, used, size))
@@ -137,7 +137,7 @@ def _outward(
     used: Int[np.ndarray, " some"],
     size: Float[np.ndarray, " d"],
 ) -> Float[np.ndarray, "some d"]:
-    """Directions at vertices of the boundary that lead out of the cells beside it."""
+    """Directions at vertices of the boundary that point out of the adjacent cells."""
     whole = cells.whole
     base = int(whole.facets.max()) + 1
     keys = (whole.facets * base ** np.arange(whole.facets.shape[1])).sum(axis=1)
@@ -176,7 +176,7 @@ def _each_once(found: list[Barrier], cells: Cells) -> tuple[Barrier, ...]:
     """Barriers without their images from the other side.
 
     The other side of a sheet's end is where the preference changes on another sheet; of a tie both
-    sides are cut, and the one counts on which the descriptor is greater that tells sheets apart.
+    sides are cut, and the one with the greater elevation (`Structure.elevation`) counts.
     """
     ends = [barrier for barrier in found if barrier.kind != EdgeKind.TIE]
     elevation = cells.eset.structure.elevation

@@ -53,11 +53,11 @@ class Charted:
     Parameters
     ----------
     states
-        Exact states; not numbers where there is none.
+        Exact states; NaN where no state exists.
     code
         Number in `STATUSES` of where each point lies.
     cell
-        Cell of the set that each state lies on, −1 where there is none.
+        Cell of the set that each state lies on, −1 where no state exists.
     """
 
     states: States
@@ -275,7 +275,7 @@ class Projection(Chart):
 @door
 @dataclass(frozen=True, eq=False, repr=False)
 class DescriptorChart(Chart):
-    """Descriptors, or some of them and some free parameters, as coordinates.
+    """Descriptors and free parameters as coordinates.
 
     Regular at folds of the set. They fail where the coordinates themselves fold (their Jacobian
     along the set vanishes) and where different sheets have the same coordinates.
@@ -334,7 +334,7 @@ class DescriptorChart(Chart):
     def single_valued(self) -> bool:
         """Whether all states have different coordinates: these fold nowhere, and nothing overlaps.
 
-        Folds are found exactly, where the overlap beside them may be narrower than a cell.
+        Folds are found exactly, where the overlap along them may be narrower than a cell.
         """
         return len(self.singular.states) == 0 and single_valued(self.cells)
 

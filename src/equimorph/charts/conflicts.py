@@ -36,7 +36,7 @@ class Conflicts:
 
 
 def conflicts_of(cells: Cells) -> Conflicts:
-    """Colours of cells that lie over others, as few as a greedy choice finds."""
+    """Colours of cells that lie over other cells, as few as a greedy choice finds."""
     count = len(cells.numbers)
     pairs = overlapping(cells)
     colour = np.full(count, -1)
@@ -54,8 +54,8 @@ def overlapping(cells: Cells) -> Int[np.ndarray, "n 2"]:
     """Pairs of cells without a common vertex that lie over each other.
 
     Over two parameters by separating axes, over three where one holds the middle of the other. At a
-    cusp neighbours lie over each other: those around them tell the sheets apart. Cells turned over
-    by chords of curved folds cover nothing.
+    cusp neighbours lie over each other: the cells around them separate the sheets. Cells turned
+    over by chords of curved folds cover nothing.
     """
     values = cells.values[cells.corners]
     size = np.maximum(np.median(np.ptp(values, axis=1), axis=0), 1e-300)

@@ -31,7 +31,7 @@ from equimorph.tolerances import SAME_NUMBER
 RINGS = 3
 """Rings of cells around the end of a cut in which a cusp is its true end."""
 MOST = 40
-"""Most cuts; what still overlaps then is left, and `Atlas` shows it."""
+"""Largest number of cuts; overlaps that remain are listed by `Atlas`."""
 
 
 @door
@@ -237,7 +237,7 @@ def _begun(
         return path
     place = clear.places
     cusp = min(near, key=lambda c: float(np.linalg.norm(place[c] - place[path[0]])))
-    # next to a cusp all cells lie over others
+    # next to a cusp all cells lie over other cells
     for walker in (clear, free):
         for k, vertex in enumerate(path[: len(path) // 2 + 1]):
             if vertex != cusp and walker.way(cusp, vertex) is not None:

@@ -218,7 +218,7 @@ def sheet_labels(cells: Cells) -> Int[np.ndarray, " own"]:
     small &= np.arange(len(size)) != size.argmax()
     a, b = label[whole.links].T
     for one, other in ((a, b), (b, a)):
-        # a sliver goes to a neighbour that is none
+        # a sliver is merged with a neighbour that is no sliver
         join = np.flatnonzero(small[one] & ~small[other])
         target = np.arange(len(size))
         target[one[join]] = other[join]
@@ -240,7 +240,7 @@ def single_domain(cells: Cells) -> Domain:
 
 
 def single_valued(cells: Cells) -> bool:
-    """Whether no coordinates have more than one state, as far as the cells can tell."""
+    """Whether no coordinates have more than one state, at the resolution of the cells."""
     if len(cells.coordinates.names) != 2:
         return not _overlapping(cells).any()
     regions = regions_within(cells.values, *outline(cells.values, cells.corners))
@@ -332,7 +332,7 @@ def _of_cells(cells: Cells, some: Bool[np.ndarray, " own"]) -> Domain:
 
 
 def _overlaps_by_cells(cells: Cells) -> tuple[Overlap, ...]:
-    """Overlaps over one or three coordinates: cells with the middles of others over them."""
+    """Overlaps over one or three coordinates: cells that contain midpoints of other cells."""
     label = sheet_labels(cells)
     corners = cells.values[cells.corners]
     hits = CellIndex.of(corners, np.zeros(len(corners))).near(corners.mean(axis=1))

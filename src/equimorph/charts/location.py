@@ -31,7 +31,7 @@ OVERHANG = 0.3
 CHUNK = 4096
 """Points whose states are found at once."""
 SLACK = 1e-9
-"""By how much a state may exceed the box or a constraint."""
+"""Largest excess over the box or a constraint, in their units, that counts as none."""
 
 
 class EdgeKind(StrEnum):
@@ -254,7 +254,7 @@ class Cells:
         again: Int[np.ndarray, " n"],
         points: Points,
     ) -> tuple[Lanes, Parameters, Flags]:
-        """Try doubtful hits from regular corners of their cells, by lifts or by Newton.
+        """Try undecided hits from regular corners of their cells, by lifts or by Newton.
 
         From the nearest one; if the cell contains the point, from all.
         """

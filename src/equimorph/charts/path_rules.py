@@ -143,7 +143,7 @@ class _OnPath(Rule):
 
 
 def _quiet_ends(eset: EquilibriumSet, load: int, low: float) -> Ends:
-    """Ends of paths on which nothing happens."""
+    """Ends of paths without events."""
     del load, low
 
     def ends(z: Lanes, begin: Parameters, goal: Parameters) -> Lanes:
@@ -178,8 +178,8 @@ class Unloaded:
     load, low
         Place of the load, and its value in natural states.
     sheet
-        Natural states over a grid, where there are two other parameters; else the structure is
-        asked for each.
+        Natural states over a grid, if there are two other parameters; else the structure computes
+        each of them.
     """
 
     structure: Structure
@@ -200,7 +200,7 @@ class Unloaded:
         load, unloaded = position(structure.parameters, parameter), structure.unloaded()
         if parameter not in unloaded:
             raise InputError(
-                f"`parameter` must be a load ({', '.join(unloaded) or 'there is none'}); "
+                f"`parameter` must be a load ({', '.join(unloaded) or 'the structure has none'}); "
                 f"got {parameter!r}."
             )
         low = float(unloaded[parameter])

@@ -31,8 +31,8 @@ from equimorph.structures import States
 DIFFERENT = 1e-4
 """Distance in the metric from which on two states over a point are different ones."""
 BESIDE, MOVED = 0.02, 0.3
-"""How far beside a fold, in lengths of edges, the preference is looked at, and how far its state
-may be away there: at a cusp it is the cube root of that."""
+"""Distance from a fold, in lengths of edges, at which the preference is examined, and the largest
+distance of its state there: at a cusp it is the cube root of the first."""
 PARTS, ROUNDS = 5, 11
 """Parts and rounds of the division of edges: the change is located to 5⁻¹¹ = 2e-8 of an edge."""
 
@@ -62,7 +62,7 @@ class Preference:
         """Function that is positive where another state is preferred.
 
         The score less that of the best other state, which is smooth where the preference changes;
-        −1 where there is none. Of rules without a score ±1.
+        −1 where no other state exists. ±1 for rules without a score.
         """
         if self.score is None:
             return np.where(self.prefers(z, p), -1.0, 1.0)
@@ -106,7 +106,7 @@ def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndar
     among = np.zeros(len(eset.cells), bool)
     among[preference.cells.numbers] = True
     values = _signs(preference)
-    # only candidates are cut: of their neighbours beyond folds nothing is asked
+    # only candidates are cut: their neighbours beyond folds play no part
     fabric = _only(fabric, among)
     crossings = _Crossings(preference, fabric, values)
     cut = cut_between(fabric, values, crossings.between)
@@ -160,7 +160,7 @@ def _only(fabric: Fabric, cells: Bool[np.ndarray, " C"]) -> Fabric:
 
 
 def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
-    """−1 at preferred vertices, 1 at others."""
+    """−1 at preferred vertices, 1 elsewhere."""
     eset, corners = preference.cells.eset, preference.cells.corners
     values = np.ones(len(eset.points))
     used = np.unique(corners)
@@ -189,7 +189,7 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
 
 
 def _preferred_beside(preference: Preference, met: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-    """Whether beside vertices at crossings, each of one sheet there, this sheet is preferred."""
+    """Whether the sheet of each vertex at a crossing is preferred next to that vertex."""
     eset, corners = preference.cells.eset, preference.cells.corners
     out = np.zeros(len(met), bool)
     two = list(permutations(range(corners.shape[1]), 2))

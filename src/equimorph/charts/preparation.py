@@ -26,7 +26,7 @@ ROUNDS = 6
 
 
 def cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:
-    """A set cut along its crossings, which are boundaries of its parts then; others as they are."""
+    """A set cut along its crossings, which become boundaries; a set without crossings as it is."""
     if not eset.crossings:
         return eset
     crossings, folds = (_facets(curves, len(eset.names)) for curves in (eset.crossings, eset.folds))
@@ -153,7 +153,7 @@ def _flip_once(
         other, first, second = best
         corners[cell], corners[other] = first, second
         touched |= {cell, other}
-        # what lies around them is known anew in the next round
+        # their neighbours are computed again in the next round
         keys = _keys(first, base) + _keys(second, base)
         touched |= {beside for key in keys for beside in around.get(key, ())}
         count += 1

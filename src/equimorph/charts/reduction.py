@@ -33,12 +33,12 @@ ON_BARRIER = 1e-9
 class Reduction(Chart):
     """The free parameters as coordinates of preferred states.
 
-    Which state is preferred is decided anew, and exactly, for every point that is asked for.
+    The preferred state is determined separately and exactly for every requested point.
 
     Parameters
     ----------
     eset
-        The preferred part of the set, cut exactly along barriers and gaps; a set of its own. Tasks
+        The preferred part of the set, cut exactly along barriers and gaps, as a set. Tasks
         take it together with `constraint`.
     whole
         The set that was reduced, with vertices at its cusps.

@@ -73,7 +73,7 @@ class Regions:
         return winding_raster(x, y, self.ends, self.jump)
 
     def loops(self, wanted: Callable[[Counts], Flags]) -> tuple[Float[np.ndarray, "_ 2"], ...]:
-        """Outlines of the region where the count is one of those wanted, which is on their left."""
+        """Outlines of the region whose counts satisfy a predicate; it is on their left."""
         inside = [wanted(count) for count in (self.left, self.left - self.jump)]
         return tuple(self.places[loop] for loop in _loops(self.edges, *inside))
 
@@ -116,7 +116,7 @@ def regions_within(
     coordinates
         Places of the ends of edges.
     edges, jump
-        Directed edges, and by how much the count on their left exceeds that on their right.
+        Directed edges, and the count on their left less that on their right.
     """
     none = np.empty(0, int)
     nothing = Regions((), np.empty((0, 2)), np.empty((0, 2), int), none, none)

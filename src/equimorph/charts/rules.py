@@ -74,8 +74,8 @@ class _Least(Rule):
 def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np.ndarray, " found"]:
     """Which states have the least finite score over their points; the highest of equal ones.
 
-    Mirror images of equal height are told apart by a product with a fixed vector: up to round-off
-    they are equal, and which is preferred must not change from point to point.
+    Mirror images of equal height are distinguished by a product with a fixed vector: up to
+    round-off they are equal, and which is preferred must not change from point to point.
     """
     states, n = found.states, found.states.structure.unknowns
     height = elevation.function(states.z, states.p)

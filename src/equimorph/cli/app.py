@@ -155,7 +155,7 @@ def paper(
         "results/paper"
     ),
 ) -> None:
-    """Compute the article's figures and tables anew, ours beside theirs."""
+    """Reproduce the figures and tables of the article, and compare the numbers."""
     from equimorph.cli.paper import reproduce_and_show
 
     reproduce_and_show(out)

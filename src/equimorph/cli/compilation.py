@@ -1,4 +1,4 @@
-"""Compiling kernels before the first run: two processes, each with a share of its own.
+"""Compiling kernels before the first run: two processes, each with its share of them.
 
 What marches along curves and joins surfaces knows no structure, so that one process compiles it on
 a small spring while the other compiles what belongs to the structure of the study.

@@ -1,4 +1,4 @@
-"""``equimorph paper``: compute the article anew and show theirs beside ours."""
+"""``equimorph paper``: reproduce the article and compare its numbers with ours."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from equimorph.paper import reproduce
 
 
 def reproduce_and_show(out: Path) -> None:
-    """Compute the article anew with progress on stderr, then print where the report is.
+    """Reproduce the article with progress on stderr, then print the path of the report.
 
     Parameters
     ----------

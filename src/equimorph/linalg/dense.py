@@ -28,7 +28,7 @@ class BorderedSolution:
 
     x holds one solution per right-hand side; `negative` counts the negative eigenvalues of A;
     `pivot_ratio` is the smallest over the largest pivot (1 where pivoting made it irrelevant);
-    `pivoted` tells which lanes took the pivoted dense factorisation; `determinant` is that of A,
+    `pivoted` flags lanes that took the pivoted dense factorisation; `determinant` is that of A,
     nan where it is not at hand or beyond the range of numbers.
     """
 

@@ -163,7 +163,7 @@ class Constraint:
 def combined(
     name: str, function: Callable[..., Any], *descriptors: Descriptor, unit: str = "1"
 ) -> Descriptor:
-    """Descriptor that is a function of others: ``combined("gap", lambda a, b: a - b, one, other)``.
+    """Function of descriptors: ``combined("gap", lambda a, b: a - b, one, other)``.
 
     Parameters
     ----------

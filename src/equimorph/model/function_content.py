@@ -40,7 +40,7 @@ def content_of_function(function: Callable[..., Any], name: str) -> str:
     Raises
     ------
     InputError
-        If it holds something whose content cannot be told, like an open file.
+        If it holds something without known content, like an open file.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def content_of_descriptor(descriptor: Descriptor) -> str:
 
 
 class _Contents:
-    """Contents of values as nested tuples of texts; what recurs is told once."""
+    """Contents of values as nested tuples of texts; repeated values are described once."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -77,7 +77,7 @@ class _Contents:
 
     @functools.singledispatchmethod
     def _inside(self, value: Any) -> Any:
-        """Contents of what is no plain data: by what it can tell of itself."""
+        """Contents of values that are no plain data: by their identity, code or state."""
         if callable(getattr(value, "identity", None)):  # structures say what they are
             return "identity", type(value).__name__, self.of(value.identity())
         if callable(getattr(value, "serialize", None)):  # symbolic functions, too
@@ -221,7 +221,7 @@ def _owner_of(value: Any) -> Any:
 
 def _full(cell: Any) -> bool:
     try:
-        cell.cell_contents  # noqa: B018  # asked whether it is there
+        cell.cell_contents  # noqa: B018  # raises if the cell is empty
     except ValueError:
         return False
     return True

@@ -46,7 +46,7 @@ def recalled(journal: Journal, step: str, compute: Callable[[], Findings]) -> Fi
 
 @runtime_checkable
 class Progress(Protocol):
-    """Receives how far a computation is."""
+    """Receives the progress of a computation."""
 
     def report(self, stage: str, done: int, total: int | None) -> None:
         """Take note that `done` of `total` units (unknown if None) of `stage` are finished."""

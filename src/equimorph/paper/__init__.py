@@ -1,4 +1,4 @@
-"""The article by Fehér, Sipos and Várkonyi, computed anew with the public face of the library."""
+"""The article by Fehér, Sipos and Várkonyi, reproduced with the public API of the library."""
 
 from equimorph.paper.reproduction import Reproduction, reproduce
 

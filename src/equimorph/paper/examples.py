@@ -17,7 +17,7 @@ from equimorph.paper import (
 
 @dataclass(frozen=True)
 class Example:
-    """A result of the article, computed anew.
+    """A result of the article, reproduced.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ EXAMPLES = (
             "parameterisations": "Equilibrium sets of the arch under the uniform load q = 2.5 "
             "(above; crown over both end angles, cut at max |κ| = 10, near a cusp of its folds) "
             "and their internal parameterisations (below). (a) Projection to Θ and Δ gives every "
-            "state its own place. (b) It fails where two states lie over one setting "
+            "state a separate place. (b) It fails where two states lie over one setting "
             "(hatched crosswise), and the height y(2/3) with Δ works. (c) Reduction to the state "
             "with the highest crown leaves a barrier (thick), over which neighbours jump, and a "
             "gap (hatched), over which no state is. (d) Dissection in three charts.",
@@ -113,7 +113,7 @@ EXAMPLES = (
         "A closed curve of heights, tracked",
         tracking.main,
         {
-            "tracking": "The arch under the uniform load q = 2.5 leads its heights at s = 1/3 and "
+            "tracking": "The arch under the uniform load q = 2.5 moves its heights at s = 1/3 and "
             "2/3 around a square (red, corners numbered). (a) Heights, with what can be reached "
             "from y(1/3) = y(2/3) = 0.15 L (ring) and its boundary by kinds. (b) The motion on "
             "the stable states. (c) The end angles, with the region of the start. (d) Shapes at "

@@ -1,4 +1,4 @@
-"""Numbers that the article quotes, beside the number of ours that answers each."""
+"""Numbers that the article quotes, each with the number that reproduces it."""
 
 from dataclasses import dataclass
 
@@ -48,7 +48,7 @@ CONVENTION = (
     "Lengths are in units of L, loads of 4π²B/L², curvatures of 1/L; ν = sin 1."
 )
 
-_SIGN = "The article's Δ has another sign or scale; its own formulas fit neither."
+_SIGN = "The article's Δ has another sign or scale; its formulas fit neither."
 _NO_ONE = "F = k (1 − x_l/cos δ) sin δ is {} k there, not 1."
 _FIXED = "(0.40, 0.90) lies on the level 0.0089 k, C_s on 0.0099 k."
 

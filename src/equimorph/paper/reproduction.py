@@ -1,4 +1,4 @@
-"""`reproduce`: every figure and number of the article, ours beside theirs, as one report."""
+"""`reproduce`: every figure and number of the article and of this package, as one report."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from equimorph.storage.files import write_text
 from equimorph.study import html
 from equimorph.study.folder import writable
 
-TITLE = "Quasi-static shape control of soft, morphing structures, computed anew"
+TITLE = "Quasi-static shape control of soft, morphing structures, reproduced"
 SOURCE = (
     "E. Fehér, A. Á. Sipos, P. L. Várkonyi: Quasi-static shape control of soft, morphing "
     "structures, arXiv:2509.12916."
 )
 INTRODUCTION = (
-    "Every figure, table and number of the article, computed anew: theirs, ours, the difference, "
+    "Every figure, table and number of the article, reproduced: theirs, ours, the difference, "
     "and a sentence where they differ."
 )
 WIDE = ("tracking", "inside-out", "parameterisations")
@@ -62,7 +62,7 @@ def reproduce(
     examples
         Which to compute.
     progress
-        Told how far it is.
+        Receives the progress.
 
     Raises
     ------

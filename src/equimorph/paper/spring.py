@@ -13,7 +13,7 @@ LEVELS = (-0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1)
 
 
 def main(folder: Path) -> dict[str, float]:
-    """Answer the tasks of the article from C_s, at its own load."""
+    """Answer the tasks of the article from C_s, at the load of C_s."""
     spring = em.Spring()
     angle, load, length = spring.angle, em.value_of(spring, "F"), em.value_of(spring, "x_l")
     within = [angle <= 1.2, angle >= -1.2]

@@ -1,4 +1,4 @@
-"""Heights at s = 1/3 and 2/3 led around a square at q = 2.5, and what can be reached."""
+"""Heights at s = 1/3 and 2/3 moved around a square at q = 2.5, and the reachable region."""
 
 from pathlib import Path
 

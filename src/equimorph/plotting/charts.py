@@ -96,7 +96,7 @@ def parameterisation(
     """Panels with the set above and its internal parameterisation below, one for each of `charts`.
 
     Above, the part of the set that the charts cover, over the free parameters, with a descriptor as
-    height. Charts of an atlas, and several of one set, lie beside each other.
+    height. Charts of an atlas, and several charts of one set, stand next to each other.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def parameterisation(
 
 
 def rows_of(widths: Sequence[int]) -> list[tuple[int, int]]:
-    """Row and first column of panels that are so many columns wide."""
+    """Row and first column of each panel, given the numbers of columns that they span."""
     places, row, column = [], 0, 0
     for width in widths:
         if column and column + width > _COLUMNS:

@@ -30,7 +30,7 @@ def fold_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]
 
 
 def crossing_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]:
-    """Curves of branch points, cut where the lowest index beside them changes; with that index."""
+    """Curves of branch points, cut where the lowest adjacent index changes, with that index."""
     return _cut_by_index(eset, eset.crossings)
 
 
@@ -52,11 +52,11 @@ def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[tuple[Int[np.nda
     eset
         Equilibrium set over two free parameters.
     box
-        True for the pieces on the box, False for the others.
+        True for the pieces on the box, False for the rest of the boundary.
 
     Returns
     -------
-    Vertices of each piece in order, and the index of the cells beside it.
+    Vertices of each piece in order, and the index of the adjacent cells.
     """
     found = []
     for boundary in eset.boundaries:
@@ -109,11 +109,11 @@ def legs(eset: EquilibriumSet, route: Route) -> list[Float[np.ndarray, "_ 2"]]:
 
 
 def way_points_of(eset: EquilibriumSet, route: Route) -> Float[np.ndarray, "corners 2"]:
-    """Free parameters at the corners that a route was asked to pass, reached or not."""
+    """Free parameters at the way points of a route, whether it reaches them or not."""
     if route.path is None:
         return np.empty((0, 2))
     corners = [dict(zip(eset.names, track(eset, route.path.states)[0].tolist(), strict=True))]
-    for corner in route.way_points:  # each changes some parameters and keeps the others
+    for corner in route.way_points:  # each changes some parameters and keeps the rest
         corners.append(corners[-1] | corner)
     return np.array([[corner[name] for name in eset.names] for corner in corners])
 

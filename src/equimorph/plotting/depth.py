@@ -53,11 +53,11 @@ Corners = Float[np.ndarray, "cells 3 3"]
 _BATCH = 1_000_000
 """Pixels that are written at a time: this bounds the memory."""
 _LEVELS = 2.0**31 - 1
-"""Number of depths that can be told apart in the buffer: positive 32-bit integers."""
+"""Number of different depths in the buffer: positive 32-bit integers."""
 _EMPTY = np.iinfo(np.int64).max
 _AROUND = 2
-"""Pixels around a point that are asked whether they hide it: a curve runs along edges of the
-surface, and is visible as soon as one side of it is."""
+"""Half width, in pixels, of the square around a point in which one pixel that does not hide it
+makes it visible: a curve runs along edges of the surface, and one visible side is enough."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ class DepthBuffer:
     Attributes
     ----------
     owner
-        Number of the triangle seen at the middle of each pixel, −1 where there is none.
+        Number of the triangle visible at the middle of each pixel, −1 for the background.
     depth
-        Distance of that place from the viewer, infinite where there is none.
+        Distance of that place from the viewer, infinite for the background.
     """
 
     owner: Int[np.ndarray, "rows columns"]
@@ -108,7 +108,7 @@ def depth_buffer(corners: Corners, rows: int, columns: int) -> DepthBuffer:
     corners
         Columns and rows of the corners in pixels, and their distances from the viewer.
     rows, columns
-        Size of the picture; what lies outside is left out.
+        Size of the picture; everything outside is clipped.
     """
     key = np.full(rows * columns, _EMPTY)
     low, high = (f(corners[..., 2], initial=0.0) for f in (np.min, np.max))

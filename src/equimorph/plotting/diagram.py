@@ -36,7 +36,7 @@ def diagram(eset: EquilibriumSet, height: Descriptor | None = None, ax: Axes | N
     eset
         Equilibrium set over one free parameter.
     height
-        Descriptor on the upright axis; None takes the one that tells the states apart best.
+        Descriptor on the vertical axis; None takes the one that distinguishes the states best.
     ax
         Where to draw; None makes a figure one column wide.
 

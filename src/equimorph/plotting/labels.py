@@ -194,7 +194,7 @@ def _to_points(ax: Axes) -> Transform:
 def _badges(corners: Places, there: Places) -> list[tuple[Float[np.ndarray, " 2"], str]]:
     """Places and numbers of the badges; `there` are the corners in typographic points."""
     badges: dict[int, list[int]] = {}
-    # First the ends, then the others as far as there is room.
+    # First the ends, then the points between them as far as there is room.
     last = len(corners) - 1
     for k in sorted(range(len(corners)), key=lambda k: k not in (0, last)):
         near = [j for j in badges if np.hypot(*(there[k] - there[j])) < _CROWDED]

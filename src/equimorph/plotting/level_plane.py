@@ -1,4 +1,4 @@
-"""Level sets of a descriptor on the set, over the plane of two others."""
+"""Level sets of a descriptor on the set, over the plane of two further descriptors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ def level_plane(
     marks: Mapping[str, State] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Level sets of a descriptor over the plane of two descriptors that tell all states apart.
+    """Level sets of a descriptor over the plane of two descriptors that distinguish all states.
 
     The levels are exact states: full lines where they are stable, dashed elsewhere.
 

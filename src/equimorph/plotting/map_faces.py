@@ -76,7 +76,7 @@ def _triangles(whole: Bool[np.ndarray, "_ _"]) -> Int[np.ndarray, "triangles 3"]
 def _crossings(
     axes: tuple[Axis, Axis], cuts: Float[np.ndarray, "points 2"]
 ) -> dict[tuple[int, int], list[tuple[float, float, float]]]:
-    """Places on the rims of cells: how far around from the first corner (0 to 4), and where."""
+    """Places on the rims of cells: distance around from the first corner (0 to 4), and place."""
     found: dict[tuple[int, int], list[tuple[float, float, float]]] = {}
     shape = [len(axis) - 1 for axis in axes]
     steps = [axis[1] - axis[0] for axis in axes]

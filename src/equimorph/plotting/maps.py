@@ -77,7 +77,7 @@ class CurveLook:
 
 @dataclass(frozen=True)
 class Panel:
-    """What a figure of a map shows besides the values.
+    """What a figure of a map shows in addition to the values.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ def new_map_axes(wider: float = 0.0) -> Axes:
 
 
 def draw_map(amap: ActuatorMap, panel: Panel, ax: Axes | None) -> Axes:
-    """Draw a map into axes, or into a figure of its own one column wide."""
+    """Draw a map into axes, or into a new figure one column wide."""
     with style.house_style({"hatch.linewidth": 0.5}):
         own = ax is None
         ax = ax or new_map_axes()

@@ -98,7 +98,7 @@ def parameter_plane(
     eset
         Equilibrium set over two free parameters.
     route
-        Drawn with its way-points numbered; one without a path is left out.
+        Drawn with its way-points numbered; a route without a path is omitted.
     ax
         Where to draw; None makes a figure one column wide.
     count

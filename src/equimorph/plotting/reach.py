@@ -23,7 +23,7 @@ from equimorph.plotting.surface import surface
 from equimorph.tasks import Reach, Tracking
 
 _HEIGHT = 148 * style.MILLIMETRE
-# told apart in black and white, too
+# distinguishable in black and white, too
 _LOOKS: dict[str, dict[str, Any]] = {
     "snap-through": {"color": style.INK, "linewidth": 1.7, "linestyle": "-"},
     "singular Jacobian": {"color": "#1f5f99", "linewidth": 1.5, "linestyle": (0, (5, 1.3))},
@@ -63,7 +63,7 @@ def reach_plane(
     ax
         Where to draw; None makes a figure one column wide.
     targets
-        Values that were asked for: numbered from 1.
+        Requested values, numbered from 1.
 
     Returns
     -------
@@ -219,7 +219,7 @@ def _entries(reach: Reach) -> list[Line2D]:
 
 
 def _legend(ax: Axes, reach: Reach) -> None:
-    """Kinds of the boundary, below the frame of a figure of its own."""
+    """Kinds of the boundary, below the frame of a new figure."""
     entries = _entries(reach)
     rows = -(-len(entries) // _COLUMNS)
     height = 0.9 * style.SINGLE_COLUMN - 0.5

@@ -1,4 +1,4 @@
-"""How sure states are: derivatives, laws of imperfections, room around a state, random trials."""
+"""Robustness: sensitivities, laws of imperfections, room around a state, random trials."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -107,7 +107,7 @@ _ENDS: dict[str, Any] = {"ls": "none", "ms": 5, "mec": style.ROUTE_COLOUR, "mew"
 def alternative_routes(
     eset: EquilibriumSet, routes: Sequence[Route], ax: Axes | None = None
 ) -> Axes:
-    """Routes over the numbers of stable equilibria; the legend tells their lengths.
+    """Routes over the numbers of stable equilibria; the legend gives their lengths.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def alternative_routes(
     Raises
     ------
     InputError
-        If there is none, or one has no path.
+        If there is no route, or a route has no path.
     """
     if not routes:
         raise InputError("`routes` must hold at least one route; got none.")

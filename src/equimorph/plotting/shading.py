@@ -159,7 +159,7 @@ def paint(
 def _linear(
     flat: Float[np.ndarray, "pixels coefficients"], offset: Float[np.ndarray, "pixels 2"]
 ) -> Float[np.ndarray, "pixels fields"]:
-    """Fields at places beside the first corners: their values there, and their two slopes."""
+    """Fields at offsets from the first corners, given their values there and their two slopes."""
     value, right, up = np.split(flat, 3, axis=1)
     return np.asarray(value + right * offset[:, :1] + up * offset[:, 1:])
 

@@ -170,14 +170,14 @@ _DASHES = ("solid", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
 
 @door
 def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None) -> Axes:
-    """Shapes of states, each with its label where it is farthest from the others.
+    """Shapes of states, each with its label where it is farthest from the other shapes.
 
     Parameters
     ----------
     states
         At least one.
     labels
-        One for each; numbers from 1 if there are none.
+        One for each state; by default numbers from 1.
     ax
         Where to draw; None makes a figure one column wide.
 
@@ -221,7 +221,7 @@ _AWAY = 11.0
 
 
 def numbered_shapes(ax: Axes, states: States) -> None:
-    """Shapes of states, each numbered where it is farthest from the others; equal ones once."""
+    """Different shapes of states, each numbered where it is farthest from the other shapes."""
     around = Surroundings(states)
     outlines = around.outlines
     frame_shapes(ax, around, _NUMBERED_ROOM)

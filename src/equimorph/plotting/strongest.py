@@ -71,7 +71,7 @@ def beside_strongest(
     lmap
         The map that they are of.
     found
-        The best sure setting, and a robust one.
+        The best setting without errors, and a robust one.
     ax
         Where to draw; None makes a figure one column wide.
 

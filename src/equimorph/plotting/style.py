@@ -1,6 +1,6 @@
 """One place for the looks of every figure: sizes, fonts, colours, saving.
 
-Figures are drawn for the printed column of a journal. Each of them lives on its own object-oriented
+Figures are drawn for the printed column of a journal. Each is a separate object-oriented
 `Figure` with the Agg canvas; neither pyplot's state nor the global ``rcParams`` is touched.
 Colours are ordered by lightness, so that they survive greyscale, and are safe for the
 colour-blind (blue, orange and yellow after Okabe and Ito).
@@ -41,7 +41,7 @@ LIMIT_LINE: dict[str, Any] = {"color": INK, "linewidth": 1.2, "linestyle": (0, (
 RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.0, foreground="white")]
 """White around letters that lie on lines."""
 
-# Lightness (CIE L*) 38, 67, 86, 94: four greys that can be told apart in print.
+# Lightness (CIE L*) 38, 67, 86, 94: four greys that are distinct in print.
 INDEX_COLOURS = ("#1f5f99", "#e8902a", "#f3d65c", "#ececec")
 
 # From none (white) to many; dark enough to count, light enough for black lines and numbers on top.
@@ -93,7 +93,7 @@ def house_style(changes: Mapping[str, Any] | None = None) -> Generator[None]:
 
 
 def new_axes(width: float, height: float, room: tuple[float, float, float, float]) -> Axes:
-    """One empty axes on a figure of its own.
+    """One empty axes on a new figure.
 
     Room for labels is given, not searched for: every figure of a kind has its frame in the same
     place, and drawing takes half the time.

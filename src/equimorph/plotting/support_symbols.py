@@ -86,6 +86,6 @@ HUB: tuple[Stroke, ...] = (
 """A clamp that turns from state to state: the hub of a rotary actuator, with a pointer."""
 
 UPRIGHT = frozenset({SupportKind.PIN, SupportKind.COIL})
-"""Kinds that stand on the ground whatever their direction."""
+"""Kinds that stand upright on the ground for any direction of the structure."""
 AWAY = frozenset({SupportKind.SPRING})
 """Kinds that reach along their direction, away from the structure."""

@@ -101,11 +101,11 @@ def surface(
     eset
         Equilibrium set over two free parameters.
     height_descriptor
-        Third axis; a height or an angle that tells the sheets apart.
+        Third axis; a height or an angle that distinguishes the sheets.
     ax
         Three-dimensional axes to draw on; None makes a figure one and a half columns wide.
     route
-        Route or motion, drawn with its start and goal; one without a path is left out.
+        Route or motion, drawn with its start and goal; omitted if it has no path.
     limit
         The set is cut along its bound, and paler where it is not obeyed.
 

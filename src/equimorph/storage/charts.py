@@ -1,4 +1,4 @@
-"""Charts and atlases: as HDF5 groups, and as files of their own beside that of the set."""
+"""Charts and atlases: as HDF5 groups, and as separate files next to that of the set."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -104,8 +104,8 @@ def fingerprint(content: Any) -> str:
 def lock_file(path: Path, what: str) -> Generator[None]:
     """Hold the lock on a file while the block lasts: one process at a time.
 
-    The file stays where it is and names its last holder. There is no stale lock: the system frees
-    it with the process, however that ends.
+    The file stays where it is and names its last holder. There is no stale lock: the system
+    releases it with the process, however that ends.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """HDF5 pieces that h5netcdf (and so xarray) understands: named dimensions, text as JSON.
 
 A file ends with a checksum of all its bytes, which HDF5 ignores: damage anywhere is found before
-anything is read. Every array carries a checksum of its own besides, for files that another program
+anything is read. In addition every array carries a checksum, for files that another program
 has changed and so stripped of theirs.
 """
 
@@ -31,7 +31,7 @@ MARK = b"equimorph-sha256"
 DAMAGE = (OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, MemoryError)
 """What the HDF5 library and readers of its content raise when the content makes no sense."""
 
-# What netCDF-4 calls a dimension that has no coordinates of its own.
+# The name in netCDF-4 of a dimension without coordinates.
 _BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable. %9d"
 
 

@@ -29,8 +29,8 @@ LENGTH, DIGEST = 16, 64
 def open_journal(path: Path | str, *, replace: bool = False) -> Generator["JournalFile"]:
     """Open a journal while the block lasts; its file is made when it is first written to.
 
-    What is damaged or was left half-written at the end of the file is dropped, and found anew. The
-    file grows with the computation (by about 1 kB for each vertex of a set, 3 kB if refined);
+    What is damaged or was left half-written at the end of the file is dropped, and computed again.
+    The file grows with the computation (by about 1 kB for each vertex of a set, 3 kB if refined);
     remove it when the result is stored.
 
     Parameters
@@ -38,7 +38,7 @@ def open_journal(path: Path | str, *, replace: bool = False) -> Generator["Journ
     path
         Of the file.
     replace
-        Begin anew in the journal of another computation, which is refused otherwise.
+        Overwrite the journal of another computation, which is refused otherwise.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def _open_privately(path: Path) -> BinaryIO:
 
 
 def _entry(file: BinaryIO) -> tuple[str, Findings] | None:
-    """Step and findings of the next entry; None if there is none, or none that is whole."""
+    """Step and findings of the next entry; None at the end of the file, or of its intact part."""
     head = file.read(LENGTH + DIGEST)
     try:
         length = int(head[:LENGTH], 16)

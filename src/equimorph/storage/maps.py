@@ -129,7 +129,7 @@ def write_map(amap: ActuatorMap, path: str | Path) -> tuple[Path, Path]:
         The map.
     path
         Name of the table of the grid, ending in ``.csv``; that of the curves ends in
-        ``-curves.csv``. A value that does not exist is left empty; "error"
+        ``-curves.csv``. A cell without a value is empty; "error"
         bounds that of a place along its grid line.
 
     Raises

@@ -18,7 +18,7 @@ class Owner:
     structure
         Knows its own descriptors by their names.
     descriptors
-        Others, by names, as users make them of functions.
+        Descriptors that users made of functions, by their names.
     """
 
     structure: Structure
@@ -30,7 +30,7 @@ class Owner:
         Raises
         ------
         InputError
-            If there is none.
+            If neither the structure nor the user gives a descriptor of this name.
         """
         return self.descriptors.get(name) or worst_named(self.structure, name)
 

@@ -1,7 +1,7 @@
 """The one way by which records get into HDF5 groups and back: by a schema and its version.
 
-What other programs look at (sets, states, maps, routes, charts) has a layout of its own; all other
-results of tasks are written field by field, see `values`. Every group says which it is.
+Records that other programs read (sets, states, maps, routes, charts) have special layouts; all
+other results of tasks are written field by field, see `values`. Every group says which it is.
 
 See docs/decisions.md, "Records carry a schema and a version".
 """

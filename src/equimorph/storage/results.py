@@ -45,11 +45,11 @@ SCHEMAS = {ROUTES: "route", MAPS: "map", EQUILIBRIA: "states"}
 
 @dataclass(frozen=True)
 class Results:
-    """What a results file holds: a set, equilibria over points, and what else was asked for.
+    """What a results file holds: a set, equilibria over points, and further answers.
 
     Routes and maps are there by name, other answers by table and name:
-    ``results.answers["optimum"]["flattest"]``. What this release cannot read, because another one
-    wrote it otherwise, is left out and named in `unreadable`, with the reason.
+    ``results.answers["optimum"]["flattest"]``. What this release cannot read, because another
+    release wrote it differently, is omitted and named in `unreadable`, with the reason.
     """
 
     equilibrium_set: EquilibriumSet | None
@@ -174,7 +174,7 @@ def save_set(path: str | Path, eset: EquilibriumSet, height: Descriptor | None =
         The set, over one, two or three parameters.
     height
         Coordinate after the free parameters in what ParaView shows; by default the descriptor that
-        tells the structure's states apart.
+        distinguishes the states of the structure.
 
     Raises
     ------

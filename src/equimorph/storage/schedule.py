@@ -23,7 +23,7 @@ from equimorph.storage.files import read_text, write_text
 
 FORMAT = "equimorph schedule"
 VERSION = 1
-"""Version of the layout of the sidecar file; others are refused."""
+"""Version of the layout of the sidecar file; other versions are refused."""
 PROGRESS, MARGIN = "progress", "stability_margin"
 
 
@@ -67,7 +67,7 @@ def read_schedule(path: str | Path) -> Schedule:
     Parameters
     ----------
     path
-        Name of the table, ending in ``.csv``; the sidecar lies beside it.
+        Name of the table, ending in ``.csv``; the sidecar stands in the same folder.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Schemas: under which names records and their fields stand in files, and how older ones are read.
 
 A record is one of our frozen dataclasses. Files name it by its schema, not by its class, and give
-the version of the schema beside it. A class or field may be renamed at any time: say so in
+the version of the schema with it. A class or field may be renamed at any time: say so in
 `CHANGES`, and raise the version there. A record that this release cannot read is named, and the
 rest of its file is read.
 """
@@ -29,7 +29,7 @@ OTHERS = (
 
 
 class UnreadableError(InputError):
-    """One record of a file cannot be read by this release; others can."""
+    """One record of a file cannot be read by this release; the rest of the file can."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Change:
 
 
 CHANGES: Mapping[str, Change] = {}
-"""What changed, by the names of the classes; all others are as they were in version 1."""
+"""Changes by class; a class that is not listed is as it was in version 1."""
 
 
 @dataclass(frozen=True)
@@ -125,14 +125,14 @@ def find_schema(name: str) -> Schema:
 
 
 def build(kind: type, values: Mapping[str, Any], version: int = 1) -> Any:
-    """Return a record of a kind that stands in a layout of its own; see `Schema.build`."""
+    """Return a record of a kind with a special layout; see `Schema.build`."""
     return find_schema(_name(kind)).build(version, values)
 
 
 @cache
 def schemas() -> dict[str, Schema]:
     """All records, by the names of their schemas; those of tasks are found by themselves."""
-    # maps have a layout of their own
+    # maps have a special layout
     found = [kind for kind in _dataclasses(tasks) if not issubclass(kind, tasks.ActuatorMap)]
     kinds = [*found, *OTHERS]
     return {

@@ -29,7 +29,7 @@ INSIDE = ("Component", "Stratum", "Audit")
 LARGEST_RESIDUAL = 1e-6
 """Residual, in the units of the structure, beyond which a stored state is no equilibrium."""
 SAMPLE = 1000
-"""States whose residuals are looked at when a set is read."""
+"""Number of states whose residuals are checked when a set is read."""
 VTK_TYPES = {2: 3, 3: 5, 4: 10}
 """Cell types of VTK by the number of corners: line, triangle, tetrahedron."""
 
@@ -44,8 +44,8 @@ def write_set(group: h5py.Group, eset: EquilibriumSet, height: Descriptor | None
     eset
         The set.
     height
-        Coordinate of the embedding after the free parameters; by default the descriptor that tells
-        states apart.
+        Coordinate of the embedding after the free parameters; by default the descriptor that
+        distinguishes states.
     """
     height = height or eset.structure.elevation
     points, parameters = eset.points, names_of(eset.structure.parameters)

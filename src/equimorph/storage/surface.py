@@ -55,8 +55,8 @@ def write_surface(path: str | Path, eset: EquilibriumSet, height: Descriptor | N
     eset
         The set.
     height
-        Coordinate after the free parameters, by default the descriptor that tells states apart; in
-        three parameters a number on the points.
+        Coordinate after the free parameters, by default the descriptor that distinguishes states;
+        in three parameters a number on the points.
 
     Raises
     ------

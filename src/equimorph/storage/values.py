@@ -1,7 +1,7 @@
 """Results of tasks as HDF5 groups: any of our records, field by field; see `schemas`.
 
 Plain values and the shape of the record are one text, ``about``; arrays and states are datasets and
-groups beside it under the names of their fields, for other programs to read. Descriptors and
+groups next to it under the names of their fields, for other programs to read. Descriptors and
 constraints are kept by name: the structure knows the rest.
 """
 
@@ -27,7 +27,7 @@ Inner = Callable[[Any], Any]
 
 
 def write_states(group: h5py.Group, states: States) -> None:
-    """Write states, with what people want to know of them."""
+    """Write states with their parameters, energies, margins and shapes."""
     put(group, "z", states.z, ["state", "unknown"], "unknowns and multipliers")
     put(group, "p", states.p, ["state", "parameter"], "parameters")
     put(group, "index", states.index, ["state"], "negative eigenvalues; 0 is stable")
@@ -96,7 +96,7 @@ def _pairs(group: h5py.Group, value: Mapping[Any, Any], place: str) -> list[list
 
 
 def _put(group: h5py.Group, value: Any, place: str) -> Any:
-    """Write what has a form of its own; return where it is, or its name."""
+    """Write a value with a special form; return its place or its name."""
     match value:
         case np.ndarray():
             axes = [f"{place.replace('/', '.')}.{axis}" for axis in range(value.ndim)]

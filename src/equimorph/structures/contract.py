@@ -214,7 +214,7 @@ class Structure(ABC):
         """Parameter values at which natural states are defined (loads at zero)."""
 
     def natural_parameters(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameters"]:
-        """Parameters of a natural state: loads as in `unloaded`, others as given or by default.
+        """Parameters of a natural state: loads as in `unloaded`, the rest as given or by default.
 
         Raises
         ------

@@ -135,7 +135,7 @@ class DiscreteStructure(Structure):
 
     @cached_property
     def _reference(self) -> Float[np.ndarray, " parameters"]:
-        """Parameters at which the natural state is known: defaults, NaN where there is none."""
+        """Parameters at which the natural state is known: NaN for parameters without a default."""
         loads = self.unloaded()
         defaults = [
             loads.get(each.name, np.nan if each.default is None else each.default)

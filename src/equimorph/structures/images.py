@@ -1,4 +1,4 @@
-"""Mirror images of networks of joints, and structures that are their own."""
+"""Mirror images of networks of joints, and tests for symmetric structures."""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product

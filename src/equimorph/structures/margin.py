@@ -18,7 +18,7 @@ RELATIVE = 1e-11
 NEAR = 1e-3
 """Distance of a shift below the eigenvalue, as a share of the second one, once that is known."""
 SWEEPS, CHUNK, SHARE = 8, 256, 1024
-"""Most solves; lanes at a time; least lanes that are worth a thread of their own."""
+"""Most solves; lanes at a time; least lanes that are worth a further thread."""
 
 Pairs = Float[np.ndarray, "lanes 2 unknowns"]
 
@@ -69,7 +69,7 @@ def _by_pairs(
     for sweep in range(SWEEPS):
         vectors, first, second, stable = _swept(structure, z[todo], p[todo], shift, vectors)
         change = np.abs(known - first)
-        # one more sweep would shrink what is left so much
+        # one more sweep would shrink the error by this factor
         left = ((first - shift) / np.maximum(second - shift, NEAR * np.abs(second))) ** 2
         tolerance = error * np.maximum(np.abs(first), 1e-3)
         settled = stable & (sweep > 0) & (change * left <= tolerance)

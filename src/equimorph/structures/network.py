@@ -43,7 +43,7 @@ class Network(ABC):
 
     @cached_property
     def walk(self) -> Int[np.ndarray, " steps"]:
-        """Joints in the order of a walk along all edges, some of them there and back."""
+        """Joints in the order of a walk along all edges, some of which it passes twice."""
         return walk_along(self.ends, len(self.joints))
 
     def joint(self, name: Any) -> int:
@@ -69,7 +69,7 @@ class Network(ABC):
         ------
         InputError
             For no edges, two between the same joints, one without length, joints without edges, or
-            joints apart from the others.
+            joints that are not connected to the rest.
         """
         if not self.edge_names:
             raise InputError(f"`{self.edge}s` must be one at least; got none.")
@@ -191,14 +191,14 @@ def check_parameter_names(names: Sequence[Any]) -> None:
     Raises
     ------
     InputError
-        With the name; or if there is none.
+        Without names, and for one that is no word or is used twice, which is named.
     """
     if not names:
         raise InputError("`loads` or `actuators` must name a parameter; got none.")
     for i, name in enumerate(names):
         if not (isinstance(name, str) and name.isidentifier()) or name in names[:i]:
             raise InputError(
-                "`loads` and `actuators` must have names of their own, of letters, digits and "
+                "`loads` and `actuators` must have different names of letters, digits and "
                 f"underscores; got {name!r}."
             )
 
@@ -241,7 +241,7 @@ def numbers(given: Any, counts: Sequence[int], what: str) -> list[float]:
 
 
 def walk_along(ends: Int[np.ndarray, "edges 2"], joints: int) -> Int[np.ndarray, " steps"]:
-    """Joints in the order of a walk along all edges, some of them there and back.
+    """Joints in the order of a walk along all edges, some of which it passes twice.
 
     It begins at joint 0 and stays in the part of the network that it can reach.
     """

@@ -17,7 +17,7 @@ Dimension = tuple[int, int, int]
 """Powers of kilogram, metre and second."""
 Unit = tuple[float, Dimension]
 Quantity = float | str
-"""A number in the units at hand, or a text with its own, like "12 kN"."""
+"""A number in the units at hand, or a text with a unit, like "12 kN"."""
 
 STANDARD_GRAVITY = 9.80665
 """m/s², by definition [BIPM2019]_: what turns a mass per length into a weight per length."""
@@ -141,7 +141,7 @@ class UnitSystem:
         Parameters
         ----------
         given
-            A number in these units, or a text with units of its own.
+            A number in these units, or a text with a unit.
         quantity
             What it measures, in the words force and length, like ``force·length²``. A force per
             length may be given as a mass per length, which standard gravity makes heavy.

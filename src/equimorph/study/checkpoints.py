@@ -29,7 +29,7 @@ class Checkpoints:
     structure
         To which the answers belong.
     asked
-        Fingerprints of the questions asked so far.
+        Fingerprints of the questions of this run so far.
     found
         Those whose answers were there already.
     """
@@ -70,7 +70,7 @@ class Checkpoints:
         return cast(Answer, load_record(file, self.structure))
 
     def forget_others(self) -> None:
-        """Remove answers that were not asked for."""
+        """Remove answers to questions that this run did not ask."""
         for file in self.results.checkpoints.iterdir():
             if file.name.partition("-")[0] not in self.asked:
                 file.unlink()

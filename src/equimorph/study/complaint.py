@@ -36,7 +36,7 @@ _REQUIREMENTS = {
 
 
 def complaint(error: ValidationError, model: type[BaseModel], file: str) -> InputError:
-    """Say in one line what is wrong first in a study file, and how much more there is.
+    """Describe the first error of a study file in one line, with the number of further errors.
 
     Parameters
     ----------

@@ -151,8 +151,7 @@ class GridArgument(Argument):
         box = ground.box
         if len(box.names) != 2:
             raise InputError(
-                f"`{place}` must be asked of a set over two parameters; got one over "
-                f"{len(box.names)}."
+                f"`{place}` needs a set over two parameters; got one over {len(box.names)}."
             )
         sides = dict(zip(box.names, zip(box.lower, box.upper, strict=True), strict=True))
         for end in (0, 1) if section.box else ():
@@ -198,7 +197,7 @@ def unloaded_load(structure: Structure, section: Any, grid: Grid) -> float:
 
 @dataclass(frozen=True)
 class OptionsArgument(Argument):
-    """Options of a computation, each under a key of its own; `written` is their class."""
+    """Options of a computation, each under a separate key; `written` is their class."""
 
     parts: tuple[Argument, ...] = ()
 

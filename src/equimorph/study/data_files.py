@@ -31,20 +31,21 @@ class DataTable(Section):
 def _read_data(given: Any, info: Any) -> Any:
     """Read the file of a name; `FOLDER` of the context is where the study file lies."""
     if not isinstance(given, str) or Path(given).name != given or not given.endswith(".csv"):
-        raise requirement("be the name of a CSV file that lies beside the study file")
+        raise requirement("be the name of a CSV file in the folder of the study file")
     folder = Path((info.context or {}).get(FOLDER, "."))
     try:
         text = (folder / given).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        raise requirement(f"be a readable file beside the study file ({reason})") from error
+        needed = f"be a readable file in the folder of the study file ({reason})"
+        raise requirement(needed) from error
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip(" ,;\t")]
     lines = [(k, line) for k, line in lines if not line.startswith("#")]
     if not 2 <= len(lines) <= MOST_ROWS:
         raise requirement(f"hold a line of column names, and from 1 to {MOST_ROWS} of numbers")
     columns, *rows = ([cell.strip() for cell in cells] for cells in csv.reader(x for _, x in lines))
     if len(set(columns)) < len(columns) or "" in columns:
-        raise requirement("give every column a name of its own in its first line")
+        raise requirement("give every column a different name in its first line")
     numbers = [_numbers(k, row, columns) for (k, _), row in zip(lines[1:], rows, strict=True)]
     return {"file": given, "columns": columns, "rows": numbers}
 

@@ -15,7 +15,7 @@ from equimorph.study.lookup import Extent, at_key, check_value, constraints_of
 from equimorph.study.signatures import arguments_of
 
 WRITTEN = ("box", "fixed", "within", "intervals")
-"""Arguments of sets with words of their own below; all others are options, by their types."""
+"""Arguments of sets with hand-written keys below; the remaining ones are options, by type."""
 OPTIONS = arguments_of(equilibrium_set, left_out=WRITTEN)
 
 
@@ -26,7 +26,7 @@ def _one_to_three(table: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Extent(Section):
-    """The part of the equilibrium set that is wanted."""
+    """The part of the equilibrium set to compute."""
 
     box: Annotated[dict[str, Interval], AfterValidator(_one_to_three)]
     fixed: Point = Field(default_factory=dict)
@@ -46,7 +46,7 @@ SetSection: type[Any] = create_model("SetSection", __base__=_Extent, **_options)
 
 
 class PointSection(Section):
-    """A point of the parameter space whose equilibria are wanted."""
+    """A point of the parameter space whose equilibria are computed."""
 
     at: Point = Field(min_length=1)
 
@@ -72,7 +72,9 @@ def extent_of_set(structure: Structure, wanted: Any) -> Extent:
 def _check_fixed(structure: Structure, box: Box, fixed: Mapping[str, float]) -> None:
     both = sorted(set(box.names) & set(fixed))
     if both:
-        raise InputError(f"`set.fixed` must not name what `set.box` frees; got {', '.join(both)}.")
+        raise InputError(
+            f"`set.fixed` must not name free parameters of `set.box`; got {', '.join(both)}."
+        )
     with at_key("set.fixed"):
         for name, value in fixed.items():
             check_value(structure, name, value)

@@ -85,7 +85,7 @@ class ResultsFolder:
         for file in arrivals:
             if file.name not in known and (self.path / file.name).exists():
                 raise InputError(
-                    f"`results folder` must not hold a file of its own at {self.path / file.name}; "
+                    f"`results folder` must not hold a foreign file at {self.path / file.name}; "
                     "got one. Move it away, or choose another folder."
                 )
         # Listed before they arrive: after an interruption they are still known to be ours.
@@ -109,7 +109,7 @@ def open_results_folder(
         The study to be run.
     replace
         Take over a folder with the results of another study: its files are removed, but not the
-        answers to questions that both studies ask. Files of others stay.
+        answers to questions that both studies ask. Files of other origin stay.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def _sweep(path: Path) -> None:
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
-    """Manifest of a folder, empty if there is none.
+    """Manifest of a folder, empty if the folder has none.
 
     Names with a folder in them are refused: a manifest never makes us touch a file elsewhere.
     """

@@ -52,9 +52,9 @@ def figure(file: Path, caption: str, *, larger: str = "", wide: bool = False) ->
     caption
         Plain text, also what is read aloud.
     larger
-        File name beside the page that the picture links to.
+        File in the folder of the page that the picture links to.
     wide
-        Whether it takes a row of its own.
+        Whether it takes a whole row.
     """
     data = base64.b64encode(file.read_bytes()).decode("ascii")
     words = escape(caption)
@@ -85,7 +85,7 @@ def pictures(folder: Path, wide: Mapping[str, str], captions: Mapping[str, str])
 
 
 def refusal_line(why: str) -> str:
-    """Return the line of an answer that there is none, and why."""
+    """Return the line of an answer without a result, with the reason."""
     return f'<p class="verdict refused"><strong>Refused.</strong> {escape(why)}</p>'
 
 
@@ -184,7 +184,7 @@ def table_of_states(
     more
         Further columns, ready texts by their titles.
     numbered
-        Whether rows are numbered from 1, as on a figure beside.
+        Whether rows are numbered from 1, as on the accompanying figure.
     """
     shapes = states.shape()
     box = np.stack([shapes.min(axis=(0, 1)) - ROOM, shapes.max(axis=(0, 1)) + ROOM])

@@ -37,7 +37,7 @@ class Ground:
 
     structure: Structure
     extent: Extent | None
-    """Of the set, if it is asked for."""
+    """Of the set, if the study has one."""
 
     @property
     def height(self) -> Descriptor:
@@ -84,7 +84,9 @@ def check_point(box: Box, point: Mapping[str, float], key: str, *, whole: bool =
     """
     names = ", ".join(box.names)
     if not set(point) <= set(box.names) or (whole and len(point) < len(box.names)):
-        need = f"name the free parameters {names}" if whole else f"name some of {names}"
+        need = (
+            f"name the free parameters {names}" if whole else f"name only free parameters ({names})"
+        )
         raise InputError(f"`{key}` must {need}; got {', '.join(point)}.")
     for name, value in point.items():
         i = box.names.index(name)

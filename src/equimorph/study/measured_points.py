@@ -29,8 +29,8 @@ class Measured:
 def measured_shapes(structure: Structure, section: Any, key: str) -> Measured:
     """Shapes in the rows of a table: one row for each point, its columns s, x, y.
 
-    Further columns are parameters, constant within a state; `state` tells states apart that have
-    the same ones; `sigma` is the standard deviation of a point.
+    Further columns are parameters, constant within a state; `state` distinguishes states with
+    equal parameters; `sigma` is the standard deviation of a point.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def _shape(
     sigma: float | None,
     key: str,
 ) -> MeasuredShape:
-    """Points of all states at the same places, not a number where there is none."""
+    """Points of all states at the same places, NaN where a state has no measurement."""
     places = np.unique(column["s"])
     points = np.full((len(states), len(places), 2), np.nan)
     deviations = np.ones(points.shape)

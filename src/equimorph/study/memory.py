@@ -55,7 +55,7 @@ def check_memory(problem: Problem) -> float:
     Raises
     ------
     InputError
-        If there is less: with what is needed, what there is, and what to reduce.
+        If the machine has less: names the need, the memory at hand, and what to reduce.
     """
     available, most = available_memory(), 0.0
     for key, extent in problem.extents.items():

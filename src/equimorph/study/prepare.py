@@ -1,4 +1,4 @@
-"""From a study file to the objects of the library, with the key of whatever does not fit."""
+"""From a study file to the objects of the library; errors name the key."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Study files: what a user may write, checked before anything is computed.
 
-A study is data only. It names a structure and what is wanted: a part of its equilibrium set, with
+A study is data only. It names a structure and the questions: a part of its equilibrium set, with
 equilibria at points and questions on it, like routes between states, or maps over actuators, or
 both. Types are strict and unknown keys are refused.
 """
@@ -54,7 +54,7 @@ class Study(Section):
     def _names_differ(self) -> "Study":
         for table, sections in self.tasks.items():
             if len({each.name for each in sections}) < len(sections):
-                raise requirement(f"give every {table} a name of its own")
+                raise requirement(f"give every {table} a different name")
         return self
 
     @model_validator(mode="after")

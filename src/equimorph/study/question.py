@@ -46,7 +46,7 @@ class Question:
     Parameters
     ----------
     kind
-        What is asked.
+        Kind of the question.
     key
         Of its section in the file, for messages.
     section
@@ -56,7 +56,7 @@ class Question:
     values
         Arguments of the task, by name; states are chosen when the set is there.
     extra
-        What a kind looks up besides.
+        Further objects that the kind looks up.
     """
 
     kind: "Kind[Any]"
@@ -92,7 +92,7 @@ class Question:
 
     @property
     def within(self) -> tuple[Constraint, ...]:
-        """Its own constraints."""
+        """Constraints of this question alone."""
         return tuple(self.values["within"])
 
     @property
@@ -137,7 +137,7 @@ class Arguments(dict[str, Any]):
 
 
 class Kind(ABC, Generic[A]):
-    """A kind of question: its task, and how the answer is drawn and told. A is the answer."""
+    """A kind of question: its task, and how an answer of type A is drawn and reported."""
 
     table: ClassVar[str]
     """Its tables in the file are ``[[table]]``."""
@@ -191,7 +191,7 @@ class Kind(ABC, Generic[A]):
         return "eset" in parameters
 
     def needs_set(self, section: Any) -> bool:
-        """Whether it is asked of the set of the study."""
+        """Whether it needs the set of the study."""
         return self.takes_set or any(each.needs_set(section) for each in self.arguments)
 
     def stems(self, section: Any) -> list[str]:
@@ -211,8 +211,8 @@ class Kind(ABC, Generic[A]):
         """Look up, or refuse, what follows from no type."""
         return None
 
-    def extent(self, question: Question) -> Extent | None:  # of kinds with a grid of their own
-        """Grid that the answer needs beside that of the set."""
+    def extent(self, question: Question) -> Extent | None:  # of kinds with a separate grid
+        """Grid that the answer needs in addition to that of the set."""
         return None
 
     def answer(self, question: Question, arguments: Arguments) -> A:

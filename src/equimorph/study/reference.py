@@ -1,6 +1,6 @@
 """All keys of study files as a page, from the signatures and docstrings of the tasks.
 
-``python -m equimorph.study.reference > docs/study-keys.md`` writes it anew.
+``python -m equimorph.study.reference > docs/study-keys.md`` writes it.
 """
 
 import inspect
@@ -25,7 +25,7 @@ see [studies.md](studies.md) for what the tables are and how values are written.
 default must be given. Every question has a `name`, with which the names of its files begin.
 """
 SHARED = {
-    "box": "Ranges of two parameters; within a set, by default its own box.",
+    "box": "Ranges of two parameters; for questions about a set, by default the box of the set.",
     "intervals": "Intervals of the grid along each of them.",
     "rates": "Largest rates of parameters, for an objective with time.",
     "schedule": "Name of a schedule file, or `start` and `steps` instead.",

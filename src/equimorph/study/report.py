@@ -29,7 +29,7 @@ def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) ->
     folder
         Where the files go, figure by figure.
     progress
-        Told how far the drawing is.
+        Receives the progress of the drawing.
     """
     figures = _figures(outcome)
     for done, figure in enumerate(figures):
@@ -74,7 +74,7 @@ def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
     outcome
         What was found.
     folder
-        Where the figures are; the page will lie beside them.
+        Folder of the figures and of the page.
     text
         The study file as it was written.
     title
@@ -113,7 +113,7 @@ def _equilibria(
     heading = f"<h2>Equilibria at {escape(where)}</h2>"
     if not len(states):
         return [heading, "<p>None within the constraints.</p>"]
-    # Leading with what a reader looks for: the highest first.
+    # The highest state comes first, which readers look for.
     order: Int[np.ndarray, " lanes"] = np.argsort(-descriptors[0](states))
     return [
         heading,

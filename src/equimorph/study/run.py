@@ -44,7 +44,7 @@ def run_study(
     replace
         Replace the results of another study, or of an earlier version of this one.
     progress
-        Told how far the run is.
+        Receives the progress of the run.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def run_study(
         _store(outcome, folder, text)
         with _measure_time(outcome.seconds, "figures"):
             draw_figures(outcome, folder, sink)
-        # The page of a run that had finished tells how long the answers took.
+        # The page of a finished run gives the times of the answers.
         if not (same_words and folder.holds([REPORT])):
             with folder.adding() as staging:
                 page = report(outcome, folder.path, text, study.title or path.stem)
@@ -101,11 +101,11 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
     Parameters
     ----------
     study, problem
-        What is asked, as written and as objects.
+        The questions, as written and as objects.
     folder
         Where answers are kept, and where earlier ones may be.
     progress
-        Told how far the run is.
+        Receives the progress of the run.
     """
     seconds: dict[str, float] = {}
     checkpoints = Checkpoints(folder, problem.structure)
@@ -131,7 +131,7 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
 
 
 def _question(study: Study, *, of_set: bool) -> dict[str, Any]:
-    """Return what an answer depends on: the structure, and the set if it is asked of that."""
+    """Return what an answer depends on: the structure, and the set if the question needs it."""
     asked = study.model_dump(mode="json", by_alias=True)
     base = {"version": version("equimorph"), "structure": asked["structure"]}
     return base | {"set": asked["set"]} if of_set else base
@@ -187,7 +187,7 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
 
 
 def _write_results(outcome: Outcome, path: Path) -> None:
-    """Write all answers as one file: routes and maps in groups of their own."""
+    """Write all answers as one file: routes and maps in separate groups."""
     routes: dict[str, Route] = {}
     for name, found in outcome.of("route").items():
         routes |= {route_name(name, k): each for k, each in enumerate(found, 1)}

@@ -71,7 +71,7 @@ MEANINGS: Mapping[str, Any] = {
 SUPPLIED = (EquilibriumSet, Structure, Progress, Journal)
 """Types of what a study has anyway."""
 MONITOR = "monitor"
-"""Descriptors that a schedule records: the study gives the one that tells states apart."""
+"""Descriptors that a schedule records: the study gives the one that distinguishes states."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""States that a study speaks of: chosen on the set, or led from a natural state."""
+"""States of a study: chosen on the set, or lifted from a natural state."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -65,7 +65,7 @@ class ChosenState(Later):
 
 @dataclass(frozen=True)
 class NaturalState(Later):
-    """A state to be led from a natural one, with the key of the study file."""
+    """A state to be lifted from a natural one, with the key of the study file."""
 
     section: NaturalSection
     key: str
@@ -115,7 +115,7 @@ def choose_state(eset: EquilibriumSet, section: StateSection, key: str) -> State
     Raises
     ------
     InputError
-        If nothing stable is there, if the choice is left open, or if `near` meets no equilibrium.
+        If no state is stable there, the choice is ambiguous, or `near` meets no equilibrium.
     """
     here = eset.at(**section.at)
     stable = here.stable

@@ -18,7 +18,7 @@ def template(kind: str) -> str:
     Raises
     ------
     InputError
-        If there is none of this kind.
+        If there is no template of this kind.
     """
     if kind not in KINDS:
         raise InputError(f"`kind` must be one of {', '.join(KINDS)}; got {kind!r}.")
@@ -30,7 +30,7 @@ def _template_file(name: str) -> Traversable:
 
 
 def write_template(path: Path, kind: str) -> None:
-    """Write an example study to a file that does not exist yet, and its data beside it.
+    """Write an example study to a new file, and its data to the same folder.
 
     Raises
     ------

@@ -80,9 +80,9 @@ def made(joints=JOINTS, members=MEMBERS, supports=HELD, loads=LOADS, actuators=N
         ({"loads": {"P": {}}}, "`loads.P` must act on a member, or on a joint"),
         ({"loads": {"P": {"B": (0,)}}}, "`loads.P.B` must be 2 or 3 finite numbers; got (0,)"),
         ({"loads": {"P": {"weight": (0, -1)}}}, "`loads.P.weight` must act on members with a wei"),
-        ({"loads": {"P 1": {"B": (0, 1)}}}, "must have names of their own"),
+        ({"loads": {"P 1": {"B": (0, 1)}}}, "must have different names of letters"),
         ({"loads": None}, "`loads` or `actuators` must name a parameter; got none"),
-        ({"actuators": {"P": {"turn": {"A": 1.0}}}}, "must have names of their own"),
+        ({"actuators": {"P": {"turn": {"A": 1.0}}}}, "must have different names of letters"),
         ({"actuators": {"a": {}}}, "`actuators.a` must have an effect (curvature, length, move"),
         ({"actuators": {"a": {"bend": {}}}}, "must have effects curvature, length, move, turn"),
         ({"actuators": {"a": {"curvature": {}}}}, "`actuators.a.curvature` must say where it acts"),
@@ -113,9 +113,9 @@ def test_stiffness_and_weight_are_positive(name, value):
 @pytest.mark.parametrize(
     ("data", "text"),
     [
-        ({"hinges": "A"}, "`hinges` of member A-B must name some of its ends, each once; got 'A'"),
-        ({"hinges": ["C"]}, "`hinges` of member A-B must name some of its ends"),
-        ({"hinges": ["A", "A"]}, "`hinges` of member A-B must name some of its ends"),
+        ({"hinges": "A"}, "`hinges` of member A-B must name one or both of its ends, each once; got 'A'"),
+        ({"hinges": ["C"]}, "`hinges` of member A-B must name one or both of its ends"),
+        ({"hinges": ["A", "A"]}, "`hinges` of member A-B must name one or both of its ends"),
         ({"curvature": NAN}, "`curvature` of member A-B must be finite; got nan"),
     ],
 )

@@ -94,7 +94,7 @@ class Formulas:
         return [self.energy, *self.constraints, *rest]
 
     def fill(self, flat: Sequence[Any]) -> "Formulas":
-        """Return the same with others, in the order of `flat`."""
+        """Return the same with new expressions, in the order of `flat`."""
         each = iter(flat)
         return Formulas(
             next(each),

@@ -39,7 +39,7 @@ def can_enclose(tape: Tape) -> bool:
 def enclosure(
     tape: Tape, low: Float[np.ndarray, "lanes inputs"], high: Float[np.ndarray, "lanes inputs"]
 ) -> tuple[Float[np.ndarray, "lanes outputs"], Float[np.ndarray, "lanes outputs"]]:
-    """Bounds of the outputs for all inputs between two bounds; infinite where there are none."""
+    """Bounds of the outputs for all inputs between two bounds; infinite where none are known."""
     lanes = len(low)
     work: dict[int, Interval] = {}
     out_low, out_high = np.empty((2, lanes, tape.outputs))
@@ -126,7 +126,7 @@ def _even_growth(a: Interval) -> Interval:
 
 
 def _power(a: Interval, b: Interval) -> Interval:
-    """Constant exponents; unbounded for others."""
+    """Power with a constant exponent; unbounded for a variable one."""
     n = b[0]
     whole, odd = n == np.round(n), np.mod(n, 2.0) == 1.0
     low, high = a[0] ** n, a[1] ** n

@@ -40,7 +40,7 @@ def casadi() -> Any:
 
 @lru_cache(maxsize=1)
 def _names() -> dict[int, str]:
-    """Operations by CasADi's own numbers, which may change from release to release."""
+    """Operations by CasADi's numbers, which may change from release to release."""
     ca = casadi()
     codes = {getattr(ca, key): key[3:].lower() for key in dir(ca) if key.startswith("OP_")}
     return {code: _SAME.get(name, name) for code, name in codes.items()}

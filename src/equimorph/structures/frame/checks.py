@@ -12,7 +12,7 @@ from equimorph.tolerances import SINGULAR
 
 
 def refuse_singular(frame: FrameFields) -> None:
-    """Refuse mechanisms, and forces that no deformation can tell.
+    """Refuse mechanisms, and forces that deformations do not determine.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def discretisation_error(frame: FrameFields, finer: FrameFields, z: Lanes, p: Pa
     """Twice the largest change of displacements, turns of ends and max |κ| on a finer frame.
 
     Displacements and curvature are relative to the mean length of the members. Infinite where the
-    finer frame has no equilibrium beside the state, as may happen at a fold.
+    finer frame has no equilibrium near the state, as may happen at a fold.
     """
     model, fine = frame.model, finer.model
     matrix = model.mesh.interpolation(fine.mesh.nodes)

@@ -93,7 +93,7 @@ class FrameFields(FrameMechanics):
         """M at the nodes of every element, from the balance of each element.
 
         Ends of elements carry what the element's nodal forces say; inside ``M' = (1 + e) (f × t)``
-        is integrated from both ends, and what is left of their difference is shared in proportion.
+        is integrated from both ends, and the remaining difference is distributed in proportion.
         """
         model, (y, turns, strain) = self.model, self._fields(z, p)
         psi = turns[:, model.nodes.ravel()]

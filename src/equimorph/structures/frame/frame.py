@@ -35,8 +35,8 @@ class Frame(FrameFields):
 
     Members are unshearable, geometrically exact rods, straight or circular arcs as drawn, which is
     free of stress. Without EA they are inextensible; with it they have the energy ½ EA ε² per
-    length besides ½ EI (κ − κ₀)². They meet at rigid or hinged joints. Dead loads act on joints or
-    along members. x points right, y up; angles and couples count counterclockwise.
+    length in addition to ½ EI (κ − κ₀)². They meet at rigid or hinged joints. Dead loads act on
+    joints or along members. x points right, y up; angles and couples count counterclockwise.
 
     Unknowns are the turns of Gauss–Lobatto nodes along the members; the multipliers are forces that
     balance without loads, one for each independent cycle of members and supports in x and in y.
@@ -62,7 +62,7 @@ class Frame(FrameFields):
         Elements of each member and their polynomial degree.
     units
         Units of force and length of all numbers, like ``{"force": "kN", "length": "mm"}``; places,
-        stiffnesses and weights may then be texts with units of their own. None: any one system.
+        stiffnesses and weights may then be texts with units. None: any one system.
 
     Raises
     ------
@@ -190,9 +190,9 @@ class Frame(FrameFields):
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points 2"]:
-        """Places along a walk over all members, some of them there and back.
+        """Places along a walk over all members, some of which it passes twice.
 
-        `s` runs from 0 to 1 along it, each member as long as the others.
+        `s` runs from 0 to 1 along it; all members get equal lengths.
         """
         made = self.model.network
         walk = made.walk

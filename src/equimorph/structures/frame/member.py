@@ -71,8 +71,8 @@ class Member:
         fine = not isinstance(self.hinges, str) and all(end in self.ends for end in self.hinges)
         if not fine or len(set(self.hinges)) < len(self.hinges):
             raise InputError(
-                f"`hinges` of member {self.name} must name some of its ends, each once; got "
-                f"{self.hinges!r}."
+                f"`hinges` of member {self.name} must name one or both of its ends, each once; "
+                f"got {self.hinges!r}."
             )
 
     @property
@@ -85,7 +85,7 @@ class Member:
         return system.measured(self, QUANTITIES, f"member {self.name}")
 
     def length(self, chord: float) -> float:
-        """Length of the arc over a chord; InputError if there is none, or none slender enough."""
+        """Length of the arc over a chord; InputError if no slender arc fits."""
         half = 0.5 * abs(float(self.curvature)) * chord
         if half >= 1.0:
             raise InputError(

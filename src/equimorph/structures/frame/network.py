@@ -90,7 +90,7 @@ def frame_network(
     ------
     InputError
         For joints without place or members, members between unknown or equal joints, arcs that do
-        not reach, unknown supports, or joints apart from the others.
+        not reach, unknown supports, or joints that are not connected to the rest.
     """
     names, places = places_of_joints(joints, system, (2,), reserved=(WEIGHT,))
     made = tuple(member_of(each).measured(system) for each in members)

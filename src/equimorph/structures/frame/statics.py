@@ -2,7 +2,7 @@
 
 Dead loads reach the ground along many ways; what differs between two of them is a circulation of
 force around cycles of the network, closed through the ground. Forces in x and in y balance
-separately, so that each has its own graph: members, and an edge to the ground for each support.
+separately, so that each has a graph: members, and an edge to the ground for each support.
 """
 
 from collections import deque

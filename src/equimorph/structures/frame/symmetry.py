@@ -98,8 +98,8 @@ class _Image:
     def matrix(self) -> Matrix:
         """Scalars (multipliers, p, 1) of the image are ``y @ matrix``.
 
-        The forces of the image are those of the frame, moved and turned; what loads do not carry
-        there in the same way is left to the multipliers.
+        The forces of the image are those of the frame, moved and turned; the multipliers take
+        the forces that the loads carry differently there.
         """
         model, (nx, ny) = self.frame.model, self.axes
         m, count = model.multipliers, model.scalars

@@ -94,7 +94,7 @@ class ClampedMechanics(Mechanics):
     def kkt(
         self, z: Lanes, p: Parameters, shift: Values | None = None
     ) -> tuple[Nodal, Float[np.ndarray, "lanes 2 nodes"]]:
-        """F_z − shift·mass as `layout` takes it: diagonal beside the stiffness, constraints."""
+        """F_z − shift·mass as `layout` takes it: diagonal to add to the stiffness, constraints."""
         z, p = self.check_widths((z, p))
         lanes, nodes = len(z), self.unknowns + 2
         diagonal, gradients = np.empty((lanes, nodes)), np.empty((lanes, 2, nodes))

@@ -68,7 +68,7 @@ class Description:
                 key = f"{group}.{name}"
                 if name in RESERVED or name in out or not name.isidentifier():
                     raise InputError(
-                        f"`{key}` must have a name of its own, of letters, digits and _; "
+                        f"`{key}` must have a different name, of letters, digits and _; "
                         f"got {name!r}."
                     )
                 several = spec if isinstance(spec, list | tuple) else [spec]

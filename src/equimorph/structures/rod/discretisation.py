@@ -190,7 +190,7 @@ def error_by_refinement(
 
     Returns
     -------
-    Twice the change. Infinite where the finer mesh has no equilibrium beside the state, as may
+    Twice the change. Infinite where the finer mesh has no equilibrium near the state, as may
     happen at a fold.
     """
     last = np.full_like(start, np.inf)

@@ -30,7 +30,7 @@ def stations(breaks: Float[np.ndarray, " ends"]) -> Float[np.ndarray, " samples"
 def peaks(values: Float[np.ndarray, "lanes samples"], at: Float[np.ndarray, " samples"]) -> Columns:
     """Local maxima of functions sampled at `stations`, ends included.
 
-    Returned are their values, −∞ where a lane has fewer than others, and their places. Polynomials
+    Returned are their values, −∞ in the unused columns of a lane, and their places. Polynomials
     of degree 8 never cross the ends of pieces.
     """
     low = np.full((len(values), 1), -np.inf)

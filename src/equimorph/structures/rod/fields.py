@@ -226,7 +226,7 @@ class GeneralFields:
     def _extrema(
         self, kappa: Float[np.ndarray, "some fine"], top: Int[np.ndarray, " some"]
     ) -> tuple[Float[np.ndarray, " some"], Float[np.ndarray, " some"]]:
-        """Place in [−1, 1] and size of the extrema beside the nodes `top`."""
+        """Place in [−1, 1] and size of the extrema next to the nodes `top`."""
         nodes = 2.0 * self.reference.nodes - 1.0
         series = self.reference.to_legendre @ kappa.T
         slope, bend = legendre.legder(series, 1), legendre.legder(series, 2)

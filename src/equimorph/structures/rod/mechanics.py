@@ -137,7 +137,7 @@ class Mechanics(ABC):
         lanes = len(z)
         z, p, row, dp = self.check_widths((z, p), (row, dp))
         inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
-        # one block each: what is freed at once stays with the process and is not mapped anew
+        # one block each: memory that is released at once stays with the process, without new pages
         dz, tangent_z = np.empty((2, lanes, self.size))
         dt, tangent_t, residual, determinant, ratio = np.empty((5, lanes))
         index = np.empty(lanes, dtype=np.int64)

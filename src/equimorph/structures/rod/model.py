@@ -48,7 +48,7 @@ class Densities:
     softness: Float[np.ndarray, "elements order"]
 
     def map_scalars(self, matrix: Float[np.ndarray, "scalars others"]) -> "Densities":
-        """For other scalars that determine these as ``matrix @ others``."""
+        """The densities for new scalars ``y``, of which the present ones are ``matrix @ y``."""
         along, across, bending, tension = (
             np.einsum("jk,jei->kei", matrix, a)
             for a in (self.along, self.across, self.bending, self.tension)
@@ -138,7 +138,7 @@ class RodModel:
     def map_scalars(
         self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
     ) -> "RodModel":
-        """The same rod in other parameters: its scalars are ``matrix @ others``."""
+        """The same rod in new parameters ``y``, of which its scalars are ``matrix @ y``."""
         return replace(
             self,
             names=tuple(names),
@@ -336,7 +336,7 @@ def _supports(
 
 @dataclass(frozen=True, eq=False)
 class Packed:
-    """Coefficients of those scalars that have any, beside each other for every point.
+    """Nonzero coefficients of the scalars, packed for every point.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ class EnclosedArea:
         return np.asarray(-s * multiply(s, self.matrix.T) - c * multiply(c, self.matrix.T))
 
     def hessian(self, theta: Nodal) -> Float[np.ndarray, "lanes nodes nodes"]:
-        """∂²V/∂θᵢ∂θⱼ: ``Wᵢⱼ sin(θⱼ − θᵢ)`` beside the diagonal."""
+        """∂²V/∂θᵢ∂θⱼ: ``Wᵢⱼ sin(θⱼ − θᵢ)`` off the diagonal."""
         s, c = np.sin(theta), np.cos(theta)
         out = self.matrix * (c[:, :, None] * s[:, None, :] - s[:, :, None] * c[:, None, :])
         at = np.arange(theta.shape[1])
@@ -86,7 +86,7 @@ Angles = Float[np.ndarray, "lanes unknowns"]
 Square = Float[np.ndarray, "unknowns unknowns"]
 
 BLOCK = 128
-"""Matrices put together at a time: calls cost little beside them."""
+"""Matrices that are assembled together: the cost of a call is small against theirs."""
 
 
 def lower_triangle(
@@ -109,9 +109,9 @@ def lower_triangle(
     stiffness, area
         K, and W of the enclosed area.
     diagonal
-        What the diagonal has besides.
+        Further terms of the diagonal.
     border, trailing
-        Gradients of the multipliers' constraints, and the multipliers' own block.
+        Gradients of the multipliers' constraints, and the block of the multipliers.
     """
     (lanes, n), m = theta.shape, border.shape[1]
     entries = np.empty((lanes, (n + m) * (n + m + 1) // 2))

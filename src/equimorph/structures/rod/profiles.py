@@ -120,7 +120,7 @@ def _from_callable(function: Shape, kinks: Sequence[float], name: str, symbol: s
 
 ProfileSpec = float | LoadSpec
 INWARD = 1e-13
-"""Share of an element by which its ends are moved inward: at a jump each side has its own value."""
+"""Share of an element by which ends are moved inward: values may differ on the sides of a jump."""
 
 
 def profile(spec: Any, name: str, kinks: Sequence[float] = ()) -> LoadShape:
@@ -129,7 +129,7 @@ def profile(spec: Any, name: str, kinks: Sequence[float] = ()) -> LoadShape:
     Raises
     ------
     InputError
-        For a number that is not finite, or whatever `load_shape` refuses.
+        For a number that is not finite, and as for `load_shape`.
     """
     if isinstance(spec, str):
         raise InputError(f"`{name}` must be a number, a table or a callable; got {spec!r}.")

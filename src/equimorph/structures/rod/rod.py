@@ -111,7 +111,7 @@ class Rod(Described):
         Bending stiffness and length; numbers are then dimensional.
     units
         Units of force and length of all numbers, like ``{"force": "mN", "length": "mm"}``; SI by
-        default. EI, length, axial, curvature, span and rise may then be texts with their own units.
+        default. EI, length, axial, curvature, span and rise may then be texts with units.
 
     Raises
     ------
@@ -327,7 +327,7 @@ class Rod(Described):
         """Bound of the errors of curvature and height, by solving again with a higher degree.
 
         Twice the largest change of max |κ|, and of κ(s) and y(s) at 25 arclengths; the heights'
-        part is the smallest by far. Infinite where the finer rod has no equilibrium beside the
+        part is the smallest by far. Infinite where the finer rod has no equilibrium near the
         state, as may happen at a fold.
         """
         return descriptors.discretisation_error(self.mechanics, self.refined, z, p)

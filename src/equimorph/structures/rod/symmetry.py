@@ -18,7 +18,7 @@ CANDIDATES = (("mirror", True, -1.0), ("reflection", False, -1.0), ("half turn",
 
 
 def mirrors(model: RodModel, unknowns: int) -> tuple[Symmetry, ...]:
-    """Symmetries among the `CANDIDATES` that the rod has, with what becomes of its parameters."""
+    """Symmetries among the `CANDIDATES` that the rod has, with their maps of the parameters."""
     found = []
     for name, reverse, sign in CANDIDATES:
         matrix = _scalar_map(model, reverse=reverse, sign=sign)
@@ -62,7 +62,7 @@ def _equal(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def _scalar_map(model: RodModel, *, reverse: bool, sign: float) -> Matrix | None:
-    """Matrix T that takes scalars to those of the image, ``y T``; None if there is none.
+    """Matrix T that takes scalars to those of the image, ``y T``; None if no such T exists.
 
     Parameters change their sign, or places two by two; multipliers may take up a share of loads.
     """
@@ -77,7 +77,7 @@ def _scalar_map(model: RodModel, *, reverse: bool, sign: float) -> Matrix | None
         if row is None:
             return None
         matrix[j] = row
-    # what has no coefficient of its own changes its sign with the multiplier that it belongs to
+    # a scalar without coefficients changes its sign with the multiplier that it belongs to
     for j in range(m, count - 1):
         beside = model.quadratic[:m, j]
         if not here[j].any() and beside.any():
@@ -108,7 +108,7 @@ def _row_of_map(
 
 
 def _reversible(model: RodModel) -> bool:
-    """Whether stiffness, supports and mesh are their own mirror images."""
+    """Whether stiffness, supports and mesh are symmetric."""
     flipped = model.stiffness[::-1, ::-1, ::-1]
     return (
         model.held[0] == model.held[1]

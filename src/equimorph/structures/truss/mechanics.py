@@ -183,9 +183,9 @@ class TrussMechanics(DiscreteStructure):
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points 2"]:
-        """Joints along a walk over all bars, some of them there and back.
+        """Joints along a walk over all bars, some of which it passes twice.
 
-        `s` runs from 0 to 1 along it, each bar as long as the others. A truss in space is seen
+        `s` runs from 0 to 1 along it; all bars get equal lengths. A truss in space is seen
         obliquely: half of y recedes.
         """
         corners = self.joint_places(z)[:, self.network.walk]

@@ -126,7 +126,7 @@ def _held_axes(joint: str, axes: Any, space: int) -> list[int]:
     fine = isinstance(axes, str) and axes and set(axes) <= set(known)
     if not fine or len(set(axes)) < len(axes):
         raise InputError(
-            f"`supports.{joint}` must hold some of the axes {known}, each once; got {axes!r}."
+            f"`supports.{joint}` must hold axes among {known}, each once; got {axes!r}."
         )
     return [known.index(axis) for axis in axes]
 

@@ -62,7 +62,7 @@ class Truss(TrussMechanics):
         "engineering" or "green".
     units
         Units of force and length of all numbers, like ``{"force": "kN", "length": "mm"}``; places,
-        lengths and stiffnesses may then be texts with units of their own. None: any one system.
+        lengths and stiffnesses may then be texts with units. None: any one system.
 
     Raises
     ------

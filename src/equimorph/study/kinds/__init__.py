@@ -11,7 +11,7 @@ ORDER = (
     *("sampled_route", "reach", "verify", "sensitivity", "imperfection", "room", "snap"),
     *("snap_graph", "trials", "estimate", "calibration", "map", "strongest", "chart", "reduction"),
 )
-"""In which kinds are answered and told; others follow by their names."""
+"""Order in which kinds are answered and reported; further kinds follow by their names."""
 
 
 def _found() -> tuple[Kind[Any], ...]:

@@ -116,7 +116,7 @@ class CalibrationKind(Kind[Calibration]):
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Calibration
     ) -> Sequence[Figure]:
-        """Measured points over the fitted shapes, and what is left over."""
+        """Measured points over the fitted shapes, and the residuals."""
         return [
             still(
                 question.files, partial(plotting.calibration, answer, question.extra.measured.shape)
@@ -146,7 +146,7 @@ class CalibrationKind(Kind[Calibration]):
         ]
 
     def verdict(self, question: Question, answer: Calibration) -> str:
-        """Values with their deviations, or why there are none."""
+        """Values with their deviations, or the reason why no fit exists."""
         head = f"{question.title}"
         if not answer.fitted:
             return f"{head}: [bold red]{answer.status}[/]. {plain(answer.why)}"
@@ -236,7 +236,7 @@ def _scatter(question: Question, answer: Calibration) -> str:
         return f"χ² = {html.number(answer.chi_squared)} at {answer.freedom} degrees of freedom."
     spread = float(np.sqrt(np.mean(answer.residuals**2)))
     unit = answer.states.structure.length_unit
-    return f"Root mean square left over: {html.number(spread)} {escape(unit)}."
+    return f"Root mean square residual: {html.number(spread)} {escape(unit)}."
 
 
 def _table(answer: Calibration) -> str:

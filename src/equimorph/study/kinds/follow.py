@@ -70,7 +70,7 @@ class FollowKind(Kind[FollowedOptimum]):
         return [head, words, *links, pictures, *_jumps(question, answer), _table(question, answer)]
 
     def verdict(self, question: Question, answer: FollowedOptimum) -> str:
-        """Say how far it could be followed."""
+        """Say up to which time the optimum could be followed."""
         head = f"{question.title}"
         if not answer.arrived:
             done = (
@@ -113,12 +113,12 @@ def _jumps(question: Question, found: FollowedOptimum) -> list[str]:
 
 
 def _limits(certificate: Certificate) -> list[str]:
-    """Active constraints; stability is told by the kind."""
+    """Active constraints but stability, which the kind of the optimum shows."""
     return [each for each in certificate.active if not each.startswith("stable ")]
 
 
 def _table(question: Question, found: FollowedOptimum) -> str:
-    """Optima along the way, some of many."""
+    """Selected optima along the way."""
     names = list(question["actuators"])
     shown = np.unique(np.linspace(0, len(found.states) - 1, MOST_ROWS).round().astype(int))
     states = found.states

@@ -91,7 +91,7 @@ def _word(question: Question) -> str:
 
 
 def _summary(question: Question, found: Landscape) -> list[tuple[str, str]]:
-    """What is told, by name."""
+    """Summary, by name."""
     total, gaps = found.gaps.size, int(found.gaps.sum())
     known = found.value[~found.gaps]
     rows = []

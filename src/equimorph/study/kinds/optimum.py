@@ -34,7 +34,7 @@ class OptimumKind(Kind[Optima]):
         return figures_of_states(question, eset, answer.states)
 
     def report(self, question: Question, answer: Optima, folder: Path) -> list[str]:
-        """A table of them, best first, with what makes each an optimum."""
+        """A table of the optima, best first, with the certificate of each."""
         if not answer.found:
             return [heading(question), html.refusal_line(answer.why)]
         certificates = [each.certificate for each in answer.all]

@@ -39,7 +39,10 @@ class ReachKind(Kind[Reached]):
         {
             "kind": (
                 Literal["reachable", "attainable"],
-                Field(default="reachable", description="By steering alone, or at all."),
+                Field(
+                    default="reachable",
+                    description="From the start without a snap, or on any stable state.",
+                ),
             ),
             "targets": (
                 list[list[Number]],
@@ -90,10 +93,10 @@ class ReachKind(Kind[Reached]):
         return [still(question.files, image), still(f"{question.files}-parameters", region)]
 
     def report(self, question: Question, answer: Reached, folder: Path) -> list[str]:
-        """Size, boundary by kinds, and what was asked."""
+        """Size, boundary by kinds, and the targets."""
         reach, answers = answer
         captions = {
-            f"{question.files}.png": "Values of the descriptors, with what bounds them.",
+            f"{question.files}.png": "Values of the descriptors, with the kinds of their boundary.",
             f"{question.files}-parameters.png": "The same region over the parameters.",
         }
         words = [f"<p>{escape(line)}</p>" for line in (_extent(question, reach), reach.why) if line]

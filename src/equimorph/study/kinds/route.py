@@ -24,7 +24,7 @@ from equimorph.study.signatures import MEANINGS
 from equimorph.tasks import Route, alternatives, plan, smoothed
 
 Routes = tuple[Route, ...]
-"""The route that was asked for, or its refusal; then others, if any were asked for."""
+"""The route, or its refusal; then alternatives, if the study asks for them."""
 
 
 def _check_name(name: str) -> str:
@@ -54,7 +54,7 @@ class RouteKind(Kind[Routes]):
         return [route_name(section.name, k + 1) for k in range(section.alternatives or 1)]
 
     def check(self, section: Any) -> None:
-        """Refuse demands of which a route can obey one only."""
+        """Refuse demands that exclude each other."""
         given = ("via", "snap_price", "alternatives")
         both = [key for key in given if getattr(section, key) is not None]
         if len(both) > 1:
@@ -66,12 +66,12 @@ class RouteKind(Kind[Routes]):
         """Refuse alternatives where there is no plane."""
         if question.section.alternatives is not None and len(question.free) != 2:
             raise InputError(
-                f"`{question.key}.alternatives` must be asked of a set over two parameters; "
+                f"`{question.key}.alternatives` needs a set over two parameters; "
                 f"got one over {len(question.free)}."
             )
 
     def answer(self, question: Question, arguments: Arguments) -> Routes:
-        """Plan; round the corners of every route that arrived, if that is wanted."""
+        """Plan; round the corners of every route that arrived, if the section says so."""
         if question.section.alternatives is not None:
             routes = tuple(alternatives(**arguments.of(alternatives)))
         else:

@@ -34,7 +34,7 @@ class SampledRouteKind(Kind[Route]):
     def check(self, section: Any) -> None:
         """It ends at a goal, or under loads."""
         if section.goal is None and not section.loads:
-            raise requirement("give a goal, or loads under the last of which it ends")
+            raise requirement("give a goal, or loads, of which the last one holds at the goal")
 
     def look_up_more(self, question: Question) -> None:
         """Refuse actuators among the loads."""

@@ -38,14 +38,14 @@ class SnapGraphKind(Kind[Snaps]):
             "descriptor": (
                 str | None,
                 Field(
-                    default=None, description="Descriptor that tells states apart in the figure."
+                    default=None, description="Descriptor that distinguishes states in the figure."
                 ),
             )
         }
     )
 
     def look_up_more(self, question: Question) -> Descriptor:
-        """Look up the descriptor that tells states apart."""
+        """Look up the descriptor that distinguishes states."""
         text = question.section.descriptor
         if text is None:
             return question.structure.elevation

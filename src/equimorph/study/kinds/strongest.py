@@ -22,7 +22,7 @@ Answer = tuple[LimitLoadMap, StrongestSettings, StrongestSettings | None]
 
 
 class StrongestKind(Kind[Answer]):
-    """Settings with the largest limit load, sure and robust."""
+    """Settings with the largest limit load, without and with errors."""
 
     table = "strongest"
     tasks = (limit_load_map, strongest)
@@ -51,7 +51,7 @@ class StrongestKind(Kind[Answer]):
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Answer
     ) -> Sequence[Figure]:
-        """Where they are on the map; what is left of the load beside the best."""
+        """The settings on the map, and limit loads near the best one."""
         amap, sure, robust = answer
         if sure.status == "refused":
             return []
@@ -61,7 +61,7 @@ class StrongestKind(Kind[Answer]):
         return [still(question.files, places), still(f"{question.files}-beside", beside)]
 
     def report(self, question: Question, answer: Answer, folder: Path) -> list[str]:
-        """A table of them, the price of being sure, and the figures."""
+        """A table of the settings, the price of robustness, and the figures."""
         amap, sure, robust = answer
         head = heading(question)
         lead = html.extent(amap.grid.box, amap.fixed, amap.within)
@@ -101,7 +101,7 @@ def _in_words(question: Question, answer: Answer) -> str:
     loads = (robust.at_risk, robust.guaranteed, robust.best.value)
     at_risk, guaranteed, nominal = (html.number(each, 6) for each in loads)
     return (
-        f"{words} With errors {errors} as little as {at_risk} is left of it. The robust setting "
+        f"{words} With errors {errors} it falls to {at_risk}. The robust setting "
         f"{_place(robust.best.setting)} carries {guaranteed} at least, and {nominal} without "
         f"errors: its price is {html.number(robust.price)}."
     )

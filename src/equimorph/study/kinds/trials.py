@@ -29,11 +29,11 @@ class TrialsKind(Kind[Trials]):
         return [still(question.files, draw)]
 
     def report(self, question: Question, answer: Trials, folder: Path) -> list[str]:
-        """Share that arrived, and how the others ended."""
+        """Share of the trials that arrived, and the ends of the rest."""
         files = question.files
         counts = Counter(answer.kind.tolist())
         rows = [[escape(kind), str(count)] for kind, count in counts.most_common()]
-        caption = "Each trial by how far the parameters were off."
+        caption = "Each trial by the errors of the parameters."
         return [
             heading(question),
             f"<p>{escape(_share(answer))}</p>",
