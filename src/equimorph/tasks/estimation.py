@@ -42,7 +42,7 @@ Measured = Mapping[Descriptor | str, float]
 
 @dataclass(frozen=True)
 class Resolving:
-    """The measurement that best distinguishes the first candidate from the others.
+    """The measurement that best distinguishes the first candidate from the rest.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class StateEstimate:
     standard_errors
         Of each free parameter of the set, by name, for each candidate.
     next_measurement
-        What to measure in order to resolve an ambiguity; None if there is none.
+        What to measure in order to resolve an ambiguity; None if the estimate is unique.
     """
 
     status: Literal["known", "ambiguous", "refused"]
@@ -100,7 +100,7 @@ class StateEstimate:
     next_measurement: Resolving | None = None
 
     def __repr__(self) -> str:
-        """The best candidate with its weight, or why there is none."""
+        """The best candidate with its weight, or the reason of a refusal."""
         if self.status == "refused":
             return f"StateEstimate(refused: {self.why})"
         return f"StateEstimate({self.status}: {self.state}, weight {self.weight[0]:.3g})"
@@ -155,8 +155,8 @@ def estimate_state(
     Raises
     ------
     InputError
-        For too few values, values or errors that are no numbers, missing errors, a confidence that
-        is none, or a set without cells.
+        For too few values, values or errors that are no numbers, missing errors, a confidence not
+        between 0 and 1, or a set without cells.
 
     Examples
     --------
@@ -184,7 +184,7 @@ def estimate_state(
     resolving = _resolving(states, rivals, could_measure) if status == "ambiguous" else None
     return StateEstimate(
         status,
-        why if resolving is None else f"{why}; {resolving.descriptor.name} would tell them apart",
+        why if resolving is None else f"{why}; {resolving.descriptor.name} would distinguish them",
         states,
         chi2,
         weight,
@@ -209,7 +209,7 @@ def _fit(eset: EquilibriumSet, measured: Measured, errors: Measured) -> ValueFit
 def _minima(
     eset: EquilibriumSet, residuals: Residuals, unstable: bool
 ) -> tuple[Spot, Values, Flags]:
-    """Best fits, their misfits, and whether they are minima; those on folds are none."""
+    """Best fits, their misfits, and whether they are minima; fits on folds are not."""
     ground = Ground(eset.setting, eset)
     value = np.linalg.norm(residuals(eset.points.z, eset.points.p), axis=1)
     cells = eset.cells if unstable else eset.cells[eset.cell_index == 0]

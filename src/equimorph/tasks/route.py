@@ -22,7 +22,7 @@ Corners = list[dict[str, float]]
 
 @dataclass(frozen=True)
 class Route:
-    """A verified route between two states, or the reason why there is none.
+    """A verified route between two states, or the reason why none was found.
 
     status: "arrived", or "refused" with the reason in `why`. A route that arrived was lifted again
     at a finer step: `path`, its smallest stability `margin`, its `length` in the structure's metric

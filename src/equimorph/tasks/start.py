@@ -1,4 +1,4 @@
-"""Where a task begins and ends: states that it accepts, and why it refuses others."""
+"""Where a task begins and ends: states that it accepts, and reasons to refuse a state."""
 
 from collections.abc import Sequence
 

@@ -74,7 +74,7 @@ class Branch:
         return self._at_measurements(np.concatenate(predicted, axis=1) - self.measured)
 
     def jacobian(self, x: Vector) -> Jacobian:
-        """Derivatives of the residuals at the last trial, which is thereby accepted.
+        """Derivatives of the residuals at the last trial, which becomes the accepted one.
 
         Sensitivities of the states: dz = −F_z⁻¹ F_p dp.
         """

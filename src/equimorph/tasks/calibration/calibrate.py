@@ -68,7 +68,7 @@ class Calibration:
     states: States
 
     def __repr__(self) -> str:
-        """Values with standard deviations, or why there are none."""
+        """Values with standard deviations, or the reason of a failure."""
         triples = zip(self.names, self.values, self.deviations, strict=True)
         values = ", ".join(f"{name} = {x:.6g} ± {error:.2g}" for name, x, error in triples)
         return (

@@ -38,7 +38,7 @@ class Measurement(Protocol):
 @door
 @dataclass(frozen=True, eq=False)
 class MeasuredValues:
-    """Measured values of a descriptor, one for each state; not a number where there is none.
+    """Measured values of a descriptor, one for each state; NaN where a state was not measured.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ class MeasuredShape:
     Parameters
     ----------
     points
-        Coordinates (states, points, 2) in the structure's unit of length; not a number where there
-        is none.
+        Coordinates (states, points, 2) in the structure's unit of length; NaN where a point was
+        not measured.
     s
         Places of the points along the structure; None for those that the structure draws.
     sigma
@@ -146,7 +146,9 @@ def _fitting(name: str, given: np.ndarray, shape: tuple[int, ...]) -> np.ndarray
         raise InputError(f"`{name}` must have the shape {shape}, states first; got {given.shape}.")
     numbers = np.asarray(given, float)
     if np.isinf(numbers).any():
-        raise InputError(f"`{name}` must be finite numbers, or nan where there is none; got inf.")
+        raise InputError(
+            f"`{name}` must be finite numbers, or nan where nothing was measured; got inf."
+        )
     return numbers
 
 

@@ -68,7 +68,7 @@ class Unknowns:
         Raises
         ------
         InputError
-            If there is none, as with a stiffness that is not positive.
+            If no structure has such data, as with a stiffness that is not positive.
         """
         values = {name: float(x[at]) for name, at in self.data.items()}
         if self.family is None or np.array_equal(x[list(self.data.values())], self._nominal):
@@ -92,7 +92,7 @@ class Unknowns:
 
 
 def unknowns(start: States, wanted: Wanted, family: Family | None = None) -> Unknowns:
-    """Linear function of the unknowns that are wanted.
+    """Parameters as a linear function of the unknowns to fit.
 
     Raises
     ------

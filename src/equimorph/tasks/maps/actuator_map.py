@@ -29,13 +29,13 @@ class ActuatorMap(ABC):
     Attributes
     ----------
     structure, grid, load, within, fixed
-        What was asked.
+        The arguments of the map.
     value
-        Value at every vertex of the grid; not a number where there is none.
+        Value at every vertex of the grid; NaN where the map is not defined.
     status
         Number in `kinds` of what happened on the path.
     states
-        States at the ends of the paths, row by row; not numbers where there is none.
+        States at the ends of the paths, row by row; NaN where no path exists.
     curves
         Where the map is not smooth.
     sheet

@@ -50,7 +50,7 @@ class Samples:
     passed: Shaped[np.ndarray, " lanes"]
 
     def take(self, lanes: Int[np.ndarray, " some"]) -> "Samples":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         return Samples(*(column[lanes] for column in vars(self).values()))
 
     def where(self, left: np.ndarray, other: "Samples") -> "Samples":
@@ -101,11 +101,11 @@ class Brackets:
         return len(self.edge)
 
     def take(self, some: Int[np.ndarray, " some"]) -> "Brackets":
-        """Return some of the pairs."""
+        """Return a selection of the pairs."""
         return Brackets(self.a.take(some), self.b.take(some), self.edge[some])
 
     def with_more(self, more: "Brackets") -> "Brackets":
-        """Return these and others."""
+        """Return these pairs and more."""
         edge = np.concatenate([self.edge, more.edge])
         return Brackets(join_samples([self.a, more.a]), join_samples([self.b, more.b]), edge)
 

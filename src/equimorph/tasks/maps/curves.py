@@ -54,8 +54,8 @@ class MapCurve:
     points
         Their settings.
     values
-        Lower and higher value of the map on both sides, close to the curve; not numbers where there
-        is none.
+        Lower and higher value of the map on both sides, close to the curve; NaN where the map is
+        not defined.
     errors
         Bound of the error of each point along its grid line, in the unit of the parameter.
     """
@@ -84,11 +84,11 @@ class Places:
     p: Float[np.ndarray, "brackets parameters"]
 
     def take(self, some: Int[np.ndarray, " some"]) -> "Places":
-        """Return some of the places."""
+        """Return a selection of the places."""
         return Places(self.brackets.take(some), *(column[some] for column in self._columns))
 
     def with_more(self, more: "Places") -> "Places":
-        """Return these and others."""
+        """Return these places and more."""
         pairs = zip(self._columns, more._columns, strict=True)
         brackets = self.brackets.with_more(more.brackets)
         return Places(brackets, *(np.concatenate(pair) for pair in pairs))
@@ -144,8 +144,8 @@ def _confirm(
 def places_on(paths: Paths, vertices: Samples, shape: tuple[int, int]) -> tuple[Places, Places]:
     """Places on grid edges at which the map is not smooth: with their causes, and without.
 
-    Suspicious edges are looked at first. Where a line of places ends inside the grid, the other
-    edges of the cell that it enters are looked at, too, until nothing new is found.
+    Suspicious edges are examined first. Where a line of places ends inside the grid, the remaining
+    edges of the cell that it enters are examined, too, until nothing new is found.
     """
     structure, edges = paths.sheet.structure, grid_edges(shape)
     ends = (vertices.take(edges[:, k]) for k in (0, 1))
@@ -244,8 +244,8 @@ def polylines(
 ) -> list[Int[np.ndarray, " _"]]:
     """Connect points on edges of a grid of ``shape`` vertices across its cells.
 
-    Within a cell the closest points on different edges are connected first, each to one other;
-    what is left over ends there.
+    Within a cell the closest points on different edges are connected first, in pairs;
+    unpaired points are ends of curves.
 
     Returns
     -------

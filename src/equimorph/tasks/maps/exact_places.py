@@ -18,11 +18,11 @@ from equimorph.tasks.maps.causes import Cause, Paths, TestsOf
 Flags = Bool[np.ndarray, " pairs"]
 
 BESIDE = 1.0 / PARTS**2
-"""Distance from a place at which both sides are looked at, as a share of the pair."""
+"""Distance from a place at which both sides are examined, as a share of the pair."""
 CLOSE = 1e-8
 """Distance in units of the parameters' scales at which a map that looks smooth on both sides of a
-place asks for another cause: beside a pitchfork that is slightly skew a cusp and a branch point of
-the path lie 1e-7 to 1e-5 apart, and one of them alone is why the map jumps."""
+place needs another cause: near a slightly unfolded pitchfork a cusp and a branch point of
+the path lie 1e-7 to 1e-5 apart, and only one of them makes the map jump."""
 SLACK = 1e-3
 """How far outside its bracket, in lengths of it, an exact place may lie."""
 ONE_PLACE = 1e-7
@@ -35,7 +35,7 @@ TEST_DIFFERENCE = 1e-6
 
 @dataclass(frozen=True)
 class Candidates:
-    """What causes of pairs led to: number of the cause (−1: none), its kind, state, parameters."""
+    """Places found for causes of pairs: number of the cause (−1: none), kind, state, parameters."""
 
     cause: Int[np.ndarray, " pairs"]
     kind: np.ndarray
@@ -108,7 +108,7 @@ def _first(
 def _of_some(
     tests: TestsOf, some: Int[np.ndarray, " some"], lanes: Int[np.ndarray, " fewer"]
 ) -> tuple[Test, Test]:
-    """Tests of lanes that are numbered among some of all."""
+    """Tests of lanes, given by their numbers in a selection."""
     return tests(some[lanes])
 
 
@@ -175,9 +175,9 @@ def correct_singular_states(
     z, p
         Guesses.
     free
-        Places of the two parameters that vary, for each lane its own.
+        Columns of the two parameters that vary, for each lane.
     tests
-        What vanishes on some of the lanes, by their numbers; see
+        Tests that vanish on the lanes with given numbers; see
         `equimorph.equilibria.critical_tests`.
     """
     vanishing = Vanishing(tests, np.arange(len(z)), TEST_DIFFERENCE, one_sided=True, at_null=True)

@@ -24,7 +24,7 @@ from equimorph.tasks.maps.causes import Cause, Paths, Start, equal_extrema, labe
 JUMP = 5e-3
 """Difference of limit loads on both sides of a curve that counts as a jump."""
 ALIKE = 0.1
-"""Cosine of null vectors whose signs can be compared: beside a pitchfork they turn fast."""
+"""Cosine of null vectors whose signs can be compared: near a pitchfork they turn fast."""
 
 
 class RayStatus(IntEnum):
@@ -75,7 +75,7 @@ class LimitLoadMap(ActuatorMap):
 
     @door
     def rays(self, settings: Settings) -> Values:
-        """Limit loads at many settings; not numbers where there is none."""
+        """Limit loads at many settings; NaN where no limit load exists."""
         place = position(self.structure.parameters, self.load)
         options = TraceOptions(record=False)
         return LimitLoadRays(self.sheet, place, self.within, self.bound, options)(settings).value
@@ -143,7 +143,7 @@ def limit_load_map(
         raise InputError(f"`bound` must exceed {load} = {lowest:g}; got {bound!r}.")
     options = replace(options or TraceOptions(), record=False)
     rays = LimitLoadRays(sheet, place, tuple(within), float(bound), options)
-    # close to a cusp the two folds are close together: shorter steps tell them apart
+    # close to a cusp the two folds are close together: shorter steps separate them
     careful = replace(rays, options=options.finer())
     found = survey(rays, grid, "limit loads", progress, near_curves=careful)
     return LimitLoadMap(

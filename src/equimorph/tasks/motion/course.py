@@ -204,7 +204,7 @@ def linearise(
 def shortest_change(
     slope: Float[np.ndarray, "lanes m k"], wanted: Float[np.ndarray, "lanes m"]
 ) -> Float[np.ndarray, "lanes k"]:
-    """Shortest changes of the actuators, in their scales, that change descriptors as wanted."""
+    """Shortest changes of the actuators, in their scales, for given changes of descriptors."""
     if slope.shape[1] == slope.shape[2]:
         size = np.abs(slope).max(axis=(1, 2))
         regular = np.abs(np.linalg.det(slope)) > 1e-14 * size ** slope.shape[1]

@@ -3,7 +3,7 @@
 ``ȧ = J⁺ (Ṡ* − S_l l̇)``, J = S_a, with the pseudoinverse in the scales of the actuators
 [Whitney1969]_; integrated by embedded Runge–Kutta formulas of orders five and four
 [DormandPrince1980]_, every step corrected onto the set and the targets. An actuator at its limit
-is held there while others can take over.
+is held there while the remaining actuators suffice.
 """
 
 from dataclasses import dataclass, replace

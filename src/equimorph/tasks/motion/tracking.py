@@ -50,7 +50,7 @@ class Tracking:
     schedule
         Parameters along the whole motion; None if it was refused.
     compromise
-        Beyond the failure, if asked for: the stable states with the least half sum of squared
+        Beyond the failure, if requested: the stable states with the least half sum of squared
         misses of the targets.
     """
 
@@ -133,7 +133,7 @@ def track(  # the knobs of the public face, all by keyword
     in pseudo-arclength, once coarsely, and again finely before it is called good. Many close
     targets are corrected side by side. With more actuators than targets the shortest motion of the
     actuators is taken at every moment, in their scales; one that meets its limit is held there as
-    long as the others can go on.
+    long as the remaining ones suffice.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def track(  # the knobs of the public face, all by keyword
 
 @dataclass(frozen=True)
 class _Motion:
-    """What is to be followed, with what, and within which bounds.
+    """Targets, actuators and bounds of a motion.
 
     Parameters
     ----------

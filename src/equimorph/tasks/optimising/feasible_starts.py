@@ -26,7 +26,7 @@ from equimorph.tasks.optimising.tangent_steps import (
 from equimorph.tasks.stable_part import vertex_values
 
 DIVISIONS = {1: 8, 2: 5, 3: 3}
-"""Parts of a side of a cell between places that are looked at, by dimension."""
+"""Parts of a side of a cell between sample places, by dimension."""
 MOST = 600
 """Cells in which feasible states are searched, the most promising first."""
 ROUNDS = 20
@@ -41,7 +41,7 @@ STARTS = 24
 
 @dataclass(frozen=True)
 class FeasibleStarts:
-    """Feasible states between vertices that are not, and the least violation where there are none.
+    """Feasible states between infeasible vertices, or else the least violation.
 
     Parameters
     ----------

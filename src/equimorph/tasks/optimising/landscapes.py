@@ -122,7 +122,7 @@ def landscape(  # the knobs of the public face, most by keyword
     sense
         "min" or "max": whether lower or higher values are better.
     within
-        Constraints, besides those of the set.
+        Constraints in addition to those of the set.
     start
         Restricts the choice to the stable piece of the set around this state.
 
@@ -202,7 +202,7 @@ def _barriers(
 
 
 def _lift_straight(a: States, b: States) -> tuple[Flags, Lanes]:
-    """Whether states stay stable on the way to the parameters of others, and where they end."""
+    """Whether states stay stable on the way to the parameters of given ones, and their ends."""
     line = ParameterLine(a.structure, a.p.copy(), b.p - a.p)
     ended = trace(line, a.z.copy(), (), TraceOptions(record=False))
     return np.asarray(ended.code == EventCode.ARRIVED), ended.z

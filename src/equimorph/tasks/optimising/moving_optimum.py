@@ -272,7 +272,7 @@ def follow_minimum(problem: MovingProblem, start: State, time: float) -> Followe
         if not track.at_jump:
             _advance(track)
         elif not _jump_over(track):
-            return _result(track, "no optimum is left", start)
+            return _result(track, "the optimum ends", start)
     return _result(track, "", start)
 
 
@@ -295,7 +295,7 @@ def _advance(track: _Track) -> None:
 
 
 def _jump_over(track: _Track) -> bool:
-    """Go on at the optimum beyond a failure; false if there is none."""
+    """Go on at the optimum beyond a failure; false if none exists there."""
     here = track.last
     after = _beyond(track.problem, here, track.failure)
     if after is None or np.linalg.norm(after.place - here.place) > NEAR:

@@ -102,7 +102,7 @@ class Optima:
     states: States
 
     def __repr__(self) -> str:
-        """The best, or why there is none."""
+        """The best optimum, or the reason of a refusal."""
         if self.status == "refused":
             return f"Optima(refused: {self.why})"
         return f"Optima(best of {len(self.all)}: {self.best})"
@@ -123,7 +123,7 @@ class Optima:
         Raises
         ------
         InputError
-            If there is none; ask for `status` first.
+            If there is no optimum; check `status` first.
         """
         if not self.found:
             raise InputError(f"`best` is that of optima that were found; got none: {self.why}.")
@@ -162,11 +162,11 @@ def optimise(  # the knobs of the public face, all by keyword
     eset
         Equilibrium set over the parameters to choose.
     objective
-        A descriptor of the set's structure; `combined` makes others.
+        A descriptor of the set's structure; `combined` makes new ones.
     sense
         "min" or "max".
     within
-        Constraints, besides those of the set.
+        Constraints in addition to those of the set.
     start
         Stable state. With it only states count that can be reached from it without a snap, and the
         route is planned.
@@ -175,7 +175,7 @@ def optimise(  # the knobs of the public face, all by keyword
 
     Returns
     -------
-    Local optima, the best first, each with its certificate; or why there is none.
+    Local optima, the best first, each with its certificate; or the reason of a refusal.
 
     Raises
     ------
@@ -260,9 +260,9 @@ def _vertex_constraints(
 def _starts(
     eset: EquilibriumSet, programme: Programme, constraints: tuple[Constraint, ...]
 ) -> tuple[SetPoints, FeasibleStarts | None]:
-    """Allowed states that no allowed neighbour beats, vertices and others between them.
+    """Feasible states, at and between vertices, that no feasible neighbour beats.
 
-    Where there are none, what the search for the least violation found.
+    If no state is feasible, the result of the search for the least violation.
     """
     parts = _best_vertices(eset, programme, feasible_vertices(eset, constraints))
     # those of the set hold on its cells
@@ -329,7 +329,7 @@ def _first_reachable(
     within: Sequence[Constraint],
     margin: float,
 ) -> tuple[int, Route] | None:
-    """Number of the first goal to which a route leads, with the route; None if there is none.
+    """Number of the first goal to which a route leads, with the route; None if no route exists.
 
     Searched over the whole set, and where a corridor may pass between its vertices, over the
     feasible piece around the start.

@@ -27,7 +27,7 @@ class Jump:
     before, after
         States on both sides; `after` is None if there is no optimum beyond.
     values
-        Objective on both sides; nan where there is none.
+        Objective on both sides; nan where no optimum exists.
     """
 
     at: float
@@ -43,7 +43,7 @@ class FollowedOptimum:
     Parameters
     ----------
     status
-        "arrived", or "refused" with the reason in `why` where no optimum is left.
+        "arrived", or "refused" with the reason in `why` where the optimum ends.
     states
         Optima along the way, the first for the start's parameters.
     at
@@ -56,7 +56,7 @@ class FollowedOptimum:
         Where the optimum moves at once.
     schedule
         Parameters at every optimum, with margins and values of the objective and the constraints,
-        straight in between: `verify` tells whether that may be executed. None if refused, and
+        straight in between: `verify` checks whether that may be executed. None if refused, and
         where it jumps, as no schedule follows that.
     """
 
@@ -90,7 +90,7 @@ class FollowedOptimum:
 def expected_end(times: tuple[float, float], curvatures: tuple[float, float]) -> float:
     """Time at which a minimum merges with a saddle, from its curvatures at two times before.
 
-    Its square falls to zero in proportion to the time that is left. Not a number where it does not
+    Its square falls to zero in proportion to the remaining time. NaN where it does not
     fall.
     """
     (t, later), (first, second) = times, curvatures

@@ -21,15 +21,15 @@ LONGEST, LEVEL = 0.05, 1e-12
 STILL = 1e-9
 """Length of a step that is the last."""
 CLOSE = 1e-6
-"""Distance from a curve, in scales, at which its sides are looked at."""
+"""Distance from a curve, in scales, at which its sides are examined."""
 ALIKE = 1e-7
-"""Difference of limit loads on a curve and beside it up to which the map is continuous there."""
+"""Difference of limit loads on a curve and next to it up to which the map is continuous there."""
 WIDEST, NARROW = 0.02, 1e-4
 """Distances along a cliff between the values of the first and the last polynomial."""
 STENCIL, SURE = np.arange(-3.0, 4.0), 3e-5
 """Places of these values; share of the last term in the bend of a polynomial that is trusted."""
 BESIDE = 10.0 ** -np.arange(2.0, 7.0)
-"""Distances from a ridge, in scales, at which both sides are looked at."""
+"""Distances from a ridge, in scales, at which both sides are examined."""
 SLOPE = 1e-3
 """First step along a curve, to see how its slope changes."""
 MET = 1e-6

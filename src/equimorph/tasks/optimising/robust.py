@@ -113,11 +113,11 @@ def robust_optimum(
 ) -> RobustOptimum:
     """Find the stable state whose worst case over a box of imperfections is best.
 
-    The worst case is that of the state and of the corners of the box, to which it is led straight,
-    see `worst_over`; it is infinite where stability is lost on the way, so that an optimum may sit
-    where the box touches the edge of stability. The share of the way at which stability is lost is
-    smooth there, and so is the objective where it is lost, its limit from inside: with these the
-    optimum on the edge is exact.
+    The worst case is that of the state and of the corners of the box, to which it is lifted
+    straight, see `worst_over`; it is infinite where stability is lost on the way, so that an
+    optimum may sit where the box touches the edge of stability. The share of the way at which
+    stability is lost is smooth there, and so is the objective where it is lost, its limit from
+    inside: with these the optimum on the edge is exact.
 
     Parameters
     ----------
@@ -126,17 +126,17 @@ def robust_optimum(
     objective
         A descriptor of the set's structure.
     offsets
-        Largest errors of parameters, by name: actuators, loads, any others.
+        Largest errors of parameters, by name: actuators, loads or any further ones.
     sense
         "min" or "max".
     within
-        Constraints, besides those of the set; they hold without imperfections.
+        Constraints in addition to those of the set; they hold without imperfections.
     margin
         Smallest stability margin allowed without imperfections.
 
     Returns
     -------
-    Nominal and robust optimum, what is guaranteed, and the price; or why there is none.
+    Nominal and robust optimum, the guaranteed value, and the price; or the reason of a refusal.
 
     Raises
     ------
@@ -190,7 +190,7 @@ class _Question:
 
 @dataclass(frozen=True)
 class _End:
-    """A candidate; `bound`: whether it is the room that was asked for, not the edge, that binds."""
+    """A candidate; `bound`: whether the required room binds, and not the edge."""
 
     state: State
     worst: float

@@ -132,7 +132,7 @@ def _remember(todo: list[_Lane], at: _Iterate) -> None:
 def _stop(programme: Programme, lanes: list[_Lane]) -> None:
     """Leave lanes at their best feasible points: at kinks of constraints steps never end.
 
-    Lanes that were merged with others count only where no other has ended.
+    Lanes that were merged into other lanes count only if no other lane has ended.
     """
     ended = any(lane.done is not None for lane in lanes)
     left = [lane for lane in lanes if lane.done is None and (lane.reach > 0.0 or not ended)]

@@ -69,8 +69,8 @@ class Strongest:
     def one_sided(self) -> tuple[float, float]:
         """Limits of the limit load towards the optimum from both sides across its curve.
 
-        Extrapolated from the three closest distances, which grow by equal factors, with whatever
-        power of the distance they follow: 2/3 at branch points.
+        Extrapolated from the three closest distances, which grow by equal factors, with the
+        power of the distance that they follow: 2/3 at branch points.
         """
         far, middle, near = self.sides[:, -3:].T
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -147,7 +147,7 @@ def strongest(
         Map of limit loads; rays are its functions.
     offsets
         Largest errors of the settings, by name: the smallest limit load over their box is made as
-        large as possible. The box is looked at in its centre, corners and middles of sides, and
+        large as possible. The box is sampled at its centre, corners and middles of sides, and
         where it is smallest of 21 × 21 settings, until that changes nothing.
 
     Returns
@@ -228,7 +228,7 @@ def _near_curves(lmap: LimitLoadMap, settings: Settings) -> Flags:
 
 
 def _distinct(lmap: LimitLoadMap, found: list[Strongest]) -> list[Strongest]:
-    """The best first; climbs that ended beside a ridge count as the ridge."""
+    """The best first; climbs that ended next to a ridge count as the ridge."""
     kept: list[Strongest] = []
     order = {"edge": 1}
     for each in sorted(found, key=lambda one: (order.get(one.kind, 0), -one.value)):
@@ -300,7 +300,7 @@ def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -
         lowest = int(values.argmin())
         if values[lowest] >= guaranteed - LEVEL:
             break
-        # a jump passes through the box between the settings that are looked at
+        # a jump passes through the box between the sampled settings
         around = np.concatenate([around, everywhere[[lowest]]])
     nominal, guaranteed = float(lmap.rays(setting[None])[0]), min(guaranteed, values[lowest])
     sides = _sides(lmap, setting, size / np.linalg.norm(size))

@@ -117,7 +117,7 @@ def maximise_least(pieces: Pieces, start: Pair, radius: Pair, box: Box) -> tuple
     for _ in range(ITERATIONS):
         if reach < SMALLEST_REACH:
             break
-        # the next points come with what is around them: a call costs more than its lanes
+        # the next points come with their neighbours: a call costs more than its lanes
         reaches = reach * SHORTER
         steps = [_step(around, here, radius, each, box) for each in reaches]
         tried = [

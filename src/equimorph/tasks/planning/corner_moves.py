@@ -18,7 +18,7 @@ FEW = Guards(iterations=8)
 SIZES = (0.12, 0.04, 0.013)
 """Moves of corners, in scaled parameters, that are tried one after the other."""
 ROUNDS, POLISHING = 6, 2
-"""Rounds of moves of one size: from a rough path, and where little is left to gain."""
+"""Rounds of moves of one size: from a rough path, and for the last improvements."""
 LEAST_GAIN = 2e-6
 """Share of the cost that a move has to gain."""
 
@@ -68,7 +68,7 @@ def move_by_chords(corners: States, demands: Demands, room: Room) -> States:
 def move_by_lifts(corners: States, demands: Demands, room: Room, quick: bool) -> States:
     """Move corners as long as that makes the straight lifts between them cheaper.
 
-    `quick`: with small steps and few rounds, where little is left to gain.
+    `quick`: with small steps and few rounds, for the last improvements.
     """
     sizes, rounds = (SIZES[1:], POLISHING) if quick else (SIZES, ROUNDS)
     return _move_corners(corners, demands, room, sizes, rounds, by_lifts=True)
@@ -77,7 +77,7 @@ def move_by_lifts(corners: States, demands: Demands, room: Room, quick: bool) ->
 def chords(
     corners: States, first: Some, second: Some, demands: Demands
 ) -> tuple[Bool[np.ndarray, " n"], Values]:
-    """Whether chords between some of the corners seem admissible, and what they cost."""
+    """Whether chords between given corners seem admissible, and their costs."""
     places = demands.objective.places(corners)
     return _chords(places[first], places[second], demands)
 
@@ -162,7 +162,7 @@ def _interleave(first: Places, second: Places) -> Places:
 
 
 def _candidates(corners: States, odd: int, size: float, room: Room) -> tuple[Some, States]:
-    """Equilibria beside every other corner, and which corner each of them is for.
+    """Equilibria near every second corner, and the corner that each of them would replace.
 
     Whether these lie on the branch of the corner is what lifts from its neighbours show.
     """

@@ -150,7 +150,7 @@ def _costs(source: States, line: ParameterLine, outcome: Traces, objective: Obje
 def shortest_path(
     count: int, pairs: Int[np.ndarray, "links 2"], costs: Values, ends: tuple[int, int]
 ) -> Int[np.ndarray, " n"] | None:
-    """Cheapest path from one node to another by Dijkstra; None if there is none."""
+    """Cheapest path from one node to another by Dijkstra; None if no path exists."""
     # a cost of zero would be no link in a sparse matrix
     weights = np.maximum(costs, 1e-300)
     graph = coo_array((weights, pairs.T), shape=(count, count)).tocsr()

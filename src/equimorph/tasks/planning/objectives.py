@@ -28,7 +28,7 @@ EXACT, NEAR, ROUGH = 1e-11, 1e-4, 1e-2
 
 @dataclass(frozen=True)
 class Places:
-    """States, with what an objective has to know at each of them.
+    """States, with the quantities that an objective needs at each of them.
 
     Efforts of the parameters and reciprocal margins, empty where they do not count.
     """
@@ -68,7 +68,7 @@ class Objective:
     terms: tuple[tuple[float, Term], ...]
 
     def __str__(self) -> str:
-        """Return it as it was asked for."""
+        """Return the words that define it."""
         words = [
             f"{'' if weight == 1.0 else f'{weight:g} '}{term if isinstance(term, str) else 'time'}"
             for weight, term in self.terms
@@ -86,7 +86,7 @@ class Objective:
         return any(term == "clearance" for _, term in self.terms)
 
     def places(self, states: States, error: float = NEAR) -> Places:
-        """States with what is to be known at each of them, margins up to a relative error."""
+        """States with the quantities that it needs, margins up to a relative error."""
         count, structure = len(states), states.structure
         efforts, nearness = np.zeros((count, 0)), np.zeros((count, 0))
         if any(term == "work" for _, term in self.terms):

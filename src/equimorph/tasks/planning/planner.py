@@ -60,7 +60,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     via
         Way-points {name: value}, each changing some of the free parameters.
     within
-        Constraints to obey on the way, besides those of the set.
+        Constraints to obey on the way, in addition to those of the set.
     margin
         Smallest stability margin allowed, in the structure's metric.
     objective
@@ -73,11 +73,11 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         may leave its stable stratum over a fold and continue where the snap lands: `route.snaps`
         has the landings, with the energy released; no margin is kept before a snap.
     monitor
-        Descriptors to record in the schedule, besides those of the constraints.
+        Descriptors to record in the schedule, in addition to those of the constraints.
 
     Returns
     -------
-    A verified route, or the reason why there is none.
+    A verified route, or the reason why none was found.
 
     Raises
     ------

@@ -81,7 +81,7 @@ class LoadCourse:
         s: Values,
         reach: float,
     ) -> tuple[Float[np.ndarray, "lanes d"], Values]:
-        """Settings at most `reach` from nodes towards others, no further than the next corner."""
+        """Settings towards given ones, at most `reach` from nodes and before the next corner."""
         here, own = tree.p[near][:, self.free], tree.s[near]
         half = 0.5 * (self.box.upper - self.box.lower)
         far = np.sqrt((((a - here) / half) ** 2).sum(axis=1) + (s - own) ** 2)
@@ -113,7 +113,7 @@ class Tree:
         return np.arange(count, len(self.s))
 
     def nearest(self, course: LoadCourse, a: Float[np.ndarray, "lanes d"], s: Values) -> Numbers:
-        """Nearest node from which settings lie ahead; −1 if there is none."""
+        """Nearest node from which settings lie ahead; −1 if no node does."""
         ahead = self.sense * (s[:, None] - self.s)
         square = np.where(ahead >= 0.0, course.gaps(a, self.p) + ahead**2, np.inf)
         best = square.argmin(axis=1)

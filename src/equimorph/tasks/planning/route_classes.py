@@ -35,7 +35,7 @@ from equimorph.tasks.route import Route, refusal
 MOST_TURNS = 2
 """How often a path may pass around one hole."""
 LABELS = 8
-"""Classes that are kept at a vertex, for each one that is asked for."""
+"""Classes that are kept at a vertex, for each requested route."""
 Class = tuple[int, ...]
 
 
@@ -67,13 +67,13 @@ def alternatives(
     count
         Largest number of routes.
     within
-        Constraints to obey on the way, besides those of the set.
+        Constraints to obey on the way, in addition to those of the set.
     margin
         Smallest stability margin allowed, in the structure's metric.
     objective
         What each route minimises; see `plan`.
     monitor
-        Descriptors to record in the schedules, besides those of the constraints.
+        Descriptors to record in the schedules, in addition to those of the constraints.
 
     Returns
     -------

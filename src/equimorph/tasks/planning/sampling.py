@@ -75,7 +75,7 @@ def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyw
     goal
         Another one; None with `loads`: any admissible state under the last load.
     actuators
-        What may be moved, and how far.
+        Box of the parameters that may be moved.
     loads
         Way-points of the environment, in order: loads move along straight legs from one to the
         next, never back, while the actuators do what they like.
@@ -241,7 +241,7 @@ class _Search:
         directions[:, np.arange(len(half)), course.free] = half
         directions[:, -1] = course.parameters(here, s) - course.parameters(here, now)
         excess, slopes = constraint_slopes(states, directions, within)
-        # loads move by the whole of the last direction, actuators by shares of the others
+        # loads move by the whole of the last direction, actuators by shares of the other directions
         excess = excess + slopes[:, :, -1]
         low, high = (course.box.lower - here) / half, (course.box.upper - here) / half
         change = project_onto_constraints(

@@ -140,7 +140,7 @@ class _Search:
         self.closed.update(gates)
 
     def path(self) -> SnapPath | None:
-        """The cheapest path all of whose links can be lifted; None if there is none."""
+        """The cheapest path all of whose links can be lifted; None if no such path exists."""
         network = self.network
         allowed = network.admissible(self.eset, self.demands)[network.pairs].all(axis=1)
         broken, _ = network.verdicts(self.demands)

@@ -91,8 +91,8 @@ def relax_corners(
     """Corners moved to where the chain of straight lifts costs least.
 
     Every other corner is tried at once in several directions and the best admissible move is made;
-    moves become smaller and smaller. Costs along chords tell enough for that, unless what comes out
-    cannot be lifted. Then corners that are of no use are left out.
+    moves become smaller and smaller. Costs along chords suffice for that, unless the resulting path
+    cannot be lifted. Then useless corners are removed.
     """
     corners = _divide_long_legs(corners, demands)
     if same_class:
@@ -118,7 +118,7 @@ def _keep_liftable(before: States, after: States, demands: Demands) -> tuple[Sta
 
 
 def _divide_long_legs(corners: States, demands: Demands) -> States:
-    """Corners with others between them on long legs."""
+    """Corners with further ones between them on long legs."""
     scales = corners.structure.scales
     gap = np.linalg.norm(np.diff(corners.p, axis=0) / scales, axis=1)
     longest = gap.sum() / LEGS
@@ -210,7 +210,7 @@ def route_over_corners(
 
 
 def way_points_of(eset: EquilibriumSet, corners: States) -> Corners:
-    """Way-points from the first of some corners over all others."""
+    """Way-points of a polygon from its first corner."""
     return [{name: corner[name] for name in eset.names} for corner in list(corners)[1:]]
 
 

@@ -61,14 +61,14 @@ class Answer:
 
     @property
     def margin(self) -> float:
-        """Smallest stability margin of the motion; nan if there is none."""
+        """Smallest stability margin of the motion; nan without a motion."""
         if not self.can:
             return float("nan")
         return self.straight.margin if self.route is None else self.route.margin
 
     @property
     def schedule(self) -> Schedule | None:
-        """Parameters along the motion; None if there is none."""
+        """Parameters along the motion; None without a motion."""
         return self.straight.schedule if self.route is None else self.route.schedule
 
 

@@ -20,7 +20,7 @@ from equimorph.tasks.stable_part import cell_near, stable_piece
 from equimorph.tasks.start import check_stable
 
 FINER = (0.1, 0.03)
-"""Accuracies of a set some of whose edges could not be cut."""
+"""Accuracies of a set, tried in turn if edges could not be cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Reach:
     Parameters
     ----------
     status, why
-        "found". What could not be cut exactly, if anything, is told in `why`.
+        "found". `why` names what could not be cut exactly.
     start
         The state.
     descriptors
@@ -41,7 +41,7 @@ class Reach:
     whole
         The stable piece of the start, uncut, for queries.
     within
-        Constraints besides those of the set.
+        Constraints in addition to those of the set.
     """
 
     status: Literal["found"]
@@ -114,7 +114,7 @@ def reachable(
     descriptors
         As many as the set has free parameters.
     within
-        Constraints besides those of the set.
+        Constraints in addition to those of the set.
     accuracy
         Refine the piece to this accuracy first; see `refine`.
 
@@ -181,7 +181,7 @@ def attainable(
     descriptors
         Any number of descriptors; their values form the image of the region.
     within
-        Constraints, besides those of the set.
+        Constraints in addition to those of the set.
 
     Returns
     -------

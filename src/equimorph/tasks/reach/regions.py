@@ -56,7 +56,7 @@ class Region:
     Parameters
     ----------
     eset
-        The region as a set of its own; its boundary consists of exact states.
+        The region as a set; its boundary consists of exact states.
     descriptors
         Descriptors that the parameters control.
     side

@@ -22,7 +22,7 @@ SIZES = (1e-3, 3e-4, 1e-4, 3e-5)
 FINER, MOST_SIZES = 10.0**-0.5, 10
 """Ratio of further, smaller sizes, and how many are tried until two fits agree."""
 RESOLVED = 1e-9
-"""Change of the limit load that is told from round-off, relative to the load or to its scale."""
+"""Change of the limit load that exceeds round-off, relative to the load or to its scale."""
 UNFOLDED = 100.0
 """Residual at a branch point, relative to that of the perfect one, which is a fold overlooked."""
 FITTED = 5
@@ -32,7 +32,7 @@ LIMITS = ("fold", "branch point", "constraint")
 ROUND_OFF = 1e-15
 """Residual that any state may have, in the structure's scale of forces."""
 WITHIN = 0.03
-"""By how much a fitted exponent may miss that of a law."""
+"""Largest difference of a fitted exponent from that of a law."""
 SETTLED = 1e-3
 """Disagreement of fits with and without the largest size, above which smaller ones are tried."""
 
@@ -150,7 +150,7 @@ def imperfection_law(
 
     Returns
     -------
-    The fitted law; or the reason why there is none: no limit load at imperfections, or no change of
+    The fitted law; or the reason of a refusal: no limit load at imperfections, or no change of
     it beyond round-off.
 
     Raises
@@ -203,7 +203,7 @@ class _Trials:
 
     @cached_property
     def noise(self) -> float:
-        """Change of the limit load that is told from round-off."""
+        """Change of the limit load that exceeds round-off."""
         parameters = self.start.structure.parameters
         scale = parameters[position(parameters, self.load)].scale
         return float(RESOLVED * max(abs(self.perfect.value), scale))
@@ -214,7 +214,7 @@ class _Trials:
         return np.where(np.abs(falls) > self.noise, falls, np.nan)
 
     def lost_in_round_off(self, loads: Float[np.ndarray, " tried"]) -> bool:
-        """Whether there are limit loads, none of which is told from that without imperfection."""
+        """Whether limit loads exist, but do not differ from that without imperfection."""
         falls = np.abs(loads - self.perfect.value)
         return bool(np.isfinite(falls).any() and not (falls > self.noise).any())
 
@@ -223,11 +223,11 @@ class _Trials:
         if self.perfect.kind not in LIMITS:
             return f"no limit load without the imperfection: {self.perfect.kind}"
         if (np.isfinite(loads).sum(axis=1) < 3).all():
-            return "fewer than three imperfections of one sign have a limit load that can be told"
+            return "fewer than three imperfections of one sign have a known limit load"
         return "imperfections of these sizes do not change the limit load beyond round-off"
 
     def loads(self, sizes: Sizes) -> Float[np.ndarray, "2 tried"]:
-        """Limit loads for both signs, positive ones first; not a number where there is none."""
+        """Limit loads for both signs, positive ones first; NaN where no limit load exists."""
         return np.array([[self._load(sign * size) for size in sizes] for sign in (1.0, -1.0)])
 
     def _load(self, size: float) -> float:
@@ -241,7 +241,7 @@ class _Trials:
         return found.value if limited else float("nan")
 
     def _overlooked(self, found: LimitLoad) -> bool:
-        """Whether a fold beside the perfect branch point was taken for a branch point.
+        """Whether a fold near the perfect branch point was taken for a branch point.
 
         Imperfections near round-off unfold it by less than a path can tell; what they leave at the
         point, which is none of their equilibria, is a residual.
@@ -257,7 +257,7 @@ def _residual(state: State) -> float:
 
 @dataclass(frozen=True)
 class _Fit:
-    """A law through the falls of a limit load, and by how much two of its fits disagree."""
+    """A law fitted to the falls of a limit load, and the difference of two of its fits."""
 
     name: str
     power: float

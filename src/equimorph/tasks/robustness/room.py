@@ -21,9 +21,9 @@ Directions = Float[np.ndarray, "directions d"]
 Shape = Literal["box", "ellipsoid"]
 
 RANDOM = 64
-"""Random directions besides axes and corners."""
+"""Random directions in addition to axes and corners."""
 MOST_CORNERS = 64
-"""Corners of the box up to which all are tried; of more, so many at random."""
+"""Largest number of corners of the box that are tried; of more corners a random sample."""
 ROUNDS, AROUND = 10, 12
 """Rounds in which the worst directions of each state are searched around, and how many each."""
 

@@ -26,7 +26,7 @@ class Trials:
     Parameters
     ----------
     names, offsets
-        Parameters that were off, and by how much in each trial.
+        Parameters with errors, and the errors in each trial.
     kind
         How each trial ended: "arrived", or what it met (see `Event`); "start" if the imperfection
         alone was too much.
@@ -43,7 +43,7 @@ class Trials:
     states: States
 
     def __repr__(self) -> str:
-        """Share of successes with its interval, and what the others met."""
+        """Share of successes with its interval, and the reasons of the failures."""
         low, high = self.interval
         others = f", {self.why}" if self.why else ""
         return f"Trials({self.share:.4g} ({low:.3g} … {high:.3g}) of {len(self.kind)}{others})"

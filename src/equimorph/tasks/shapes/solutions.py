@@ -27,7 +27,7 @@ from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
 from equimorph.tolerances import SAME_STATE
 
 AT_EDGE = 1e-9
-"""By how much a solution may exceed the box or a constraint."""
+"""Largest excess of a solution over the box or a constraint, in their units."""
 EXACT = 1e-8
 """Misfit, in ranges over the set, below which values are met."""
 STARTS = 12
@@ -54,9 +54,9 @@ class Shapes:
     misfit
         Misfit of each: root of the sum of squares of its misses, in ranges over the set.
     routes
-        Route to each from the start, or why there is none; empty without a start.
+        Route to each solution from the start, or the reason of a refusal; empty without a start.
     closest, miss
-        Vertex of the set whose descriptors come nearest to the targets, and how far it is from
+        Vertex of the set whose descriptors come nearest to the targets, and its distance from
         them; see `nearest` for the exact state.
     """
 
@@ -73,7 +73,7 @@ class Shapes:
     known: Predictor | None = field(default=None, metadata=NOT_KEPT)
 
     def __repr__(self) -> str:
-        """How many there are, or why there is none."""
+        """Number of solutions, or the reason of a refusal."""
         if self.status == "refused":
             return f"Shapes(refused: {self.why})"
         return f"Shapes({len(self)} states, {int(np.sum(self.index == 0))} of them stable)"
@@ -159,7 +159,7 @@ def solve_shape(
     targets
         Descriptors of the structure with their values.
     within
-        Constraints that solutions have to obey, besides those of the set.
+        Constraints that solutions have to obey, in addition to those of the set.
     start
         Stable state from which to plan a route to each stable solution.
     rank
@@ -168,7 +168,7 @@ def solve_shape(
 
     Returns
     -------
-    The solutions; refused, with the nearest vertex, if there is none.
+    The solutions; refused, with the nearest vertex, if none exists.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def solve_shapes(
     targets
         Descriptors of the structure with their values, one per question.
     within
-        Constraints that solutions have to obey, besides those of the set.
+        Constraints that solutions have to obey, in addition to those of the set.
     start
         Stable state from which to plan a route to each stable solution.
     rank

@@ -49,7 +49,7 @@ class Bounds:
     Parameters
     ----------
     proved
-        Whether one equilibrium exists and is unique beside every point of the chord.
+        Whether one equilibrium exists and is unique near every point of the chord.
     error
         Largest distance r of the equilibria from the chord, in multiples of the weights.
     unique
@@ -73,7 +73,7 @@ class Bounds:
     margin: Values
 
     def take(self, at: Int[np.ndarray, " some"]) -> "Bounds":
-        """Return some of the segments."""
+        """Return a selection of the segments."""
         return Bounds(*(column[at] for column in vars(self).values()))
 
     @classmethod
@@ -176,7 +176,7 @@ def _defect(
     bound: Majorant,
     half: Direction,
 ) -> tuple[Float[np.ndarray, "lanes 2 size"], Lanes]:
-    """|A⁻¹F| at both ends with an allowance for rounding, and how much more it is between."""
+    """|A⁻¹F| at both ends with an allowance for rounding, and its largest increase between."""
     rows = []
     for end in (first, last):
         residual = end.structure.residual(end.z, end.p)

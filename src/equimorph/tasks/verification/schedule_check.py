@@ -314,7 +314,7 @@ def _moving(rows: Float[np.ndarray, "rows parameters"]) -> Float[np.ndarray, "mo
 
 
 def first_state(schedule: Schedule, structure: Structure | None) -> State:
-    """State in which a schedule begins, of its own structure unless another is given.
+    """State in which a schedule begins; its structure is that of the schedule by default.
 
     Raises
     ------
@@ -351,7 +351,7 @@ def _violation(
 ) -> tuple[str, int]:
     """First violation in words, and the number of the state; nothing for none."""
     low = np.flatnonzero(margins < margin) if margin > 0.0 else np.flatnonzero(margins <= 0.0)
-    # the end at a fold has no margin, but the fold is what is to be told
+    # the end at a fold has no margin, but the report must name the fold
     low = low[low < len(margins) - (done.end.kind != "arrived")]
     names = _moved_names(done.states)
     if len(low):
