@@ -3,8 +3,10 @@
 import ast
 from importlib import import_module
 from pathlib import Path
+from typing import get_args
 
 import equimorph as em
+from equimorph.study.structures import StructureSection
 
 STUB = ast.parse(Path(em.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
 HOMES = {
@@ -21,6 +23,22 @@ def test_every_name_of_the_stub_is_the_object_that_its_layer_exports():
         layer = import_module(f"equimorph.{home}")
         assert name in layer.__dict__.get("__all__", dir(layer)), (name, home)
         assert getattr(em, name) is getattr(layer, name), (name, home)
+
+
+PARTS = {"ActuatorMap", "Barriers", "Jump", "Resolving", "natural_states_over", "unloaded_base"}
+"""Exports of the tasks that are parts or helpers of others."""
+
+
+def test_every_task_and_every_structure_stands_in_the_stub():
+    """Whoever adds one and forgets the stub hears it from this test."""
+    assert set(em.tasks.__all__) - PARTS <= set(HOMES)
+    assert {each.__name__ for each in em.structures.KINDS.values()} <= set(HOMES)
+
+
+def test_every_structure_has_a_section_of_its_kind_in_study_files():
+    sections = StructureSection.__subclasses__()
+    kinds = [kind for each in sections for kind in get_args(each.model_fields["kind"].annotation)]
+    assert sorted(kinds) == sorted(em.structures.KINDS)
 
 
 def test_all_public_names_complete():

@@ -113,6 +113,7 @@ from .structures import (
     distance_to as distance_to,
     effort_of as effort_of,
     margin_of as margin_of,
+    natural_state as natural_state,
     outside as outside,
     value_of as value_of,
 )

@@ -6,7 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from equimorph.errors import InputError
-from equimorph.structures import EnergyStructure, Frame, Rod, Spring, Structure, from_identity
+from equimorph.structures import (
+    KINDS,
+    EnergyStructure,
+    Frame,
+    Rod,
+    Spring,
+    Structure,
+    from_identity,
+    natural_state,
+)
 from equimorph.structures.discrete import DiscreteStructure
 from oracles.specimens import (
     SPECIMENS,
@@ -336,10 +345,36 @@ def test_a_structure_is_rebuilt_from_its_identity(made):
 
 
 @pytest.mark.parametrize(
+    ("made", "values"),
+    [
+        (Rod(), {"Theta": 0.9, "Delta": 0.1}),
+        (Spring(), {"x_l": 0.8}),
+        (arch_truss("green"), {}),
+        (toggle(), {}),
+    ],
+    ids=["rod", "spring", "truss", "frame"],
+)
+def test_every_structure_has_a_natural_state_by_the_contract_alone(made, values):
+    """As by the method that the structures offer; loads are refused."""
+    state = natural_state(made, **values)
+    assert state.residual < 1e-10
+    assert state.structure is made
+    np.testing.assert_array_equal(state.z, made.natural_state(**values).z)
+    load = next(iter(made.unloaded()))
+    with pytest.raises(InputError, match=f"`{load}` must be 0 in the natural state; got 1"):
+        natural_state(made, **values, **{load: 1.0})
+
+
+def test_a_natural_state_that_is_not_found_is_refused():
+    with pytest.raises(InputError, match="`rod` must have a natural state; none is found at Theta"):
+        natural_state(Rod(), Theta=-0.5, Delta=0.0)
+
+
+@pytest.mark.parametrize(
     ("identity", "text"),
     [
-        ({"kind": "plate"}, "`kind` must be one of rod, spring, energy, truss, frame; got 'plate'"),
-        ({}, "`kind` must be one of rod, spring, energy, truss, frame; got None"),
+        ({"kind": "plate"}, f"`kind` must be one of {', '.join(KINDS)}; got 'plate'"),
+        ({}, f"`kind` must be one of {', '.join(KINDS)}; got None"),
         ({"kind": "rod", "colour": "red"}, "`structure` must have the data of a rod"),
     ],
 )

@@ -35,16 +35,13 @@ from equimorph.structures.rod import (
     Tendon,
 )
 from equimorph.structures.spring import Spring
-from equimorph.structures.states import State, States
+from equimorph.structures.states import State, States, natural_state
 from equimorph.structures.truss import Bar, Truss
 
 KINDS: dict[str, Callable[..., Structure]] = {
-    "rod": Rod,
-    "spring": Spring,
-    "energy": EnergyStructure,
-    "truss": Truss,
-    "frame": Frame,
+    each.kind: each for each in (Rod, Spring, EnergyStructure, Truss, Frame)
 }
+"""Classes of structures by their words in files."""
 
 __all__ = [
     "KINDS",
@@ -76,6 +73,7 @@ __all__ = [
     "effort_of",
     "from_identity",
     "margin_of",
+    "natural_state",
     "outside",
     "shape_coordinate",
     "stability_margin",

@@ -14,7 +14,7 @@ from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Advance, Structure, advance_by
-from equimorph.structures.states import State
+from equimorph.structures.states import State, natural_state
 
 STEPS = 12
 """Steps of the continuation from the parameters where the natural state is given."""
@@ -186,15 +186,7 @@ class DiscreteStructure(Structure):
             For unknown or meaningless parameters, a load that is not zero, or where the
             continuation from the default parameters does not converge.
         """
-        p = self.natural_parameters(values)
-        z, found = self.natural(p[None])
-        if not found[0]:
-            settings = ", ".join(f"{name}={value:g}" for name, value in values.items())
-            raise InputError(
-                f"`{self.kind}` must have a natural state; none is found at "
-                f"{settings or 'the defaults'}, coming from the defaults."
-            )
-        return State(self, z[0], p)
+        return natural_state(self, **values)
 
 
 def along_corners(

@@ -21,7 +21,7 @@ from equimorph.model import (
     SupportKind,
 )
 from equimorph.structures.contract import Direction, Majorant, Structure, Symmetry
-from equimorph.structures.states import State
+from equimorph.structures.states import State, natural_state
 
 Term = tuple[float, dict[str, int]]
 """Factor and exponents of x, F, k, sec δ and tan δ."""
@@ -202,8 +202,7 @@ class Spring(Structure):
     @door
     def natural_state(self, **values: float) -> State:
         """Unloaded state with B above A."""
-        p = self.natural_parameters(values)
-        return State(self, self.natural(p[None])[0][0], p)
+        return natural_state(self, **values)
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Angles between −1.5 and 1.5."""

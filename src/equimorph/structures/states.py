@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.door import door
+from equimorph.errors import InputError
 from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
@@ -181,3 +182,36 @@ class State:
     ) -> Float[np.ndarray, "points space"]:
         """Coordinates to draw, in the structure's unit of length."""
         return np.asarray(self.batch.shape(s)[0])
+
+
+@door
+def natural_state(structure: Structure, /, **values: float) -> State:
+    """Natural state of any structure: unloaded, at given or default values of the parameters.
+
+    Parameters
+    ----------
+    structure
+        The structure.
+    **values
+        Values of parameters by name, in their units; loads are those of `Structure.unloaded`.
+
+    Raises
+    ------
+    InputError
+        For unknown or meaningless parameters, a load, or where no natural state is found.
+
+    Examples
+    --------
+    >>> from equimorph import Spring, natural_state
+    >>> natural_state(Spring(), x_l=0.8)
+    State(spring: x_l=0.8, F=0, k=1; index 0)
+    """
+    p = structure.natural_parameters(values)
+    z, found = structure.natural(p[None])
+    if not found[0]:
+        settings = ", ".join(f"{name}={value:g}" for name, value in values.items())
+        raise InputError(
+            f"`{structure.kind}` must have a natural state; none is found at "
+            f"{settings or 'the defaults'}, coming from the defaults."
+        )
+    return State(structure, z[0], p)

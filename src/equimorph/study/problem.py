@@ -19,7 +19,7 @@ from equimorph.study.data_files import FOLDER
 from equimorph.study.extent import PointSection, SetSection
 from equimorph.study.fields import Section, requirement
 from equimorph.study.kinds import KINDS
-from equimorph.study.structures import StructureSection
+from equimorph.study.structures import ANY_STRUCTURE, StructureSection
 
 _PLACE = re.compile(r"(.*) \(at line (\d+), column (\d+)\)")
 
@@ -90,6 +90,7 @@ _tables: dict[str, Any] = {
     kind.table: (list[kind.section], Field(default_factory=list))  # type: ignore[name-defined]
     for kind in KINDS
 }
+_tables["structure"] = (ANY_STRUCTURE, ...)
 _tables["equilibrium_set"] = (SetSection | None, Field(default=None, alias="set"))
 STUDY: type[Study] = create_model("Study", __base__=Study, **_tables)
 """A study with a table for each kind of question."""

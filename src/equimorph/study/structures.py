@@ -1,6 +1,6 @@
 """Structures of a study file."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Union
 
 from pydantic import AfterValidator, Field, field_validator
 
@@ -88,7 +88,13 @@ Term = Annotated[Any, AfterValidator(_terms)]
 EndOfRod = Annotated[Any, AfterValidator(_end)]
 
 
-class RodSection(Section):
+class StructureSection(Section):
+    """A structure; its `kind` is a key of `equimorph.structures.KINDS`."""
+
+    kind: str
+
+
+class RodSection(StructureSection):
     """A planar rod: by default a curved one between two rotary actuators; see `equimorph.Rod`."""
 
     kind: Literal["rod"]
@@ -118,7 +124,7 @@ class RodSection(Section):
         return span
 
 
-class SpringSection(Section):
+class SpringSection(StructureSection):
     """The constrained spring."""
 
     kind: Literal["spring"]
@@ -164,7 +170,7 @@ class DrawnForceSection(Section):
     force: list[Formula] = Field(min_length=2, max_length=2)
 
 
-class EnergySection(Section):
+class EnergySection(StructureSection):
     """A structure given by its energy; see `equimorph.EnergyStructure`."""
 
     kind: Literal["energy"]
@@ -194,7 +200,7 @@ Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
 Place = Annotated[list[Quantity], Field(min_length=2, max_length=3)]
 
 
-class TrussSection(Section):
+class TrussSection(StructureSection):
     """Bars between joints; see `equimorph.Truss`."""
 
     kind: Literal["truss"]
@@ -241,7 +247,7 @@ class EffectSection(Section):
     turn: dict[str, Number] | None = None
 
 
-class FrameSection(Section):
+class FrameSection(StructureSection):
     """Rods between joints; see `equimorph.Frame`."""
 
     kind: Literal["frame"]
@@ -257,7 +263,8 @@ class FrameSection(Section):
     units: UnitSystem | None = None
 
 
-StructureSection = Annotated[
-    RodSection | SpringSection | EnergySection | TrussSection | FrameSection,
+ANY_STRUCTURE: Any = Annotated[
+    Union[tuple(StructureSection.__subclasses__())],  # noqa: UP007  # of the classes above
     Field(discriminator="kind"),
 ]
+"""Sections of all structures, told apart by their kinds."""

@@ -6,10 +6,9 @@ from pathlib import Path
 
 from equimorph.errors import InputError
 
-KINDS = (
-    *("arch", "arm", "beam", "bridge", "calibration", "column", "deep_arch", "drive", "lee"),
-    *("maps", "network", "spring", "stack", "strip", "tasks", "truss"),
-)
+TEMPLATES = files("equimorph.study") / "templates"
+KINDS = sorted(each.name[:-5] for each in TEMPLATES.iterdir() if each.name.endswith(".toml"))
+"""Names of the templates."""
 
 
 def template(kind: str) -> str:
@@ -26,7 +25,7 @@ def template(kind: str) -> str:
 
 
 def _template_file(name: str) -> Traversable:
-    return files("equimorph.study").joinpath(f"templates/{name}")
+    return TEMPLATES / name
 
 
 def write_template(path: Path, kind: str) -> None:
