@@ -262,6 +262,59 @@ def along_parameters(t: Values) -> Parameters:
     return np.column_stack([t, np.arange(len(t))])
 
 
+@dataclass(frozen=True)
+class ForceLine:
+    """F(z, p) = t·force at fixed parameters: from an equilibrium at t = 0 under a growing force."""
+
+    structure: Structure
+    p: Parameters
+    force: Lanes
+    """Force on the unknowns at t = 1."""
+    lengths: Values
+    """Length of the curve's own part of the metric."""
+
+    @property
+    def weight(self) -> Values:
+        """As given."""
+        return self.lengths
+
+    def take(self, lanes: Int[np.ndarray, " some"]) -> "ForceLine":
+        """Return some of the lanes."""
+        return ForceLine(self.structure, self.p[lanes], self.force[lanes], self.lengths[lanes])
+
+    def parameters(self, t: Values) -> Parameters:
+        """Parameters, the same for all t."""
+        return self.p + 0.0 * t[:, None]
+
+    @property
+    def metric(self) -> Metric:
+        """The structure's own."""
+        return self.structure
+
+    @property
+    def folds_change_index(self) -> bool:
+        """Whether the index changes where dt/ds vanishes, and only there."""
+        return True
+
+    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
+        """Return z and p."""
+        return z, self.parameters(t)
+
+    def rate(self, t: Values) -> Parameters:
+        """Zero."""
+        return np.zeros_like(self.p)
+
+    def bend(self, t: Values) -> Parameters:
+        """Zero."""
+        return np.zeros_like(self.p)
+
+    def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
+        """Newton step and tangent by the general bordered solve."""
+        residual = self.structure.residual(z, self.p) - t[:, None] * self.force
+        given = (self.structure, z, self.p, residual, -self.force)
+        return bordered_advance(*given, row, corner, defect)
+
+
 def squared_length(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> Values:
     """Squared length of a step (dz, dt) in the metric and the curve's own."""
     return _squared(metric, weight, dz, dt, 0.0)

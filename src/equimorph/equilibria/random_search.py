@@ -73,10 +73,17 @@ class Pools:
     A group is one independent run at one point; all groups advance together in one batch.
     """
 
-    def __init__(self, ground: Ground, generator: np.random.Generator) -> None:
+    def __init__(
+        self,
+        ground: Ground,
+        generator: np.random.Generator,
+        z: Lanes | None = None,
+        group: Groups | None = None,
+    ) -> None:
+        """Begin with nothing, or with known states."""
         self.ground, self.generator = ground, generator
-        self.z = np.zeros((0, ground.structure.size))
-        self.group = np.zeros(0, int)
+        self.z = np.zeros((0, ground.structure.size)) if z is None else z
+        self.group = np.zeros(0, int) if group is None else group
         self.failures: list[tuple[str, Groups]] = []
 
     def start(self, guesses: int) -> None:
@@ -92,11 +99,15 @@ class Pools:
         number = np.arange(len(group)) % guesses
         again = ~found & (number < np.ceil(HOMOTOPIES * guesses))
         self._by_homotopy(guess[again], group[again])
-        self._by_deflation()
+        self._by_deflation(np.arange(len(self.z)), NUDGE)
 
-    def spread(self) -> None:
-        """Lay lines through equilibria until they bring nothing new."""
-        begin = 0
+    def deflate(self, groups: Groups) -> None:
+        """Deflated Newton close to all known states of some groups, and from random guesses."""
+        for share in (NUDGE, 1.0):
+            self._by_deflation(np.flatnonzero(np.isin(self.group, groups)), share)
+
+    def spread(self, begin: int = 0) -> None:
+        """Lay lines through equilibria, those before `begin` left out, until nothing is new."""
         for _ in range(ROUNDS):
             new = np.arange(begin, len(self.z))
             begin = len(self.z)
@@ -114,15 +125,18 @@ class Pools:
         self.failures.append(("the Newton homotopy did not arrive", group[~arrived]))
         self._polished(outcome.z[arrived], group[arrived])
 
-    def _by_deflation(self) -> None:
-        if len(self.z) == 0:
+    def _by_deflation(self, lanes: Int[np.ndarray, " lanes"], share: float) -> None:
+        """From points on the way to random guesses."""
+        if len(lanes) == 0:
             return
-        structure, p = self.ground.structure, self.ground.p[self.group]
-        guess = self.z + NUDGE * (structure.sample(p, self.generator) - self.z)
-        away = settle(structure, guess, p, guards=Guards(iterations=30, known=self._known()))
+        structure, group = self.ground.structure, self.group[lanes]
+        p = self.ground.p[group]
+        guess = self.z[lanes] + share * (structure.sample(p, self.generator) - self.z[lanes])
+        guards = Guards(iterations=30, known=self._known()[lanes])
+        away = settle(structure, guess, p, guards=guards)
         found = away.found
-        self.failures.append(("deflated Newton did not converge", self.group[~found]))
-        self._take(away.z[found], self.group[found])
+        self.failures.append(("deflated Newton did not converge", group[~found]))
+        self._take(away.z[found], group[found])
 
     def _known(self) -> Float[np.ndarray, "lanes roots unknowns"]:
         """The pool of its group for each state; rows of NaN fill up."""

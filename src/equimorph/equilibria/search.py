@@ -5,13 +5,15 @@ See docs/decisions.md, "Searches follow lines through known equilibria".
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import gammaln, xlogy
 
 from equimorph.door import door
+from equimorph.equilibria.arguments import Argument, arguments_of, contradicts
+from equimorph.equilibria.minima_graph import MinimaGraph
 from equimorph.equilibria.random_search import Ground, Pools, distinct
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
@@ -31,7 +33,8 @@ class Completeness:
     Parameters
     ----------
     captured
-        Whether each run found each equilibrium.
+        Whether each run found each equilibrium; no run found those that descents and searches
+        between minima have added.
 
     References
     ----------
@@ -47,7 +50,7 @@ class Completeness:
 
     @property
     def found(self) -> int:
-        """Number of different equilibria found by all runs together."""
+        """Number of different equilibria found by all runs together, and those added to them."""
         return int(self.captured.shape[1])
 
     @property
@@ -75,9 +78,10 @@ class Completeness:
         """
         if self.found == 0:
             return self.estimate
-        if int(self.captured.sum()) == self.found:
+        if int(self.captured.sum()) == int(self.captured.any(axis=0).sum()):
             return np.inf
-        number, best = self.found, self._log_likelihood(self.found)
+        number = int(self.captured.any(axis=0).sum())
+        best = self._log_likelihood(number)
         while best - self._log_likelihood(number + 1) <= 0.5 * REJECTED:
             number += 1
             best = max(best, self._log_likelihood(number))
@@ -86,7 +90,8 @@ class Completeness:
     def _log_likelihood(self, number: int) -> float:
         """Of `number` equilibria, at the most likely chance of a catch, the same for all."""
         trials, hits = self.runs * number, int(self.captured.sum())
-        ways = gammaln(number + 1) - gammaln(number - self.found + 1)
+        seen = int(self.captured.any(axis=0).sum())
+        ways = gammaln(number + 1) - gammaln(number - seen + 1)
         chance = hits / trials
         return float(ways + xlogy(hits, chance) + xlogy(trials - hits, 1.0 - chance))
 
@@ -109,6 +114,10 @@ class Completeness:
 
 Points = Float[np.ndarray, "points parameters"]
 
+COMPLETIONS = 4
+"""Rounds in which what descents and searches between minima found serves lines again."""
+NO_RUN = -1
+"""Instead of the number of a run: found by descents, or between minima."""
 REPEATS = 3
 """Times that the runs at a point are made, at most: again while an equilibrium was found once."""
 
@@ -123,15 +132,22 @@ class FoundStates(States):
         Capture and recapture over the independent runs of the search; see `Completeness`.
     failures
         How many starts led to no equilibrium, by reason.
+    arguments
+        Arguments that no stable state is missing, and whether they hold; see `Argument`. A state
+        whose neighbours of index one are all missing with it escapes them.
     """
 
     completeness: Completeness
     failures: Mapping[str, int]
+    arguments: tuple[Argument, ...] = ()
 
     def __repr__(self) -> str:
         """How many, how many of them are stable, and how many there may be."""
         stable, kind = int((self.index == 0).sum()), self.structure.kind
-        return f"FoundStates({kind}: {len(self)}, {stable} of them stable; {self.completeness})"
+        told = "".join(f"; {each.name}: {each.standing}" for each in self.arguments)
+        return (
+            f"FoundStates({kind}: {len(self)}, {stable} of them stable; {self.completeness}{told})"
+        )
 
 
 @door
@@ -153,6 +169,12 @@ def find_equilibria(
     through which lines are laid again, until nothing new comes. Images under symmetries that leave
     `at` unchanged belong to each run. States that the discretisation does not resolve, or that
     violate `within`, are dropped. While only one run found some equilibrium, runs are added.
+
+    Then the energy is followed downwards from every state of index one until that leads to nothing
+    new, and saddles are searched between minima that no chain of saddles joins: so no stable state
+    is missing unless every state of index one beside it is missing as well. What is found serves
+    lines again. Where the energy is known to grow at infinity the sum of (−1)^index must be 1, else
+    deflation searches once more. `FoundStates.arguments` tells what held.
 
     Parameters
     ----------
@@ -210,7 +232,37 @@ def search_points(
         todo = np.array([point for point in todo if catches[point].doubtful], dtype=int)
         if len(todo) == 0:
             break
-    return [catch.states() for catch in catches]
+    return _argued(structure, points, catches, generator)
+
+
+def _argued(
+    structure: Structure,
+    points: Points,
+    catches: list["_Catch"],
+    generator: np.random.Generator,
+) -> list[FoundStates]:
+    """What was found, with what the arguments add that no stable state is missing."""
+    if not catches:
+        return []
+    ground = Ground(structure, points, catches[0].ground.within)
+    group = np.repeat(np.arange(len(points)), [len(catch.z) for catch in catches])
+    graph = MinimaGraph(ground, np.concatenate([catch.z for catch in catches]), group)
+    for _ in range(COMPLETIONS):
+        known = len(graph)
+        graph.descend()
+        graph.connect()
+        lacking = [number for number in range(len(points)) if contradicts(graph, number)]
+        if len(graph) == known and not lacking:
+            break
+        pools = Pools(ground, generator, graph.z, graph.group)
+        if len(graph) == known:
+            pools.deflate(np.array(lacking))
+        pools.spread(known)
+        graph.add(pools.z[len(graph) :], pools.group[len(graph) :])
+    return [
+        catch.joined(graph.z[graph.group == number]).states(arguments_of(graph, number))
+        for number, catch in enumerate(catches)
+    ]
 
 
 @dataclass(frozen=True)
@@ -238,34 +290,45 @@ class _Catch:
         """With the groups `first`, `first` + 1, ... of pools as further runs."""
         mine = np.flatnonzero((pools.group >= first) & (pools.group < first + runs))
         z, run = pools.z[mine], pools.group[mine] - first + self.runs
-        valid = self.ground.excess(z, np.zeros(len(z), int)) <= 0.0
         counts = Counter(self.failures)
         for reason, group in pools.failures:
             counts[reason] += int(((group >= first) & (group < first + runs)).sum())
         return _Catch(
             self.ground,
-            np.concatenate([self.z, z[valid]]),
-            np.concatenate([self.run, run[valid]]),
+            np.concatenate([self.z, z]),
+            np.concatenate([self.run, run]),
             self.runs + runs,
             {reason: count for reason, count in counts.items() if count},
         )
 
+    def joined(self, z: Float[np.ndarray, "more size"]) -> "_Catch":
+        """With states that no run has found."""
+        run = np.concatenate([self.run, np.full(len(z), NO_RUN)])
+        return replace(self, z=np.concatenate([self.z, z]), run=run)
+
+    @property
+    def valid(self) -> Int[np.ndarray, " valid"]:
+        """What obeys the constraints."""
+        return np.flatnonzero(self.ground.excess(self.z, np.zeros(len(self.z), int)) <= 0.0)
+
     @property
     def kept(self) -> Int[np.ndarray, " found"]:
         """The different states, sorted by energy."""
-        structure, at = self.ground.structure, distinct(self.ground.structure, self.z)
+        structure, valid = self.ground.structure, self.valid
+        at = valid[distinct(structure, self.z[valid])]
         energy = structure.energy(self.z[at], np.tile(self.ground.p, (len(at), 1)))
-        return at[np.argsort(energy, kind="stable")]
+        return np.asarray(at[np.argsort(energy, kind="stable")])
 
     @property
     def captured(self) -> Bool[np.ndarray, "runs found"]:
         """Whether each run found each of the different states."""
         kept = self.z[self.kept]
         captured = np.zeros((self.runs, len(kept)), bool)
-        if len(kept):
+        mine = self.valid[self.run[self.valid] != NO_RUN]
+        if len(mine):
             n = self.ground.structure.unknowns
-            gap = (self.z[:, None, :n] - kept[None, :, :n]) ** 2 @ self.ground.structure.mass
-            captured[self.run, gap.argmin(axis=1)] = True
+            gap = (self.z[mine, None, :n] - kept[None, :, :n]) ** 2 @ self.ground.structure.mass
+            captured[self.run[mine], gap.argmin(axis=1)] = True
         return captured
 
     @property
@@ -273,9 +336,9 @@ class _Catch:
         """Whether a state was found only once in several runs: another one may be missing."""
         return self.runs > 1 and bool((self.captured.sum(axis=0) == 1).any())
 
-    def states(self) -> FoundStates:
+    def states(self, arguments: tuple[Argument, ...]) -> FoundStates:
         """Return the result."""
         z = self.z[self.kept]
         p = np.tile(self.ground.p, (len(z), 1))
         completeness = Completeness(self.captured)
-        return FoundStates(self.ground.structure, z, p, completeness, self.failures)
+        return FoundStates(self.ground.structure, z, p, completeness, self.failures, arguments)

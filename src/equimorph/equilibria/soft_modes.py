@@ -28,8 +28,9 @@ GUESSES = 64
 """Random guesses whose extent is the scale of configurations."""
 WIDEST = 0.1
 """Largest length of a mode, as a share of the extent of the guesses."""
-DIFFERENCE = 1e-3
-"""Step of the difference of third derivatives, relative to the length as far as it is known."""
+DIFFERENCE, REFINEMENTS = 0.1, 4
+"""Step of the difference of third derivatives, relative to the length as far as it is known; and
+how often it becomes known better."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,10 @@ def soft_modes(structure: Structure, z: Lanes, p: Parameters) -> SoftModes:
     size, answer = metric_length(structure, rest), metric_length(structure, response)
     # nothing is left beside the mode if it is the only way to move
     stiffness = np.where(answer > NOTHING * size, size / np.maximum(answer, 1e-300), 0.0)
+    # the shift is far larger than small eigenvalues, which would have no digit left
+    across = multiply(mode * _response(structure, z, p, mode, np.zeros(len(z))), mass)
+    with np.errstate(divide="ignore"):
+        eigenvalue = np.where(np.isfinite(across) & (across != 0.0), 1.0 / across, eigenvalue)
     length, rate, critical = _lengths(structure, z, p, mode, eigenvalue)
     stiffness = np.where(stiffness > 0.0, np.maximum(stiffness, np.abs(eigenvalue)), rate)
     return SoftModes(eigenvalue, mode, stiffness, length, rate, critical)
@@ -121,12 +126,14 @@ def _lengths(
     size = np.abs(eigenvalue)
     third = np.abs(_third(structure, z, p, mode))
     by_third = size / np.maximum(third, 1e-300)
-    step = DIFFERENCE * np.clip(by_third, DIFFERENCE * widest, widest)
-    move = np.zeros_like(z)
-    move[:, : structure.unknowns] = step[:, None] * mode
-    change = _third(structure, z + move, p, mode) - _third(structure, z - move, p, mode)
-    fourth = np.maximum(np.abs(change) / (2.0 * step), 1e-300)
-    length = np.minimum(np.minimum(by_third, np.sqrt(2.0 * size / fourth)), widest)
+    length = np.minimum(by_third, widest)
+    for _ in range(REFINEMENTS):
+        step = DIFFERENCE * np.maximum(length, SAME_STATE)
+        move = np.zeros_like(z)
+        move[:, : structure.unknowns] = step[:, None] * mode
+        change = _third(structure, z + move, p, mode) - _third(structure, z - move, p, mode)
+        fourth = np.maximum(np.abs(change) / (2.0 * step), 1e-300)
+        length = np.minimum(np.minimum(by_third, np.sqrt(2.0 * size / fourth)), widest)
     critical = (length <= SAME_STATE) | (eigenvalue >= 0.0)
     at_fold = np.minimum(third / fourth, widest)
     beyond = np.where(at_fold > SAME_STATE, at_fold, widest)  # by symmetry there is no third one

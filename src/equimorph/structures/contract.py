@@ -109,6 +109,20 @@ class Equations(Protocol):
         """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
 
 
+@dataclass(frozen=True)
+class Growth:
+    """Whether the energy is smooth on all of Rⁿ and grows there at infinity.
+
+    Then Σ (−1)^index of all equilibria is 1 [Milnor1965]_.
+
+    applies: whether that is so, shown or promised; promised: by the author of the energy only.
+    """
+
+    applies: bool
+    reason: str
+    promised: bool = False
+
+
 class Structure(ABC):
     """A structure with energy E(u; p), constraints c(u; p) = 0 and L = E + λ·c.
 
@@ -269,6 +283,11 @@ class Structure(ABC):
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Symmetries of the equilibrium set; none unless the structure says so."""
         return ()
+
+    def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
+        """Whether the energy at parameters p is smooth on Rⁿ and grows at infinity."""
+        del p
+        return Growth(False, "it is not known whether the energy grows at infinity")
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Values:
         """Discretisation error of the unknowns; zero for discrete structures."""

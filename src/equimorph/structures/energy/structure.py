@@ -12,7 +12,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Descriptor, Drawing, position
-from equimorph.structures.contract import Direction, Majorant
+from equimorph.structures.contract import Direction, Growth, Majorant
 from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.energy.declared import (
     Formulas,
@@ -23,6 +23,7 @@ from equimorph.structures.energy.declared import (
 )
 from equimorph.structures.energy.drawing import energy_drawing, forces_of, marks_of
 from equimorph.structures.energy.enclosures import can_enclose, enclosure
+from equimorph.structures.energy.leading_form import grows
 from equimorph.structures.energy.tape import Derivatives, Tape, casadi, tape
 
 
@@ -56,6 +57,10 @@ class EnergyStructure(DiscreteStructure):
         the height of figures of the set.
     definitions
         Parts of formulas by name, each in terms of the ones before.
+    coercive
+        The author's promise that the energy is smooth for all values of the unknowns and grows to
+        infinity in all directions; then the sum of (−1)^index over all equilibria is 1, which tells
+        whether some are missing. Polynomials with a positive definite leading form need no promise.
 
     Raises
     ------
@@ -102,12 +107,14 @@ class EnergyStructure(DiscreteStructure):
         forces: Sequence[Mapping[str, Any]] = (),
         descriptors: Mapping[str, Any] | None = None,
         definitions: Mapping[str, Any] | None = None,
+        coercive: bool = False,
     ) -> None:
         self._unknowns, self.parameters = unknowns_of(unknowns), parameters_of(parameters)
         self.unknowns, self.constraints = len(self._unknowns), len(constraints)
         self.mass = np.array([float(unknown.mass) for unknown in self._unknowns])
         natural = tuple(unknown.natural for unknown in self._unknowns)
         points = _points(draw)
+        self._coercive = _promise(coercive, self.constraints)
         self._marks = marks_of(supports, len(points))
         self._loaded, pushes = forces_of(forces, len(points))
         given = Formulas(
@@ -141,6 +148,7 @@ class EnergyStructure(DiscreteStructure):
             "constraints": list(formulas.constraints),
             "draw": [list(point) for point in formulas.draw],
             **{key: value for key, value in drawn.items() if value},
+            **({"coercive": True} if self._coercive else {}),
             "descriptors": dict(formulas.descriptors),
             "definitions": dict(definitions),
         }
@@ -202,6 +210,23 @@ class EnergyStructure(DiscreteStructure):
         values = self._graphs.step(z, p, dp)
         residual, column, entries = np.split(values, [self.size, 2 * self.size], axis=1)
         return residual, column, entries
+
+    def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
+        """Whether the energy grows at infinity: shown for polynomials, or promised."""
+        bounded = [
+            each.name for each in self._unknowns if np.isfinite([each.lower, each.upper]).any()
+        ]
+        if self.constraints or bounded:
+            why = "constraints" if self.constraints else f"limits of {', '.join(bounded)}"
+            return Growth(False, f"the configurations have {why}")
+        if self._coercive:
+            return Growth(True, "the author promises that the energy grows at infinity", True)
+        known = grows(self._graphs.energy, self.unknowns, p)
+        if known is None:
+            return Growth(False, "the energy is no polynomial, and `coercive=True` is not promised")
+        if not known:
+            return Growth(False, "the leading form of the energy is not shown positive definite")
+        return Growth(True, "a polynomial with a positive definite leading form")
 
     # --- states ---------------------------------------------------------------------------------
 
@@ -319,3 +344,14 @@ def _points(draw: Sequence[Sequence[Any]]) -> tuple[tuple[Any, Any], ...]:
     if len(points) == 1:
         raise InputError("`draw` must have at least two points; got one.")
     return tuple(points)
+
+
+def _promise(coercive: Any, constraints: int) -> bool:
+    """Check the promise of growth."""
+    if not isinstance(coercive, bool):
+        raise InputError(f"`coercive` must be True or False; got {coercive!r}.")
+    if coercive and constraints:
+        raise InputError(
+            f"`coercive` must be False for energies with constraints; got {constraints} of them."
+        )
+    return coercive

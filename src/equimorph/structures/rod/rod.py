@@ -5,11 +5,13 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Parameter, names_of
+from equimorph.structures.contract import Growth
 from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.described import Described
@@ -322,6 +324,11 @@ class Rod(Described):
     def ends(self) -> tuple[End, End]:
         """How ends A and B are supported."""
         return (End(), End()) if self._general is None else self._general.supports
+
+    def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
+        """Not known: ever more states are wound up ever more, and the resolution cuts them off."""
+        del p
+        return Growth(False, "the resolution cuts off states that are wound up")
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Values:
         """Bound of the errors of curvature and height, by solving again with a higher degree.

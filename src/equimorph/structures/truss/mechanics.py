@@ -11,7 +11,7 @@ from equimorph.linalg.dense import multiply
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
-from equimorph.structures.contract import Direction, Symmetry
+from equimorph.structures.contract import Direction, Growth, Symmetry
 from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.supports import supports_of_point
@@ -179,6 +179,21 @@ class TrussMechanics(DiscreteStructure):
         """No bar has shrunk to a point, and all rest lengths are positive."""
         g, l0 = self.lengths(z, p)
         return np.asarray(((l0 > 0.0) & (g > (SHORTEST * l0) ** 2)).all(axis=1))
+
+    def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
+        """Green strain gives a polynomial of degree four, definite if no motion is free of strain.
+
+        Its leading form is the sum of EA |Δu|⁴/(8 l₀³) over all bars: it vanishes only where no
+        bar turns or stretches.
+        """
+        if not self.energies.green:
+            return Growth(False, "engineering strain has kinks where bars shrink to points")
+        if (self.rest_lengths(p[None]) <= 0.0).any():
+            return Growth(False, "a rest length is not positive")
+        changes = self._differences(np.eye(self.unknowns)).reshape(self.unknowns, -1)
+        if np.linalg.matrix_rank(changes) < self.unknowns:
+            return Growth(False, "a part of the truss has no support")
+        return Growth(True, "Green strain, supported")
 
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None

@@ -1,0 +1,165 @@
+"""Graph of minima: descents from saddles are its edges, saddles are searched between its pieces.
+
+See docs/decisions.md, "Completeness is argued".
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, csgraph_from_dense, dijkstra
+
+from equimorph.arrays import Lanes
+from equimorph.equilibria.descents import descend
+from equimorph.equilibria.gradient_flow import Ending
+from equimorph.equilibria.random_search import Ground, Groups
+from equimorph.equilibria.saddles import Pairs, states_between
+from equimorph.tolerances import SAME_STATE
+
+TRIES = 60
+"""Pairs of minima over one point between which a saddle is searched, at most."""
+AT_ONCE = 6
+"""Of these at the same time."""
+ROUNDS = 12
+"""Rounds of descents from the saddles that the round before has found, at most."""
+NONE = -1
+"""Instead of the number of a state: the descent ended at none that is resolved."""
+
+Numbers = Int[np.ndarray, " states"]
+Pair = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One way down: the saddle from which it leads, the state where it ends, and how it ended."""
+
+    saddle: int
+    end: int
+    ending: Ending
+
+
+class MinimaGraph:
+    """States over points of the parameter space, and the minima that their saddles join.
+
+    A group is a point. States keep their numbers when others are added.
+    """
+
+    def __init__(self, ground: Ground, z: Lanes, group: Groups) -> None:
+        """Begin with known states."""
+        self.ground = ground
+        self.z, self.group = np.zeros((0, ground.structure.size)), np.zeros(0, int)
+        self.index, self._left = np.zeros(0, int), np.zeros(0, bool)
+        self.edges: list[Edge] = []
+        self.tried: dict[int, set[Pair]] = {each: set() for each in range(len(ground.p))}
+        self.add(z, group)
+
+    def __len__(self) -> int:
+        """Return the number of states."""
+        return len(self.z)
+
+    # --- states and descents --------------------------------------------------------------------
+
+    def add(self, z: Lanes, group: Groups) -> Numbers:
+        """Numbers of states; those that are new are added, with their images under symmetries."""
+        before = len(self)
+        numbers = np.array(
+            [self._number(*each) for each in zip(z, group.tolist(), strict=True)], int
+        )
+        for number in range(before, len(self)):
+            for image in self.ground.images(self.z[[number]], int(self.group[number])):
+                self._number(image[0], int(self.group[number]))
+        p = self.ground.p[self.group[before:]]
+        self.index = np.append(self.index, self.ground.structure.index(self.z[before:], p))
+        self._left = np.append(self._left, np.zeros(len(p), bool))
+        return numbers
+
+    def _number(self, z: Float[np.ndarray, " size"], group: int) -> int:
+        own = np.flatnonzero(self.group == group)
+        n, mass = self.ground.structure.unknowns, self.ground.structure.mass
+        gap = np.sqrt((self.z[own, :n] - z[:n]) ** 2 @ mass)
+        if gap.min(initial=np.inf) <= SAME_STATE:
+            return int(own[gap.argmin()])
+        self.z, self.group = np.append(self.z, z[None], axis=0), np.append(self.group, group)
+        return len(self.z) - 1
+
+    def descend(self) -> None:
+        """Follow the energy down from saddles of index one, until that leads to nothing new."""
+        structure = self.ground.structure
+        for _ in range(ROUNDS):
+            saddles = np.flatnonzero((self.index == 1) & ~self._left)
+            if len(saddles) == 0:
+                return
+            self._left[saddles] = True
+            led = descend(structure, self.z[saddles], self.ground.p[self.group[saddles]])
+            saddle, code = np.tile(saddles, 2), led.code.ravel()
+            ends, group = led.z.reshape(-1, structure.size), self.group[saddle]
+            good = np.isin(code, (Ending.LANDED, Ending.SADDLE))
+            good[good] = structure.resolved(ends[good], self.ground.p[group[good]])
+            number = np.full(len(code), NONE)
+            number[good] = self.add(ends[good], group[good])
+            rows = zip(saddle.tolist(), number.tolist(), code.tolist(), strict=True)
+            self.edges += [Edge(top, end, Ending(how)) for top, end, how in rows]
+
+    # --- pieces ---------------------------------------------------------------------------------
+
+    def pieces(self, group: int) -> tuple[Numbers, Numbers]:
+        """Stable states over a point, and the number of the piece of the graph of each."""
+        joined = [(edge.saddle, edge.end) for edge in self.edges if edge.end != NONE]
+        top, end = np.array(joined, int).reshape(-1, 2).T
+        count = len(self)
+        graph = coo_array((np.ones(len(top)), (top, end)), shape=(count, count))
+        label = connected_components(graph, directed=False)[1]
+        minima = np.flatnonzero((self.group == group) & (self.index == 0))
+        return minima, np.unique(label[minima], return_inverse=True)[1]
+
+    def connect(self) -> None:
+        """Search saddles between pieces, along the chains of minima with the shortest gaps.
+
+        Dijkstra with weights 0 within a piece, d² between minima of different pieces, ∞ where no
+        saddle was found [CarrTrygubenkoWales2005]_; the shortest gap of the best chain is tried.
+        """
+        while True:
+            pairs = [
+                (group, *pair) for group in range(len(self.ground.p)) for pair in self._gaps(group)
+            ]
+            if not pairs:
+                return
+            group, start, goal = np.array(pairs, int).T
+            for each, *pair in pairs:
+                self.tried[each].add((min(pair), max(pair)))
+            given = Pairs(self.z[start], self.z[goal], self.ground.p[group])
+            met = states_between(self.ground.structure, given)
+            good = self.ground.structure.resolved(met.z, given.p[met.pair])
+            self.add(met.z[good], group[met.pair[good]])
+            self.descend()
+
+    def _gaps(self, group: int) -> list[Pair]:
+        """Pairs of minima of different pieces that are tried next."""
+        minima, piece = self.pieces(group)
+        left = TRIES - len(self.tried[group])
+        if piece.max(initial=0) == 0 or left <= 0:
+            return []
+        u = self.z[minima, : self.ground.structure.unknowns] * np.sqrt(self.ground.structure.mass)
+        gaps = ((u[:, None] - u[None]) ** 2).sum(axis=2)
+        gaps[piece[:, None] == piece] = 0.0
+        place = {number: k for k, number in enumerate(minima.tolist())}
+        for pair in self.tried[group]:
+            i, j = (place.get(number, NONE) for number in pair)
+            if min(i, j) != NONE and piece[i] != piece[j]:
+                gaps[i, j] = gaps[j, i] = np.inf
+        graph = csgraph_from_dense(gaps, null_value=np.inf)
+        length, before = dijkstra(graph, indices=0, return_predecessors=True)
+        ends = [np.flatnonzero(piece == k)[0] for k in range(piece.max() + 1) if k != piece[0]]
+        chosen = {_shortest(gaps, before, int(end)) for end in ends if np.isfinite(length[end])}
+        return [(int(minima[i]), int(minima[j])) for i, j in sorted(chosen)][: min(left, AT_ONCE)]
+
+
+def _shortest(gaps: Float[np.ndarray, "n n"], before: Int[np.ndarray, " n"], end: int) -> Pair:
+    """Shortest gap on the chain that Dijkstra found to a minimum."""
+    chain = [end]
+    while before[chain[-1]] >= 0:
+        chain.append(int(before[chain[-1]]))
+    links = [(i, j) for i, j in pairwise(chain) if gaps[i, j] > 0.0]
+    return min(links, key=lambda link: float(gaps[link]))
