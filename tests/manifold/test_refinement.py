@@ -376,7 +376,7 @@ def test_rough_tangent_spaces_of_new_vertices_are_nearly_exact(plain_edges):
     half = np.full(len(ends), 0.5)
     with unchecked():
         found, exact = on_edges(flipped, ends, 0, index, half)
-        again, rough = on_edges(flipped, ends, 0, index, half, rough=True)
+        again, rough = on_edges(flipped, ends, 0, index, half, refining=True)
     assert found.sum() > 50
     assert np.array_equal(again, found)
     np.testing.assert_array_equal(rough.index, exact.index)

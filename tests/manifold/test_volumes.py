@@ -9,6 +9,7 @@ from equimorph.manifold import (
     EquilibriumSet,
     build,
     equilibrium_set,
+    level_set,
     refine,
     stability_distance,
 )
@@ -25,7 +26,7 @@ from equimorph.manifold.geometry.topology import (
 )
 from equimorph.manifold.lifting import cells
 from equimorph.manifold.lifting.cells import volumes_over
-from equimorph.manifold.refining.quality import smallest_angles
+from equimorph.manifold.refining.quality import qualities, smallest_angles
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
 from oracles.complexes import assert_faithful, assert_folds_are_singular
@@ -350,3 +351,34 @@ def test_slice_of_the_arch_at_a_load_is_its_set_at_that_load():
         np.testing.assert_array_equal(np.sort(one.index), np.sort(other.index))
         gap = np.abs(one.states.z[:, None] - other.states.z[None]).max(axis=2)
         assert gap.min(axis=1).max() < 1e-9
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 1.2])
+def test_steep_tetrahedra_count_by_the_cosine_of_their_angle_with_the_set(turn):
+    """The sheet x = 0 with tangent spaces turned out of it: the smallest angle times the cosine."""
+    names = ("a", "b", "c")
+    sheet = Polynomial(lambda x, a, b, c: integral(x + 0.0 * (a + b + c)), 1, names)
+    fabric = fabric_of(lifted(sheet, BOX, (2, 2, 2)))
+    rows = fabric.vertices.rows.copy()
+    rows[:, 0] *= np.cos(turn)
+    rows[:, 0, 0] += np.sin(turn)  # the coordinate x of the embedding
+    vertices = replace(fabric.vertices, rows=rows)
+    angles = smallest_angles(fabric.squared)
+    found = qualities(vertices, fabric.cells, fabric.cell_index)
+    np.testing.assert_allclose(found, np.cos(turn) * angles, rtol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("accuracy", [0.1, 0.05])
+def test_every_level_cuts_a_refined_set_that_bulges_over_the_sides_of_its_box(accuracy):
+    """x³ = (a + 0.3·b − 0.2·c) x: no edge may lack a vertex on x = v, however near to a side."""
+    names = ("a", "b", "c")
+    pitchfork = Polynomial(
+        lambda x, a, b, c: integral(x**3 - (a + 0.3 * b - 0.2 * c) * x), 1, names
+    )
+    x = Descriptor("x", "1", lambda z, p: z[:, 0].copy())
+    box = Box(a=(-1.0, 1.1), b=(-1.0, 1.2), c=(-1.05, 1.15))
+    with unchecked():
+        eset = refine(lifted(pitchfork, box, (3, 4, 3)), accuracy)
+        for value in np.linspace(-0.9, 0.9, 19):
+            assert level_set(eset, x, value).lost == 0

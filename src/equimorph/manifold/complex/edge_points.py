@@ -44,8 +44,8 @@ MET = (0, -2, -1)
 WEIGHTS = np.array([0.36, 0.48, 0.8])
 """Coordinates, and a direction in them, along which vertices are in order."""
 BESIDE = 0.05
-"""How near to a side of the box, relative to its edge, a vertex may lie where the set bulges over
-that side."""
+"""How near to a side of the box, relative to its edge, a vertex of a refined set may lie where the
+set bulges over that side; cuts may have to pass nearer."""
 ALONG = 0.5
 """Least cosine of the angle between an edge and the set at its new vertex."""
 
@@ -82,7 +82,7 @@ def on_all_edges(fabric: Fabric, parts: Sequence[Places]) -> list[Tried]:
     """Exact vertices on edges, several parts at the same time; see `on_edges`."""
 
     def find(part: Places) -> Tried:
-        return on_edges(fabric, part.ends, part.mark, part.lowest, part.t, rough=True)
+        return on_edges(fabric, part.ends, part.mark, part.lowest, part.t, refining=True)
 
     return list(results_of([partial(find, part) for part in parts]))
 
@@ -120,17 +120,19 @@ def on_edges(
     lowest: Int[np.ndarray, " n"],
     t: Float[np.ndarray, " n"],
     *,
-    rough: bool = False,
+    refining: bool = False,
 ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
     """Exact vertices at places t along edges with a mark, and for which edges they were found.
 
-    Their tangent spaces may be `rough`: those at the start of the last step of Newton.
+    For `refining`, their tangent spaces may be rough: those at the start of the last step of
+    Newton; and vertices very near to a side of the box, which make slivers, are refused.
     """
-    found, vertices = _orthogonally(fabric, ends, mark, lowest, t, rough=rough)
+    found, vertices = _orthogonally(fabric, ends, mark, lowest, t, rough=refining)
     left = np.flatnonzero(~found)
     if fabric.dimension != TETRAHEDRA or mark & ON_CROSSING or len(left) == 0:
         return found, vertices
-    again, more = _beside_sides(fabric, ends[left], mark, lowest[left], t[left])
+    room = BESIDE if refining else 0.0
+    again, more = _beside_sides(fabric, ends[left], mark, lowest[left], t[left], room)
     at = np.concatenate([np.flatnonzero(found), left[again]])
     found[left[again]] = True
     return found, vertices.joined(more).take(np.argsort(at))
@@ -142,10 +144,12 @@ def _beside_sides(
     mark: int,
     lowest: Int[np.ndarray, " n"],
     t: Float[np.ndarray, " n"],
+    least: float,
 ) -> Tried:
     """Vertices on edges that the set bulges over a side of the box from, and for which edges.
 
-    They keep the parameter that the side holds.
+    They keep the parameter that the side holds, which must be off it by more than `least`,
+    relative to the edge.
     """
     setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
     first, second = (fabric.end(ends, side, mark) for side in range(2))
@@ -162,7 +166,7 @@ def _beside_sides(
         a, b = store.p[ends, setting.free[k]].T
         there = a + t * (b - a)
         room = np.abs(there[:, None] - fabric.box[:, k]).min(axis=1) / setting.scales[k]
-        own = np.flatnonzero(freely.found & beyond & (room > BESIDE * length) & ~found)
+        own = np.flatnonzero(freely.found & beyond & (room > least * length) & ~found)
         if len(own) == 0:
             continue
         near = z[own], p[own].copy()

@@ -1,4 +1,7 @@
-"""Cut polygons along folds and crossings into pieces, and pieces into triangles."""
+"""Cut polygons along folds and crossings into pieces, and pieces into triangles.
+
+See docs/decisions.md, "Folds and constraints are built into the cells".
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

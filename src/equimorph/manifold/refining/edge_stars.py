@@ -52,13 +52,21 @@ def reconnections(
     sides = [fabric.cells[poor][:, list(k)] for k in combinations(range(4), 2)]
     edges = rows_of(distinct(np.concatenate([keys_of(side, base) for side in sides])), base, 2)
     # rings whose edge has an end that is not near are what they were
-    edges = edges[near[edges].all(axis=1)]
+    #    edges = edges[near[edges].all(axis=1)]
     part = replace(fabric, cells=fabric.cells[around], cell_index=fabric.cell_index[around])
     rings = rings_around(part, edges)
     rings = replace(rings, cells=np.where(rings.cells < 0, -1, around[rings.cells]))
+    rings = rings.take(_open_again(rings, near))
     return _without_edges(fabric, rings, barred, facets).joined(
         _through_facets(fabric, poor, around, barred)
     )
+
+
+def _open_again(rings: "Rings", near: Bool[np.ndarray, " V"]) -> Bool[np.ndarray, " rings"]:
+    """Which rings changed, or may be filled by a chord that was an edge elsewhere before."""
+    polygons = np.concatenate([rings.first, rings.second], axis=1)
+    corners = (near[polygons] & (polygons >= 0)).sum(axis=1)
+    return np.asarray(near[rings.ends].all(axis=1) | (corners > 1))
 
 
 def _known(fabric: Fabric, around: Cells, but: Edges) -> tuple[Keys, Keys]:

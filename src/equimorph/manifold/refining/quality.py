@@ -2,7 +2,8 @@
 
 Angles are measured in the embedding: at the corners of triangles, between the faces of tetrahedra.
 An upright cell projects onto the parameters as the parity of its index demands, and looks the same
-way as the cells around it in the tangent spaces at its corners.
+way as the cells around it in the tangent spaces at its corners. Tetrahedra that are steep against
+these count less. See docs/decisions.md, "Steep tetrahedra count as slivers".
 
 No triangle between two curves (folds, constraints, crossings, sides of the box) is better than the
 corner at which these meet. And where two eigenvalues nearly vanish together, a fold and a crossing
@@ -80,17 +81,29 @@ def _smallest_dihedrals(squared: Float[np.ndarray, "cells 6"]) -> Angles:
     return np.asarray(np.arccos(np.clip(largest, -1.0, 1.0)))
 
 
+def _volumes(squared: Float[np.ndarray, "cells 6"]) -> Float[np.ndarray, " cells"]:
+    """Volumes, times 3!, of tetrahedra: from the products of the sides from corner 0."""
+    a, b, c, ab, ac, bc = squared.T
+    x, y, z = 0.5 * (a + b - ab), 0.5 * (a + c - ac), 0.5 * (b + c - bc)
+    gram = a * (b * c - z * z) - x * (x * c - z * y) + y * (x * z - b * y)
+    return np.asarray(np.sqrt(np.maximum(gram, 1e-300)))
+
+
 def qualities(vertices: Vertices, cells: Cells, index: Indices) -> Angles:
     """Smallest angle of each cell; less if it is not upright.
 
-    Little or nothing is left of it if the cell is overturned. Each corner at which it is turned
-    takes π: there its volume in the tangent space is not positive.
+    Of tetrahedra it is multiplied by the cosine of the largest angle between the cell and the
+    tangent space at a corner. Little or nothing is left of it if the cell is overturned. Each
+    corner at which it is turned takes π: there its volume in the tangent space is not positive.
     """
-    d = cells.shape[1] - 1
-    angle = smallest_angles(squared_sides(vertices.place, cells))
-    turned = (volumes_at_corners(vertices, cells) <= 0.0).sum(axis=1)
+    d, squared = cells.shape[1] - 1, squared_sides(vertices.place, cells)
+    seen = volumes_at_corners(vertices, cells)
     factor = np.where(overturned(vertices, cells, index), OVERTURNED[d], 1.0)
-    return np.asarray(factor * angle - np.pi * turned)
+    if d > TRIANGLES:
+        cosine = seen.min(axis=1) / _volumes(squared)
+        factor *= np.where(cosine > 0.0, np.minimum(cosine, 1.0), 1.0)
+    turned = (seen <= 0.0).sum(axis=1)
+    return np.asarray(factor * smallest_angles(squared) - np.pi * turned)
 
 
 def qualities_near(fabric: Fabric, near: Bool[np.ndarray, " V"]) -> Angles:

@@ -9,7 +9,7 @@ crossings, sides of the box) and the rim of a patch stay what they are.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -115,12 +115,13 @@ def repeat(
     """Apply the best candidates again and again, around what changed before; and what changed."""
     changed = np.zeros(len(fabric.vertices), bool)
     for _ in range(passes):
-        refills, come = _best(candidates(fabric, quality, near), quality, memory, limit)
+        best = _best(candidates(fabric, quality, near), quality, memory, limit)
+        refills, come = best.refills, best.come
         # vertices that were found stay, even if unused: what follows would copy all others
         fabric = refills.fabric
         if refills.count == 0:
             break
-        near = np.zeros(len(fabric.vertices), bool)
+        near = best.beaten
         near[fabric.cells[refills.gone]] = True
         near[refills.come] = True
         changed = _extended(changed, fabric) | near
@@ -133,19 +134,31 @@ def _extended(near: Bool[np.ndarray, " old"], fabric: Fabric) -> NewNear:
     return np.pad(near, (0, len(fabric.vertices) - len(near)))
 
 
-def _best(
-    refills: Refills, quality: Quality, memory: Memory, limit: float
-) -> tuple[Refills, Float[np.ndarray, " come"]]:
-    """Refills that help, the best first, with stars that do not overlap; and their qualities."""
+@dataclass(frozen=True)
+class _Best:
+    """Refills that help, with the qualities of the cells that come; and vertices of the beaten.
+
+    beaten: corners of the stars of other refills that help, too, and overlap with these.
+    """
+
+    refills: Refills
+    come: Float[np.ndarray, " come"]
+    beaten: Near
+
+
+def _best(refills: Refills, quality: Quality, memory: Memory, limit: float) -> _Best:
+    """Refills that help, the best first, with stars that do not overlap."""
     quality = with_exact(refills, quality)
     refills = refills.take(hopeful(refills, quality))
     come = qualities(refills.fabric.vertices, refills.come, refills.index)
     gain = gains(refills, quality, come)
     kept = gain > GAIN
     come, gain, refills = come[kept[refills.come_row]], gain[kept], refills.take(kept)
-    kept = _allowed(refills, memory, limit)
-    kept &= _apart(refills, np.where(kept, gain, -1.0))
-    return refills.take(kept), come[kept[refills.come_row]]
+    allowed = _allowed(refills, memory, limit)
+    kept = _apart(refills, np.where(allowed, gain, -1.0))
+    beaten = np.zeros(len(refills.fabric.vertices), bool)
+    beaten[refills.fabric.cells[refills.gone[(allowed & ~kept)[refills.gone_row]]]] = True
+    return _Best(refills.take(kept), come[kept[refills.come_row]], beaten)
 
 
 def _allowed(refills: Refills, memory: Memory, limit: float) -> Bool[np.ndarray, " refills"]:
