@@ -51,8 +51,8 @@ class CriticalCurve:
     length
         Length along the curve per state, in the metric and scaled parameters; 0 at the start given.
     index
-        Negative eigenvalues besides the one that vanishes, per state: 0 where the curve bounds
-        stable states.
+        Negative eigenvalues in addition to the one that vanishes, per state: 0 where the curve
+        bounds stable states.
     events
         Special points in order; `at` is their length. Kinds: "cusp" ("standard": of the three
         states that merge the middle one has the higher index, "dual": the lower), "branch point"
@@ -201,7 +201,7 @@ def fold_curve(
     on
         Constraints that hold with equality all along.
     box
-        Limits of some of the parameters; they end the curve.
+        Limits of parameters; they end the curve.
     within
         Constraints whose violation ends the curve.
     options
@@ -232,7 +232,7 @@ def branch_curve(
     """Follow branch points of the paths along one parameter, both ways from `state`.
 
     ``F + βb = 0, g = 0, vᵀF_p = 0``. Branch points that persist by symmetry need two parameters
-    (β stays zero); others need three.
+    (β stays zero); general ones need three.
 
     Parameters
     ----------

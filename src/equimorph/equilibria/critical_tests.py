@@ -16,7 +16,7 @@ from equimorph.structures import State, Structure
 
 
 def places(structure: Structure, names: Sequence[str], count: int) -> Int[np.ndarray, " k"]:
-    """Places of so many different parameters."""
+    """Columns of `count` different parameters."""
     found = [position(structure.parameters, name) for name in names]
     if len(found) != count or len(set(found)) != count:
         raise InputError(f"`parameters` must be {count} different names; got {list(names)!r}.")

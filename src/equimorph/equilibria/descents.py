@@ -28,7 +28,7 @@ SHORTER = (1.0, 0.1, 0.01, 0.001)
 ASIDE = 4.0
 """Distance from the state at which stiff modes are at rest, in nudges, at most."""
 RELAXATIONS = 4
-"""Steps in which stiff modes come to rest before it is asked whether a nudge grows."""
+"""Steps in which stiff modes come to rest before the growth of a nudge is judged."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Descents:
     soft
         Softest modes of the states.
     flow
-        The way of the flows that left, in lanes of their own.
+        The way of the flows that left, each in a separate lane.
     lane
         Lane in `flow` of each descent; −1 where nothing left.
     """
@@ -78,7 +78,7 @@ def descend(structure: Structure, z: Lanes, p: Parameters, pace: Pace = QUICK) -
 
 @dataclass(frozen=True)
 class _Starts:
-    """Points from which flows leave, how far they are moved, whether they leave, and if known."""
+    """Starting points of flows, their distances, whether they leave, and whether that is known."""
 
     z: Lanes
     moved: Values
@@ -89,7 +89,7 @@ class _Starts:
 def _starts(
     structure: Structure, z: Lanes, p: Parameters, soft: SoftModes, modes: Modes
 ) -> _Starts:
-    """Configurations beside states from which the flow leads away, along modes.
+    """Configurations near states from which the flow leads away, along modes.
 
     Steps that cannot be solved, because the energy bends down within them, are tried again shorter.
     """
@@ -117,7 +117,7 @@ def _starts(
 def _relaxed(
     structure: Structure, z: Lanes, p: Parameters, nudge: Modes, h: Values
 ) -> tuple[Lanes, Values, Flags]:
-    """Configurations beside states on the constraints, and how far the flow leads on from there.
+    """Configurations near states on the constraints, and the speed of the flow away from there.
 
     The last says where all steps of length h were solved and stayed there.
     """

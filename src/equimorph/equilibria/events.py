@@ -37,7 +37,7 @@ class Events:
     found: Bool[np.ndarray, " events"]
 
     def take(self, events: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"]) -> "Events":
-        """Return some of the events."""
+        """Return a selection of the events."""
         return Events(*(column[events] for column in vars(self).values()))
 
     @classmethod

@@ -51,7 +51,7 @@ class _Walk:
     up: Flags
 
     def take(self, some: Flags) -> "_Walk":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         return _Walk(*(column[some] for column in vars(self).values()))
 
 
@@ -89,7 +89,7 @@ class FirstStable:
     ) -> tuple[Lanes, Parameters, Int[np.ndarray, " lanes"]]:
         """States at loads `at` (other than the unloaded one), and numbers in `WAYS`.
 
-        Critical states on the way are added to those `passed`, if these are asked for.
+        Critical states on the way are added to those `passed`, if these are requested.
         """
         z, p, way = z.copy(), p.copy(), np.full(len(z), LOST)
         still = np.zeros(len(z), bool)

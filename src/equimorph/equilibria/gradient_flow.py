@@ -79,9 +79,9 @@ ITERATIONS = 12
 SOLVED = 1e-8
 """Newton correction in the metric that is the last: the next one would be about its square."""
 CLOSE, EXACT = 1e-2, 0.003 * SAME_STATE
-"""The same, relative to the step of the flow, and where it is small enough whatever the step."""
+"""The same, relative to the step of the flow, and the length that suffices for any step."""
 FINEST = 0.03 * SAME_STATE
-"""Length in the metric of steps that have no direction: round-off rules there, beside folds."""
+"""Length in the metric of steps that have no direction: round-off dominates there, near folds."""
 ROUND_OFF = 1e-12
 """Rise of the energy, relative to it, that is no rise."""
 CONTRACTION = 0.25
@@ -142,7 +142,7 @@ class _Front:
         return cls(np.arange(count), z, h, still, nothing, length, np.zeros(count, int))
 
     def take(self, at: Bool[np.ndarray, " some"]) -> "_Front":
-        """Return some of the flows."""
+        """Return a selection of the flows."""
         return _Front(*(column[at] for column in vars(self).values()))
 
 

@@ -2,7 +2,8 @@
 
 Between neighbouring points of a path the eigenvalue of F_z nearest to zero is the cubic through its
 values and slopes. Where that comes close to zero, the step is searched. For many lanes, a test
-function that costs one solve per point tells first where the eigenvalue is worth its price.
+function that costs one solve per point first selects the steps in which the eigenvalue is worth its
+price.
 """
 
 from dataclasses import replace
@@ -21,7 +22,7 @@ from equimorph.structures import Structure
 
 DOUBTFUL = 0.4
 """Least value of the test function between two points, as a share of those at its ends, from which
-on the eigenvalue is looked at."""
+on the eigenvalue is computed."""
 COLUMNS = 3
 """Right-hand sides of the solve for the test function: the smallest eigenvalues that it sees."""
 AT_ONCE = 1024
@@ -84,7 +85,7 @@ def _why(end: Events, i: int) -> str:
 def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     """Events between the last point of a lane and its end, inside a longer step with two of them.
 
-    They show where the index at the end is another than the steps tell.
+    They show where the index at the end differs from that which the steps imply.
     """
     size, found = curve.structure.size, list[Events]()
     last = np.flatnonzero(np.append(np.diff(points.lanes) != 0, True))
@@ -195,7 +196,7 @@ def _doubtful_points(points: Points, gap: Values) -> Some:
     ends = sign[:-1] * gap[:-1], sign[1:] * gap[1:]
     rates = sign[:-1] * slopes[:-1], sign[1:] * slopes[1:]
     least = least_inside(ends, rates, np.diff(length))[1]
-    # not <: what is not a number is doubtful; an odd number of poles or zeros changes the sign
+    # not <: NaN is suspicious, too; an odd number of poles or zeros changes the sign
     doubtful = ~(least >= DOUBTFUL * np.minimum(*ends)) | (sign[:-1] != sign[1:])
     near = np.zeros(len(gap), bool)
     for shift in (0, 1):
@@ -237,7 +238,7 @@ def _neighbours(points: Points, near: Some) -> Bool[np.ndarray, " some"]:
 def _lowest(
     value: Float[np.ndarray, " some"], inner: Bool[np.ndarray, " some"], share: float
 ) -> Bool[np.ndarray, " some"]:
-    """Points that lie near a least value themselves, lest it hide between two steps."""
+    """Points near a least value, which could otherwise hide between two steps."""
     out = np.zeros(len(value), bool)
     out[1:-1] = inner[1:-1] & ~(value[1:-1] >= share * np.minimum(value[:-2], value[2:]))
     return out
@@ -246,7 +247,7 @@ def _lowest(
 def _fronts(curve: Curve, points: Points, near: Some) -> Front:
     """Unit tangents at points of paths, along them."""
     lanes = points.lanes
-    # the chord to the next point, or from the one before, tells the direction and closes the system
+    # the chord to the next point, or from the one before, gives the direction and closes the system
     ahead = np.append(lanes[1:] == lanes[:-1], False)[near]
     one, two = np.where(ahead, near, near - 1), np.where(ahead, near + 1, near)
     dz, dt = points.z[two] - points.z[one], points.t[two] - points.t[one]

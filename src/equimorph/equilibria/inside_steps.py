@@ -47,7 +47,7 @@ class Probe:
     length: Values
 
     def at(self, some: Int[np.ndarray, " some"]) -> "Probe":
-        """Return some of the points."""
+        """Return a selection of the points."""
         columns = (self.value[some], self.slope[some], self.length[some])
         return Probe(self.front.take(some), *columns)
 
@@ -82,9 +82,9 @@ def inside_step(
 
 
 def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> list[Events]:
-    """Events inside steps that are the only one of their lane, which nothing before them tells.
+    """Events inside steps that are the only one of their lane, without a point before them.
 
-    The determinant at the middle of the step tells where to look.
+    The determinant at the middle of the step shows where to search.
     """
     ends = bracket.before.index == bracket.after.index
     ends &= (bracket.travelled == 0.0) & (bracket.what & options.stops != 0)
@@ -172,7 +172,7 @@ def _upright(probe: Probe, sign: float, zero: float) -> Probe:
 
 
 def _surprise(curve: Curve, ends: tuple[Probe, Probe], middle: Probe) -> float:
-    """By how much the cubic through two points misses the value between them."""
+    """Error of the cubic through two points at a point between them."""
     low, high = ends
     s, width = (middle.length - low.length) / (high.length - low.length), _chord(curve, low, high)
     cubic = (1 - s) ** 2 * ((1 + 2 * s) * low.value + s * width * low.slope)
@@ -262,7 +262,7 @@ def _both(
 
 
 def step_between(pair: tuple[Probe, Probe], what: int | None) -> Bracket:
-    """Step between two points, with what its ends tell."""
+    """Step between two points, with the data of its ends."""
     low, high = pair
     flipped = np.sign(low.front.tangent_t) != np.sign(high.front.tangent_t)
     code = (

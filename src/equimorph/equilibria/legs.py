@@ -1,4 +1,4 @@
-"""What a lift is asked: starts that are equilibria, and legs to follow one after the other."""
+"""Arguments of a lift: starts that are equilibria, and legs to follow one after the other."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ def listed(to: Leg | Sequence[Leg]) -> list[Leg]:
     Raises
     ------
     InputError
-        If there is none, or something else among them.
+        If the list is empty, or holds anything but legs.
     """
     legs = [to] if isinstance(to, Mapping) or callable(to) else list(to)
     for leg in legs:
@@ -54,7 +54,7 @@ def way_points(
     start: Float[np.ndarray, " parameters"],
     to: Waypoint | Sequence[Waypoint],
 ) -> list[Float[np.ndarray, " parameters"]]:
-    """Corners of a polyline: each way-point changes some parameters and keeps the others.
+    """Corners of a polyline: each way-point changes some parameters and keeps the rest.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def _numbers(name: str, value: Value, lanes: int) -> Float[np.ndarray, "*values"
 
 
 def of_some(leg: Leg, lanes: Int[np.ndarray, " some"], total: int) -> Leg:
-    """Leg of some of the lanes, where a leg of all may have a value for each."""
+    """Leg of selected lanes; a leg of all lanes may have a value for each."""
     if isinstance(leg, Spline):
         wide = {name: values for name, values in leg.samples.items() if values.ndim > 1}
         _check_widths({name: values[0] for name, values in wide.items()}, total)

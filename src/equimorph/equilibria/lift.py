@@ -50,7 +50,8 @@ def lift(
     Error-controlled predictor–corrector in pseudo-arclength; folds and constraints by root finding
     on the curve, branch points by minimally augmented systems. Without `through_folds` a lift ends
     at the first event, as a quasi-static motion would. Many states are lifted side by side on all
-    processors; the result of each is the same, bit for bit, whatever the others and their order.
+    processors; the result of each is the same, bit for bit, independent of the other lanes and
+    their order.
 
     Parameters
     ----------
@@ -79,8 +80,8 @@ def lift(
         Step control. `record` keeps all points of the lifts of many states (default: none); those
         of one state are always kept.
     progress
-        Is told how many lanes are finished. If it raises `CancelledError` the lifts end: those
-        of many states keep what is done, the others are "cancelled".
+        Receives the number of finished lanes. If it raises `CancelledError` the lifts end: those
+        of many states keep finished lanes, the rest are "cancelled".
 
     Returns
     -------

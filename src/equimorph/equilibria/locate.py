@@ -32,7 +32,7 @@ from equimorph.equilibria.steps import Bracket, Front, new_scalars
 from equimorph.structures import Advance
 
 AT_ROUND_OFF = Guards(iterations=24, converged=1e-9)
-"""A point is exact after a correction below 1e-9 in the metric: Newton squares what is left."""
+"""A point is exact after a correction below 1e-9 in the metric: Newton squares the error."""
 UNFOLDED = 1e-9
 """Unfolding β, a residual, from which on a branch point does not exist."""
 TINY = 1e-300
@@ -215,7 +215,7 @@ def root_inside(
     Parameters
     ----------
     scalar
-        Values at points on some of the lanes, whose numbers come first.
+        Values at points on the lanes whose numbers are the first argument.
     ends
         Values at both ends of the step; a zero at the start is the root.
     guess
@@ -228,7 +228,7 @@ def root_inside(
 
 
 class _Search:
-    """All lanes of one search, each somewhere in an iteration of its own."""
+    """All lanes of one search, each in an independent iteration."""
 
     def __init__(
         self, curve: Curve, bracket: Bracket, ends: tuple[Values, Values], guess: Values

@@ -32,7 +32,7 @@ SMALL_EIGENVALUE = 1e-7
 MULTIPLIERS = 1e-2
 """Weight of squared multipliers in the length of corrections: they are not in the metric."""
 DEPENDENT = 1e-6
-"""Length of a direction, without what others share, relative to it, that counts as none."""
+"""Length of the independent part of a direction, relative to the whole, that counts as zero."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Spots:
         return np.ascontiguousarray(self.basis[:, 0])
 
     def take(self, lanes: Some | Flags | slice) -> "Spots":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         return Spots(*(column[lanes] for column in vars(self).values()))
 
     def turned(self, sign: Values) -> "Spots":

@@ -28,7 +28,7 @@ _SECOND = {
 
 
 class LostPartError(Exception):
-    """A part of a step failed where the whole succeeded: shorter steps will tell."""
+    """A part of a step failed where the whole succeeded: shorter steps will decide."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,11 @@ class Walks:
 
     @property
     def index(self) -> Int[np.ndarray, " lanes"]:
-        """Negative eigenvalues besides those that vanish."""
+        """Negative eigenvalues in addition to those that vanish."""
         return self.spots.index
 
     def take(self, lanes: Some | Flags | slice) -> "Walks":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         columns = list(vars(self).values())
         return Walks(columns[0].take(lanes), *(column[lanes] for column in columns[1:]))
 

@@ -52,7 +52,7 @@ AT_GOAL, FROM_GOAL = 1e-9, 1e-6
 """Distance from an end of t, and of the states in the metric, from which Newton's method takes
 lanes there whose steps became too small."""
 PATIENCE = 40
-"""Share of lanes, one in so many, that may be finished before their gaps are closed."""
+"""One in so many lanes may be finished before their gaps in the block are closed."""
 WHY = {
     kernels.SHORT: "the step became too small",
     kernels.LONG: "no end in {most} steps",
@@ -72,11 +72,11 @@ class Loss:
 
 
 class Block:
-    """Lanes side by side, each somewhere in a step of its own; finished ones make room for others.
+    """Lanes that march independently; finished ones make room for waiting ones.
 
     Every round asks the structure for one Newton step of all lanes; the kernels then take each lane
     on: to its next correction, or over an accepted step to the prediction of the next. So no lane
-    ever waits for another, and what it does never depends on others.
+    ever waits for another, and its result never depends on other lanes.
 
     Parameters
     ----------
@@ -374,7 +374,7 @@ class Block:
 
 
 def _apart(lanes: int) -> int:
-    """Length of rows for so many lanes: rows an even number of cache lines apart share sets."""
+    """Padded length of rows of lanes: rows an even number of cache lines apart share cache sets."""
     return 8 * (-(-lanes // 8) | 1)
 
 

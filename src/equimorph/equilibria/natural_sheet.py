@@ -1,4 +1,4 @@
-"""Natural states over a grid of settings: one from the structure, the others by continuation."""
+"""Natural states over a grid of settings: one from the structure, the rest by continuation."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ SHARE = 0.25
 GUARDS = Guards(iterations=8, longest=np.inf, converged=1e-7)
 """Newton squares the last correction."""
 TRIES = 3
-"""Vertices of each unreached piece of the grid at which the structure is asked."""
+"""Vertices of each unreached piece of the grid at which the structure computes its state."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def natural_sheet(
     The structure gives the state at a vertex in the middle; its neighbours follow by a tangent step
     and Newton's method at fixed parameters, and so on. A step counts if its correction is small and
     the state stable. For every piece of the grid that cannot be reached in this way, the structure
-    is asked again.
+    computes another state.
     """
     axes = grid.axes()
     shape = (len(axes[0]), len(axes[1]))
@@ -104,7 +104,7 @@ def _parameters(
 def _seeds(
     found: Bool[np.ndarray, "rows columns"], asked: Int[np.ndarray, " vertices"]
 ) -> Int[np.ndarray, " pieces"]:
-    """One vertex that was not asked yet, in the middle of each unreached piece of the grid."""
+    """One vertex that was not tried yet, in the middle of each unreached piece of the grid."""
     pieces, many = ndimage.label(~found)
     seeds = []
     for piece in range(1, many + 1):
@@ -160,7 +160,7 @@ def _neighbours(
 def _stepped(
     structure: Structure, z: Lanes, p: Parameters, target: Parameters
 ) -> tuple[Lanes, Flags]:
-    """States at `target` on the sheet of the stable states (z, p), and whether they are sure."""
+    """States at `target` on the sheet of the stable states (z, p), and whether they are certain."""
     n = structure.unknowns
     still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
     tangent = structure.advance(z, p, target - p, still, one, none).tangent_z

@@ -48,7 +48,7 @@ class Pieces:
     which: Int[np.ndarray, " lanes"]
 
     def take(self, lanes: Int[np.ndarray, " some"]) -> "Pieces":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         return Pieces(self.breaks, self.tables, self.which[lanes])
 
     def value(self, t: Values) -> Columns:
@@ -159,7 +159,7 @@ class SmoothCurve:
         return True
 
     def take(self, lanes: Int[np.ndarray, " some"]) -> "SmoothCurve":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         return SmoothCurve(self.structure, self.pieces.take(lanes), self.weight[lanes])
 
     def parameters(self, t: Values) -> Parameters:
@@ -235,7 +235,7 @@ class TrackedCurve:
         return False
 
     def take(self, lanes: Int[np.ndarray, " some"]) -> "TrackedCurve":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         given, weight = self.prescribed.take(lanes), self.weight[lanes]
         return TrackedCurve(self.structure, given, self.free, self.descriptors, weight)
 

@@ -68,7 +68,7 @@ class Ground:
 
 
 class Pools:
-    """Different equilibria by group, and why starts led to none.
+    """Different equilibria by group, and the reasons of failed starts.
 
     A group is one independent run at one point; all groups advance together in one batch.
     """

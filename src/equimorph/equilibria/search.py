@@ -131,7 +131,7 @@ class FoundStates(States):
     completeness
         Capture and recapture over the independent runs of the search; see `Completeness`.
     failures
-        How many starts led to no equilibrium, by reason.
+        Number of starts that led to no equilibrium, by reason.
     arguments
         Arguments that no stable state is missing, and whether they hold; see `Argument`. A state
         whose neighbours of index one are all missing with it escapes them.
@@ -163,18 +163,18 @@ def find_equilibria(
     """Equilibria at parameters `at`, sorted by energy, with an estimate of how many are missing.
 
     Several independent runs, together in one batch. In each: Newton from random guesses of the
-    structure; Newton homotopy from some of the guesses where Newton failed; Newton deflated by what
-    was found. Then lines in random directions of the actuators and loads are laid through every
-    equilibrium and followed both ways through folds: where they return to `at` they bring others,
-    through which lines are laid again, until nothing new comes. Images under symmetries that leave
-    `at` unchanged belong to each run. States that the discretisation does not resolve, or that
-    violate `within`, are dropped. While only one run found some equilibrium, runs are added.
+    structure; Newton homotopy from some of the guesses where Newton failed; Newton deflated by the
+    known ones. Then lines in random directions of the actuators and loads are laid through every
+    equilibrium and followed both ways through folds: where they return to `at` they give further
+    ones, through which lines are laid again, until nothing new comes. Images under symmetries that
+    leave `at` unchanged belong to each run. States that the discretisation does not resolve, or
+    that violate `within`, are dropped. While only one run found some equilibrium, runs are added.
 
     Then the energy is followed downwards from every state of index one until that leads to nothing
     new, and saddles are searched between minima that no chain of saddles joins: so no stable state
-    is missing unless every state of index one beside it is missing as well. What is found serves
-    lines again. Where the energy is known to grow at infinity the sum of (−1)^index must be 1, else
-    deflation searches once more. `FoundStates.arguments` tells what held.
+    is missing unless every state of index one next to it is missing as well. New states serve lines
+    again. Where the energy is known to grow at infinity the sum of (−1)^index must be 1, else
+    deflation searches once more. `FoundStates.arguments` records the outcome.
 
     Parameters
     ----------

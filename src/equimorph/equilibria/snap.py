@@ -86,7 +86,7 @@ def snap_landing(state: State, *, at: Mapping[str, float] | None = None) -> tupl
     Gradient flow ``M u̇ = −∂L/∂u`` in the structure's metric, on the constraints, at constant
     parameters: implicit Euler steps, as long as their error allows, along which the energy falls;
     the end is polished by Newton, and its index verified. This is the landing of an overdamped
-    structure; with little damping others may be reached.
+    structure; with little damping other states may be reached.
 
     Parameters
     ----------
@@ -129,11 +129,11 @@ def snap_landing(state: State, *, at: Mapping[str, float] | None = None) -> tupl
 
 
 def _still(state: State, direction: int, code: int) -> Landing:
-    """Nothing moves, as far as can be told."""
+    """Landing where the state was not left."""
     if code == Ending.HELD:
         status, detail = "held", Ending.HELD.reason
     else:
-        status, detail = "lost", "no step beside the state, however short, could be solved"
+        status, detail = "lost", "no step near the state, however short, could be solved"
     return Landing(status, direction, state, 0.0, state.batch, np.zeros(1), detail)
 
 

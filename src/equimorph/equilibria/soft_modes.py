@@ -23,7 +23,7 @@ SHIFT = 1e-4
 SMALLEST = 1e-3
 """Eigenvalue below which the shift keeps its distance: at the eigenvalue it would be singular."""
 NOTHING = 1e-6
-"""Part of a response outside the mode, relative to what was put in, that is none."""
+"""Part of a response outside the mode, relative to the excitation, that counts as zero."""
 GUESSES = 64
 """Random guesses whose extent is the scale of configurations."""
 WIDEST = 0.1
@@ -47,8 +47,8 @@ class SoftModes:
         About the size of the other eigenvalues.
     length
         Distance along the mode, in the metric, over which the eigenvalue changes by its own size:
-        about that of the next states beside a saddle. At critical states the distance over which
-        the third derivative changes so.
+        about the distance of a saddle from its neighbours. At critical states the distance over
+        which the third derivative changes so.
     rate
         Size of the eigenvalue at this distance: its inverse is the scale of time.
     critical
@@ -64,7 +64,7 @@ class SoftModes:
     critical: Flags
 
     def take(self, some: Some) -> "SoftModes":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         return SoftModes(*(column[some] for column in vars(self).values()))
 
 
@@ -87,7 +87,7 @@ def soft_modes(structure: Structure, z: Lanes, p: Parameters) -> SoftModes:
     response = _response(structure, z, p, rest, shift)
     response -= multiply(response * mode, mass)[:, None] * mode
     size, answer = metric_length(structure, rest), metric_length(structure, response)
-    # nothing is left beside the mode if it is the only way to move
+    # without another way to move there is no response outside the mode
     stiffness = np.where(answer > NOTHING * size, size / np.maximum(answer, 1e-300), 0.0)
     # the shift is far larger than small eigenvalues, which would have no digit left
     across = multiply(mode * _response(structure, z, p, mode, np.zeros(len(z))), mass)

@@ -21,7 +21,7 @@ class Front:
     index: Int[np.ndarray, " lanes"]
 
     def take(self, lanes: Int[np.ndarray, " some"] | Flags) -> "Front":
-        """Return some of the lanes."""
+        """Return a selection of the lanes."""
         return Front(
             self.z[lanes],
             self.t[lanes],
@@ -31,7 +31,7 @@ class Front:
         )
 
     def updated(self, new: "Front", where: Flags) -> "Front":
-        """Return `new` on some of the lanes and this on the others."""
+        """Return `new` on the flagged lanes and this on the rest."""
         wide = where[:, None]
         return Front(
             np.where(wide, new.z, self.z),
@@ -57,7 +57,7 @@ class Bracket:
     what: Int[np.ndarray, " some"]
 
     def take(self, at: Int[np.ndarray, " fewer"]) -> "Bracket":
-        """Return some of the brackets."""
+        """Return a selection of the brackets."""
         return Bracket(
             self.lanes[at],
             self.before.take(at),
@@ -140,7 +140,7 @@ class Points:
     index: Int[np.ndarray, " points"]
 
     def take(self, at: Int[np.ndarray, " some"] | Bool[np.ndarray, " points"]) -> "Points":
-        """Return some of the points."""
+        """Return a selection of the points."""
         return Points(*(column[at] for column in vars(self).values()))
 
     @classmethod

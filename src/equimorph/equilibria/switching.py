@@ -57,9 +57,9 @@ def branches(
     along
         Parameter whose paths branch.
     path
-        A lift that ended in `state`: the curve that it came on is left out.
+        A lift that ended in `state`: its curve is not returned again.
     distance
-        Length of the first step in the metric; halved where it leads astray.
+        Length of the first step in the metric; halved where it fails.
 
     Returns
     -------

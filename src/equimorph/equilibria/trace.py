@@ -1,4 +1,4 @@
-"""`follow`: trace many lanes, locate what happened to each, and tell how it ended.
+"""`trace`: follow many curves in lanes, locate their events, and report how each ended.
 
 See docs/decisions.md, "Two engines trace".
 """
@@ -37,7 +37,7 @@ REPORT_EVERY = 0.2
 class Batching:
     """How many lanes march side by side on how many threads; no result depends on it.
 
-    capacity: lanes of a thread, so many that calls cost little beside them; threads: as many as
+    capacity: lanes of a thread, enough to make the cost of calls small; threads: as many as
     there are processors if None.
     """
 
@@ -73,12 +73,12 @@ def trace(
     Lanes wait in a queue; each thread takes as many as march well together and fills up from the
     queue as lanes finish. Of the events in the last step of a lane the first along the curve is its
     end. Lanes whose events could not be located are traced again with finer steps. Every lane is
-    treated by itself: its result is the same, bit for bit, whatever the other lanes, their order
-    and the threads.
+    treated by itself: its result is the same, bit for bit, independent of the other lanes, their
+    order and the threads.
 
     Whatever `progress` raises stops all threads and reaches the caller; only after
     `CancelledError` lanes that were not finished have the code `EventCode.CANCELLED`, and the
-    others are returned.
+    rest are returned.
     """
     options, batching = options or TraceOptions(), batching or Batching()
     count = max(1, min(batching.threads or threads(), len(z) // LANES_PER_THREAD))
@@ -239,7 +239,7 @@ class _Job:
 
 
 def _run(jobs: list[_Job], queue: _Queue, progress: Progress) -> None:
-    """Run jobs, the only one in this thread, and report from this thread how far they are."""
+    """Run jobs, the only one in this thread, and report their progress from this thread."""
     shown = time.monotonic()
 
     def report() -> None:

@@ -26,7 +26,7 @@ from equimorph.equilibria.trace_options import EventKind, TraceOptions
 CLOSE = 0.05
 """Least value inside a step, as a share of those at its ends, that asks for shorter steps."""
 NARROW = 1e-3
-"""Share of the first step below which hidden pairs of special points are not told apart."""
+"""Share of the first step below which hidden pairs of special points are not separated."""
 BACK = 0.4
 """Factor of a step's length after a refusal."""
 FOLLOWING = 1e-12
@@ -94,7 +94,7 @@ def trace_locus(
 def step(
     locus: Locus, here: Walks, watches: Sequence[Watch], options: TraceOptions
 ) -> tuple[Walks, Flags]:
-    """Try one step of each lane; which are good. The others are to be tried with shorter ones."""
+    """Try one step of each lane; which are good. The rest need shorter ones."""
     guess = predict(locus, here, here.length)
     spots, found = advance(locus, here.spots, here.length, guess, following=FOLLOWING)
     if found.all():
@@ -110,7 +110,7 @@ def step(
 
 
 def update(here: Walks, there: Walks, good: Flags) -> Walks:
-    """Take over good steps, and shorten the others."""
+    """Accept good steps, and shorten the rest."""
     if good.all():
         return there
     new = here.with_others(there.take(good), np.flatnonzero(good))

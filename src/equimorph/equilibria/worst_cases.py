@@ -35,14 +35,14 @@ def worst_over(
 ) -> Descriptor:
     """Largest value of a descriptor over a box of imperfections around a state.
 
-    The state is led straight to the corners of the box; the largest value there and in the state
+    The state is lifted straight to the corners of the box; the largest value there and in the state
     itself counts, ∞ where stability is lost on the way. The values are its branches, so that its
     minima, kinks among them, are found exactly: a robust optimum.
 
     Parameters
     ----------
     offsets
-        Largest errors of parameters, by name: actuators, loads, any others.
+        Largest errors of parameters, by name: actuators, loads or any further ones.
 
     Raises
     ------
@@ -128,7 +128,7 @@ class _Ray:
     corner: Float[np.ndarray, " parameters"]
 
     def room(self, z: Lanes, p: Parameters) -> Values:
-        """Share of the way at which stability is lost; −1 where there is none to lose."""
+        """Share of the way at which stability is lost; −1 for unstable states."""
         return self._ended(z, p)[0]
 
     def limit(self, z: Lanes, p: Parameters) -> Values:
@@ -178,7 +178,7 @@ def worst_named(structure: Structure, text: str) -> Descriptor:
 
 @dataclass(frozen=True)
 class _Corners:
-    """A descriptor, and offsets of all parameters at which it is looked at; the first is zero."""
+    """A descriptor, and offsets of all parameters at which it is evaluated; the first is zero."""
 
     structure: Structure
     descriptor: Descriptor
@@ -213,7 +213,7 @@ class _Corners:
 
 
 SAMPLES = 9
-"""Values at which a range is looked at; between them parabolas tell the extremum."""
+"""Number of samples of a range; between them parabolas give the extremum."""
 
 
 @door
@@ -223,7 +223,7 @@ def held_over(
     ends: tuple[float, float],
     within: Sequence[Constraint] = (),
 ) -> Constraint:
-    """Constraint that a state stays stable, and others hold, for all values of a load in a range.
+    """Constraint that a state stays stable, and obeys others, for all values of a load in a range.
 
     From the state the load is moved to both ends of the range on stable states. The descriptor is
     the worst relative excess ``(S − bound)/max(1, |bound|)`` on the way, or, where stability is
@@ -253,7 +253,7 @@ def held_over(
 
 @dataclass(frozen=True)
 class _Range:
-    """Values of one parameter at which constraints are looked at."""
+    """Values of one parameter at which constraints are evaluated."""
 
     structure: Structure
     at: int
