@@ -11,7 +11,7 @@ from equimorph.arrays import Points
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells, EdgeKind, Found
-from equimorph.charts.paths import AtlasPath, path_over_cells
+from equimorph.charts.paths import AtlasPath, Place, path_over_cells
 from equimorph.charts.preparation import crossing_facets, first_copies
 from equimorph.door import door
 from equimorph.errors import InputError
@@ -268,7 +268,9 @@ class Atlas:
         for name, state, cell in zip(("start", "goal"), (start, goal), cells, strict=True):
             if cell < 0:
                 raise InputError(f"`{name}` must be a state of the atlas; got {state}.")
-        found = path_over_cells(self.eset, self.chart, (start, cells[0]), (goal, cells[1]))
+        found = path_over_cells(
+            self.eset, self.chart, Place(start, cells[0]), Place(goal, cells[1])
+        )
         if found is None:
             raise InputError(
                 "`goal` must be joined to `start` on the set; got states that are not."

@@ -62,7 +62,7 @@ class Scalars:
 
 
 def solve_over_parameters(
-    scalars: Scalars, guess: tuple[Lanes, Parameters], wanted: Values, tried: Some
+    scalars: Scalars, z: Lanes, p: Parameters, wanted: Values, tried: Some
 ) -> Settled:
     """States by Newton in those free parameters that are not given: quick, and singular at folds.
 
@@ -74,7 +74,7 @@ def solve_over_parameters(
     setting, structure = scalars.setting, scalars.setting.structure
     given, asked = scalars.places >= 0, np.flatnonzero(scalars.places < 0)
     unknown = np.setdiff1d(setting.free, scalars.places)
-    z, p, wanted = guess[0][tried], guess[1][tried], wanted[tried]
+    z, p, wanted = z[tried], p[tried], wanted[tried]
     p[:, scalars.places[given]] = wanted[:, given]
     functions = tuple(scalars.scalars[k].function for k in asked)
     values = TargetValues(functions, wanted[:, asked], FORWARD, one_sided=True)
@@ -83,7 +83,7 @@ def solve_over_parameters(
 
 
 def solve_on_the_set(
-    scalars: Scalars, guess: tuple[Lanes, Parameters], wanted: Values, rows: Rows
+    scalars: Scalars, z: Lanes, p: Parameters, wanted: Values, rows: Rows
 ) -> Settled:
     """States by Newton along and across the set at once: regular at folds."""
     setting, structure = scalars.setting, scalars.setting.structure
@@ -92,7 +92,7 @@ def solve_on_the_set(
     values = TargetValues(functions, wanted, FORWARD, one_sided=True, reach=ON_SET.longest)
     directions = free_directions(structure, setting.free, len(wanted))
     frame = embedded_planes(structure, setting.free, rows)
-    return settle(structure, *guess, directions, [values], ON_SET, frame, frames=False)
+    return settle(structure, z, p, directions, [values], ON_SET, frame, frames=False)
 
 
 def full_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
@@ -153,7 +153,8 @@ class Coordinates(Scalars):
 
     def solved(
         self,
-        guess: tuple[Lanes, Parameters],
+        z: Lanes,
+        p: Parameters,
         wanted: Values,
         planes: Callable[[Int[np.ndarray, " some"]], Rows],
         folded: Flags,
@@ -162,8 +163,8 @@ class Coordinates(Scalars):
 
         Parameters
         ----------
-        guess
-            Unknowns and all parameters.
+        z, p
+            The guesses.
         wanted
             The coordinates.
         planes
@@ -173,20 +174,19 @@ class Coordinates(Scalars):
             Lanes next to folds. Where the coordinates are the parameters, that does not matter.
         """
         if self.projecting:
-            p = guess[1].copy()
+            p = p.copy()
             p[:, self.places] = wanted
-            z, good, index = exact_states(self.setting.structure, guess[0], p)
+            z, good, index = exact_states(self.setting.structure, z, p)
             return z, p, good, index
-        z, p, good = guess[0].copy(), guess[1].copy(), np.zeros(len(wanted), bool)
-        index, regular = np.full(len(wanted), -1), np.flatnonzero(~folded)
-        quick = solve_over_parameters(self, guess, wanted, regular)
+        quick = solve_over_parameters(self, z, p, wanted, regular := np.flatnonzero(~folded))
+        z, p, good = z.copy(), p.copy(), np.zeros(len(wanted), bool)
+        index = np.full(len(wanted), -1)
         own = regular[quick.found]
         z[own], p[own], index[own], good[own] = (
             column[quick.found] for column in (quick.z, quick.p, quick.index, quick.found)
         )
         rest = np.flatnonzero(~good)
-        start = (guess[0][rest], guess[1][rest])
-        slow = solve_on_the_set(self, start, wanted[rest], planes(rest))
+        slow = solve_on_the_set(self, z[rest], p[rest], wanted[rest], planes(rest))
         z[rest], p[rest], good[rest] = slow.z, slow.p, slow.found
         index[rest] = np.where(slow.found, slow.index, -1)
         return z, p, good, index

@@ -73,7 +73,7 @@ def dissect(eset: EquilibriumSet) -> Atlas:
     whole = eset
     if len(fabric.vertices) > len(eset.points):
         nothing = np.zeros(len(fabric.vertices), bool)
-        whole = part_of(eset, fabric, np.ones(len(fabric.cells), bool), (nothing, 0))
+        whole = part_of(eset, fabric, np.ones(len(fabric.cells), bool), nothing, 0)
     _, label = np.unique(work.fabric.cell_index, return_inverse=True)
     order = np.argsort(-np.bincount(label), kind="stable")
     rank = np.empty(len(order), int)
@@ -288,4 +288,4 @@ def _amid(
         return None
     kinds = np.full(len(ends), VertexKind.REFINED)
     rows = np.ascontiguousarray(store.rows[ends[:, 0]])
-    return vertices_of(setting, (z, p), kinds, (index, np.full(len(ends), -1)), rows)
+    return vertices_of(setting, z, p, kinds, index, np.full(len(ends), -1), rows)

@@ -166,9 +166,9 @@ class Cells:
     def _some(self, points: Points, first: int) -> tuple[np.ndarray, ...]:
         hits = self._index.near(points)
         hits = hits.take(hits.inside | self._edge[hits.cell])
-        z, p, good = self._polish(self._guess(hits), hits, points[hits.point])
+        z, p, good = self._polish(*self._guess(hits), hits, points[hits.point])
         again = self._doubtful(hits, good, len(points))
-        z, p, good = self._again(hits, (z, p, good), again, points)
+        z, p, good = self._again(hits, z, p, good, again, points)
         kept = np.flatnonzero(good)
         kept = kept[self._one_of_each(z[kept], p[kept], hits.take(kept))]
         hits = hits.take(kept)
@@ -189,17 +189,17 @@ class Cells:
         return z, p
 
     def _polish(
-        self, guess: Guess, hits: Hits, wanted: Float[np.ndarray, "hits d"]
+        self, guess_z: Lanes, guess_p: Parameters, hits: Hits, wanted: Float[np.ndarray, "hits d"]
     ) -> tuple[Lanes, Parameters, Flags]:
         """Exact states near guesses, where there are any that the cells may have."""
         folded = self._at_fold[hits.cell]
         z, p, good, index = self.coordinates.solved(
-            guess, wanted, lambda lanes: self._planes(hits.cell[lanes]), folded
+            guess_z, guess_p, wanted, lambda lanes: self._planes(hits.cell[lanes]), folded
         )
         setting = self.coordinates.setting
         some = np.flatnonzero(good)
         moved = np.linalg.norm(
-            embed(setting, z[some], p[some]) - embed(setting, guess[0][some], guess[1][some]),
+            embed(setting, z[some], p[some]) - embed(setting, guess_z[some], guess_p[some]),
             axis=1,
         )
         good[some] = moved <= 2.0 * self._sizes[hits.cell[some]] + SAME_STATE
@@ -250,7 +250,9 @@ class Cells:
     def _again(
         self,
         hits: Hits,
-        known: tuple[Lanes, Parameters, Flags],
+        z: Lanes,
+        p: Parameters,
+        good: Flags,
         again: Int[np.ndarray, " n"],
         points: Points,
     ) -> tuple[Lanes, Parameters, Flags]:
@@ -258,7 +260,7 @@ class Cells:
 
         From the nearest one; if the cell contains the point, from all.
         """
-        z, p, good = known
+        z, p, good = z.copy(), p.copy(), good.copy()
         far = np.isin(self.eset.kinds, SINGULAR)[self.corners[hits.cell[again]]]
         nearest = np.argsort(1e9 * far - hits.weights[again], axis=1)
         for k, place in enumerate(nearest.T):
@@ -281,7 +283,7 @@ class Cells:
     ) -> tuple[Lanes, Parameters, Flags]:
         start = self.eset.points[corner]
         if not self.coordinates.projecting:
-            return self._polish((start.z, start.p), hits, wanted)
+            return self._polish(start.z, start.p, hits, wanted)
         velocity = np.zeros_like(start.p)
         velocity[:, self.coordinates.places] = wanted - start.p[:, self.coordinates.places]
         line = ParameterLine(self.eset.structure, start.p.copy(), velocity)

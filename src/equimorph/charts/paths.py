@@ -62,28 +62,36 @@ class AtlasPath:
         )
 
 
+@dataclass(frozen=True)
+class Place:
+    """A state of a set, and the number of its cell."""
+
+    state: State
+    cell: int
+
+
 def path_over_cells(
     eset: EquilibriumSet,
     chart: Int[np.ndarray, " C"],
-    start: tuple[State, int],
-    goal: tuple[State, int],
+    start: Place,
+    goal: Place,
 ) -> AtlasPath | None:
-    """Short path between states, each with its cell; None if the set does not connect them.
+    """Short path between two places; None if the set does not connect them.
 
     Shortest over edges, in the metric; over two parameters then pulled straight between folds.
     """
     # ways may lead from sheet to sheet where these cross
     eset = replace(eset, cells=first_copies(eset)[eset.cells])
-    if start[1] == goal[1]:
-        states = _chain(eset, start[0], None, goal[0])
-        return AtlasPath(states, _coords(eset, states), chart[[start[1]]])
+    if start.cell == goal.cell:
+        states = _chain(eset, start.state, None, goal.state)
+        return AtlasPath(states, _coords(eset, states), chart[[start.cell]])
     path = _over_edges(eset, start, goal)
     if path is None:
         return None
     way = _straighten(eset, path)
-    states = _chain(eset, start[0], _states_on(eset, way), goal[0])
+    states = _chain(eset, start.state, _states_on(eset, way), goal.state)
     charts = _charts_of(eset, chart, way)
-    whole = np.concatenate([chart[[start[1]]], charts, chart[[goal[1]]]])
+    whole = np.concatenate([chart[[start.cell]], charts, chart[[goal.cell]]])
     return AtlasPath(states, _coords(eset, states), whole)
 
 
@@ -97,18 +105,16 @@ def _chain(eset: EquilibriumSet, start: State, middle: States | None, goal: Stat
     return States(eset.structure, z, p)
 
 
-def _over_edges(
-    eset: EquilibriumSet, start: tuple[State, int], goal: tuple[State, int]
-) -> list[int] | None:
+def _over_edges(eset: EquilibriumSet, start: Place, goal: Place) -> list[int] | None:
     """Vertices of the shortest way over edges from one cell to another."""
     setting, count = eset.setting, len(eset.points)
     place = embed(setting, eset.points.z, eset.points.p)
     pairs = faces_of(eset.cells, 2) if eset.cells.shape[1] > 2 else eset.cells
     pairs = pairs[~_at_end(eset)[pairs].any(axis=1)]
     links, lengths = [pairs], [np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)]
-    for number, (state, cell) in enumerate((start, goal)):
-        corners = eset.cells[cell]
-        own = embed(setting, state.z[None], state.p[None])
+    for number, end in enumerate((start, goal)):
+        corners = eset.cells[end.cell]
+        own = embed(setting, end.state.z[None], end.state.p[None])
         links.append(np.stack([np.full(len(corners), count + number), corners], axis=1))
         lengths.append(np.linalg.norm(place[corners] - own, axis=1))
     joined = np.concatenate(links)

@@ -11,7 +11,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Points, Values
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.rules import Chooser, Scoring
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.cuts import About, Ends, cut_between
+from equimorph.manifold.complex.cuts import Ends, cut_between
 from equimorph.manifold.complex.edge_points import on_edges
 from equimorph.manifold.complex.marked_complex import (
     ON_CAP,
@@ -112,7 +112,7 @@ def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndar
     cut = cut_between(fabric, values, crossings.between)
     inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
     used = np.unique(cut.fabric.cells[inside])
-    chosen = part_of(eset, cut.fabric, inside, (cut.on_level, cut.lost))
+    chosen = part_of(eset, cut.fabric, inside, cut.on_level, cut.lost)
     return chosen, cut.on_level[used], cut.lost
 
 
@@ -136,17 +136,22 @@ class _Crossings:
         keys, found = [np.zeros(0, int)], fabric.vertices.take(np.zeros(0, int))
         for mark in np.unique(marks[crossed]).tolist():
             own = np.flatnonzero(crossed & (marks == mark))
-            about = (mark, lowest[own])
-            done, new = _locate_changes(preference, fabric, ends[own], about, values[ends[own]])
+            given = ends[own], mark, lowest[own], values[ends[own]]
+            done, new = _locate_changes(preference, fabric, *given)
             keys.append(keys_of(ends[own[done]], self._base))
             found = found.joined(new)
         self._keys, self._found = np.concatenate(keys), found
 
     def between(
-        self, fabric: Fabric, ends: Ends, about: About, known: Float[np.ndarray, "n 2"]
+        self,
+        fabric: Fabric,
+        ends: Ends,
+        mark: int,
+        index: Int[np.ndarray, " n"],
+        known: Float[np.ndarray, "n 2"],
     ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
         """Those on some edges; see `cut_between`."""
-        del fabric, about, known
+        del fabric, mark, index, known
         wanted = keys_of(ends, self._base)
         done = np.isin(wanted, self._keys) & (ends < self._base).all(axis=1)
         order = np.argsort(self._keys)
@@ -210,11 +215,12 @@ def _locate_changes(
     preference: Preference,
     fabric: Fabric,
     ends: Ends,
-    about: About,
+    mark: int,
+    index: Int[np.ndarray, " n"],
     values: Float[np.ndarray, "n 2"],
 ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
     """Vertices on edges where the preference changes first on the way from their first ends."""
-    way = _straight(fabric, ends, about)
+    way = _straight(fabric, ends, mark, index)
     low, high = np.zeros(len(ends)), np.ones(len(ends))
     first: Bool[np.ndarray, " n"] = values[:, 0] < 0.0
     todo: Int[np.ndarray, " n"] = np.arange(len(ends))
@@ -238,14 +244,14 @@ def _locate_changes(
     done = np.zeros(len(ends), bool)
     z, p, good = way(todo, 0.5 * (low + high)[todo])
     done[todo[good]] = True
-    return done, _vertices(fabric, ends[done], about[1][done], (z[good], p[good]))
+    return done, _vertices(fabric, ends[done], index[done], z[good], p[good])
 
 
-def _straight(fabric: Fabric, ends: Ends, about: About) -> Way:
+def _straight(fabric: Fabric, ends: Ends, mark: int, wanted: Int[np.ndarray, " n"]) -> Way:
     """States over straight lines between the ends of edges; those on constraints stay on them."""
     store, structure = fabric.vertices, fabric.setting.structure
     folded = np.isin(store.kinds[ends], (VertexKind.FOLD, VertexKind.CORNER))
-    bent = np.full(len(ends), bool(about[0] & (ON_CAP | ON_FOLD))) | folded.all(axis=1)
+    bent = np.full(len(ends), bool(mark & (ON_CAP | ON_FOLD))) | folded.all(axis=1)
 
     def way(lanes: Int[np.ndarray, " n"], t: Float[np.ndarray, " n"]) -> Solved:
         weights = np.stack([1.0 - t, t], axis=1)
@@ -256,11 +262,11 @@ def _straight(fabric: Fabric, ends: Ends, about: About) -> Way:
         good = np.zeros(len(lanes), bool)
         plain = np.flatnonzero(~bent[lanes])
         z[plain], good[plain], index = exact_states(structure, z[plain], p[plain])
-        good[plain] &= index == about[1][lanes[plain]]
+        good[plain] &= index == wanted[lanes[plain]]
         rest = np.flatnonzero(~good)
         if len(rest):
             some = lanes[rest]
-            found, at = on_edges(fabric, ends[some], about[0], about[1][some], t[rest])
+            found, at = on_edges(fabric, ends[some], mark, wanted[some], t[rest])
             z[rest[found]], p[rest[found]], good[rest] = at.z, at.p, found
         return z, p, good
 
@@ -268,7 +274,7 @@ def _straight(fabric: Fabric, ends: Ends, about: About) -> Way:
 
 
 def _vertices(
-    fabric: Fabric, ends: Ends, index: Int[np.ndarray, " n"], states: tuple[Lanes, Parameters]
+    fabric: Fabric, ends: Ends, index: Int[np.ndarray, " n"], z: Lanes, p: Parameters
 ) -> Vertices:
     """Vertices on edges, on the same folds and caps as both ends."""
     store = fabric.vertices
@@ -282,5 +288,5 @@ def _vertices(
     )
     plain = np.isin(kinds[:, 0], (VertexKind.FOLD, VertexKind.CORNER)).astype(int)
     rows = store.rows[ends[np.arange(len(ends)), plain]]
-    others = (index, np.full(len(ends), -1))
-    return vertices_of(fabric.setting, states, kind, others, np.ascontiguousarray(rows))
+    rows, nowhere = np.ascontiguousarray(rows), np.full(len(ends), -1)
+    return vertices_of(fabric.setting, z, p, kind, index, nowhere, rows)

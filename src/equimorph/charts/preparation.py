@@ -93,7 +93,7 @@ def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
     if len(cusps) == 0:
         return eset
     nothing = np.zeros(len(fabric.vertices), bool)
-    return part_of(eset, fabric, np.ones(len(fabric.cells), bool), (nothing, 0))
+    return part_of(eset, fabric, np.ones(len(fabric.cells), bool), nothing, 0)
 
 
 def flip_inverted_triangles(

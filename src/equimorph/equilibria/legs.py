@@ -161,7 +161,7 @@ def prepared(states: States, leg: Leg) -> Prepared:
         return changed(structure, here if _wide(values) else base, values)
 
     names = [parameter.name for parameter in structure.parameters]
-    pieces = _pieces(leg, at, (here, names, structure.scales))
+    pieces = _pieces(leg, at, here, names, structure.scales)
     return Prepared(SmoothCurve(structure, pieces, pieces.lengths(structure.scales)), states.z)
 
 
@@ -175,10 +175,11 @@ def _wide(values: Waypoint) -> bool:
 def _pieces(
     leg: Callable[[float], Waypoint],
     at: Callable[[float], Parameters],
-    start: tuple[Parameters, list[str], Float[np.ndarray, " columns"]],
+    here: Parameters,
+    names: list[str],
+    scales: Float[np.ndarray, " columns"],
 ) -> Pieces:
     """Polynomials of a smooth curve, which has to begin where the lanes are."""
-    here, names, scales = start
     gap = np.abs(at(0.0) - here) / (scales + np.abs(here))
     if not (gap <= AT_START).all():
         lane, column = np.unravel_index(int(np.argmax(gap)), gap.shape)
@@ -216,7 +217,7 @@ def _tracked(states: States, leg: Leg, first: Waypoint) -> Prepared:
     names = [parameter.name for parameter in structure.parameters]
     scales = np.concatenate([structure.scales, np.ones(len(descriptors))])
     if callable(leg):
-        pieces = _pieces(leg, at, (start, [*names, *(d.name for d in descriptors)], scales))
+        pieces = _pieces(leg, at, start, [*names, *(d.name for d in descriptors)], scales)
     else:
         stop = at(1.0)
         line = lambda t: start + t * (stop - start)  # noqa: E731

@@ -88,7 +88,7 @@ def natural_sheet(
     while (seeds := _seeds((found | ~defined).reshape(shape), asked)).size:
         asked[seeds] = 1
         z[seeds], found[seeds] = structure.natural(p[seeds])
-        _flood(structure, p, (z, found), shape, seeds[found[seeds]])
+        _flood(structure, p, z, found, shape, seeds[found[seeds]])
     found &= defined
     return NaturalSheet(structure, base, (axes[0], axes[1]), places, z, found)
 
@@ -119,12 +119,12 @@ def _seeds(
 def _flood(
     structure: Structure,
     p: Float[np.ndarray, "vertices parameters"],
-    sheet: tuple[Float[np.ndarray, "vertices size"], Bool[np.ndarray, " vertices"]],
+    z: Float[np.ndarray, "vertices size"],
+    found: Bool[np.ndarray, " vertices"],
     shape: tuple[int, int],
     front: Int[np.ndarray, " front"],
 ) -> None:
-    """Continue states from the vertices of a front to all that can be reached; fills `sheet`."""
-    z, found = sheet
+    """Continue states from the vertices of a front to all in reach; fills z and `found`."""
     while len(front):
         start, target = _neighbours(front, shape)
         fresh = ~found[target]

@@ -29,12 +29,13 @@ def answers(
 
 def slopes_along(
     structure: Structure,
-    here: tuple[Lanes, Parameters],
-    along: tuple[Float[np.ndarray, "lanes k size"], Float[np.ndarray, "lanes k parameters"]],
+    z: Lanes,
+    p: Parameters,
+    dz: Float[np.ndarray, "lanes k size"],
+    dp: Float[np.ndarray, "lanes k parameters"],
     descriptors: Sequence[Descriptor],
 ) -> Float[np.ndarray, "lanes m k"]:
     """Derivatives of descriptors along directions (dz, dp) from states."""
-    (z, p), (dz, dp) = here, along
     n, (lanes, k, _) = structure.unknowns, dz.shape
     # the softer the direction, the shorter the step, so that differences stay small in the metric
     size = np.sqrt(dz[:, :, :n] ** 2 @ structure.mass + ((dp / structure.scales) ** 2).sum(axis=2))
@@ -58,4 +59,4 @@ def steering(
     descriptors: Sequence[Descriptor],
 ) -> Float[np.ndarray, "lanes m k"]:
     """Jacobian of descriptors by free parameters along the set, per scale of these."""
-    return slopes_along(structure, (z, p), answers(structure, z, p, free), descriptors)
+    return slopes_along(structure, z, p, *answers(structure, z, p, free), descriptors)

@@ -87,11 +87,11 @@ def _unit(curve: Curve, front: Front) -> Front:
 def step_along(curve: Curve, front: Front, length: Values) -> tuple[Front, Flags]:
     """Go `length` along each curve, predicted by the tangent; see `onto_curve`."""
     z = front.z + length[:, None] * front.tangent_z
-    return onto_curve(curve, front, (z, front.t + length * front.tangent_t), length)
+    return onto_curve(curve, front, z, front.t + length * front.tangent_t, length)
 
 
 def onto_curve(
-    curve: Curve, front: Front, guess: tuple[Lanes, Values], length: Values
+    curve: Curve, front: Front, z: Lanes, t: Values, length: Values
 ) -> tuple[Front, Flags]:
     """Points at pseudo-arclength `length` from `front`, corrected from guesses, and the success.
 
@@ -101,11 +101,11 @@ def onto_curve(
     """
     metric, lanes = curve.metric, len(length)
     numbers, counts = new_scalars(lanes)
-    trial = np.ascontiguousarray(guess[0]).copy()
+    trial = np.ascontiguousarray(z).copy()
     row, corner = dual(metric, curve.weight, front.tangent_z, front.tangent_t)
-    numbers[kernels.TRIAL], numbers[kernels.CORNER] = guess[1], corner
+    numbers[kernels.TRIAL], numbers[kernels.CORNER] = t, corner
     numbers[kernels.DEFECT] = kernels.row_sums(row, trial - front.z) - length
-    numbers[kernels.DEFECT] += corner * (guess[1] - front.t)
+    numbers[kernels.DEFECT] += corner * (t - front.t)
     numbers[kernels.LENGTH], numbers[kernels.WEIGHT] = length, curve.weight**2
     out = replace(front, tangent_z=np.zeros_like(trial), index=np.zeros(lanes, int))
     closing = (numbers[kernels.CORNER], numbers[kernels.DEFECT])

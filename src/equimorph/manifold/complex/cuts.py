@@ -24,9 +24,9 @@ STILL = 1e-11
 Values = Float[np.ndarray, " V"]
 Function = Callable[[Vertices], Values]
 Ends = Int[np.ndarray, "n 2"]
-About = tuple[int, Int[np.ndarray, " n"]]
 Between = Callable[
-    [Fabric, Ends, About, Float[np.ndarray, "n 2"]], tuple[Bool[np.ndarray, " n"], Vertices]
+    [Fabric, Ends, int, Int[np.ndarray, " n"], Float[np.ndarray, "n 2"]],
+    tuple[Bool[np.ndarray, " n"], Vertices],
 ]
 
 
@@ -73,7 +73,7 @@ def cut_between(
         fresh = np.flatnonzero(crossed & ~np.isin(keys, found.asked))
         for mark in np.unique(marks[fresh]).tolist():
             own = fresh[marks[fresh] == mark]
-            done, more = between(fabric, ends[own], (mark, lowest[own]), values[ends[own]])
+            done, more = between(fabric, ends[own], mark, lowest[own], values[ends[own]])
             found = found.joined(keys[own], done, more)
         lost = found.asked[found.row < 0]
         chosen = _one_per_cell(crossed & ~np.isin(keys, lost), of_cells)
@@ -135,7 +135,8 @@ def _one_per_cell(
 def roots(
     fabric: Fabric,
     ends: Int[np.ndarray, "n 2"],
-    about: tuple[int, Int[np.ndarray, " n"]],
+    mark: int,
+    index: Int[np.ndarray, " n"],
     known: Float[np.ndarray, "n 2"],
     value_of: Callable[[Vertices, Int[np.ndarray, " some"]], Float[np.ndarray, " some"]],
 ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
@@ -143,7 +144,7 @@ def roots(
 
     Parameters
     ----------
-    about
+    mark, index
         The mark of the edges, and the index of each.
     known
         Values at both ends, of different signs.
@@ -162,9 +163,8 @@ def roots(
     lanes, found, last = [], [], np.full(len(ends), np.inf)
     for _ in range(TRIALS):
         t = low[todo] - at_low[todo] * (high - low)[todo] / (at_high - at_low)[todo]
-        good, at, t = _somewhere(
-            fabric, ends[todo], (about[0], about[1][todo]), (low[todo], high[todo]), t
-        )
+        bounds = low[todo], high[todo]
+        good, at, t = _somewhere(fabric, ends[todo], mark, index[todo], bounds, t)
         todo, t = todo[good], t[good]
         value = value_of(at, todo)
         ended = (np.abs(value) <= small[todo]) | (np.abs(t - last[todo]) < STILL)
@@ -191,20 +191,21 @@ def roots(
 def _somewhere(
     fabric: Fabric,
     ends: Int[np.ndarray, "n 2"],
-    about: tuple[int, Int[np.ndarray, " n"]],
+    mark: int,
+    index: Int[np.ndarray, " n"],
     bounds: tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]],
     t: Float[np.ndarray, " n"],
 ) -> tuple[Bool[np.ndarray, " n"], Vertices, Float[np.ndarray, " n"]]:
     """Vertices on edges at the places that are proposed, or elsewhere between the bounds."""
     (low, high), t = bounds, t.copy()
-    good, at = on_edges(fabric, ends, *about, t)
+    good, at = on_edges(fabric, ends, mark, index, t)
     order = np.flatnonzero(good)
     for share in ELSEWHERE:
         left = np.flatnonzero(~good)
         if len(left) == 0:
             break
         t[left] = low[left] + share * (high - low)[left]
-        more, vertices = on_edges(fabric, ends[left], about[0], about[1][left], t[left])
+        more, vertices = on_edges(fabric, ends[left], mark, index[left], t[left])
         good[left[more]] = True
         at, order = at.joined(vertices), np.concatenate([order, left[more]])
     return good, at.take(np.argsort(order)), t

@@ -101,7 +101,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
-    audit = _audit(given, lifting, (crossed, whole, component), boundaries, frame.setting)
+    audit = _audit(given, lifting, crossed, whole, component, boundaries, frame.setting)
     return EquilibriumSet(
         structure=frame.setting.structure,
         box=frame.box,
@@ -117,7 +117,7 @@ def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         stratum=stratum,
         folds=tuple(pieces(whole.facets[folds])),
         boundaries=boundaries,
-        components=_components(corners, given.cell_index, component, (whole, boundaries)),
+        components=_components(corners, given.cell_index, component, whole, boundaries),
         strata=strata,
         audit=audit,
         mesh=frame.mesh,
@@ -155,9 +155,9 @@ def _components(
     corners: Int[np.ndarray, "C corners"],
     cell_index: Int[np.ndarray, " C"],
     component: Int[np.ndarray, " C"],
-    given: tuple[Adjacency, tuple[Boundary, ...]],
+    whole: Adjacency,
+    boundaries: tuple[Boundary, ...],
 ) -> tuple[Component, ...]:
-    whole, boundaries = given
     edges = _edges_of(whole, component)
     at_loops = np.array([boundary.vertices.flat[0] for boundary in boundaries], int)
     out = []
@@ -189,12 +189,13 @@ def _edges_of(whole: Adjacency, component: Int[np.ndarray, " C"]) -> list[int | 
 def _audit(
     given: Complex,
     lifting: Lifting,
-    parts: tuple[Bool[np.ndarray, " F"], Adjacency, Int[np.ndarray, " C"]],
+    crossed: Bool[np.ndarray, " F"],
+    whole: Adjacency,
+    component: Int[np.ndarray, " C"],
     boundaries: tuple[Boundary, ...],
     setting: Setting,
 ) -> Audit:
     corners, cell_index, points = given.cells, given.cell_index, given.points
-    crossed, whole, component = parts
     coordinates = points.p[:, setting.free]
     # of parts of sets two cells may be left at a crossing that belong to different sheets
     if crossed.any():

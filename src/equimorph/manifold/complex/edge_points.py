@@ -158,7 +158,7 @@ def _beside_sides(
     plane = first.rows + turned @ second.rows
     length = np.linalg.norm(second.place - first.place, axis=1)
     place = _embedded(fabric, z, p)
-    freely = _on_curves(fabric, mark, (z, p), (place, plane, length), first)
+    freely = _on_curves(fabric, mark, z, p, place, plane, length, first)
     found = np.zeros(len(ends), bool)
     for k in range(d):
         free = freely.p[:, setting.free[k]]
@@ -169,37 +169,37 @@ def _beside_sides(
         own = np.flatnonzero(freely.found & beyond & (room > least * length) & ~found)
         if len(own) == 0:
             continue
-        near = z[own], p[own].copy()
-        near[1][:, setting.free[k]] = there[own]
+        near_z, near_p = z[own], p[own].copy()
+        near_p[:, setting.free[k]] = there[own]
         end = first.take(own)
         row = plane[own][:, :, plane.shape[2] - d + k]
         end = replace(end, slopes=np.concatenate([end.slopes, row[:, None]], axis=1))
-        place[own] = _embedded(fabric, *near)
-        given = (place[own], plane[own], length[own])
-        pinned = _on_curves(fabric, mark | SIDES << 2 * k, near, given, end)
+        place[own] = _embedded(fabric, near_z, near_p)
+        given = near_z, near_p, place[own], plane[own], length[own]
+        pinned = _on_curves(fabric, mark | SIDES << 2 * k, *given, end)
         z[own], p[own], found[own] = pinned.z, pinned.p, pinned.found
-    return _accepted(fabric, (ends, mark, lowest, t), Pinned(z, p, found), place, plane)
+    return _accepted(fabric, Places(ends, mark, lowest, t), Pinned(z, p, found), place, plane)
 
 
 def _accepted(
     fabric: Fabric,
-    about: tuple[Int[np.ndarray, "n 2"], int, Int[np.ndarray, " n"], Float[np.ndarray, " n"]],
+    wanted: Places,
     at: Pinned,
     place: Float[np.ndarray, "n coordinates"],
     plane: Float[np.ndarray, "n d coordinates"],
 ) -> Tried:
     """Those vertices on edges that are close to where they were looked for, and of the index."""
-    ends, mark, lowest, t = about
-    first, second = (fabric.vertices.place[ends[:, side]] for side in range(2))
+    first, second = (fabric.vertices.place[wanted.ends[:, side]] for side in range(2))
     length = np.linalg.norm(second - first, axis=1)
     here = _embedded(fabric, at.z, at.p)
     found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
-    for end, part in ((first, t), (second, 1.0 - t)):
+    for end, part in ((first, wanted.t), (second, 1.0 - wanted.t)):
         found &= np.linalg.norm(here - end, axis=1) <= (part + EXCESS) * length
     free = at.p[:, fabric.setting.free]
     found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
-    vertices = _counted(fabric, mark, at, (found, lowest), plane)
-    good = _along(replace(fabric, vertices=vertices), mark, (second - first)[found])
+    found &= _of_index(fabric, wanted.mark, at, found, wanted.lowest)
+    vertices = _vertices_at(fabric, wanted.mark, at, found, wanted.lowest, plane)
+    good = _along(replace(fabric, vertices=vertices), wanted.mark, (second - first)[found])
     found[found] = good
     return found, vertices.take(np.flatnonzero(good))
 
@@ -223,9 +223,9 @@ def _orthogonally(
     place = _embedded(fabric, z, p)
     length = np.linalg.norm(second.place - first.place, axis=1)
     if mark == 0 and rough:
-        at: Corrected | Pinned = corrected_amid(setting, (z, p), place, plane, length)
+        at: Corrected | Pinned = corrected_amid(setting, z, p, place, plane, length)
     else:
-        at = _on_curves(fabric, mark, (z, p), (place, plane, length), first)
+        at = _on_curves(fabric, mark, z, p, place, plane, length, first)
     here = _embedded(fabric, at.z, at.p)
     found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
     for end, part in ((first, t), (second, 1.0 - t)):
@@ -238,7 +238,8 @@ def _orthogonally(
     else:
         if mark & ON_CROSSING:
             lowest = store.index[ends].max(axis=1)
-        vertices = _counted(fabric, mark, at, (found, lowest), plane)
+        found &= _of_index(fabric, mark, at, found, lowest)
+        vertices = _vertices_at(fabric, mark, at, found, lowest, plane)
     good = _along(replace(fabric, vertices=vertices), mark, (second.place - first.place)[found])
     found[found] = good
     return found, vertices if good.all() else vertices.take(np.flatnonzero(good))
@@ -265,17 +266,15 @@ def _predicted(
 def _on_curves(
     fabric: Fabric,
     mark: int,
-    states: tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]],
-    near: tuple[
-        Float[np.ndarray, "n coordinates"],
-        Float[np.ndarray, "n d coordinates"],
-        Float[np.ndarray, " n"],
-    ],
+    z: Float[np.ndarray, "n size"],
+    p: Float[np.ndarray, "n P"],
+    place: Float[np.ndarray, "n coordinates"],
+    plane: Float[np.ndarray, "n d coordinates"],
+    length: Float[np.ndarray, " n"],
     end: Ends,
 ) -> Pinned:
     """Points on folds, constraints, crossings or sides of the box near places with planes."""
     setting, d = fabric.setting, fabric.dimension
-    place, plane, length = near
     inside = replace(end, rows=plane).allowed
     rows = np.swapaxes(inside, 1, 2) @ plane
     span = np.delete(np.eye(d), held(mark, d), axis=0)
@@ -289,34 +288,42 @@ def _on_curves(
         bool(mark & ON_CROSSING),
         plane if len(span) == d else None,
     )
-    return corrected(aim, *states, length)
+    return corrected(aim, z, p, length)
 
 
-def _counted(
+def _of_index(
     fabric: Fabric,
     mark: int,
     at: Pinned,
-    wanted: tuple[Bool[np.ndarray, " n"], Int[np.ndarray, " n"]],
+    found: Bool[np.ndarray, " n"],
+    lowest: Int[np.ndarray, " n"],
+) -> Bool[np.ndarray, " n"]:
+    """Which points, of those that were found, have the right index."""
+    good, count = found.copy(), lower_index if mark & (ON_FOLD | ON_CROSSING) else _index
+    good[found] = count(fabric.setting, at.z[found], at.p[found]) == lowest[found]
+    return good
+
+
+def _vertices_at(
+    fabric: Fabric,
+    mark: int,
+    at: Pinned,
+    found: Bool[np.ndarray, " n"],
+    index: Int[np.ndarray, " n"],
     plane: Float[np.ndarray, "n d coordinates"],
 ) -> Vertices:
-    """Vertices on folds and so on where they were found; of these, only those of the right index.
-
-    What was found and the index are `wanted`; the former is changed.
-    """
-    (found, lowest), setting = wanted, fabric.setting
+    """Vertices on folds and so on where they were found."""
     fold, cap, crossing = (bool(mark & each) for each in (ON_FOLD, ON_CAP, ON_CROSSING))
-    count = lower_index if fold or crossing else _index
-    found[found] = count(setting, at.z[found], at.p[found]) == lowest[found]
     kind = {
         (False, False): VertexKind.REFINED,
         (True, False): VertexKind.FOLD,
         (False, True): VertexKind.CAP,
         (True, True): VertexKind.CORNER,
     }
-    others = (lowest[found], np.full(found.sum(), -1))
     kinds = np.full(found.sum(), VertexKind.CROSSING if crossing else kind[fold, cap])
-    states = (at.z[found], at.p[found])
-    return vertices_of(setting, states, kinds, others, np.ascontiguousarray(plane[found]))
+    rows, nowhere = np.ascontiguousarray(plane[found]), np.full(found.sum(), -1)
+    known = at.z[found], at.p[found], kinds, index[found], nowhere
+    return vertices_of(fabric.setting, *known, rows)
 
 
 def _along(

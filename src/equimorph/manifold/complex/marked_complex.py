@@ -235,8 +235,10 @@ def fabric_of(eset: EquilibriumSet) -> Fabric:
     whole = adjacency(cells)
     sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
     rows = best_corners(setting, z, p, cells, sense.signs)
-    others = (eset.index[origin], eset.grid_vertex[origin])
-    vertices = vertices_of(setting, (z, p), eset.kinds[origin], others, rows)
+    kinds, index, grid_vertex = (
+        column[origin] for column in (eset.kinds, eset.index, eset.grid_vertex)
+    )
+    vertices = vertices_of(setting, z, p, kinds, index, grid_vertex, rows)
     common = np.where(np.isin(origin, crossings), origin, -1)
     vertices = replace(vertices, shared=common)
     known = origin[whole.facets]

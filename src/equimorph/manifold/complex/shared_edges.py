@@ -62,8 +62,8 @@ def with_copies(fabric: Fabric, ends: Ends, more: Vertices) -> tuple[Ends, Verti
     first, second = (fabric.vertices.rows[others[:, side]] for side in range(2))
     plane = first + first @ np.swapaxes(second, 1, 2) @ second
     own = more.take(row)
-    about = (own.index, own.grid_vertex)
-    new = vertices_of(fabric.setting, (own.z, own.p), own.kinds, about, plane)
+    known = own.z, own.p, own.kinds, own.index, own.grid_vertex
+    new = vertices_of(fabric.setting, *known, plane)
     whole = more.joined(new)
     whole = replace(whole, shared=np.concatenate([shared, shared[row]]))
     return np.concatenate([ends, others]), whole

@@ -105,13 +105,14 @@ def gathered(parts: Sequence[Vertices], place: Int[np.ndarray, " V"]) -> Vertice
 
 def vertices_of(
     setting: Setting,
-    states: tuple[Float[np.ndarray, "V size"], Float[np.ndarray, "V P"]],
+    z: Float[np.ndarray, "V size"],
+    p: Float[np.ndarray, "V P"],
     kinds: Int[np.ndarray, " V"],
-    others: tuple[Int[np.ndarray, " V"], Int[np.ndarray, " V"]],
+    index: Int[np.ndarray, " V"],
+    grid_vertex: Int[np.ndarray, " V"],
     rows: Float[np.ndarray, "V d coordinates"],
 ) -> Vertices:
-    """Vertices with their frames; `others` are index and grid vertex, `rows` nearby planes."""
-    z, p = states
+    """Vertices with their frames; `rows` are nearby planes."""
     crossing = kinds == VertexKind.CROSSING
     d = len(setting.free)
     frame = np.empty((len(z), d, z.shape[1] + d))
@@ -129,36 +130,33 @@ def vertices_of(
         own = np.flatnonzero(wanted)
         if len(own):
             out[own] = function(setting, z[own], p[own], frame[own])
-    return _with_slopes(setting, states, kinds, others, frame, (folds, caps, crossings))
+    slopes = folds, caps, crossings
+    return _with_slopes(setting, z, p, kinds, index, grid_vertex, frame, slopes)
 
 
 def free_vertices(setting: Setting, at: Corrected) -> Vertices:
     """Vertices inside sheets."""
     count, d = at.frames.shape[:2]
     kinds, nowhere = np.full(count, VertexKind.REFINED), np.full(count, -1)
-    slopes = np.zeros((3, count, d))
-    return _with_slopes(
-        setting,
-        (at.z, at.p),
-        kinds,
-        (at.index, nowhere),
-        at.frames,
-        (slopes[0], slopes[1], slopes[2]),
-    )
+    none = np.zeros((count, d))
+    slopes = none, none.copy(), none.copy()
+    return _with_slopes(setting, at.z, at.p, kinds, at.index, nowhere, at.frames, slopes)
 
 
 def _with_slopes(
     setting: Setting,
-    states: tuple[Float[np.ndarray, "V size"], Float[np.ndarray, "V P"]],
+    z: Float[np.ndarray, "V size"],
+    p: Float[np.ndarray, "V P"],
     kinds: Int[np.ndarray, " V"],
-    others: tuple[Int[np.ndarray, " V"], Int[np.ndarray, " V"]],
+    index: Int[np.ndarray, " V"],
+    grid_vertex: Int[np.ndarray, " V"],
     frame: Float[np.ndarray, "V d full"],
     slopes: tuple[Float[np.ndarray, "V d"], Float[np.ndarray, "V d"], Float[np.ndarray, "V d"]],
 ) -> Vertices:
     """Vertices with all that is known of them, in the coordinates of the embedding, too."""
-    place, placed = embed(setting, *states), placed_frames(setting, frame)
+    place, placed = embed(setting, z, p), placed_frames(setting, frame)
     lone = np.full(len(kinds), -1)
-    return Vertices(*states, kinds, *others, place, frame, placed, *slopes, lone)
+    return Vertices(z, p, kinds, index, grid_vertex, place, frame, placed, *slopes, lone)
 
 
 def on_constraints(

@@ -128,7 +128,7 @@ class Aim:
         by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(setting.structure.mass)
         return by_z, self._changes(rows[:, :, n:] / setting.scales)
 
-    def conditions(self, centre: tuple[Lanes, Parameters]) -> tuple[Condition, ...]:
+    def conditions(self, z: Lanes, p: Parameters) -> tuple[Condition, ...]:
         """As many scalars as directions; none for plain points: no step leaves their planes."""
         if self.plain:
             return ()
@@ -141,7 +141,7 @@ class Aim:
             *([Fold()] if self.fold else []),
             *([Crossing(directions)] if self.crossing else []),
             *([TakesValues((excess,), np.zeros((len(self.span), 1)))] if self.cap else []),
-            *([Plane(*centre, *self.products(self.rows))] if self.rows.shape[1] else []),
+            *([Plane(z, p, *self.products(self.rows))] if self.rows.shape[1] else []),
         )
 
     def _changes(
@@ -182,7 +182,8 @@ def corrected(
 
 def corrected_amid(
     setting: Setting,
-    states: tuple[Lanes, Parameters],
+    z: Lanes,
+    p: Parameters,
     middle: Float[np.ndarray, "lanes coordinates"],
     rows: Rows,
     around: Values,
@@ -193,7 +194,7 @@ def corrected_amid(
     """
     span = np.tile(np.eye(len(setting.free)), (len(middle), 1, 1))
     aim = Aim(setting, False, False, span, middle, rows)
-    found = _settled(aim, *states, around, None, None)
+    found = _settled(aim, z, p, around, None, None)
     frames, good = np.zeros_like(found.frames), found.found
     frames[good] = orthonormal(setting, found.frames[good])
     return Corrected(found.z, found.p, frames, found.index, good)
@@ -223,7 +224,7 @@ def _settled(
     frame: Planes | Tangents = Tangents(unfolded=aim.crossing)
     if tangents is not None and not aim.crossing:
         frame = Planes(*aim.products(tangents))
-    return settle(setting.structure, z, p, aim.directions, aim.conditions(centre), guards, frame)
+    return settle(setting.structure, z, p, aim.directions, aim.conditions(*centre), guards, frame)
 
 
 def _crosses(aim: Aim, z: Lanes, p: Parameters) -> Flags:
@@ -245,7 +246,8 @@ def pin(
     groups: Sequence[Sequence[int]],
     kind: int,
     span: Span,
-    shift: tuple[int, float] = (0, 0.0),
+    member: int = 0,
+    share: float = 0.0,
 ) -> Pinned:
     """Exact points in the middle of each group of points, on the same sheet.
 
@@ -262,11 +264,10 @@ def pin(
         The k orthonormal directions, in scaled free parameters, in which the parameters may move.
         As many conditions as are left put the point into the normal space of the group through
         its middle, so that it lies amid the group.
-    shift
+    member, share
         A member of the groups, and the share of the way towards it at which the middle is taken.
     """
     z, p, deviations = middles(setting, points, groups)
-    member, share = shift
     towards = np.array([group[member] for group in groups], int)
     z += share * (points.z[towards] - z)
     p += share * (points.p[towards] - p)
@@ -286,8 +287,8 @@ def pin(
         if len(lanes) == 0:
             break
         start = np.array([groups[lane][end] for lane in lanes.tolist()], int)
-        states = (points.z[start], points.p[start])
-        led = _led(aim.take(lanes), steps, states, around[lanes], low[lanes])
+        z, p = points.z[start], points.p[start]
+        led = _led(aim.take(lanes), steps, z, p, around[lanes], low[lanes])
         pinned.z[lanes], pinned.p[lanes], pinned.found[lanes] = led.z, led.p, led.found
     return pinned
 
@@ -295,12 +296,13 @@ def pin(
 def _led(
     aim: Aim,
     steps: int,
-    states: tuple[Lanes, Parameters],
+    z: Lanes,
+    p: Parameters,
     around: Values,
     low: Numbers,
 ) -> Pinned:
     """Pin folds in small steps from known ones to the middle, where one step goes astray."""
-    z, p = (each.copy() for each in states)
+    z, p = z.copy(), p.copy()
     found = np.ones(len(z), bool)
     start = embed(aim.setting, z, p)
     for share in np.linspace(0.0, 1.0, steps + 1)[1:]:

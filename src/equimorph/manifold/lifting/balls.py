@@ -72,7 +72,7 @@ def pin_confined(
         if len(lanes) == 0:
             continue
         own = [groups[lane] for lane in lanes.tolist()]
-        pinned = pin(setting, points, own, kind, span[lanes], (member, share))
+        pinned = pin(setting, points, own, kind, span[lanes], member, share)
         depth = np.where(pinned.found, depths(frames[lanes], pinned.p[:, setting.free]), -np.inf)
         better = depth > best[lanes]
         at = lanes[better]

@@ -16,7 +16,7 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.lifting.pairing import ABANDONED, Pairing, Rays
+from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 from equimorph.model import Constraint
 
 LONGEST = 0.5
@@ -107,8 +107,15 @@ EFFORTS = 4
 NOISE = 1e-6
 """Distance in the metric below which two crossings are one, and by which folds may be misplaced."""
 
-Inner = tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"], int, int]
-"""Unknowns, parameters, index and kind of a point inside an edge."""
+
+@dataclass(frozen=True)
+class Inner:
+    """A point inside an edge."""
+
+    z: Float[np.ndarray, " size"]
+    p: Float[np.ndarray, " P"]
+    index: int
+    kind: VertexKind
 
 
 @dataclass(frozen=True)
@@ -136,7 +143,7 @@ class Traced:
         out: dict[int, list[Inner]] = {}
         lanes, index, kinds = (each.tolist() for each in (self.lanes, self.inner_index, self.kinds))
         for k, lane in enumerate(lanes):
-            point = (self.inner_z[k], self.inner_p[k], index[k], kinds[k])
+            point = Inner(self.inner_z[k], self.inner_p[k], index[k], VertexKind(kinds[k]))
             out.setdefault(lane, []).append(point)
         return out
 
@@ -149,7 +156,7 @@ def trace_rays(pairing: Pairing, rays: Rays) -> None:
         lanes = np.flatnonzero(efforts == effort)
         if len(lanes):
             _trace(pairing, rays.take(lanes), line.take(lanes), effort)
-    pairing.mark(rays.take(efforts >= EFFORTS), ABANDONED)
+    pairing.mark(rays.take(efforts >= EFFORTS), RayMark.ABANDONED)
 
 
 def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> None:
@@ -180,9 +187,9 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
 
 def _number(pairing: Pairing, point: Inner, edge: int) -> int:
     """Number of a point inside an edge; one where curves cross belongs to both."""
-    if point[3] == VertexKind.CROSSING:
-        return pairing.crossing(*point[:3], edge)
-    return pairing.points.add(*point, edge)
+    if point.kind == VertexKind.CROSSING:
+        return pairing.crossing(point.z, point.p, point.index, edge)
+    return pairing.points.add(point.z, point.p, point.index, point.kind, edge)
 
 
 def _traced(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOptions) -> Traced:
@@ -197,7 +204,7 @@ def _traced(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOpt
     vertices = mesh.edges[rays.edges, side]
     vertices[outcome.code == EventCode.CONSTRAINT] = -1
     there = np.flatnonzero(good & (vertices >= 0))
-    rows = [(lane, *each) for lane, own in inner.items() for each in own]
+    rows = [(lane, *vars(each).values()) for lane, own in inner.items() for each in own]
     lanes, z, p, index, kind = zip(*rows, strict=True) if rows else 5 * ((),)
     return Traced(
         good, vertices, outcome.z[there], outcome.index[there], np.array(lanes, int),
@@ -223,7 +230,7 @@ def _caps(pairing: Pairing, outcome: Traces, line: ParameterLine, good: Flags) -
     z, p = outcome.z[lanes], line.take(lanes).parameters(outcome.t[lanes])
     # counted anew: a fold may lie between the last step and the constraint
     index = pairing.setting.structure.index(z, p).tolist()
-    return {int(lane): (z[k], p[k], index[k], VertexKind.CAP) for k, lane in enumerate(lanes)}
+    return {int(lane): Inner(z[k], p[k], index[k], VertexKind.CAP) for k, lane in enumerate(lanes)}
 
 
 def _inner(
@@ -246,19 +253,17 @@ def _inner(
     keep = np.ones(len(at), bool)
     own = np.flatnonzero(kind == VertexKind.CROSSING)
     if len(own):
-        pinned = _pinned(
-            pairing, rays.take(passed.lanes[at[own]]), (z[own], p[own]), VertexKind.CROSSING
-        )
+        those = rays.take(passed.lanes[at[own]])
+        pinned = _pinned(pairing, those, z[own], p[own], VertexKind.CROSSING)
         z[own], p[own] = pinned.z, pinned.p
         index[own] = lower_index(pairing.setting, pinned.z, pinned.p)
         good[passed.lanes[at[own[~pinned.found]]]] = False
         crossed = passed.lanes[at[own]]
         keep[own] = _first_ones(pairing, crossed, pinned)
         doubtful = np.flatnonzero((kind == VertexKind.FOLD) & np.isin(passed.lanes[at], crossed))
-        there = (z[doubtful], p[doubtful])
-        keep[doubtful] = _pinned(
-            pairing, rays.take(passed.lanes[at[doubtful]]), there, EventCode.FOLD
-        ).found
+        those = rays.take(passed.lanes[at[doubtful]])
+        again = _pinned(pairing, those, z[doubtful], p[doubtful], VertexKind.FOLD)
+        keep[doubtful] = again.found
     rows: dict[int, list[Inner]] = {}
     places: dict[int, float] = {}
     for k in np.flatnonzero(keep):
@@ -266,7 +271,7 @@ def _inner(
         own_rows = rows.setdefault(lane, [])
         if lane in places:
             own_rows.append(_between(outcome, line, lane, (places[lane], travelled)))
-        own_rows.append((z[k], p[k], int(index[k]), int(kind[k])))
+        own_rows.append(Inner(z[k], p[k], int(index[k]), VertexKind(kind[k])))
         places[lane] = travelled
     return rows
 
@@ -284,8 +289,9 @@ def _first_ones(
 def _pinned(
     pairing: Pairing,
     rays: Rays,
-    states: tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]],
-    kind: int,
+    z: Float[np.ndarray, "n size"],
+    p: Float[np.ndarray, "n P"],
+    kind: VertexKind,
 ) -> Pinned:
     """Crossings or folds on edges, polished, and which of them are where they were thought to be.
 
@@ -296,10 +302,10 @@ def _pinned(
     ends = mesh.vertices[mesh.edges[rays.edges]] / setting.scales
     span = ends[:, 1] - ends[:, 0]
     span /= np.linalg.norm(span, axis=1, keepdims=True)
-    place, fold = embed(setting, *states), kind == EventCode.FOLD
+    place, fold = embed(setting, z, p), kind == VertexKind.FOLD
     rows = place[:, None][:, :0]
     aim = Aim(setting, fold, False, span[:, None], place, rows, crossing=not fold)
-    pinned = corrected(aim, *states, np.zeros(len(place)))
+    pinned = corrected(aim, z, p, np.zeros(len(place)))
     if fold:
         moved = np.linalg.norm(embed(setting, pinned.z, pinned.p) - place, axis=1)
         pinned = replace(pinned, found=pinned.found & (moved < NOISE))
@@ -317,4 +323,4 @@ def _between(outcome: Traces, line: ParameterLine, lane: int, span: tuple[float,
     p = line.start[lane] + points.t[at] * line.velocity[lane]
     # counted anew: near crossings the tracer may have met round-off
     index = int(line.structure.index(points.z[at : at + 1], p[None])[0])
-    return points.z[at], p, index, VertexKind.BETWEEN
+    return Inner(points.z[at], p, index, VertexKind.BETWEEN)

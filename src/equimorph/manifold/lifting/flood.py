@@ -10,7 +10,7 @@ import numpy as np
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.edges import lift_directly, trace_rays
-from equimorph.manifold.lifting.pairing import HARD, LONG, UNTRACED, Pairing, Rays
+from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 from equimorph.model import Progress
 
 STEPS = 4
@@ -29,11 +29,11 @@ def flood(pairing: Pairing, progress: Progress) -> None:
     """
     while True:
         flood_directly(pairing, progress)
-        long = pairing.marked(LONG)
+        long = pairing.marked(RayMark.LONG)
         if len(long.points):
             _lift(pairing, long, STEPS)
             continue
-        hard = _one_of_each_pair(pairing, pairing.marked(HARD))
+        hard = _one_of_each_pair(pairing, pairing.marked(RayMark.HARD))
         if len(hard.points) == 0:
             return
         for at in range(0, len(hard.points), CHUNK):
@@ -43,7 +43,7 @@ def flood(pairing: Pairing, progress: Progress) -> None:
 def flood_directly(pairing: Pairing, progress: Progress) -> None:
     """Lift edges from all known points as far as single steps lead."""
     pairing.fit()
-    while len((rays := pairing.marked(UNTRACED)).points):
+    while len((rays := pairing.marked(RayMark.UNTRACED)).points):
         _lift(pairing, rays, 1)
         _refuse_endless(pairing)
         live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == VertexKind.GRID)
@@ -76,9 +76,9 @@ def _one_of_each_pair(pairing: Pairing, rays: Rays) -> Rays:
 
 def _lift(pairing: Pairing, rays: Rays, steps: int) -> None:
     """Enter the curves of rays that so many steps lift; mark the others for more effort."""
-    pairing.mark(rays, LONG if steps == 1 else HARD)
+    pairing.mark(rays, RayMark.LONG if steps == 1 else RayMark.HARD)
     difficult = pairing.effort[rays.edges] > 0
-    pairing.mark(rays.take(difficult), HARD)
+    pairing.mark(rays.take(difficult), RayMark.HARD)
     rays = rays.take(~difficult)
     for at in range(0, len(rays.points), CHUNK):
         _lift_some(pairing, rays.take(slice(at, at + CHUNK)), steps)

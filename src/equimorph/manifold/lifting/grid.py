@@ -193,7 +193,7 @@ def _split(
         halves[apex, second] = len(mesh.triangles) + len(growth.more_triangles)
         growth.more_triangles.append(([middle, second, apex], [half_edges[second], to_apex, cut]))
     for cell in around[1]:
-        _split_tetrahedron(growth, mesh, cell, (a, b, middle), (cuts, halves))
+        _split_tetrahedron(growth, mesh, cell, (a, b, middle), cuts, halves)
 
 
 def _split_tetrahedron(
@@ -201,11 +201,11 @@ def _split_tetrahedron(
     mesh: BaseMesh,
     cell: int,
     ends: tuple[int, int, int],
-    known: tuple[dict[int, int], dict[tuple[int, int], int]],
+    cuts: dict[int, int],
+    halves: dict[tuple[int, int], int],
 ) -> None:
     """Part a tetrahedron by the triangle through the middle of the edge and the other corners."""
     a, b, middle = ends
-    cuts, halves = known
     corners, faces = mesh.tetrahedra[cell].tolist(), mesh.faces[cell].tolist()
     at = {corner: k for k, corner in enumerate(corners)}
     c, d = (corner for corner in corners if corner not in {a, b})

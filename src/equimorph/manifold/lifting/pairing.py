@@ -1,6 +1,7 @@
 """Sheet lifting: the pairs of equilibria over the ends of grid edges."""
 
 from dataclasses import dataclass, field
+from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -11,8 +12,17 @@ from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.tolerances import SAME_STATE
 
-UNTRACED, ABANDONED, LONG, HARD = -1, -2, -3, -4
-"""Marks of rays without a curve: long are those that one step cannot lift, hard if few neither."""
+
+class RayMark(IntEnum):
+    """Rays without a curve."""
+
+    UNTRACED = -1
+    ABANDONED = -2
+    """Tracing failed with every effort."""
+    LONG = -3
+    """One step cannot lift them."""
+    HARD = -4
+    """A few steps cannot, either."""
 
 
 @dataclass
@@ -69,7 +79,7 @@ class Pairing:
     points: Points
     curves: Curves
     rays: Int[np.ndarray, "capacity slots"]
-    """Curve that starts or ends at a point over one of its vertex's edges; `UNTRACED` if none."""
+    """Curve that starts or ends at a point over one of its vertex's edges; a `RayMark` if none."""
     slots: Int[np.ndarray, "E 2"]
     """Place of an edge among those of its two vertices."""
     incident: Int[np.ndarray, "V slots"]
@@ -91,7 +101,7 @@ class Pairing:
         side = int(self.mesh.edges[edge, 1] == self.points.vertex[point])
         self.rays[point, self.slots[edge, side]] = curve
 
-    def mark(self, rays: Rays, mark: int) -> None:
+    def mark(self, rays: Rays, mark: RayMark) -> None:
         """Mark rays that have no curve."""
         self.rays[rays.points, self.slots[rays.edges, rays.sides]] = mark
 
@@ -118,7 +128,7 @@ class Pairing:
         """Whether a curve has not been taken back."""
         return self.ray(self.curves.start[curve], self.curves.edge[curve]) == curve
 
-    def marked(self, mark: int) -> Rays:
+    def marked(self, mark: RayMark) -> Rays:
         """Rays with a certain mark: of each edge from one end, lest curves be traced twice."""
         count = self.points.count
         vertex = self.points.vertex[:count]
@@ -176,7 +186,7 @@ class Pairing:
         """Make room for rays of new points and edges."""
         shape = (len(self.points.z), self.incident.shape[1])
         if shape != self.rays.shape:
-            rays = np.full(shape, UNTRACED)
+            rays = np.full(shape, RayMark.UNTRACED)
             rays[: self.rays.shape[0], : self.rays.shape[1]] = self.rays
             self.rays = rays
 
@@ -184,11 +194,11 @@ class Pairing:
         """Take over a mesh with more vertices and edges; curves on removed edges are forgotten."""
         gone = self.mesh.edges_in_use & ~mesh.edges_in_use[: len(self.mesh.edges)]
         for curve in np.flatnonzero(gone[self.curves.edge]).tolist():
-            self.forget(curve, ABANDONED)
+            self.forget(curve, RayMark.ABANDONED)
         for edge in np.flatnonzero(gone):  # untraced rays of removed edges need no tracing any more
             for side in range(2):
                 for point in self.points.over(int(self.mesh.edges[edge, side])):
-                    self.rays[point, self.slots[edge, side]] = ABANDONED
+                    self.rays[point, self.slots[edge, side]] = RayMark.ABANDONED
         self.points.grow_vertices(len(mesh.vertices))
         self.incident, self.slots = _incidence(mesh)
         more = len(mesh.edges) - len(self.effort)
@@ -196,7 +206,7 @@ class Pairing:
         self.mesh = mesh
         self.fit()
 
-    def forget(self, curve: int, mark: int = UNTRACED) -> None:
+    def forget(self, curve: int, mark: RayMark = RayMark.UNTRACED) -> None:
         """Take a curve back from its ends."""
         edge = self.curves.edge[curve]
         for point in (self.curves.start[curve], self.curves.end[curve]):
@@ -228,7 +238,7 @@ def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
         mesh,
         Points.empty(setting.structure, len(mesh.vertices)),
         Curves(),
-        np.full((0, incident.shape[1]), UNTRACED),
+        np.full((0, incident.shape[1]), RayMark.UNTRACED),
         slots,
         incident,
         np.zeros(len(mesh.edges), int),

@@ -37,7 +37,7 @@ def seeds(
 
     Random search looks over some of the `searchable` vertices only.
     """
-    vertices, z = _from_natural_states(setting, _spread(mesh))
+    vertices, z = _from_natural_states(setting, *_spread(mesh))
     searched_v, searched_z = _from_search(setting, mesh, searchable, seed)
     vertices, z = np.concatenate([vertices, searched_v]), np.concatenate([z, searched_z])
     return polished(setting, mesh, vertices, z)[0]
@@ -72,9 +72,8 @@ def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n
 
 
 def _from_natural_states(
-    setting: Setting, chosen: tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n d"]]
+    setting: Setting, vertices: Int[np.ndarray, " n"], points: Float[np.ndarray, "n d"]
 ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
-    vertices, points = chosen
     structure = setting.structure
     p = setting.parameters(points)
     unloaded = p.copy()

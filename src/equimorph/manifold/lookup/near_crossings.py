@@ -213,10 +213,10 @@ class NearCrossings:
         self,
         centres: Centres,
         p: Parameters,
-        states: tuple[Lanes, Int[np.ndarray, " lanes"]],
+        z: Lanes,
+        point: Int[np.ndarray, " lanes"],
     ) -> Flags:
         """Which states, given with their points, are such that `branches` finds."""
-        z, point = states
         structure = self.setting.structure
         out = np.zeros(len(z), bool)
         for k in range(len(centres.z)):

@@ -129,22 +129,28 @@ class Sheets:
             order = np.lexsort((cell, point))
             z, point, cell = z[order], point[order], cell[order]
         if self.crossings is not None:
-            z, point, cell = self._beside_crossings(self.crossings, p, (z, point, cell))
+            z, point, cell = self._beside_crossings(self.crossings, p, z, point, cell)
         return States(self.structure, z, p[point]), point, cell
 
-    def _beside_crossings(self, crossings: NearCrossings, p: Points, found: Found) -> Found:
+    def _beside_crossings(
+        self,
+        crossings: NearCrossings,
+        p: Points,
+        z: Lanes,
+        point: Int[np.ndarray, " lanes"],
+        cell: Int[np.ndarray, " lanes"],
+    ) -> Found:
         """States found over points, where these are close to crossings by the reduced equation."""
-        z, point, cell = found
         near = self.above.near(p[:, self.free])
         close = crossings.close(near, p)
         if len(close) == 0:
-            return found
+            return z, point, cell
         centres = crossings.centres(close, p)
         branches, centres = crossings.branches(centres, p)
         own = np.isin(branches.index, self.cell_index)
         own &= self._allowed(branches.z, p[branches.point])
         of_own = (branches.z[own], branches.point[own], branches.index[own])
-        kept = ~crossings.on_branches(centres, p, (z, point))
+        kept = ~crossings.on_branches(centres, p, z, point)
         parts = [(z[kept], point[kept], cell[kept])]
         for number in np.unique(of_own[1]):
             here, index = (column[of_own[1] == number] for column in (of_own[0], of_own[2]))

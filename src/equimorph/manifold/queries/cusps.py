@@ -158,7 +158,7 @@ def cusps_on_edges(
     def value(at: Vertices, lanes: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
 
-    done, found = roots(fabric, ends[turning], (ON_FOLD, lowest), known[turning], value)
+    done, found = roots(fabric, ends[turning], ON_FOLD, lowest, known[turning], value)
     return ends[turning[done]], found
 
 

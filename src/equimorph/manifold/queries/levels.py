@@ -10,7 +10,6 @@ from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import (
     ROUND_OFF,
-    About,
     Cut,
     Ends,
     Function,
@@ -119,7 +118,7 @@ def divided_by(eset: EquilibriumSet, constraint: Constraint) -> Division:
 
 def _divided(eset: EquilibriumSet, cut: "Cut") -> Division:
     nothing = np.zeros(len(cut.values), bool)
-    whole = part_of(eset, cut.fabric, np.ones(len(cut.fabric.cells), bool), (nothing, cut.lost))
+    whole = part_of(eset, cut.fabric, np.ones(len(cut.fabric.cells), bool), nothing, cut.lost)
     side = np.sign(cut.values[cut.fabric.cells].sum(axis=1)).astype(int)
     on_level, number = np.zeros(len(whole.points), bool), cut.fabric.numbers
     on_level[number[cut.on_level & (number >= 0)]] = True
@@ -155,7 +154,7 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
     inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
     constraints = (*eset.constraints, constraint)
     setting = replace(fabric.setting, constraints=constraints)
-    return part_of(eset, replace(cut.fabric, setting=setting), inside, (cut.on_level, cut.lost))
+    return part_of(eset, replace(cut.fabric, setting=setting), inside, cut.on_level, cut.lost)
 
 
 def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
@@ -172,7 +171,7 @@ def part(eset: EquilibriumSet, cells: Bool[np.ndarray, " C"]) -> EquilibriumSet:
     """Some of the cells as a set of its own, like the stable ones: ``eset.cell_index == 0``."""
     fabric = fabric_of(eset)
     nothing = np.zeros(len(fabric.vertices), bool)
-    return part_of(eset, fabric, cells, (nothing, 0))
+    return part_of(eset, fabric, cells, nothing, 0)
 
 
 def _level(eset: EquilibriumSet, function: Function) -> Level:
@@ -191,9 +190,13 @@ def _cut(fabric: Fabric, function: Function) -> Cut:
     values = np.where(np.abs(values) <= ROUND_OFF * np.abs(values).max(initial=0.0), 0.0, values)
 
     def between(
-        fabric: Fabric, ends: Ends, about: About, known: Float[np.ndarray, "n 2"]
+        fabric: Fabric,
+        ends: Ends,
+        mark: int,
+        index: Int[np.ndarray, " n"],
+        known: Float[np.ndarray, "n 2"],
     ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
-        return roots(fabric, ends, about, known, lambda at, _: function(at))
+        return roots(fabric, ends, mark, index, known, lambda at, _: function(at))
 
     return cut_between(fabric, values, between, function)
 
@@ -202,10 +205,13 @@ def part_of(
     eset: EquilibriumSet,
     fabric: Fabric,
     cells: Bool[np.ndarray, " C"],
-    level: tuple[Bool[np.ndarray, " V"], int],
+    on_level: Bool[np.ndarray, " V"],
+    lost: int,
 ) -> EquilibriumSet:
-    """Some cells of a fabric as a set; facets on the level lie on a constraint."""
-    on_level, lost = level
+    """Some cells of a fabric as a set; facets on the level lie on a constraint.
+
+    `lost`: how many edges could not be cut.
+    """
     whole = adjacency(fabric.cells[cells]) if cells.any() else None
     facets, marks = fabric.facets, fabric.marks
     if whole is not None:

@@ -191,7 +191,7 @@ def rings_around(fabric: Fabric, ends: Edges) -> Rings:
     table = np.full((len(ends), MOST, 3), -1)
     table[edge, place] = np.concatenate([cell[:, None], arc], axis=1)
     kept = (count > 0) & (count <= MOST)
-    return _ordered(fabric, (ends[kept], mark[kept], count[kept]), table[kept])
+    return _ordered(fabric, ends[kept], mark[kept], count[kept], table[kept])
 
 
 def _single(mark: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
@@ -221,11 +221,12 @@ def _arcs(
 
 def _ordered(
     fabric: Fabric,
-    about: tuple[Edges, Int[np.ndarray, " n"], Int[np.ndarray, " n"]],
+    ends: Edges,
+    mark: Int[np.ndarray, " n"],
+    count: Int[np.ndarray, " n"],
     table: Int[np.ndarray, "n ring 3"],
 ) -> Rings:
     """Rings with their cells one after the other, parted where facets are marked."""
-    ends, mark, count = about
     base, rows = len(fabric.vertices), np.arange(len(ends))
     known = np.sort(keys_of(fabric.facets, base))
     marked = np.zeros((len(ends), MOST), bool)

@@ -114,7 +114,7 @@ def _step(
     if index[0] != lowest:
         return None
     kinds = np.array([FOLD if mark == ON_FOLD else CAP])
-    return vertices_of(setting, (pinned.z, pinned.p), kinds, (index, np.array([-1])), at.rows)
+    return vertices_of(setting, pinned.z, pinned.p, kinds, index, np.array([-1]), at.rows)
 
 
 def _index(

@@ -254,10 +254,10 @@ def _at_better_places(
     found[found] = counted == index[found]
     kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
     some = int(found.sum())
-    states, others = (pinned.z[found], pinned.p[found]), (index[found], np.full(some, -1))
+    z, p, index, nowhere = pinned.z[found], pinned.p[found], index[found], np.full(some, -1)
     kinds, planes = np.full(some, kind[fold, cap]), store.rows[chosen[found]]
     none[np.flatnonzero(far)[found]] = True
-    return none, vertices_of(setting, states, kinds, others, planes)
+    return none, vertices_of(setting, z, p, kinds, index, nowhere, planes)
 
 
 @dataclass(frozen=True)

@@ -198,7 +198,7 @@ def linearise(
 ) -> Linearisation:
     """Linearise at states."""
     along = answers(structure, z, p, which)
-    return Linearisation(*along, slopes_along(structure, (z, p), along, descriptors))
+    return Linearisation(*along, slopes_along(structure, z, p, *along, descriptors))
 
 
 def shortest_change(
