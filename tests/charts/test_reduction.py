@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.charts.location import Found
+from equimorph.charts.rules import first_of_each
 from equimorph.errors import InputError
 from oracles.charted import lifted, spring_fold
 from oracles.polynomial import fold_form
@@ -175,3 +177,15 @@ def test_wrong_reductions_are_refused(spring_set):
         em.reduce(spring_set, prefer=em.quasi_static("x_l"))
     with pytest.raises(InputError, match="`nearest` must name one of 2 strata"):
         em.reduce(spring_set, prefer=em.nearest(7))
+
+
+def test_of_equally_preferred_states_the_highest_is_taken():
+    """Mirror images over F = 0 have one energy; the elevation of the spring is its angle."""
+    spring = em.Spring()
+    z, p = np.array([[-0.6], [0.6], [0.0]]), np.tile([0.8, 0.0, 1.0], (3, 1))
+    none = np.zeros(3, int)
+    found = Found(em.States(spring, z, p), none, none, np.ones(3, bool))
+    energy = spring.energy(z, p)
+    assert energy[0] == energy[1] < energy[2]
+    assert first_of_each(found, energy, spring.elevation).tolist() == [False, True, False]
+    assert first_of_each(found, -energy, spring.elevation).tolist() == [False, False, True]

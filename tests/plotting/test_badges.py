@@ -24,3 +24,11 @@ def test_way_points_too_close_to_another_get_no_number():
     ax.set(xlim=(0, 288), ylim=(0, 288))
     number_way_points(ax, np.array([[50.0, 50.0], [53.0, 50.0], [200.0, 90.0]]))
     assert [text.get_text() for text in ax.texts] == ["1", "3"]
+
+
+def test_the_ends_of_a_route_come_before_the_points_near_them():
+    """The last way-point keeps its number, the one before it gives way."""
+    ax = Figure(figsize=(4, 4), dpi=72).add_axes((0, 0, 1, 1))
+    ax.set(xlim=(0, 288), ylim=(0, 288))
+    number_way_points(ax, np.array([[50.0, 50.0], [197.0, 90.0], [200.0, 90.0]]))
+    assert [text.get_text() for text in ax.texts] == ["1", "3"]

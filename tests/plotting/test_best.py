@@ -64,6 +64,21 @@ def test_strips_show_what_moves_and_nothing_else():
         )
 
 
+def test_the_strips_that_move_most_are_kept():
+    """Of 26 parameters that move by 0.001, 0.002, … the two that move least are left out."""
+    steps, count = np.linspace(0.0, 1.0, 5), 26
+    names = tuple(f"p{k}" for k in range(count))
+    schedule = Schedule(
+        names, ("actuator",) * count, ("rad",) * count,
+        0.001 * steps[:, None] * np.arange(1.0, count + 1.0), steps, steps, {}, {},
+        np.array([0, 4]),
+    )  # fmt: skip
+    figure = plotting.schedule_strips(schedule)
+    words = [text.get_text().strip("$") for ax in figure.axes for text in ax.texts]
+    shown = [word.replace("_{", "").replace("}", "").replace("_", "") for word in words]
+    assert sorted(set(names) - set(shown)) == ["p0", "p1"]
+
+
 def test_a_jump_of_an_optimum_breaks_its_line(spring):
     z, p = np.array([[0.5], [0.6], [0.9]]), np.tile([0.8, 0.0, 1.0], (3, 1))
     p[:, 0] = [0.8, 0.7, 0.9]

@@ -11,6 +11,7 @@ from equimorph.errors import InputError
 from equimorph.model import Silent
 from equimorph.storage import read_results
 from equimorph.study import Outcome, parse_study, prepare, run_study
+from equimorph.study.measured_points import _shape
 from typecheck import unchecked
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -108,6 +109,20 @@ def test_other_data_are_another_study(run, tmp_path):
     (tmp_path / "calibration.csv").write_text(data.replace("0.0491", "0.0492"), encoding="utf-8")
     with pytest.raises(InputError, match="results of another study"):
         run_study(tmp_path / "calibration.toml", run[1])
+
+
+def test_every_point_keeps_its_deviation():
+    """Rows in any order of s; a state without a point has the deviation 1, which counts nowhere."""
+    column = {
+        "s": np.array([1.0, 0.5, 1.0]),
+        "x": np.array([4.0, 2.0, 5.0]),
+        "y": np.array([0.4, 0.2, 0.5]),
+        "sigma": np.array([0.01, 0.02, 0.03]),
+    }
+    shape = _shape(column, [[0, 1], [2]], None, "calibration[0]")
+    np.testing.assert_array_equal(shape.s, [0.5, 1.0])
+    np.testing.assert_array_equal(shape.points, [[[2, 0.2], [4, 0.4]], [[np.nan] * 2, [5, 0.5]]])
+    np.testing.assert_array_equal(np.asarray(shape.sigma)[:, :, 0], [[0.02, 0.01], [1.0, 0.03]])
 
 
 def test_exact_points_give_the_exact_unknowns(tmp_path):

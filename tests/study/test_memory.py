@@ -50,6 +50,24 @@ def test_a_study_that_needs_too_much_is_refused_with_the_numbers():
         check_memory(problem)
 
 
+def test_the_largest_need_counts_and_may_just_be_met(monkeypatch: pytest.MonkeyPatch):
+    """A set of 9 × 9 and a map of 3 × 3 intervals: the set needs more."""
+    words = '[structure]\nkind = "spring"\n[set.box]\nx_l = [0.5, 1.2]\nF = [-0.1, 0.1]\n'
+    grid = (
+        '[[map]]\nname = "a"\nkind = "limit_load_map"\nload = "F"\nintervals = [3, 3]\n'
+        "box = { x_l = [0.5, 0.9], k = [1, 2] }\n"
+    )
+    study = words.replace("[set.box]", "[set]\nintervals = [9, 9]\n[set.box]") + grid
+    problem = prepare(parse_study(study, "spring.toml"))
+    assert len(problem.extents) == 2
+    needed = memory.estimated_memory(problem.structure.size, (9, 9))
+    monkeypatch.setattr(memory, "available_memory", lambda: 1.001 * needed)
+    assert check_memory(problem) == needed
+    monkeypatch.setattr(memory, "available_memory", lambda: 0.999 * needed)
+    with pytest.raises(InputError, match=r"`set\.intervals` must fit into memory; got \[9, 9\]"):
+        check_memory(problem)
+
+
 SET = """
 import re, sys
 from pathlib import Path
