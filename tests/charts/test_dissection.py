@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import equimorph as em
+from equimorph.charts import Transition
 from equimorph.charts.conflicts import overlapping
 from equimorph.charts.coordinates import coordinates_of
 from equimorph.charts.location import Cells
@@ -69,6 +70,34 @@ def test_transitions_are_one_to_one_both_ways(spring_atlas):
             transition.cross(np.array([[0.4, 0.4]]), first)
         with pytest.raises(InputError, match="`source` must be one of"):
             transition.cross(at, 7)
+
+
+@pytest.fixture
+def bend():
+    """A transition from (0, 0) over (1, 0) to (1, 1), stretched twice and three times."""
+    ours = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    states = em.States(em.Spring(), np.zeros((3, 1)), np.ones((3, 3)))
+    facets = np.array([[0, 1], [1, 2]])
+    return Transition((0, 1), "cut", states, (ours, ours * [2.0, 3.0]), facets)
+
+
+def test_points_on_a_transition_keep_their_share_of_a_chord(bend):
+    there = bend.cross(np.array([[0.25, 0.0], [1.0, 0.5], [1.0, 1.0]]), 0)
+    np.testing.assert_allclose(there, [[0.5, 0.0], [2.0, 1.5], [2.0, 3.0]], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("place", "lies"),
+    [((0.25, 5e-7), True), ((0.25, 2e-6), False), ((-5e-7, 0.0), True), ((-2e-6, 0.0), False)],
+)
+def test_points_belong_to_a_transition_up_to_a_millionth_of_its_extent(bend, place, lies):
+    """Beyond its ends as well as beside it."""
+    if lies:
+        expected = [2.0 * max(place[0], 0.0), 0.0]
+        np.testing.assert_allclose(bend.cross(np.array([place]), 0)[0], expected, atol=1e-15)
+    else:
+        with pytest.raises(InputError, match="`coords` must lie on the transition"):
+            bend.cross(np.array([place]), 0)
 
 
 @given(st.floats(-1.25, 1.25), st.floats(0.31, 1.29))
