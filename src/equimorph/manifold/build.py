@@ -179,7 +179,13 @@ def _of_grid(
         recovered += lacking
         some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
         _recover(pairing, found.missing[some])
-    audit = replace(eset.audit, checked=found.found, missing=lacking, recovered=recovered)
+    audit = replace(
+        eset.audit,
+        checked=found.found,
+        missing=lacking,
+        recovered=recovered,
+        descents=found.descents,
+    )
     return replace(eset, audit=audit)
 
 

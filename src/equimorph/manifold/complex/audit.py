@@ -23,6 +23,9 @@ class Audit:
     Of the equilibria found by random search at random points, `recovered` were missing and have
     been added; in the last round, `missing` of `checked` were, which must be zero too.
 
+    `descents` counts how descents from vertices of the strata of index one, and from folds, ended;
+    what they landed on and the set lacked has been added, too.
+
     Of refined sets: the `accuracy` that was asked for, the largest `deviation` of straight cells
     from the set as their edges show it, how many edges are `unrefined` (they could not be
     bisected), by how much the numbers of pieces and of boundary loops and the Euler characteristic
@@ -59,6 +62,7 @@ class Audit:
     changed: int = 0
     smallest_free_angle: float = 0.0
     wrong: int = 0
+    descents: tuple[tuple[str, int], ...] = ()
 
     @property
     def missing_at_most(self) -> float:
@@ -122,9 +126,26 @@ class Audit:
                 "completeness check",
                 f"{self.missing} of {self.checked} equilibria found at random points are missing, "
                 f"{self.recovered} added before; with 95 % confidence fewer than "
-                f"{100 * self.missing_at_most:.0f} % are missing"
+                f"{_percent(self.missing_at_most)} of those that it can find are missing"
                 if self.checked
                 else "not made",
             ),
+            ("descents from unstable strata", self._descents),
             *(refined if self.accuracy else []),
         ]
+
+    @property
+    def _descents(self) -> str:
+        """What descents say: one line."""
+        if not self.checked:
+            return "not made"
+        ends = ", ".join(f"{count} {outcome}" for outcome, count in self.descents)
+        return (
+            f"{ends or 'no unstable stratum'}; no stable sheet is missing unless every sheet of "
+            "index one beside it is missing as well"
+        )
+
+
+def _percent(share: float) -> str:
+    """A share in per cent with two digits, never rounded to none."""
+    return f"{100.0 * share:.2g} %" if share < 0.01 else f"{100.0 * share:.0f} %"

@@ -14,6 +14,7 @@ from equimorph.equilibria.settle import Guards, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.lifting.descents_of_set import descents_of_set
 from equimorph.manifold.lifting.seeds import Seeds, polished
 from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.model import Progress, position
@@ -31,10 +32,15 @@ ITERATIONS = 40
 
 @dataclass(frozen=True)
 class Check:
-    """How many equilibria a search found, and those of them that the set lacks."""
+    """How many equilibria a search found, and those of them that the set lacks.
+
+    descents: how many descents from unstable strata ended how; what they landed on is among those
+    that were found.
+    """
 
     found: int
     missing: States
+    descents: tuple[tuple[str, int], ...] = ()
 
 
 def check(
@@ -72,8 +78,10 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
         seed=seed,
     )
     scattered = _scattered(eset, SCATTERED, np.random.default_rng(seed))
+    led = descents_of_set(eset)
     found = _together([*searched, scattered])
-    return Check(len(found), _lacking(found, eset))
+    lacking = _together([_lacking(each, eset) for each in (found, led.landed)])
+    return Check(len(found), lacking, led.outcomes)
 
 
 def _together(parts: Sequence[States]) -> States:

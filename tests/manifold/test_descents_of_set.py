@@ -1,0 +1,62 @@
+"""Sheets that no search sees are found by descents from the unstable sheet beside them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.manifold.lifting import completeness, seeds
+from oracles.close_states import close_roots, close_sheets
+from typecheck import unchecked
+
+BOX = em.Box(p=(-1, 1), r=(-1, 1))
+
+
+def blind(search):
+    """Search that overlooks stable states at x < 2."""
+
+    def some(*args, **options):
+        found = search(*args, **options)
+        return [each[np.flatnonzero((each.index > 0) | (each.z[:, 0] > 2.0))] for each in found]
+
+    return some
+
+
+@pytest.mark.parametrize("distance", [0.1, 1e-3])
+def test_a_stable_sheet_that_no_search_sees_is_found(monkeypatch, distance):
+    """E' = (x − 3)(x − a)(x − a − d)(x − a − 2d): x = a + d lies between two unstable sheets."""
+    for module in (seeds, completeness):
+        monkeypatch.setattr(module, "search_points", blind(module.search_points))
+    monkeypatch.setattr(completeness, "_scattered", lambda eset, *_: eset.points[:0])
+    with unchecked():
+        eset = em.equilibrium_set(close_sheets(distance), BOX, intervals=(6, 7))
+    assert eset.audit.clean
+    assert eset.audit.recovered > 0
+    assert sorted(each.index for each in eset.strata) == [0, 0, 1, 1]
+    here = eset.at(p=0.3, r=0.2)
+    # Newton ends at corrections of 1e-10
+    assert np.sort(here.z[:, 0]) == pytest.approx(close_roots(distance, 3, 0.3, 0.2), abs=1e-9)
+
+
+def test_the_audit_says_what_descents_mean():
+    with unchecked():
+        eset = em.equilibrium_set(close_sheets(0.1), BOX, intervals=(6, 7))
+    told = dict(eset.audit.rows())
+    row = told["descents from unstable strata"]
+    assert row.startswith("24 landed, 8 left the box of guesses; no stable sheet is missing unless")
+    assert "fewer than 0 %" not in told["completeness check"]
+    assert (
+        dict(replace(eset.audit, checked=0).rows())["descents from unstable strata"] == "not made"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sheets", [2, 3, 4, 5, 6])
+@pytest.mark.parametrize("distance", [1e-1, 1e-2, 1e-3, 1e-4])
+def test_sets_of_close_sheets_are_complete(distance, sheets):
+    """As many sheets as roots, over the whole box."""
+    with unchecked():
+        eset = em.equilibrium_set(close_sheets(distance, sheets), BOX)
+    assert eset.audit.clean
+    assert len(eset.components) == sheets + 1
