@@ -63,6 +63,17 @@ def bench_newton_step_on_one_thread(benchmark, elements, degree, lanes):
 
 
 @pytest.mark.parametrize("lanes", [100, 4096])
+@pytest.mark.parametrize("what", ["index", "margin"])
+def bench_stability_in_space(benchmark, what, lanes):
+    """Lateral index and margin, with as many threads as there are."""
+    rod = Rod(torsion=0.77, lateral=1.0)
+    z, p, _, _ = lanes_near_the_arch(rod, lanes)
+    ask = getattr(rod.out_of_plane(), what)
+    benchmark.pedantic(ask, (z, p), rounds=20, warmup_rounds=2)
+    record(benchmark, rod, lanes)
+
+
+@pytest.mark.parametrize("lanes", [100, 4096])
 def bench_newton_step_through_the_contract(benchmark, lanes):
     """With checks and allocation, and as many threads as there are."""
     rod = Rod()

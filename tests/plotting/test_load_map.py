@@ -75,3 +75,12 @@ def test_a_curvature_map_dots_what_snaps_and_draws_barriers():
     assert labels[0] == "barrier: fold"
     assert labels[-1] == "snaps on the way"
     assert any(axes.get_ylabel() == "max |κ| (1/L) at $q$ = 2.5" for axes in ax.figure.axes)
+
+
+def test_stripes_mark_where_the_rod_leaves_its_plane_first():
+    """A round rod does so nearly everywhere; the dots' entry has no place."""
+    rod = em.Rod(torsion=0.77, lateral=1.0)
+    grid = em.Grid(Theta=(0.8, 1.0, 2), Delta=(-0.1, 0.1, 2))
+    within = [rod.max_curvature <= 10, rod.stable_in_space]
+    ax = plotting.load_map(em.limit_load_map(rod, grid, "q", within=within))
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["leaves its plane first"]

@@ -44,7 +44,7 @@ def with_hidden_events(
 
     The first hidden event that stops a lane becomes its end. See `hidden_events`.
     """
-    points = _points(curve, z, outcome)
+    points = recorded_points(curve, z, outcome)
     inside = hidden_events(curve, points, options, thorough=thorough)
     last_ones = _before_ends(curve, points, outcome)
     hidden = Events.joined([inside, last_ones], z.shape[1])
@@ -96,7 +96,7 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     for i in np.flatnonzero(index != points.index[last]):
         ends, one = np.array([last[i] - 1, last[i]]), curve.take(lanes[i : i + 1])
         both = curve.take(np.repeat(lanes[i], 2))
-        probe = probed(both, _fronts(both, points, ends), points.travelled[ends])
+        probe = probed(both, fronts(both, points, ends), points.travelled[ends])
         if np.abs(probe.value[1]) <= AT_EVENT * np.abs(probe.value[0]):
             continue
         front = replace(probe.front, index=np.array([points.index[last[i]], index[i]]))
@@ -107,7 +107,7 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     return Events.joined(found, size)
 
 
-def _points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
+def recorded_points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
     """Starts, recorded points, and the ends that are regular ones."""
     lanes, none = np.arange(len(z)), np.zeros(len(z))
     index = curve.structure.index(z, curve.parameters(none))
@@ -142,7 +142,7 @@ def hidden_events(
         return Events.joined(found, curve.structure.size)
     lanes, index = points.lanes[near], points.index[near]
     many = curve.take(lanes)
-    probe = probed(many, _fronts(many, points, near), points.travelled[near])
+    probe = probed(many, fronts(many, points, near), points.travelled[near])
     low = _lowest(np.abs(probe.value), _neighbours(points, near), CLOSE)
     kept = np.flatnonzero(~low)
     few, sign = probe.at(kept), np.sign(probe.value[kept])
@@ -244,7 +244,7 @@ def _lowest(
     return out
 
 
-def _fronts(curve: Curve, points: Points, near: Some) -> Front:
+def fronts(curve: Curve, points: Points, near: Some) -> Front:
     """Unit tangents at points of paths, along them."""
     lanes = points.lanes
     # the chord to the next point, or from the one before, gives the direction and closes the system

@@ -19,6 +19,8 @@ from equimorph.model import Constraint, Progress
 from equimorph.structures import States
 
 Words = Shaped[np.ndarray, " lanes"]
+WORD = "U24"
+"""Array of kinds of events and of criticality: room for the longest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,10 +171,10 @@ class _Ledger:
         self.z, self.p = self.begun.z.copy(), self.begun.p.copy()
         self.at, self.length = np.zeros(lanes), np.zeros(lanes)
         self.index = self.begun.structure.index(self.z, self.p)
-        over = violated(self.begun, self.within)
+        self.over = violated(self.begun, self.within)
         self.code, self.words = (
-            np.where(over, EventCode.CONSTRAINT, EventCode.ARRIVED),
-            np.full(lanes, "", "U16"),
+            np.where(self.over, EventCode.CONSTRAINT, EventCode.ARRIVED),
+            np.full(lanes, "", WORD),
         )
         self.detail: dict[int, str] = {}
         self.events: list[_Part] = []
@@ -195,7 +197,7 @@ class _Ledger:
             curve.take(branched), outcome.z[branched], outcome.t[branched]
         )
         passed = outcome.passed
-        words = np.full(len(passed.code), "", "U16")
+        words = np.full(len(passed.code), "", WORD)
         at = np.flatnonzero(passed.code == EventCode.BRANCH_POINT)
         words[at] = _criticality(curve.take(passed.lanes[at]), passed.z[at], passed.t[at])
         z, p = curve.take(passed.lanes).states(passed.z, passed.t)
@@ -210,12 +212,17 @@ class _Ledger:
 
     def lifts(self, within: tuple[Constraint, ...], recorded: bool) -> Lifts:
         """Everything together."""
+        kind = _kinds(self.code)
         met = np.flatnonzero(self.code == EventCode.CONSTRAINT)
         if len(met):
             excess = np.array([c.excess(self.z[met], self.p[met]) for c in within])
-            for lane, which in zip(met, excess.argmax(axis=0), strict=True):
+            worst = excess.argmax(axis=0)
+            for lane, which in zip(met, worst, strict=True):
                 self.detail[int(lane)] = str(within[which])
-        kind = _kinds(self.code)
+            for which in np.unique(worst):  # lanes that begin beyond have met nothing
+                lanes = met[(worst == which) & ~self.over[met]]
+                kind[lanes] = within[which].event
+                self.words[lanes] = within[which].criticality(self.z[lanes], self.p[lanes])
         ends = (self.at, self.length, self.index, self.words, self.detail)
         points = self._marks(self.points) if recorded else None
         return Lifts(self.states, kind, *ends, self._marks(self.events), points)
@@ -239,7 +246,7 @@ class _Ledger:
 
 def _kinds(code: Int[np.ndarray, " some"]) -> Shaped[np.ndarray, " some"]:
     known, which = np.unique(code, return_inverse=True)
-    names = np.array([EventCode(each).kind for each in known], "U16")
+    names = np.array([EventCode(each).kind for each in known], WORD)
     return np.asarray(names[which])
 
 
@@ -247,5 +254,5 @@ def _criticality(
     curve: Curve, z: Lanes, t: Float[np.ndarray, " some"]
 ) -> Shaped[np.ndarray, " some"]:
     if len(t) == 0:
-        return np.zeros(0, "U16")
-    return np.array(criticality(curve, z, t), "U16")
+        return np.zeros(0, WORD)
+    return np.array(criticality(curve, z, t), WORD)

@@ -21,8 +21,10 @@ from equimorph.structures import State, States
 class LimitLoad:
     """The largest load met up to the first critical point.
 
-    kind: "fold", "branch point", "multiple point", "constraint", "none below the bound", "undefined
-    unloaded" (a constraint fails at the start) or "lost"; `state`: where the path ended.
+    kind: "fold", "branch point", "multiple point", "constraint", "lateral branch point" (of the
+    constraint `stable_in_space` of a rod), "none below the bound", "undefined unloaded" (a
+    constraint fails at the start) or "lost"; `state`: where the path ended; `criticality` of branch
+    points.
     """
 
     value: float

@@ -6,13 +6,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve, ParameterLine
-from equimorph.equilibria.hidden_events import with_hidden_events, with_multiple_points
+from equimorph.equilibria.hidden_events import (
+    recorded_points,
+    with_hidden_events,
+    with_multiple_points,
+)
 from equimorph.equilibria.legs import Leg, listed, prepared
 from equimorph.equilibria.march import UNRESOLVED
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
+from equimorph.equilibria.vanishing import vanishing_points
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import State, States
@@ -26,11 +32,11 @@ class Event:
     """Something that happened on a lift, at an exact state.
 
     kind: an `EventKind`, equal to its text: "arrived", "fold", "branch point", "constraint",
-    "returned" (a path that turned at a fold came back to the parameters of its start), "critical"
-    (stability changes where a path with unknown parameters goes on), "multiple point" (several
-    eigenvalues vanish at once, so that the path has no direction; it ends within round-off of it)
-    or "lost"; `at`: number of the leg + share of it; `criticality` of branch points; `detail`: one
-    line.
+    "lateral branch point" (the structure begins to leave its plane), "returned" (a path that turned
+    at a fold came back to the parameters of its start), "critical" (stability changes where a path
+    with unknown parameters goes on), "multiple point" (several eigenvalues vanish at once, so that
+    the path has no direction; it ends within round-off of it) or "lost"; `at`: number of the leg +
+    share of it; `criticality` of branch points; `detail`: one line.
     """
 
     kind: str
@@ -104,7 +110,8 @@ def lift_one(
         if begun.curve.folds_change_index:
             outcome = with_hidden_events(begun.curve, begun.z, outcome, options)
         outcome = with_multiple_points(begun.curve, begun.z, outcome)
-        pieces.append(_segment(begun.curve, outcome, number, within))
+        aside = _vanishing_events(begun.curve, begun.z, outcome)
+        pieces.append(_segment(begun.curve, outcome, number, within, aside=aside))
         if pieces[-1].events[-1].kind != "arrived":
             break
         here = pieces[-1].events[-1].state
@@ -148,12 +155,19 @@ class _Segment:
 
 
 def _segment(
-    curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...], lane: int = 0
-) -> _Segment:
-    """One lane of an outcome, as leg number so much of a path."""
+    curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...], lane: int = 0,
+    aside: Sequence[tuple[float, Event]] = (),
+) -> _Segment:  # fmt: skip
+    """One lane of an outcome, as leg number so much of a path.
+
+    `aside`: events that do not stop a path, by their length on it; their `at` counts from 0.
+    """
     if len(outcome.code) > 1:
         curve, outcome = curve.take(np.array([lane])), _lane(outcome, lane)
-    events = (*_passed(curve, outcome, number), _end(curve, outcome, number, within))
+    passed = [*zip(outcome.passed.travelled, _passed(curve, outcome, number), strict=True)]
+    passed += [(length, replace(one, at=number + one.at)) for length, one in aside]
+    passed.sort(key=lambda each: each[0])
+    events = (*(event for _, event in passed), _end(curve, outcome, number, within))
     last = outcome.travelled[0] if outcome.code[0] != EventCode.LOST else np.inf
     points = outcome.points.take(outcome.points.travelled < last)
     ended = slice(0, int(outcome.code[0] != EventCode.LOST))
@@ -202,14 +216,30 @@ def _passed(curve: Curve, outcome: Traces, number: int) -> list[Event]:
     ]
 
 
+def _vanishing_events(curve: Curve, z: Lanes, outcome: Traces) -> list[tuple[float, Event]]:
+    """Events of the only lane that do not stop it: where descriptors that are watched vanish."""
+    found = []
+    for descriptor in curve.structure.watched:
+        assert descriptor.vanishing is not None
+        at = vanishing_points(curve, recorded_points(curve, z, outcome), descriptor)
+        states = _states(curve, at.z, at.t)
+        critical = descriptor.vanishing.criticality(*states)
+        for i, length in enumerate(at.travelled):
+            state = State(curve.structure, states[0][i], states[1][i])
+            kind = descriptor.vanishing.event
+            found.append((float(length), Event(kind, state, float(at.t[i]), critical[i])))
+    return found
+
+
 def _end(curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...]) -> Event:
     code, t = int(outcome.code[0]), outcome.t
     z, p = _states(curve, outcome.z, t)
     state = State(curve.structure, z[0], p[0])
-    kind, detail, critical = EventCode(code).kind, outcome.why.get(0, ""), None
+    kind: str = EventCode(code).kind
+    detail, critical = outcome.why.get(0, ""), None
     if code == EventCode.CONSTRAINT:
-        worst = max(within, key=lambda c: c.excess(state.z[None], state.p[None])[0])
-        detail = str(worst)
+        worst = max(within, key=lambda c: c.excess(z, p)[0])
+        kind, detail, critical = worst.event, str(worst), worst.criticality(z, p)[0] or None
     if code == EventCode.FOLD and not curve.folds_change_index:
         detail = "the Jacobian of the descriptors by the unknown parameters is singular"
     if code == EventCode.BRANCH_POINT:

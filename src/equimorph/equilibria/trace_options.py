@@ -18,6 +18,7 @@ class EventKind(StrEnum):
     FOLD = "fold"
     BRANCH_POINT = "branch point"
     CONSTRAINT = "constraint"
+    LATERAL_BRANCH_POINT = "lateral branch point"
     CRITICAL = "critical"
     MULTIPLE_POINT = "multiple point"
     LOST = "lost"
@@ -36,6 +37,10 @@ class EventKind(StrEnum):
     def __repr__(self) -> str:
         """Return the text in quotes, as that of any other word."""
         return repr(self.value)
+
+
+VIOLATIONS = (EventKind.CONSTRAINT, EventKind.LATERAL_BRANCH_POINT)
+"""Kinds of events where a path violates a constraint."""
 
 
 class EventCode(IntEnum):

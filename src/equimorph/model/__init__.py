@@ -1,6 +1,13 @@
 """Plain data: parameters, boxes, descriptors, constraints, schedules; sinks and journals."""
 
-from equimorph.model.descriptor import Constraint, Descriptor, combined, eased, largest_of
+from equimorph.model.descriptor import (
+    Constraint,
+    Descriptor,
+    Vanishing,
+    combined,
+    eased,
+    largest_of,
+)
 from equimorph.model.drawing import (
     Actuator,
     ActuatorKind,
@@ -57,6 +64,7 @@ __all__ = [
     "Spline",
     "Support",
     "SupportKind",
+    "Vanishing",
     "combined",
     "content_of_descriptor",
     "content_of_function",

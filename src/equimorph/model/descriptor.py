@@ -23,6 +23,8 @@ Branches = Callable[
     tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]],
 ]
 
+CONSTRAINT = "constraint"
+"""Event of a path that meets any other constraint."""
 EASE = 1e-9
 """Relative excess over a bound that counts as rounding."""
 
@@ -56,6 +58,22 @@ class ManyStates(Protocol):
         """Return the number of states."""
 
 
+@dataclass(frozen=True)
+class Vanishing:
+    """What a path meets where a descriptor vanishes, if that is an event of its own.
+
+    Parameters
+    ----------
+    event
+        Its kind, in words.
+    criticality
+        Of states there: "supercritical", "subcritical" or "not judged".
+    """
+
+    event: str
+    criticality: Callable[[Lanes, Parameters], list[str]]
+
+
 @door
 @dataclass(frozen=True, eq=False)
 class Descriptor:
@@ -80,6 +98,8 @@ class Descriptor:
         their places, which identify them.
     obstacle
         For the distance of the shape from an obstacle: this one, which figures show.
+    vanishing
+        For eigenvalues: the event where they vanish.
     """
 
     name: str
@@ -90,6 +110,7 @@ class Descriptor:
     place: Evaluate | None = None
     branches: Branches | None = None
     obstacle: Obstacle | None = None
+    vanishing: Vanishing | None = None
 
     # one and many states differ by the number of axes only, which static types do not see
     @overload
@@ -147,6 +168,18 @@ class Constraint:
     def __str__(self) -> str:
         """Return it as it is written."""
         return f"{self.descriptor.name} {self.sense} {self.bound:g}"
+
+    @property
+    def event(self) -> str:
+        """Kind of the event where a path violates the constraint."""
+        vanishing = self.descriptor.vanishing if self.bound == 0.0 else None
+        return CONSTRAINT if vanishing is None else vanishing.event
+
+    def criticality(self, z: Lanes, p: Parameters) -> list[str]:
+        """That of the event, state by state; empty texts where it has none."""
+        if self.event == CONSTRAINT or self.descriptor.vanishing is None:
+            return [""] * len(z)
+        return self.descriptor.vanishing.criticality(z, p)
 
     def excess(self, z: Lanes, p: Parameters) -> Values:
         """Amount by which states exceed the bound: positive where violated."""

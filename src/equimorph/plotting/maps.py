@@ -18,6 +18,7 @@ from matplotlib.tri import Triangulation
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.door import door
+from equimorph.model.descriptor import CONSTRAINT
 from equimorph.plotting import style
 from equimorph.plotting.labels import (
     constraint_label,
@@ -52,10 +53,10 @@ GROUND: dict[str, Any] = {
     "linewidth": 0.0,
 }
 """Where nothing is known."""
+_DOTS, _STRIPES = "....", "\\\\"
 _MARK: dict[str, Any] = {
     "facecolor": "none",
     "edgecolor": style.INK,
-    "hatch": "....",
     "linewidth": 0.0,
     "alpha": 0.55,
 }
@@ -76,6 +77,15 @@ class CurveLook:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """A pattern of some settings, and what it means; dots unless said otherwise."""
+
+    where: Bool[np.ndarray, "rows columns"]
+    label: str
+    hatch: str = _DOTS
+
+
+@dataclass(frozen=True)
 class Panel:
     """What a figure of a map shows in addition to the values.
 
@@ -85,8 +95,8 @@ class Panel:
         Looks of the curves by kind; those of other kinds are left out.
     bar
         Label of the colour bar.
-    marked, mark_label
-        Settings that are dotted, and what that means.
+    marks
+        Settings that have a pattern, and what it means.
     ground_label
         What is hatched.
     from_zero
@@ -95,8 +105,7 @@ class Panel:
 
     looks: Mapping[str, CurveLook]
     bar: str
-    marked: Bool[np.ndarray, "rows columns"]
-    mark_label: str
+    marks: tuple[Mark, ...]
     ground_label: str
     from_zero: bool
 
@@ -119,9 +128,10 @@ def draw_map(amap: ActuatorMap, panel: Panel, ax: Axes | None) -> Axes:
         if np.isfinite(amap.value).any():
             _fill(ax, amap, panel, faces(axes, amap.value, cuts))
         entries: list[Line2D | Patch] = list(_draw_curves(ax, amap, panel))
-        if panel.marked.any():
-            _mark(ax, faces(axes, panel.marked.astype(float), cuts), axes, panel.marked)
-            entries.append(Patch(label=panel.mark_label, **_MARK))
+        for mark in panel.marks:
+            if mark.where.any():
+                _mark(ax, faces(axes, mark.where.astype(float), cuts), axes, mark)
+                entries.append(Patch(label=mark.label, **_MARK, hatch=mark.hatch))
         if not np.isfinite(amap.value).all():
             entries.append(Patch(label=panel.ground_label, **GROUND))
         write_legend(ax, entries, room=own)
@@ -195,13 +205,14 @@ def _mark(
     ax: Axes,
     found: Faces,
     axes: tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]],
-    marked: Bool[np.ndarray, "rows columns"],
+    mark: Mark,
 ) -> None:
-    """Dot the faces whose corners are marked."""
-    inside = marked.ravel()[found.triangles].all(axis=1)
+    """Pattern of the faces whose corners are marked."""
+    inside = mark.where.ravel()[found.triangles].all(axis=1)
     whole = list(corners(axes)[found.triangles[inside]])
     cut = [piece for piece, value in zip(found.pieces, found.values, strict=True) if value > 0.5]
-    ax.add_collection(PolyCollection([*whole, *cut], zorder=3, rasterized=True, **_MARK))
+    look = {**_MARK, "hatch": mark.hatch}
+    ax.add_collection(PolyCollection([*whole, *cut], zorder=3, rasterized=True, **look))
 
 
 def _draw_curves(ax: Axes, amap: ActuatorMap, panel: Panel) -> list[Line2D]:
@@ -253,7 +264,8 @@ def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
 
     Cells that a jump crosses are cut along it; nothing is interpolated across. Contours are drawn
     where the map is smooth. Dots mark settings at which a constraint is met before stability is
-    lost; settings without a limit load are hatched.
+    lost, stripes those at which the structure leaves its plane first; settings without a limit load
+    are hatched.
 
     Parameters
     ----------
@@ -266,11 +278,14 @@ def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
     -------
     The axes.
     """
+    met = [each for each in lmap.within if each.event == CONSTRAINT]
     panel = Panel(
         looks=_LOOKS,
         bar=f"limit load {parameter_label(lmap.structure, lmap.load)}",
-        marked=lmap.where("constraint"),
-        mark_label=f"{constraint_label(lmap.within)} first",
+        marks=(
+            Mark(lmap.where("constraint"), f"{constraint_label(met)} first"),
+            Mark(lmap.where("lateral branch point"), "leaves its plane first", _STRIPES),
+        ),
         ground_label="undefined",
         from_zero=True,
     )
@@ -308,8 +323,7 @@ def curvature_map(cmap: CurvatureMap, ax: Axes | None = None) -> Axes:
     panel = Panel(
         looks=_CURVATURE_LOOKS,
         bar=f"{descriptor_label(cmap.descriptor)} at {symbol(cmap.load)} = {cmap.at:g}",
-        marked=cmap.snaps,
-        mark_label="snaps on the way",
+        marks=(Mark(cmap.snaps, "snaps on the way"),),
         ground_label="no stable state",
         from_zero=False,
     )

@@ -27,16 +27,23 @@ from equimorph.structures.quantities import (
 )
 from equimorph.structures.rod import (
     Couple,
+    CrossSection,
     Curvature,
     End,
+    LateralMode,
     LineLoad,
+    OwnSection,
     PointForce,
     Pressure,
     Rod,
+    Round,
+    SectionProperties,
+    Strip,
     Tendon,
+    Tube,
 )
 from equimorph.structures.spring import Spring
-from equimorph.structures.states import State, States, natural_state
+from equimorph.structures.states import SpaceStability, State, States, natural_state
 from equimorph.structures.truss import Bar, Truss
 
 KINDS: dict[str, Callable[..., Structure]] = {
@@ -49,6 +56,7 @@ __all__ = [
     "Advance",
     "Bar",
     "Couple",
+    "CrossSection",
     "Curvature",
     "Direction",
     "End",
@@ -56,19 +64,26 @@ __all__ = [
     "Equations",
     "Frame",
     "Growth",
+    "LateralMode",
     "LineLoad",
     "Majorant",
     "Member",
+    "OwnSection",
     "PointForce",
     "Pressure",
     "Rod",
+    "Round",
+    "SectionProperties",
+    "SpaceStability",
     "Spring",
     "State",
     "States",
+    "Strip",
     "Structure",
     "Symmetry",
     "Tendon",
     "Truss",
+    "Tube",
     "Unknown",
     "bordered_advance",
     "distance_to",

@@ -298,6 +298,16 @@ class Structure(ABC):
         nothing = np.zeros((len(z), 0, self.size))
         return self.solve(z, p, nothing).negative - self.constraints
 
+    @property
+    def watched(self) -> tuple[Descriptor, ...]:
+        """Descriptors whose zeros are events on the lift of one state; see `Vanishing`."""
+        return ()
+
+    def index_out_of_plane(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"] | None:
+        """Independent movements out of the plane that lower the energy; None: not judged."""
+        del z, p
+        return None
+
     def advance(  # the fused step of the hot path
         self,
         z: Lanes,

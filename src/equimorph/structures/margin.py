@@ -5,44 +5,73 @@ See docs/decisions.md, "The metric is diagonal".
 
 from functools import partial
 from itertools import pairwise
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.linalg import BorderedSolution
 from equimorph.linalg.lanes import in_background, threads
-from equimorph.structures.contract import Structure
 
 RELATIVE = 1e-11
 """Relative change of an eigenvalue at which an iteration ends."""
 NEAR = 1e-3
 """Distance of a shift below the eigenvalue, as a share of the second one, once that is known."""
+HALVINGS = (4, 4, 8)
+"""Bisections between a number below all eigenvalues and zero, before each try to go on in pairs."""
 SWEEPS, CHUNK, SHARE = 8, 256, 1024
 """Most solves; lanes at a time; least lanes that are worth a further thread."""
 
 Pairs = Float[np.ndarray, "lanes 2 unknowns"]
 
 
+@runtime_checkable
+class Pencil(Protocol):
+    """A constrained second variation and its metric, as structures and `OutOfPlane` have them."""
+
+    unknowns: int
+    constraints: int
+    mass: Float[np.ndarray, " unknowns"]
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns and multipliers."""
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Any = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with the second variation − shift · mass; `negative` counts its eigenvalues."""
+
+
 def stability_margin(
-    structure: Structure,
+    structure: Pencil,
     z: Lanes,
     p: Parameters,
     error: float = RELATIVE,
+    floor: Values | None = None,
 ) -> Values:
     """Smallest σ of ``L_uu v + c_uᵀ μ = σ M v``, ``c_u v = 0``, per lane.
 
     Inverse iteration on pairs of vectors finds it for stable states in four or five solves, the
     last of them so near below it that their inertia, which counts the eigenvalues below a shift,
-    proves that it is the smallest. For other states bisection on that count isolates it first.
+    proves that it is the smallest. Other states begin at `floor`, numbers below all eigenvalues;
+    without it, bisection on that count isolates the smallest one first.
     A larger relative `error` than that of round-off saves a solve or two.
     Scale: energy over the metric's unit squared.
     """
     value, proved = np.empty(len(z)), np.zeros(len(z), bool)
+    start = np.zeros(len(z))
 
     def run(begin: int, end: int) -> None:
         for first in range(begin, end, CHUNK):
             part = slice(first, min(first + CHUNK, end))
-            value[part], proved[part] = _by_pairs(structure, z[part], p[part], error)
+            value[part], proved[part] = _by_pairs(structure, z[part], p[part], error, start[part])
 
     shares = max(1, min(threads(), len(z) // SHARE)) if len(z) >= 2 * SHARE else 1
     cuts = [len(z) * k // shares for k in range(shares + 1)]
@@ -51,21 +80,25 @@ def stability_margin(
     for job in jobs:
         job.result()
     rest = np.flatnonzero(~proved)
+    if floor is not None and len(rest):
+        value[rest], proved[rest] = _above(structure, z[rest], p[rest], error, floor[rest])
+        rest = rest[~proved[rest]]
     if len(rest):
         value[rest] = _by_bisection(structure, z[rest], p[rest])
     return value
 
 
 def _by_pairs(
-    structure: Structure,
+    structure: Pencil,
     z: Lanes,
     p: Parameters,
     error: float,
+    start: Values,
 ) -> tuple[Values, Flags]:
-    """Margins of stable states, and which of them are proved."""
+    """Margins of states without eigenvalues below `start`, and which of them are proved."""
     value, proved = np.empty(len(z)), np.zeros(len(z), bool)
     todo, vectors = np.arange(len(z)), np.tile(_first_pair(structure), (len(z), 1, 1))
-    shift, known = np.zeros(len(z)), np.full(len(z), np.inf)
+    shift, known = start.copy(), np.full(len(z), np.inf)
     for sweep in range(SWEEPS):
         vectors, first, second, stable = _swept(structure, z[todo], p[todo], shift, vectors)
         change = np.abs(known - first)
@@ -79,11 +112,33 @@ def _by_pairs(
             break
         arrays = (todo, vectors, first, second, change)
         todo, vectors, known, second, change = (each[more] for each in arrays)
-        shift = known - np.maximum(change, NEAR * second) if sweep > 0 else np.zeros(len(todo))
+        gap = np.maximum(change, NEAR * np.abs(second))
+        shift = known - gap if sweep > 0 else shift[more]
     return value, proved
 
 
-def _first_pair(structure: Structure) -> Float[np.ndarray, "2 unknowns"]:
+def _above(
+    structure: Pencil, z: Lanes, p: Parameters, error: float, floor: Values
+) -> tuple[Values, Flags]:
+    """Negative margins, and which of them are proved: pairs from a number not far below each.
+
+    A few bisections on the count of eigenvalues find it; more of them where two are too close.
+    """
+    value, proved = np.empty(len(z)), np.zeros(len(z), bool)
+    low, high = floor.copy(), np.zeros(len(z))
+    for halvings in HALVINGS:
+        at = np.flatnonzero(~proved)
+        if len(at) == 0:
+            break
+        for _ in range(halvings):
+            middle = 0.5 * (low[at] + high[at])
+            below = _count_below(structure, z[at], p[at], middle) > 0
+            high[at], low[at] = np.where(below, middle, high[at]), np.where(below, low[at], middle)
+        value[at], proved[at] = _by_pairs(structure, z[at], p[at], error, low[at])
+    return value, proved
+
+
+def _first_pair(structure: Pencil) -> Float[np.ndarray, "2 unknowns"]:
     """Vectors that are smooth along a chain, and orthogonal to no mode."""
     n = structure.unknowns
     at, count = np.arange(n), np.array([[2.0], [3.0]])
@@ -92,7 +147,7 @@ def _first_pair(structure: Structure) -> Float[np.ndarray, "2 unknowns"]:
 
 
 def _swept(
-    structure: Structure,
+    structure: Pencil,
     z: Lanes,
     p: Parameters,
     shift: Values,
@@ -140,7 +195,7 @@ def _products(left: Pairs, right: Pairs) -> tuple[Values, Values, Values]:
 
 
 def _by_bisection(
-    structure: Structure,
+    structure: Pencil,
     z: Lanes,
     p: Parameters,
 ) -> Values:
@@ -154,7 +209,7 @@ def _by_bisection(
 
 
 def _count_below(
-    structure: Structure,
+    structure: Pencil,
     z: Lanes,
     p: Parameters,
     shift: Values,
@@ -164,7 +219,7 @@ def _count_below(
 
 
 def _bracket(
-    structure: Structure,
+    structure: Pencil,
     z: Lanes,
     p: Parameters,
 ) -> tuple[Values, Values]:
@@ -184,7 +239,7 @@ def _bracket(
 
 
 def _polish(
-    structure: Structure,
+    structure: Pencil,
     z: Lanes,
     p: Parameters,
     low: Values,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 from typing import Any, overload
 
@@ -14,6 +15,18 @@ from equimorph.errors import InputError
 from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
+
+
+class SpaceStability(StrEnum):
+    """Whether a planar state stays where it is in space, too; true only if it does."""
+
+    STABLE = "stable"
+    UNSTABLE = "unstable"
+    NOT_JUDGED = "not judged"
+
+    def __bool__(self) -> bool:
+        """Whether it is known to be stable."""
+        return self is SpaceStability.STABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +77,29 @@ class States:
     def stable(self) -> "States":
         """The stable ones."""
         keep = self.index == 0
+        return States(self.structure, self.z[keep], self.p[keep])
+
+    @cached_property
+    def index_out_of_plane(self) -> Int[np.ndarray, " lanes"]:
+        """Independent movements out of the plane that lower the energy.
+
+        Raises
+        ------
+        InputError
+            Where the structure has no stiffnesses out of its plane.
+        """
+        index = self.structure.index_out_of_plane(self.z, self.p)
+        if index is None:
+            raise InputError(
+                "`structure` must have stiffnesses out of its plane to be judged in space, like "
+                f"Rod(..., torsion=0.77, lateral=1.0); got a {self.structure.kind} without."
+            )
+        return index
+
+    @property
+    def stable_in_space(self) -> "States":
+        """Those that are stable in their plane and do not leave it."""
+        keep = (self.index == 0) & (self.index_out_of_plane == 0)
         return States(self.structure, self.z[keep], self.p[keep])
 
     @cached_property
@@ -143,8 +179,21 @@ class State:
 
     @property
     def stable(self) -> bool:
-        """Whether the state is a strict constrained minimum of the energy."""
+        """Whether the state is a strict constrained minimum of the energy in its plane."""
         return self.index == 0
+
+    @property
+    def stable_in_space(self) -> SpaceStability:
+        """Whether it also resists all movements out of the plane; true if it is known to.
+
+        "not judged" where the structure has no stiffnesses out of its plane.
+        """
+        if not self.stable:
+            return SpaceStability.UNSTABLE
+        index = self.structure.index_out_of_plane(self.z[None], self.p[None])
+        if index is None:
+            return SpaceStability.NOT_JUDGED
+        return SpaceStability.STABLE if index[0] == 0 else SpaceStability.UNSTABLE
 
     @property
     def margin(self) -> float:

@@ -144,7 +144,8 @@ class UnitSystem:
             A number in these units, or a text with a unit.
         quantity
             What it measures, in the words force and length, like ``force·length²``. A force per
-            length may be given as a mass per length, which standard gravity makes heavy.
+            length, area or volume may be given as a mass per such, which standard gravity makes
+            heavy.
         what
             Its name, for messages.
 
@@ -170,7 +171,8 @@ class UnitSystem:
                 'Add units={"force": "N", "length": "m"}, say: plain numbers are in these.'
             )
         unit, wanted = read_unit(quantity, self._own, what)
-        if wanted == read_unit("force/length", self._own, what)[1] and dimension == (1, -1, 0):
+        per = [read_unit(f"force/length{k}", self._own, what)[1] for k in ("", "2", "3")]
+        if wanted in per and dimension == (1, wanted[1] - 1, 0):
             value, dimension = STANDARD_GRAVITY * value, wanted
         if dimension != wanted:
             raise InputError(

@@ -106,6 +106,12 @@ def _shown_descriptors(problem: Problem) -> list[Descriptor]:
     return list({each.name: each for each in [problem.ground.height, *bounded]}.values())
 
 
+def _in_space(stable: States) -> str:
+    """How many of the states that are stable in their plane are so in space, if that is known."""
+    index = stable.structure.index_out_of_plane(stable.z, stable.p)
+    return "" if index is None else f" in their plane, {int((index == 0).sum())} also in space"
+
+
 def _equilibria(
     point: dict[str, float], states: States, descriptors: list[Descriptor]
 ) -> list[str]:
@@ -115,9 +121,10 @@ def _equilibria(
         return [heading, "<p>None within the constraints.</p>"]
     # The highest state comes first, which readers look for.
     order: Int[np.ndarray, " lanes"] = np.argsort(-descriptors[0](states))
+    stable = states.stable
     return [
         heading,
-        f"<p>{len(states)} found, {len(states.stable)} of them stable.</p>",
+        f"<p>{len(states)} found, {len(stable)} of them stable{_in_space(stable)}.</p>",
         html.table_of_states(states[order], descriptors),
         html.EXPLANATION,
     ]

@@ -79,12 +79,26 @@ def _stiff(given: Any) -> Any:
     return _quantity(given)
 
 
+def _section(given: Any) -> Any:
+    """Check the form of a cross-section; the rod itself knows its keys."""
+    plain = isinstance(given, dict) and all(
+        isinstance(value, str) or is_number(value) for value in given.values()
+    )
+    if not (plain and isinstance(given.get("kind"), str)):
+        raise requirement(
+            'be a table like { kind = "strip", width = "20 mm", thickness = "0.5 mm", '
+            'E = "210 GPa", nu = 0.3 }'
+        )
+    return given
+
+
 Formula = Annotated[Any, AfterValidator(_formula)]
 Quantity = Annotated[Any, AfterValidator(_quantity)]
 Stiffness = Annotated[Any, AfterValidator(_stiff)]
 UnitSystem = Annotated[dict[str, str], Field(min_length=2, max_length=2)]
 Profile = Annotated[Any, AfterValidator(_profile)]
 Term = Annotated[Any, AfterValidator(_terms)]
+CrossSection = Annotated[Any, AfterValidator(_section)]
 EndOfRod = Annotated[Any, AfterValidator(_end)]
 
 
@@ -110,6 +124,9 @@ class RodSection(StructureSection):
     EI: Quantity | None = None
     length: Quantity | None = None
     units: UnitSystem | None = None
+    torsion: Profile | None = None
+    lateral: Profile | None = None
+    section: CrossSection | None = None
     span: Stiffness | None = None
     elements: int | None = Field(default=None, ge=2, le=1000)
     degree: int | None = Field(default=None, ge=3, le=16)

@@ -120,6 +120,7 @@ def describe_obstacle(end: Event, names: Sequence[str]) -> str:
     what = {
         "fold": "a fold: stability is lost and the structure would snap",
         "branch point": f"a {end.criticality} branch point: stability is lost",
+        "lateral branch point": f"a {end.criticality} lateral branch point: it leaves its plane",
         "multiple point": f"a multiple point ({end.detail})",
         "constraint": f"the constraint {end.detail}",
     }.get(end.kind, f"a numerical failure ({end.detail})")

@@ -2,6 +2,15 @@
 
 from equimorph.structures.rod.ends import End
 from equimorph.structures.rod.rod import Rod
+from equimorph.structures.rod.sections import (
+    CrossSection,
+    OwnSection,
+    Round,
+    SectionProperties,
+    Strip,
+    Tube,
+)
+from equimorph.structures.rod.space import LateralMode
 from equimorph.structures.rod.terms import (
     Couple,
     Curvature,
@@ -11,4 +20,20 @@ from equimorph.structures.rod.terms import (
     Tendon,
 )
 
-__all__ = ["Couple", "Curvature", "End", "LineLoad", "PointForce", "Pressure", "Rod", "Tendon"]
+__all__ = [
+    "Couple",
+    "CrossSection",
+    "Curvature",
+    "End",
+    "LateralMode",
+    "LineLoad",
+    "OwnSection",
+    "PointForce",
+    "Pressure",
+    "Rod",
+    "Round",
+    "SectionProperties",
+    "Strip",
+    "Tendon",
+    "Tube",
+]

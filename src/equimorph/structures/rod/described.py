@@ -4,12 +4,16 @@ from abc import abstractmethod
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from equimorph.door import door
-from equimorph.model import Descriptor
-from equimorph.structures.rod import descriptors, validity
+from equimorph.model import Constraint, Descriptor
+from equimorph.structures.rod import descriptors, space, validity
 from equimorph.structures.rod.ends import End
-from equimorph.structures.rod.general import GeneralMechanics
+from equimorph.structures.rod.lateral import OutOfPlane
 from equimorph.structures.rod.measured import Measured
+from equimorph.structures.rod.space import LateralMode
+from equimorph.structures.rod.terms import Term
 from equimorph.structures.states import State
 
 
@@ -23,8 +27,8 @@ class Described(Measured):
 
     @property
     @abstractmethod
-    def general_mechanics(self) -> GeneralMechanics:
-        """The rod as a general one: in its parameters, and further ones that are zero."""
+    def has_lateral_stiffness(self) -> bool:
+        """Whether the rod has stiffnesses out of its plane."""
 
     @door
     def height(self, s: float) -> Descriptor:
@@ -79,15 +83,65 @@ class Described(Measured):
         """
         return validity.clearance(self, apart)
 
+    # --- out of the plane -------------------------------------------------------------------
+
+    @abstractmethod
+    def out_of_plane(self, torsion: Any = None, lateral: Any = None) -> OutOfPlane:
+        """The second variation out of the plane, with the rod's stiffnesses or others."""
+
+    @property
+    @abstractmethod
+    def terms(self) -> dict[str, tuple[Term, ...]]:
+        """Loads and actuators that act on the rod, by the name of their amplitude."""
+
     @door
-    def lateral_margin(self, torsion: Any, lateral: Any) -> Descriptor:
+    def lateral_index(self, torsion: Any = None, lateral: Any = None) -> Descriptor:
+        """Number of independent movements out of the plane that lower the energy.
+
+        0 where the rod stays in its plane. Arguments as of `lateral_margin`.
+        """
+        block, written = self.out_of_plane(torsion, lateral), self._written(torsion, lateral)
+        return space.lateral_index(self, block, written)
+
+    @door
+    def lateral_margin(self, torsion: Any = None, lateral: Any = None) -> Descriptor:
         """Smallest eigenvalue of the second variation for movements out of the plane.
 
-        `torsion` and `lateral` are GJ and EI about the axis in the plane, relative to the bending
-        stiffness in the plane. Where it is negative the rod buckles out of its plane.
+        Where it is negative the rod leaves its plane. Relative to ∫ φ² + ψ² ds of the rotations, in
+        the unit of couples.
+
+        Parameters
+        ----------
+        torsion, lateral
+            GJ and EI about the axis in the plane: relative to the bending stiffness in the plane,
+            or texts with units. None: those of the rod.
+
+        Raises
+        ------
+        InputError
+            Where neither the rod nor the arguments have them, or under loads without a potential in
+            space.
         """
-        stiffness = validity.LateralStiffness(torsion, lateral)
-        return validity.lateral(self, self.general_mechanics, self.ends, stiffness)
+        block, written = self.out_of_plane(torsion, lateral), self._written(torsion, lateral)
+        return space.lateral_margin(self, block, written, self.terms)
+
+    def _written(self, torsion: Any, lateral: Any) -> str:
+        """Arguments of a descriptor's name; none for the rod's own stiffnesses."""
+        return "" if torsion is None and lateral is None else f"({torsion}, {lateral})"
+
+    @cached_property
+    def stable_in_space(self) -> Constraint:
+        """Constraint that planar states do not leave their plane: ``lateral_margin >= 0``.
+
+        A path that violates it ends at a lateral branch point.
+        """
+        return self.lateral_margin() >= 0.0
+
+    @door
+    def lateral_mode(self, state: State, points: int = 101) -> LateralMode:
+        """The movement out of the plane that a state resists least, at equidistant points."""
+        s = np.linspace(0.0, 1.0, points)
+        return space.lateral_mode(self, self.out_of_plane(), state.z[None], state.p[None], s)
 
     @door
     def warnings(
@@ -96,13 +150,13 @@ class Described(Measured):
         """Why the planar model may not hold in a state, one line each.
 
         Contact with itself, for a rod of some `thickness` in the user's unit of length; buckling
-        out of the plane, where the stiffnesses of `lateral_margin` are given.
+        out of the plane, where the stiffnesses of `lateral_margin` are given here or to the rod.
         """
         found = []
         distance = self.clearance()(state)
         if distance <= max(thickness, 1e-9 * self.units.value("length")):
             found.append(f"the rod touches itself: points come as near as {distance:.3g}")
-        if torsion is not None and lateral is not None:
+        if self.has_lateral_stiffness or (torsion is not None and lateral is not None):
             margin = self.lateral_margin(torsion, lateral)(state)
             if margin < 0.0:
                 found.append(f"the rod buckles out of its plane: eigenvalue {margin:.3g}")
@@ -110,4 +164,8 @@ class Described(Measured):
 
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
+        found = space.LATERAL.fullmatch(text)
+        if found:
+            make = self.lateral_index if found[1] == "index" else self.lateral_margin
+            return make(*space.stiffness_arguments(found[2]))
         return descriptors.descriptor_from_text(self, text)

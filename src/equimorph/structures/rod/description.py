@@ -47,6 +47,8 @@ class Description:
     rise: float
     kinks: Sequence[float]
     units: Units
+    breaks: Sequence[float] = ()
+    """Arclengths where stiffnesses out of the plane are not smooth."""
 
     @cached_property
     def supports(self) -> tuple[End, End]:
@@ -93,7 +95,8 @@ class Description:
             axial = self._profile("axial", self.units.value("force"))
         shapes = [rigid, curved, *([] if axial is None else [axial])]
         breaks = [s for terms in self.terms.values() for one in terms for s in one.breaks]
-        kinks = np.unique([*breaks, *(s for shape in shapes for s in shape.kinks)])
+        breaks += [s for shape in shapes for s in shape.kinks]
+        kinks = np.unique([*breaks, *self.breaks])
         if len(kinks) and np.diff(np.concatenate([[0.0], kinks, [1.0]])).min() < CLOSEST:
             raise InputError(
                 f"`kinks`, of loads and profiles together, must lie {CLOSEST:g} apart at least; "
@@ -105,7 +108,8 @@ class Description:
         _check_positive(axial, "axial", mesh.nodes)
         couple, spring = self.units.value("couple"), self.units.value("spring")
         first, last = (support.scaled(couple, spring) for support in self.supports)
-        return Build(mesh, (first, last), rigid, curved, axial, self.terms)
+        length = self.units.value("length")
+        return Build(mesh, (first, last), rigid, curved, axial, self.terms, length)
 
     def _check_pressure(self) -> None:
         """Refuse pressure without a potential, or with a stretching axis."""

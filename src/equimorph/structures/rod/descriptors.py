@@ -19,6 +19,7 @@ Extrema = Float[np.ndarray, "lanes extrema"]
 
 WRITTEN = (
     *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy", "clearance(s)"),
+    *("lateral_margin", "lateral_index"),
     *("support_force(lambda)", "support_force(mu)", "end_moment(0)", "end_moment(1)"),
 )
 SAMPLES = np.linspace(0.0, 1.0, 25)

@@ -85,7 +85,7 @@ class GeneralMechanics(Mechanics):
 
     @property
     def fine_reference(self) -> Reference:
-        """Rule on whose nodes `recovered` gives fields."""
+        """Rule on whose nodes `fine_fields` gives fields."""
         return self._fields.reference
 
     def fine_fields(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes elements 5 fine"]:

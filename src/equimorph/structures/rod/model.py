@@ -20,7 +20,8 @@ Rows = Float[np.ndarray, "scalars elements order"]
 class Build:
     """What a general rod is made of, in non-dimensional form.
 
-    terms: what each amplitude scales, by name, in the order of the parameters.
+    terms: what each amplitude scales, by name, in the order of the parameters; length: that of the
+    rod in the user's unit, in which the offsets of tendons are given.
     """
 
     mesh: Mesh
@@ -29,6 +30,7 @@ class Build:
     curvature: LoadShape
     axial: LoadShape | None
     terms: Mapping[str, Sequence[Term]]
+    length: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,23 +39,22 @@ class Densities:
 
     Rows belong to the scalars. The force on the cross-section is (−b, −a): ``b = Σ y along``,
     ``a = Σ y across``; the moment is ``rigidity · κ − Σ y bending``; cables pull along the axis of
-    a stretchable rod with ``Σ y tension``.
+    a stretchable rod with ``Σ y tension``, and stiffen every rod against twist by ``Σ y torsion``.
     """
 
     along: Rows
     across: Rows
     bending: Rows
     tension: Rows
+    torsion: Rows
     rigidity: Float[np.ndarray, "elements order"]
     softness: Float[np.ndarray, "elements order"]
 
     def map_scalars(self, matrix: Float[np.ndarray, "scalars others"]) -> "Densities":
         """The densities for new scalars ``y``, of which the present ones are ``matrix @ y``."""
-        along, across, bending, tension = (
-            np.einsum("jk,jei->kei", matrix, a)
-            for a in (self.along, self.across, self.bending, self.tension)
-        )
-        return Densities(along, across, bending, tension, self.rigidity, self.softness)
+        rows = (self.along, self.across, self.bending, self.tension, self.torsion)
+        a, b, c, d, e = (np.einsum("jk,jei->kei", matrix, row) for row in rows)
+        return Densities(a, b, c, d, e, self.rigidity, self.softness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +234,7 @@ def _sum_effects(terms: Sequence[Term], mesh: Mesh) -> Effects:
         couples=tuple(couple for part in parts for couple in part.couples),
         pressure=sum(part.pressure for part in parts),
         tension=sum((part.tension for part in parts), zero),
+        torsion=sum((part.torsion for part in parts), zero),
         force=(sum(part.force[0] for part in parts), sum(part.force[1] for part in parts)),
     )
 
@@ -242,7 +244,8 @@ def _densities(
 ) -> Densities:
     """Rows of all scalars on a mesh with the elements of the rod."""
     rigidity = at_nodes(build.stiffness, mesh) / FOUR_PI_SQUARED
-    along, across, bending, tension = np.zeros((4, count, mesh.elements, mesh.degree + 1))
+    shape = (5, count, mesh.elements, mesh.degree + 1)
+    along, across, bending, tension, torsion = np.zeros(shape)
     for c, axis in enumerate(each for each in axes if each.opposed):
         along[c], across[c] = axis.unit
     bending[-1] = rigidity * at_nodes(build.curvature, mesh)
@@ -255,11 +258,13 @@ def _densities(
         )  # fmt: skip
         along[row], across[row] = effects.along - hung[0], effects.across - hung[1]
         bending[row] = effects.bending + rigidity * effects.natural
-        tension[row] = 0.0 if build.axial is None else effects.tension
+        # amplitudes of tendons are tensions times the unit of their offsets
+        tension[row] = 0.0 if build.axial is None else effects.tension * build.length
+        torsion[row] = effects.torsion / build.length
     softness = np.zeros_like(rigidity)
     if build.axial is not None:
         softness = 1.0 / at_nodes(build.axial, mesh)
-    return Densities(along, across, bending, tension, rigidity, softness)
+    return Densities(along, across, bending, tension, torsion, rigidity, softness)
 
 
 def _add_couples(

@@ -5,12 +5,12 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.door import door
 from equimorph.errors import InputError
-from equimorph.model import Drawing, Parameter, names_of
+from equimorph.model import Descriptor, Drawing, Parameter, names_of
 from equimorph.structures.contract import Growth
 from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.clamped import ClampedMechanics
@@ -20,10 +20,15 @@ from equimorph.structures.rod.discretisation import mesh_with_kinks
 from equimorph.structures.rod.drawing import Amplitudes, rod_drawing
 from equimorph.structures.rod.ends import End
 from equimorph.structures.rod.general import GeneralMechanics
+from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
 from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch, natural_rod
 from equimorph.structures.rod.profiles import LoadShape, LoadSpec, load_shape
-from equimorph.structures.rod.terms import LineLoad
+from equimorph.structures.rod.sections import SectionProperties, cross_section
+from equimorph.structures.rod.space import check_terms
+from equimorph.structures.rod.space_options import SpaceOptions
+from equimorph.structures.rod.terms import LineLoad, Term
 from equimorph.structures.rod.units import rod_units
 from equimorph.structures.states import State, States
 from equimorph.structures.unit_system import Quantity, unit_system
@@ -114,13 +119,21 @@ class Rod(Described):
     units
         Units of force and length of all numbers, like ``{"force": "mN", "length": "mm"}``; SI by
         default. EI, length, axial, curvature, span and rise may then be texts with units.
+    torsion, lateral
+        GJ and EI about the axis in the plane, with which `stable_in_space` and `lateral_margin`
+        judge whether states leave their plane: relative to the bending stiffness in the plane
+        (numbers, tables or callables), or texts with units. None: not judged.
+    section
+        A `Strip`, `Round`, `Tube` or `OwnSection` in place of EI, torsion and lateral. The rod is
+        inextensible all the same, unless `axial` is given.
 
     Raises
     ------
     InputError
         For an unknown load, values that are not finite, a span outside (0, 1), a resolution below 2
         elements or outside degrees 3 … 16, a support that lets the rod drift, stiffness that is not
-        positive, a kink outside the rod, a follower load, or inconsistent names.
+        positive, a kink outside the rod, a follower load, inconsistent names, a section beside what
+        it gives, or stiffnesses out of the plane for a rod under pressure.
 
     References
     ----------
@@ -159,16 +172,24 @@ class Rod(Described):
         EI: Quantity | None = None,
         length: Quantity | None = None,
         units: Mapping[str, Any] | None = None,
+        torsion: Any = None,
+        lateral: Any = None,
+        section: Any = None,
     ) -> None:
         if not (isinstance(elements, int) and elements >= 2):
             raise InputError(f"`elements` must be a whole number >= 2; got {elements!r}.")
         if not (isinstance(degree, int) and 3 <= degree <= 16):
             raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
-        self.units = rod_units(EI, length, unit_system(units))
+        system = unit_system(units)
+        made = None if section is None else cross_section(section)
+        self._space = SpaceOptions(torsion, lateral, made).check(EI, length)
+        self.units = rod_units(self._space.bending_stiffness(EI, system), length, system)
+        self._stiffness = self._space.stiffness(self.units, kinks)
+        breaks = [] if self._stiffness is None else self._stiffness.breaks
         number = self.units.number
         axial = number(axial, "force", "axial")
         curvature = number(curvature, "1/length", "curvature")
-        self._resolution = (elements, degree)
+        self._resolution, self._breaks = (elements, degree), breaks
         shape = "uniform" if load is None and loads is None else load
         self._load = None if shape is None else load_shape(shape, kinks)
         self._general: Description | None = None
@@ -184,18 +205,19 @@ class Rod(Described):
             self._general = Description(
                 ends, stiffness, curvature, axial, {**own, **(loads or {})}, actuators or {},
                 coordinates, number(span, "length", "span"), number(rise, "length", "rise"),
-                kinks, self.units,
+                kinks, self.units, breaks,
             )  # fmt: skip
             self._become_general(self._general)
+        if self.has_lateral_stiffness:
+            check_terms(self.terms)
         self.unknowns, self.constraints = self.mechanics.unknowns, self.mechanics.constraints
         self.mass, self.length_unit = self.mechanics.mass, self.units.label("length")
         self.energy_scale = self.units.value("couple")
 
     def _become_arch(self, load: LoadShape, span: float) -> None:
         elements, degree = self._resolution
-        self.mechanics: Mechanics = ClampedMechanics(
-            mesh_with_kinks(load.kinks, elements, degree), load
-        )
+        kinks = np.union1d(load.kinks, self._breaks)
+        self.mechanics: Mechanics = ClampedMechanics(mesh_with_kinks(kinks, elements, degree), load)
         self.parameters = (
             Parameter("Theta", "rad", 1.0, "actuator"),
             Parameter("Delta", "rad", 1.0, "actuator", 0.0),
@@ -236,6 +258,9 @@ class Rod(Described):
                     "Sample it into a table [[s, Q], ...]."
                 )
             data |= {"load": self._load.identity, "span": self.parameters[3].default}
+        data |= self._space.data()
+        if self._space.section is not None:  # which gives it
+            data.pop("EI")
         return {**data, "elements": elements, "degree": degree}
 
     @cached_property
@@ -247,7 +272,8 @@ class Rod(Described):
             raw, matrix = self._general.mechanics(elements, degree)
             return GeneralMechanics(raw.model.map_scalars(names_of(self.parameters), matrix))
         assert self._load is not None
-        return ClampedMechanics(mesh_with_kinks(self._load.kinks, elements, degree), self._load)
+        kinks = np.union1d(self._load.kinks, self._breaks)
+        return ClampedMechanics(mesh_with_kinks(kinks, elements, degree), self._load)
 
     def _natural(self, p: Parameters) -> Natural:
         """Natural states and how each was met."""
@@ -339,12 +365,67 @@ class Rod(Described):
         """
         return descriptors.discretisation_error(self.mechanics, self.refined, z, p)
 
+    # --- out of the plane -------------------------------------------------------------------
+
+    @property
+    def has_lateral_stiffness(self) -> bool:
+        """Whether the rod has stiffnesses out of its plane."""
+        return self._stiffness is not None
+
+    @property
+    def section(self) -> SectionProperties | None:
+        """Stiffnesses and weight of the section in the rod's units; None if none was given."""
+        return self._space.properties(self.units)
+
+    @property
+    def terms(self) -> dict[str, tuple[Term, ...]]:
+        """Loads and actuators that act on the rod, by the name of their amplitude."""
+        return {"q": (self._arch_load,)} if self._general is None else self._general.terms
+
+    @property
+    def watched(self) -> tuple[Descriptor, ...]:
+        """The lateral margin, if the rod is judged in space."""
+        return (self.lateral_margin(),) if self.has_lateral_stiffness else ()
+
+    def index_out_of_plane(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"] | None:
+        """Independent movements out of the plane that lower the energy; None: not judged."""
+        return self.out_of_plane().index(z, p) if self.has_lateral_stiffness else None
+
+    def out_of_plane(self, torsion: Any = None, lateral: Any = None) -> OutOfPlane:
+        """The second variation out of the plane, with the rod's stiffnesses or others.
+
+        Raises
+        ------
+        InputError
+            Without stiffnesses, or under loads without a potential in space.
+        """
+        if torsion is None and lateral is None:
+            return self._own_block
+        check_terms(self.terms)
+        stiffness = SpaceOptions(torsion, lateral, None).check(None, None)
+        return self._block(stiffness.stiffness(self.units, ()))
+
     @cached_property
-    def general_mechanics(self) -> GeneralMechanics:
-        """The arch as a general rod with a rise; general rods as they are."""
+    def _own_block(self) -> OutOfPlane:
+        return self._block(self._stiffness)
+
+    def _block(self, stiffness: LateralStiffness | None) -> OutOfPlane:
+        if stiffness is None:
+            raise InputError(
+                "`torsion`, `lateral` must be given to judge whether a rod leaves its plane; got "
+                "neither. Give the rod these, like torsion=0.77, lateral=1.0 for a round one, or a "
+                "section."
+            )
+        return OutOfPlane(self.mechanics, self._model, Holding.of(self.ends), stiffness)
+
+    @cached_property
+    def _model(self) -> RodModel:
+        """Its Lagrangian; that of the arch as of a general rod with a rise."""
         if isinstance(self.mechanics, GeneralMechanics):
-            return self.mechanics
-        loads, units = {"q": self._arch_load}, self.units
-        twin = Description(CLAMPED, 1.0, 0.0, None, loads, {}, None, DEFAULT_SPAN, 0.0, (), units)
+            return self.mechanics.model
+        twin = Description(
+            CLAMPED, 1.0, 0.0, None, {"q": self._arch_load}, {}, None, DEFAULT_SPAN, 0.0, (),
+            self.units, self._breaks,
+        )  # fmt: skip
         raw, matrix = twin.mechanics(*self._resolution)
-        return GeneralMechanics(raw.model.map_scalars(names_of(twin.parameters), matrix))
+        return raw.model.map_scalars(names_of(twin.parameters), matrix)

@@ -53,7 +53,8 @@ class Effects:
 
     along, across: load cumulated from end A in x and y, `force` all of it; bending: the part of the
     moment that does not come from curvature; natural: intrinsic curvature; couples: (arclength,
-    moment); pressure: towards the left of the rod; tension: of cables along the rod.
+    moment); pressure: towards the left of the rod; tension: of cables along the rod, and torsion:
+    the torsional stiffness that they give it.
     """
 
     along: ElementNodes | float = 0.0
@@ -64,6 +65,7 @@ class Effects:
     force: tuple[float, float] = (0.0, 0.0)
     pressure: float = 0.0
     tension: ElementNodes | float = 0.0
+    torsion: ElementNodes | float = 0.0
 
 
 class Term(ABC):
@@ -261,7 +263,8 @@ class Tendon(Term):
 
     Between `start` and `stop` the cable at offset d(s), positive to the left of the axis, has the
     length ``∫ (1 + ε − d θ') ds``: tension T bends the rod as the moment T d does, compresses a
-    rod with axial stiffness, and works on the shortening. Friction is left out.
+    rod with axial stiffness, and works on the shortening. Friction is left out. Out of the plane it
+    stiffens the rod against twist by T d².
 
     Parameters
     ----------
@@ -292,10 +295,10 @@ class Tendon(Term):
         return _interior([self.start, self.stop, *self._profile().kinks.tolist()])
 
     def effects(self, mesh: Mesh) -> Effects:
-        """A moment T d, and a thrust T."""
+        """A moment T d, a thrust T, and a torsional stiffness T d²."""
         there = inside(self.start, self.stop, mesh)[:, None]
-        along = there * np.ones(mesh.degree + 1)
-        return Effects(bending=there * at_nodes(self._profile(), mesh), tension=along)
+        along, offset = there * np.ones(mesh.degree + 1), at_nodes(self._profile(), mesh)
+        return Effects(bending=there * offset, tension=along, torsion=there * offset**2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from equimorph.door import door
 from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, limit_load, trace
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
-from equimorph.equilibria.trace_options import EventCode
+from equimorph.equilibria.trace_options import EventCode, EventKind
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Grid, Progress, position
 from equimorph.structures import Structure
@@ -37,6 +37,11 @@ class RayStatus(IntEnum):
     BRANCH_POINT = 4
     CONSTRAINT = 5
     NONE_BELOW_THE_BOUND = 6
+    LATERAL_BRANCH_POINT = 7
+
+
+MET = (RayStatus.CONSTRAINT, RayStatus.LATERAL_BRANCH_POINT)
+"""Statuses of paths that violate a constraint."""
 
 
 STATUS_OF_EVENT = {
@@ -175,6 +180,9 @@ class LimitLoadRays(Paths):
             met = ready[kind[ready] == RayStatus.CONSTRAINT]
             if len(met):
                 place[met] = _extrema_met(self.within, z[met], p[met])
+                events = np.array([each.event for each in self.within])[place[met].astype(int) // 2]
+                lateral = events == EventKind.LATERAL_BRANCH_POINT
+                kind[met[lateral]] = RayStatus.LATERAL_BRANCH_POINT
         z[kind <= RayStatus.LOST] = np.nan
         return Samples(settings, value, kind, place, z, p, start.passed)
 
@@ -228,7 +236,7 @@ class LimitLoadRays(Paths):
         """Jumps, kinks, and other places of the extremum that meets a constraint."""
         a, b = pairs.a, pairs.b
         known = self.known(a) & self.known(b)
-        moved = (a.kind == RayStatus.CONSTRAINT) & (b.kind == RayStatus.CONSTRAINT)
+        moved = np.isin(a.kind, MET) & np.isin(b.kind, MET)
         kind = np.where(np.abs(a.value - b.value) > JUMP, "jump", np.where(moved, "place", "kink"))
         return np.where(known, kind, "").astype(object)
 
@@ -240,7 +248,7 @@ def _is_critical(side: Samples) -> Bool[np.ndarray, " pairs"]:
 
 def _meets(side: Samples, k: int) -> Bool[np.ndarray, " pairs"]:
     """Whether paths end at constraint number `k`."""
-    return np.asarray((side.kind == RayStatus.CONSTRAINT) & (side.place // 2 == k))
+    return np.asarray(np.isin(side.kind, MET) & (side.place // 2 == k))
 
 
 def _extrema_met(

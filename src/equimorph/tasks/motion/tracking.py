@@ -11,6 +11,7 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.door import door
 from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
+from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, position
 from equimorph.structures import State, States
@@ -302,7 +303,7 @@ def _failure(end: Event, bounds: Sequence[Constraint]) -> Failure:
         return "singular Jacobian"
     if end.kind == "limit":
         return "actuator limit"
-    if end.kind == "constraint":
+    if end.kind in VIOLATIONS:
         limits = {str(bound) for bound in bounds}
         return "actuator limit" if end.detail in limits else "constraint"
     return "lost"

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from equimorph.door import door
 from equimorph.equilibria import LimitLoad, check_start
+from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, names_of, position
 from equimorph.structures import State, Structure
@@ -131,7 +132,7 @@ def limit_sensitivity(
         if abs(slopes[load]) < FLAT * size:
             raise InputError(f"`limit` must be a fold in {load}; got one in other directions.")
         return {name: -slopes[name] / slopes[load] for name in names}
-    if limit.kind == "constraint":
+    if limit.kind in VIOLATIONS:
         met = [constraint for constraint in within if str(constraint) == limit.detail]
         detail = limit.detail or "a constraint"
         if limit.path is not None:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from equimorph.door import door
 from equimorph.equilibria import LimitLoad, lift, limit_load
+from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
 from equimorph.model import Constraint, position
 from equimorph.structures import State
@@ -27,7 +28,7 @@ UNFOLDED = 100.0
 """Residual at a branch point, relative to that of the perfect one, which is a fold overlooked."""
 FITTED = 5
 """Smallest sizes through which a law is fitted: the larger ones only add higher orders."""
-LIMITS = ("fold", "branch point", "constraint")
+LIMITS = ("fold", "branch point", *VIOLATIONS)
 """Ends of paths that are limit loads."""
 ROUND_OFF = 1e-15
 """Residual that any state may have, in the structure's scale of forces."""
