@@ -301,6 +301,78 @@ def test_least_snap_lands_on_the_other_side(spring_set):
     assert found.landing.state.z[0] < 0.0
 
 
+def straight_moves_of_the_spring(state: State, folds: np.ndarray) -> np.ndarray:
+    """Lengths of straight moves to folds δ that snap there, ∞ for others, by tracking roots.
+
+    F = (1 − x/cos δ) sin δ is solved by Newton at 1000 stations of each move; stable as long as
+    x > cos³ δ. Folds stand at x = cos³ δ, F = sin³ δ; that at δ = 0 is the tip of a cusp.
+    """
+    start, scales = np.array([state["x_l"], state["F"]]), Spring().scales[:2]
+    goals = np.stack([np.cos(folds) ** 3, np.sin(folds) ** 3], axis=1)
+    delta, stable = np.full(len(folds), state.z[0]), np.ones(len(folds), bool)
+    for share in np.linspace(0.0, 1.0 - 1e-6, 1000)[1:]:
+        x, force = (start + share * (goals - start)).T
+        for _ in range(3):
+            slope = np.cos(delta) - x / np.cos(delta) ** 2
+            delta = delta - (np.sin(delta) - x * np.tan(delta) - force) / slope
+            delta = np.clip(delta, -1.5, 1.5)
+        stable &= x > np.cos(delta) ** 3
+    length = np.linalg.norm((goals - start) / scales, axis=1)
+    return np.where(stable & (np.abs(delta - folds) < 0.02) & (folds != 0.0), length, np.inf)
+
+
+def check_least_snaps_of_the_spring(eset: em.EquilibriumSet, count: int, seed: int) -> int:
+    """Compare with all straight moves; how many least snaps are infima that are not attained."""
+    stable = np.unique(eset.cells[eset.cell_index == 0])
+    stable = stable[eset.kinds[stable] == 0]
+    folds = np.linspace(-0.9, 0.9, 1201)
+    infima = 0
+    for vertex in np.random.default_rng(seed).choice(stable, count, replace=False).tolist():
+        state = eset.points[vertex]
+        found = least_snap(eset, state)
+        moves = straight_moves_of_the_spring(state, folds)
+        assert found.landing is not None
+        assert found.landing.status != "held"
+        length = np.hypot(
+            *(found.change[name] / Spring().scales[k] for k, name in enumerate(("x_l", "F")))
+        )
+        assert found.infimum == pytest.approx(moves.min(), rel=2e-3, abs=3e-4)
+        assert found.infimum <= length <= (1 + 1e-3) * found.infimum
+        infima += found.status == "infimum"
+    return infima
+
+
+def test_no_least_snap_is_a_cusp_where_nothing_snaps(spring_set):
+    """Some states of the spring are nearest to the cusp (1, 0), where nothing snaps."""
+    with unchecked():
+        assert check_least_snaps_of_the_spring(spring_set, 3, seed=3) >= 1
+
+
+@pytest.mark.slow
+def test_least_snaps_of_many_states_of_the_spring(spring_set):
+    with unchecked():
+        assert check_least_snaps_of_the_spring(spring_set, 40, seed=1) >= 8
+
+
+@pytest.mark.slow
+def test_least_snaps_of_many_states_of_the_arch(arch_set):
+    """Of 119 states, 35 were told the tip of a cusp; each has a snap that lands elsewhere now."""
+    stable = np.unique(arch_set.cells[arch_set.cell_index == 0])
+    stable = stable[arch_set.kinds[stable] == 0]
+    with unchecked():
+        for vertex in np.random.default_rng(1).choice(stable, 119, replace=False).tolist():
+            found = least_snap(arch_set, arch_set.points[vertex])
+            assert found.status in ("found", "infimum")
+            assert found.landing.landed
+            away = found.landing.state.z - found.fold.z
+            assert np.abs(away).max() > 1e-3
+            end = em.lift(
+                arch_set.points[vertex],
+                {name: found.fold[name] + 1e-3 * found.change[name] for name in found.change},
+            ).end
+            assert end.kind in ("fold", "branch point")
+
+
 def test_critical_states_have_no_derivative():
     fold = em.limit_load(Spring().natural_state(x_l=0.8), "F").state
     with pytest.raises(InputError, match=r"^`state` must be regular; got a critical one"):

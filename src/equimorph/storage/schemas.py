@@ -57,7 +57,10 @@ class Change:
     removed: tuple[str, ...] = ()
 
 
-CHANGES: Mapping[str, Change] = {"Audit": Change(version=2)}
+CHANGES: Mapping[str, Change] = {
+    "Audit": Change(version=2),
+    "LeastSnap": Change(version=2),
+}
 """Changes by class; a class that is not listed is as it was in version 1."""
 
 

@@ -62,9 +62,9 @@ class SnapKind(Kind[tuple[State, LeastSnap]]):
 def _stations(answer: tuple[State, LeastSnap]) -> States:
     """State, fold and landing."""
     state, snap = answer
-    others = [] if snap.landing is None else [snap.distance.nearest, snap.landing.state]
-    all_of_them = [state, *(each for each in others if each is not None)]
-    z, p = (np.stack([getattr(each, name) for each in all_of_them]) for name in "zp")
+    if snap.states is None:
+        return state.batch
+    z, p = (np.vstack([getattr(each, name) for each in (state, snap.states)]) for name in "zp")
     return States(state.structure, z, p)
 
 
@@ -72,4 +72,5 @@ def _snap_in_words(snap: LeastSnap) -> str:
     assert snap.landing is not None
     moves = ", ".join(f"{name} by {value:+.6g}" for name, value in snap.change.items())
     end = snap.landing
-    return f"the least way to a snap is {moves}; {end.status}, {end.released:.4g} released."
+    least = f" ({snap.why})" if snap.why else ""
+    return f"the least way to a snap is {moves}; {end.status}, {end.released:.4g} released{least}."
