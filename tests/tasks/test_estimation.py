@@ -105,6 +105,116 @@ def test_errors_cover_the_truth(spring_set):
     assert inside >= 24  # 28.5 expected, standard deviation 1.2
 
 
+@pytest.fixture(scope="module")
+def pushed_spring():
+    """The spring under forces F ≥ 0 only: its side F = 0 is x = cos δ, or δ = 0."""
+    with unchecked():
+        return equilibrium_set(
+            em.Spring(), em.Box(x_l=(0.3, 1.3), F=(0.0, 0.5)), intervals=(12, 12), checks=0
+        )
+
+
+def least_misfit_at_no_force(delta: float, x: float) -> float:
+    """Least χ of (δ, x) with errors 0.01 on F = 0: x = cos δ with δ ≠ 0, or δ = 0 and x > 1."""
+    angles = np.linspace(-1.2, 1.2, 240001)
+    buckled = np.hypot(angles - delta, np.cos(angles) - x).min()
+    straight = np.hypot(delta, min(x - 1.0, 0.0))
+    return float(min(buckled, straight) / 0.01)
+
+
+def test_best_fits_at_a_side_of_the_box_are_least_along_it(pushed_spring):
+    """Of 80 noisy (δ, x) near F = 0 most fit best at F < 0: one candidate, the nearest on F = 0."""
+    spring, generator = pushed_spring.structure, np.random.default_rng(0)
+    outside = 0
+    with unchecked():
+        for _ in range(12):
+            x = generator.uniform(0.5, 0.95)
+            delta, seen_x = -np.arccos(x) + generator.normal(0, 0.01), x + generator.normal(0, 0.01)
+            seen = {spring.angle: delta, "x_l": seen_x}
+            found = em.estimate_state(pushed_spring, seen, dict.fromkeys(seen, 0.01))
+            assert found.known
+            assert len(found.states) == 1
+            if force(delta, seen_x) >= 0.0:
+                assert found.chi2[0] == pytest.approx(0.0, abs=1e-12)
+                assert found.inside[0]
+            else:
+                outside += 1
+                assert not found.inside[0]
+                assert found.state["F"] == pytest.approx(0.0, abs=1e-12)
+                least = least_misfit_at_no_force(delta, seen_x)
+                assert np.sqrt(found.chi2[0]) == pytest.approx(least, abs=1e-4)
+    assert outside >= 3
+
+
+@pytest.fixture(scope="module")
+def steered_arch():
+    """The arch over Θ and q ≥ 0 at Δ = 0.05."""
+    arch = em.Rod()
+    with unchecked():
+        return equilibrium_set(
+            arch,
+            em.Box(Theta=(0.5, 1.5), q=(0.0, 4.0)),
+            fixed={"Delta": 0.05},
+            within=[arch.max_curvature <= 20],
+            intervals=(10, 10),
+            checks=0,
+        )
+
+
+def estimates_of_the_arch(eset, places):
+    """χ² of the true states over places, drawn at random, and estimates from heights with errors."""
+    arch, generator = eset.structure, np.random.default_rng(0)
+    left, right = arch.height(1 / 3), arch.height(2 / 3)
+    out = []
+    for place in places(generator):
+        here = eset.at(**place).stable
+        state = here[int(generator.integers(len(here)))]
+        seen = {each: each(state) + generator.normal(0, 1e-3) for each in (left, right)}
+        truth = sum(((each(state) - value) / 1e-3) ** 2 for each, value in seen.items())
+        out.append((truth, em.estimate_state(eset, seen, dict.fromkeys(seen, 1e-3))))
+    return out
+
+
+@pytest.mark.slow
+def test_a_state_beside_the_limit_of_an_actuator_has_one_candidate(steered_arch):
+    """29 of 80 were ambiguous, with up to four candidates on one side."""
+
+    def places(draw):
+        return [
+            {"Theta": 1.5 - abs(draw.normal()) * 0.02, "q": draw.uniform(0.2, 3)} for _ in range(40)
+        ]
+
+    with unchecked():
+        estimates = estimates_of_the_arch(steered_arch, places)
+    for truth, found in estimates:
+        assert found.known
+        assert len(found.states) == 1
+        assert found.chi2[0] <= truth
+
+
+@pytest.mark.slow
+def test_candidates_near_no_load_are_minima_of_their_own(steered_arch):
+    """30 of 100 were ambiguous, with up to six candidates; 16 of them on a fine grid, too.
+
+    Candidates are inside, or exactly at q = 0 or a limit of Θ, and clearly apart.
+    """
+
+    def places(draw):
+        return [
+            {"Theta": draw.uniform(0.6, 1.4), "q": abs(draw.normal() * 0.05)} for _ in range(40)
+        ]
+
+    with unchecked():
+        estimates = estimates_of_the_arch(steered_arch, places)
+    for truth, found in estimates:
+        assert found.chi2[0] <= truth
+        theta, load = found.states["Theta"], found.states["q"]
+        side = np.minimum(np.abs(load), np.abs(np.abs(theta - 1.0) - 0.5))
+        assert (found.inside | (side < 1e-9)).all()
+        assert np.hypot(np.diff(theta), np.diff(load)).min(initial=1.0) > 0.05
+        assert len(found.states) <= 3
+
+
 def test_nothing_explains_what_contradicts_itself(spring_set):
     spring = spring_set.structure
     seen = {spring.angle: 0.62, spring.height: 0.2, "x_l": 0.8}

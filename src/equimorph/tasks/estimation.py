@@ -14,15 +14,9 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.tangents import fold_slopes, split_step
 from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.queries.least_squares import DIFFERENCE, Residuals, nearest
 from equimorph.manifold.queries.locate import ValueFit, different, pieces_of
-from equimorph.manifold.queries.nearest import (
-    DIFFERENCE,
-    Ground,
-    Residuals,
-    Spot,
-    local_minima,
-    spots,
-)
+from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, shape_coordinate
 
@@ -214,7 +208,7 @@ def _minima(
     value = np.linalg.norm(residuals(eset.points.z, eset.points.p), axis=1)
     cells = eset.cells if unstable else eset.cells[eset.cell_index == 0]
     starts = local_minima(faces_of(cells, 2), value)[:STARTS]
-    found, misfit, inside = ground.nearest(spots(eset, starts), residuals)
+    found, misfit, inside = nearest(ground, spots(eset, starts), residuals)
     if unstable:
         return found, misfit, inside
     stable = eset.structure.index(found.z, found.p) == 0
@@ -238,7 +232,7 @@ def _at_edge(
     begin = spots(eset, starts)
     if len(starts) == 0:
         return begin, np.zeros(0)
-    edge, misfit, _ = Ground(ground.setting, eset, fold=True).nearest(begin, residuals)
+    edge, misfit, _ = nearest(Ground(ground.setting, eset, fold=True), begin, residuals)
     frames, rows = ground.frames(edge)
     across = fold_slopes(ground.setting, edge.z, edge.p, frames)
     across /= np.linalg.norm(across, axis=1, keepdims=True)

@@ -12,6 +12,7 @@ from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.queries.least_squares import nearest
 from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
 from equimorph.model import Descriptor, position
 from equimorph.structures import State, States, Structure
@@ -121,7 +122,7 @@ def locate(
     misfit = np.linalg.norm(fit.residuals(eset.points.z, eset.points.p), axis=1)
     starts = local_minima(faces_of(eset.cells, 2), misfit)[:CANDIDATES]
     ground = Ground(eset.setting, eset)
-    found, value, inside = ground.nearest(spots(eset, starts), fit.residuals)
+    found, value, inside = nearest(ground, spots(eset, starts), fit.residuals)
     chosen = different(eset.structure, found, value)[:2]
     places = _places(eset, found.take(chosen), value[chosen], inside[chosen])
     return Location(places[0], places[1] if len(places) > 1 else None)

@@ -15,6 +15,7 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import placed_frames
 from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.queries.least_squares import nearest as nearest_points
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
 from equimorph.manifold.queries.snap_graph import stability_boundary
@@ -115,7 +116,7 @@ def _in_parameters(
 
     far = np.linalg.norm(change(eset.points.z, eset.points.p), axis=1)
     starts = _nearest_of_each_part(boundary, far)
-    found, length, _ = Ground(setting, eset, fold=True).nearest(spots(eset, starts), change)
+    found, length, _ = nearest_points(Ground(setting, eset, fold=True), spots(eset, starts), change)
     best, nearest = np.inf, None
     for lane in np.argsort(length, kind="stable"):
         if length[lane] >= best:

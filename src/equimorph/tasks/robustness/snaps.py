@@ -11,6 +11,7 @@ from equimorph.door import door
 from equimorph.equilibria import Landing, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, StabilityDistance, stability_distance
 from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.queries.least_squares import nearest
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.manifold.queries.nearest import Ground, Spot, spots
 from equimorph.manifold.queries.snap_graph import stability_boundary
@@ -182,8 +183,8 @@ class _Moves:
         stratum, _ = pieces_of(self.eset, self.state)
         vertices = np.unique(stability_boundary(self.eset, stratum))
         some = self.eset.points[vertices]
-        nearest = np.argsort(np.linalg.norm(self.changes(some.z, some.p), axis=1), kind="stable")
-        p = some.p[nearest[:MOST_MOVES]]
+        order = np.argsort(np.linalg.norm(self.changes(some.z, some.p), axis=1), kind="stable")
+        p = some.p[order[:MOST_MOVES]]
         if held is not None:
             p = np.concatenate([self._around(held, vertices), p])
         return self.shortest(p)
@@ -202,7 +203,7 @@ class _Moves:
             np.repeat(tip.rows, len(each), axis=0),
         )
         on_fold, found = self._on_folds(between)
-        return on_fold.p[found]
+        return np.asarray(on_fold.p[found])
 
     def shortest(self, p: Parameters) -> _Snap | None:
         """Shortest change that snaps on the way to some parameters; None if there is none."""
@@ -242,7 +243,7 @@ class _Moves:
         both.
         """
         here = self._spot(snap.fold)
-        near, length, _ = self._folds.nearest(here, self.changes)
+        near, length, _ = nearest(self._folds, here, self.changes)
         attained = self.shortest(near.p)
         if attained is not None and attained.length <= snap.length:
             return attained, attained.length
@@ -274,8 +275,8 @@ class _Moves:
         vertices = np.unique(np.concatenate([np.ravel(piece) for piece in eset.folds]))
         place = embed(eset.setting, eset.points.z[vertices], eset.points.p[vertices])
         here = embed(eset.setting, fold.z[None], fold.p[None])
-        nearest = vertices[[np.linalg.norm(place - here, axis=1).argmin()]]
-        spot = Spot(fold.z[None], fold.p[None], spots(eset, nearest).rows)
+        closest = vertices[[np.linalg.norm(place - here, axis=1).argmin()]]
+        spot = Spot(fold.z[None], fold.p[None], spots(eset, closest).rows)
         return Spot(spot.z, spot.p, self._folds.frames(spot)[1])
 
 
