@@ -162,7 +162,7 @@ def steered_arch():
 
 
 def estimates_of_the_arch(eset, places):
-    """χ² of the true states over places, drawn at random, and estimates from heights with errors."""
+    """χ² of true states over places, drawn at random, and estimates from heights with errors."""
     arch, generator = eset.structure, np.random.default_rng(0)
     left, right = arch.height(1 / 3), arch.height(2 / 3)
     out = []
