@@ -8,6 +8,7 @@ import pytest
 
 import equimorph as em
 from equimorph.structures.rod.criticality import quartic
+from oracles.spatial_rod import sideways_from
 
 ROUND = 1.0 / 1.3
 """C = 1/(1 + ν) at ν = 0.3, as all tables but where they say so."""
@@ -66,24 +67,81 @@ def test_the_lateral_margin_far_beyond_is_that_of_the_rod_in_space():
 
 
 def test_a_round_rod_leaves_its_plane_without_a_snap():
-    """q(z(½)) of the branch in space: 1.601557 at 0.005, 1.607025 at 0.04.
-
-    On the branch q − q₀ = b z² + O(z⁴); b by extrapolation from both, to the digits given.
-    """
+    """q(z(½)) = 1.601557, 1.607025, 1.777788 at 0.005, 0.04, 0.18, index 0: last digit."""
     rod = em.Rod(torsion=0.77, lateral=1.0)
     found = em.limit_load(rod.natural_state(Theta=0.9), "q", within=[rod.stable_in_space])
     assert found.criticality == "supercritical"
-    block, z, p = rod.out_of_plane(), found.state.z[None], found.state.p[None]
-    h, ends = 1e-3, []
-    for side in (-1.0, 1.0):
-        state = em.lift(rod.natural_state(Theta=0.9), {"q": found.value + side * h}).end.state
-        ends.append(rod.lateral_margin()(state))
-    slope = (ends[1] - ends[0]) / (2 * h)
+    at = sideways_from(rod, found.state, 0.77, 1.0)
+    for place, exact in ((0.005, 1.601557), (0.04, 1.607025), (0.1, None), (0.18, 1.777788)):
+        load, spectrum, _ = at(place)
+        assert spectrum[0] > 0.0
+        assert exact is None or load == pytest.approx(exact, abs=5.1e-7)
+
+
+@pytest.mark.parametrize(
+    ("lateral", "Theta", "Delta", "word"),
+    [
+        (1.0, 0.9, 0.0, "supercritical"),
+        (2.0, 0.9, 0.0, "supercritical"),
+        (2.5, 0.9, 0.0, "subcritical"),
+        (1.5, 0.6, 0.3, "subcritical"),
+    ],
+)
+def test_a_rod_in_space_follows_the_side_that_criticality_tells(lateral, Theta, Delta, word):
+    """q − q₀ = b z² + O(z⁴) by fourth-order terms and by two equilibria in space: 1e-5."""
+    rod = em.Rod(torsion=0.77, lateral=lateral)
+    state = rod.natural_state(Theta=Theta, Delta=Delta)
+    found = em.limit_load(state, "q", within=[rod.stable_in_space])
+    assert found.criticality == word
+    at, bends = sideways_from(rod, found.state, 0.77, lateral), []
+    for place in (0.01, 0.02):
+        load, spectrum, _ = at(place)
+        bends.append((load - found.value) / place**2)
+        assert (spectrum < 0.0).sum() == int(word == "subcritical")
+    h, z, p = 1e-3, found.state.z[None], found.state.p[None]
+    ends = [em.lift(state, {"q": found.value + side * h}).end.state for side in (-1.0, 1.0)]
+    slope = (rod.lateral_margin()(ends[1]) - rod.lateral_margin()(ends[0])) / (2 * h)
     middle = rod.lateral_mode(found.state, 3).z[1]
-    b = -4.0 * quartic(block, z, p)[0][0] / slope / middle**2
-    near, far = (1.601557 - found.value) / 0.005**2, (1.607025 - found.value) / 0.04**2
-    assert b == pytest.approx((64 * near - far) / 63, abs=0.02)  # 5e-7/0.005²
-    assert b == pytest.approx(far, rel=0.02)
+    bend = -4.0 * quartic(rod.out_of_plane(), z, p)[0][0] / slope / middle**2
+    assert bend == pytest.approx((4 * bends[0] - bends[1]) / 3, rel=1e-4)
+
+
+def inverted(Theta, load):
+    """The inverted round arch under a load."""
+    rod = em.Rod(torsion=0.77, lateral=1.0)
+    z, p = (each[-1] for each in inverted_route())
+    state = em.State(rod, z, p)
+    return rod, em.lift(state, {"q": load, "Theta": Theta}).end.state
+
+
+def test_the_sideways_branch_rejoins_the_inverted_arch():
+    """(0.9, 0): at q₀ = 2.476483, z² = 0.1096 (q₀ − q); at 2.1 (y, z) = (−0.0385, 0.184)."""
+    rod, state = inverted(0.9, 3.0)
+    assert state.stable_in_space
+    end = em.lift(state, {"q": 2.0}, within=[rod.stable_in_space]).end
+    assert (end.kind, end.criticality) == ("lateral branch point", "supercritical")
+    assert end.state["q"] == pytest.approx(2.476483, abs=5.1e-7)
+    at = sideways_from(rod, end.state, 0.77, 1.0)
+    load, spectrum, _ = at(0.01)
+    assert 0.01**2 / (2.476483 - load) == pytest.approx(0.1096, abs=1e-3)
+    assert spectrum[0] > 0.0
+    for place in (0.05, 0.1, 0.15, 0.184):
+        load, spectrum, middle = at(place)
+        assert spectrum[0] > 0.0
+    assert load == pytest.approx(2.1, abs=4e-3)  # of half a last digit of z
+    assert middle[1] == pytest.approx(-0.0385, abs=1.3e-3)
+
+
+def test_where_both_planar_states_are_unstable_in_space_a_sideways_pair_is_stable():
+    """(1, 0), q = 2.5: middle at (−0.07768, ±0.15005), margin 0.1035; to the digits given."""
+    rod, state = inverted(1.0, 3.0)
+    end = em.lift(state, {"q": 2.0}, within=[rod.stable_in_space]).end
+    at = sideways_from(rod, end.state, 0.77, 1.0)
+    for place in (0.02, 0.06, 0.1, 0.13, 0.15005):
+        load, spectrum, middle = at(place)
+    assert load == pytest.approx(2.5, abs=3e-5)  # of half a last digit of z
+    assert middle[1] == pytest.approx(-0.07768, abs=1.2e-5)
+    assert spectrum[0] == pytest.approx(0.1035, abs=5.7e-5)
 
 
 @cache
@@ -166,3 +224,23 @@ def test_of_the_stable_states_of_the_set_a_part_is_stable_in_space():
     for (torsion, lateral), share in zip(stiffnesses, (0.721, 0.864, 0.959, 1.0), strict=True):
         index = em.Rod(torsion=torsion, lateral=lateral).out_of_plane().index(stable.z, stable.p)
         assert (index == 0).mean() == pytest.approx(share, abs=1.0 / 882)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("torsion", "lateral", "possible"), [(0.77, 1.0, False), (0.9, 2.0, True)])
+def test_sets_that_are_stable_in_space_hold_the_ways_that_are(torsion, lateral, possible):
+    """q = 2.5: nothing is left over (1, 0) for a round rod; at A = 2, C = 0.9 a way inside out."""
+    rod = em.Rod(torsion=torsion, lateral=lateral)
+    eset = em.equilibrium_set(
+        rod, em.Box(Theta=(0.2, 2.5), Delta=(-2.0, 2.0)), fixed={"q": 2.5},
+        within=[rod.max_curvature <= 20.0, rod.stable_in_space], intervals=(24, 41),
+    )  # fmt: skip
+    assert eset.audit.clean
+    assert rod.lateral_margin()(eset.points).min() > -1e-8
+    over = eset.at(Theta=1.0, Delta=0.0)
+    assert len(over) == (2 if possible else 0)
+    if possible:
+        states = over[np.argsort(rod.height(0.5)(over))]
+        route = em.plan(eset, states[1], states[0], margin=0.1)
+        assert route.arrived
+        assert rod.lateral_margin()(route.path.states).min() > 0.0
