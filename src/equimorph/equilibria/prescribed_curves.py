@@ -10,8 +10,12 @@ from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev
 
 from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.curves import Metric
+from equimorph.equilibria.point_conditions import Linear, Move
+from equimorph.equilibria.point_conditions import Values as DescriptorValues
 from equimorph.errors import InputError
+from equimorph.linalg import BorderedSolution
 from equimorph.model import Descriptor
 from equimorph.structures import Advance, Structure
 
@@ -184,7 +188,6 @@ class SmoothCurve:
 
 
 Extended = Float[np.ndarray, "lanes extended"]
-Rows = Float[np.ndarray, "lanes k size"]
 
 DIFFERENCE = 1e-5
 """Step of central differences: their error and that of round-off are about 1e-11."""
@@ -203,8 +206,8 @@ class TrackedMetric:
 class TrackedCurve:
     """Equilibria with ``S(z, p) = S*(t)``, part of the parameters given and part of them unknown.
 
-    Unknowns (u, a, λ): those of the structure with the free parameters a between u and λ. The
-    gradients of descriptors are taken by central differences.
+    Unknowns (u, a, λ): those of the structure with the free parameters a between u and λ.
+    Descriptors are differentiated along the set, by central differences.
 
     Parameters
     ----------
@@ -272,66 +275,103 @@ class TrackedCurve:
     def advance(
         self, z: Extended, t: Values, row: Extended, corner: Values, defect: Values
     ) -> Advance:
-        """Newton step and tangent by the bordered solve with k + 1 more rows and columns."""
-        structure, k, n = self.structure, len(self.free), self.structure.unknowns
-        count = len(structure.parameters)
-        x, p = self.states(z, t)
+        """Newton step and tangent: onto the set, and along it to the conditions.
+
+        The set has k + 1 directions here; the descriptors and the closing row are k + 1 conditions.
+        """
+        structure, (x, p), k = self.structure, self.states(z, t), len(self.free)
+        size, changes = structure.size, self._changes(self.rate(t))
         residual = structure.residual(x, p)
-        missed = self._values(x, p) - self.prescribed.value(t)[:, count:]
-        changes = self._changes(self.rate(t))
-        columns = np.stack([structure.parameter_derivative(x, p, dp) for dp in changes], 1)
-        rows, slopes = self._gradients(x, p, changes)
-        slopes[:, :, k] -= self.prescribed.rate(t)[:, count:]
-        corners = np.zeros((len(z), k + 1, k + 1))
-        corners[:, :k], corners[:, k, :k], corners[:, k, k] = slopes, row[:, n : n + k], corner
-        last = np.concatenate([row[:, :n], row[:, n + k :]], axis=1)
-        rhs = np.zeros((len(z), 2, structure.size + k + 1))
-        rhs[:, 0] = -np.concatenate([residual, missed, defect[:, None]], axis=1)
-        rhs[:, 1, -1] = 1.0
-        border = (columns, np.concatenate([rows, last[:, None]], axis=1), corners)
-        solved = structure.solve(x, p, rhs, border)
-        step, tangent = (
-            self._joined(each[:, : structure.size], each[:, structure.size : -1])
-            for each in (solved.x[:, 0], solved.x[:, 1])
-        )
+        solved = _tangent_space(structure, x, p, residual, changes)
+        onto, along = solved.x[:, 0], solved.x[:, 1:]
+        linear = self._linear(x, p, t, solved.x, changes)
+        closing = self._closing(solved.x, row, corner)
+        matrix = np.concatenate([linear.slopes, closing[:, None, 1:]], axis=1)
+        rhs = np.zeros((len(z), 2, k + 1))
+        rhs[:, 0, :k], rhs[:, 0, k], rhs[:, 1, k] = -linear.value, -defect - closing[:, 0], 1.0
+        step, tangent = (_solve_small(matrix, rhs) @ along).transpose(1, 0, 2)
+        step += onto
+        missed = self._values(x, p) - self._targets(t)
         return Advance(
-            step,
-            solved.x[:, 0, -1].copy(),
-            tangent,
-            solved.x[:, 1, -1].copy(),
+            self._joined(step[:, :size], step[:, size:-1]),
+            step[:, -1].copy(),
+            self._joined(tangent[:, :size], tangent[:, size:-1]),
+            tangent[:, -1].copy(),
             np.abs(np.concatenate([residual, missed], axis=1)).max(axis=1),
             solved.negative - structure.constraints,
             np.full(len(z), np.nan),
         )
 
+    def _targets(self, t: Values) -> Float[np.ndarray, "lanes k"]:
+        """S*(t)."""
+        return self.prescribed.value(t)[:, len(self.structure.parameters) :]
+
+    def _linear(
+        self,
+        z: Lanes,
+        p: Parameters,
+        t: Values,
+        moves: Float[np.ndarray, "lanes moves bordered"],
+        changes: Float[np.ndarray, "lanes directions parameters"],
+    ) -> Linear:
+        """S − S* after the first move, onto the set, and its slopes along the others."""
+        structure, size = self.structure, self.structure.size
+        dz, dp = moves[:, :, :size], moves[:, :, size:] @ changes
+        functions = tuple(descriptor.function for descriptor in self.descriptors)
+        takes = DescriptorValues(functions, self._targets(t), DIFFERENCE)
+        move = Move(dz[:, 0], dp[:, 0], dz[:, 1:], dp[:, 1:])
+        found = takes.linear(Critical(structure, z, p, z), move)
+        rate = self.prescribed.rate(t)[:, len(structure.parameters) :, None] * moves[:, None, :, -1]
+        return Linear(found.value - rate[:, :, 0], found.slopes - rate[:, :, 1:])
+
     def _values(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes k"]:
         return np.stack([descriptor.function(z, p) for descriptor in self.descriptors], 1)
 
-    def _changes(self, rate: Parameters) -> list[Parameters]:
+    def _changes(self, rate: Parameters) -> Float[np.ndarray, "lanes directions parameters"]:
         """Directions in parameter space: each free parameter, and the given rate."""
-        units = np.zeros((len(self.free), *rate.shape))
-        for unit, place in zip(units, self.free, strict=True):
-            unit[:, place] = 1.0
-        return [*units, rate]
+        units = np.zeros((len(rate), len(self.free), rate.shape[1]))
+        units[:, np.arange(len(self.free)), self.free] = 1.0
+        return np.concatenate([units, rate[:, None]], axis=1)
 
-    def _gradients(
-        self, z: Lanes, p: Parameters, changes: list[Parameters]
-    ) -> tuple[Rows, Float[np.ndarray, "lanes k directions"]]:
-        """∂S/∂z, and ∂S/∂p along directions."""
-        lanes, size = z.shape
-        steps = DIFFERENCE * np.eye(size)
-        here = np.repeat(p, size, axis=0)
-        ahead, behind = (
-            self._values((z[:, None] + sign * steps).reshape(-1, size), here)
-            for sign in (1.0, -1.0)
-        )
-        rows = ((ahead - behind) / (2.0 * DIFFERENCE)).reshape(lanes, size, -1)
-        slopes = [self._along(z, p, dp) for dp in changes]
-        return np.ascontiguousarray(rows.transpose(0, 2, 1)), np.stack(slopes, 2)
+    def _closing(
+        self, moves: Float[np.ndarray, "lanes moves bordered"], row: Extended, corner: Values
+    ) -> Float[np.ndarray, "lanes moves"]:
+        """Products of the closing row with changes of (z, a, t)."""
+        n, k = self.structure.unknowns, len(self.free)
+        whole = np.concatenate([row[:, :n], row[:, n + k :], row[:, n : n + k], corner[:, None]], 1)
+        return np.asarray(np.einsum("lmi,li->lm", moves, whole))
 
-    def _along(self, z: Lanes, p: Parameters, dp: Parameters) -> Float[np.ndarray, "lanes k"]:
-        longest = np.abs(dp / self.structure.scales).max(axis=1)
-        h = (DIFFERENCE / np.maximum(longest, 1e-300))[:, None]
-        h = np.where(longest[:, None] > 0.0, h, 1.0)
-        change = self._values(z, p + h * dp) - self._values(z, p - h * dp)
-        return np.asarray(change / (2.0 * h))
+
+def _tangent_space(
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    residual: Lanes,
+    changes: Float[np.ndarray, "lanes k parameters"],
+) -> BorderedSolution:
+    """A step onto the set, and directions along it, for changes of the parameters.
+
+    Any rows that see the tangent space will do.
+    """
+    (lanes, size), k = z.shape, changes.shape[1]
+    columns = [
+        structure.parameter_derivative(z, p, np.ascontiguousarray(changes[:, i])) for i in range(k)
+    ]
+    rows = np.cos(np.outer(np.arange(1, k + 1), 1.7 * np.arange(size + k)) + 0.4)
+    rows = np.tile(rows, (lanes, 1, 1))
+    rhs = np.zeros((lanes, k + 1, size + k))
+    rhs[:, 0, :size], rhs[:, 1:, size:] = -residual, np.eye(k)
+    return structure.solve(z, p, rhs, (np.stack(columns, 1), rows[:, :, :size], rows[:, :, size:]))
+
+
+def _solve_small(
+    matrix: Float[np.ndarray, "lanes k k"], rhs: Float[np.ndarray, "lanes sides k"]
+) -> Float[np.ndarray, "lanes sides k"]:
+    """Solutions of small systems; not a number where they are singular."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        regular = np.abs(np.linalg.det(matrix)) > 0.0
+    out = np.full(rhs.shape, np.nan)
+    out[regular] = np.linalg.solve(matrix[regular], rhs[regular].transpose(0, 2, 1)).transpose(
+        0, 2, 1
+    )
+    return out
