@@ -19,7 +19,7 @@ from equimorph.equilibria.settle import (
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.geometry.tangents import border_of, placed_frames, split_step
+from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Descriptor, position
 from equimorph.structures import value_of
@@ -95,24 +95,6 @@ def solve_on_the_set(
     return settle(structure, z, p, directions, [values], ON_SET, frame, frames=False)
 
 
-def full_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
-    """Bases of the tangent spaces that project to those of planes R.
-
-    ``[F_z F_p; R] (t_1 … t_d) = (0, e_1) … (0, e_d)``.
-    """
-    lanes, size, d = len(z), z.shape[1], len(setting.free)
-    rhs = np.zeros((lanes, d, size + d))
-    rhs[:, :, size:] = np.eye(d)
-    return setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
-
-
-def orthonormal(setting: Setting, frames: Frames) -> Frames:
-    """Bases of the same spaces, orthonormal in the metric."""
-    placed = placed_frames(setting, frames)
-    gram = placed @ np.swapaxes(placed, 1, 2)
-    return np.asarray(np.linalg.solve(np.linalg.cholesky(gram), frames))
-
-
 def frames_anywhere(setting: Setting, z: Lanes, p: Parameters) -> Frames:
     """Orthonormal bases of the tangent spaces of states, without any knowledge of where these are.
 
@@ -124,7 +106,7 @@ def frames_anywhere(setting: Setting, z: Lanes, p: Parameters) -> Frames:
     rows = np.ascontiguousarray(np.broadcast_to(basis, (len(z), d, width)))
     frames = np.zeros((len(z), d, z.shape[1] + d))
     for _ in range(2):
-        frames = orthonormal(setting, full_frames(setting, z, p, rows))
+        frames = tangent_frames(setting, z, p, rows)
         rows = placed_frames(setting, frames)
     return frames
 

@@ -215,7 +215,7 @@ class Cells:
     ) -> Flags:
         low, high = self._indices
         good = good & (index >= low[cell]) & (index <= high[cell])
-        good &= self.eset.box.contains(p[:, self.coordinates.setting.free], slack=SLACK)
+        good &= self.eset.box.holds(p[:, self.coordinates.setting.free], slack=SLACK)
         good[good] = self.eset.structure.resolved(z[good], p[good])
         for constraint in self.eset.constraints:
             some = np.flatnonzero(good)

@@ -95,7 +95,7 @@ class Reduction(Chart):
         found = self.preference.over(points)
         code = np.full(len(points), PointStatus.GAP)
         code[found.point] = PointStatus.INSIDE
-        beyond = ~self.eset.box.contains(points, slack=1e-12)
+        beyond = ~self.eset.box.holds(points, slack=1e-12)
         code[beyond] = PointStatus.BEYOND_THE_BOX
         code[self._on_barrier(points) & ~beyond] = PointStatus.BARRIER
         return self._answers(found.take(code[found.point] == PointStatus.INSIDE), code)

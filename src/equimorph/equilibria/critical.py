@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters
-from equimorph.structures import Equations
+from equimorph.structures import Equations, LinearSystem
 
 THIRD_STEP = 2e-3
 """Step of differences for F_zzz, in the metric: of fourth order, with errors near 1e-11."""
@@ -22,15 +22,28 @@ class Critical:
     With ``[F_z b; bᵀ 0] [v; g] = [0; 1]`` the matrix F_z is singular exactly where g = 0, and then
     v is its null vector with b·v = 1 [Govaerts2000]_. All test functions are smooth in (z, p) as
     long as no second eigenvalue vanishes.
+
+    Parameters
+    ----------
+    structure, z, p, b
+        The structure, the points, and their borders.
+    system
+        F_z at the points, if it is at hand.
+    null
+        (v, g), if they are known.
     """
 
     structure: Equations
     z: Lanes
     p: Parameters
     b: Lanes
+    system: LinearSystem | None = None
+    null: Lanes | None = None
 
     @cached_property
     def _bordered(self) -> Lanes:
+        if self.null is not None:
+            return self.null
         rhs = np.zeros((len(self.z), 1, self.structure.size + 1))
         rhs[:, 0, -1] = 1.0
         return np.asarray(self.solve(rhs)[:, 0])
@@ -40,6 +53,8 @@ class Critical:
     ) -> Float[np.ndarray, "lanes sides bordered"]:
         """Solve with the bordered matrix, which stays regular at simple singular points."""
         border = (self.b[:, None], self.b[:, None], np.zeros((len(self.z), 1, 1)))
+        if self.system is not None:
+            return self.system.solve(rhs, border).x
         return self.structure.solve(self.z, self.p, rhs, border).x
 
     @property
@@ -113,10 +128,11 @@ Test = Callable[[Critical], Values]
 
 def null_border(structure: Equations, z: Lanes, p: Parameters) -> Lanes:
     """Unit vectors near the null vectors of F_z, by bordered solves that stay regular there."""
+    system = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1])))
     b = np.tile(np.cos(1.3 * np.arange(z.shape[1])) + 1.1, (len(z), 1))
     for _ in range(4):
         b = b / np.linalg.norm(b, axis=1, keepdims=True)
-        b = Critical(structure, z, p, np.ascontiguousarray(b)).v
+        b = Critical(structure, z, p, np.ascontiguousarray(b), system).v
     return np.ascontiguousarray(b / np.linalg.norm(b, axis=1, keepdims=True))
 
 

@@ -1,6 +1,6 @@
 """Curves that the tracer follows: a path in parameter space, or a homotopy."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT, squared_lengths
 from equimorph.linalg import Border, BorderedSolution
-from equimorph.structures import Advance, Structure, bordered_advance
+from equimorph.structures import Advance, LinearSystem, Structure, advance_by
 from equimorph.structures.contract import Direction
 
 
@@ -168,9 +168,11 @@ class NewtonHomotopy:
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent by the general bordered solve."""
-        residual = self.structure.residual(z, self.p) - (1.0 - t)[:, None] * self.defect
-        given = (self.structure, z, self.p, residual, self.defect)
-        return bordered_advance(*given, row, corner, defect)
+        structure = self.structure
+        here = structure.linear_system(z, self.p, np.zeros((len(z), 0, self.p.shape[1])))
+        residual = here.residual - (1.0 - t)[:, None] * self.defect
+        system = replace(here, residual=residual, columns=self.defect[:, None])
+        return advance_by(system, row, corner, defect, structure.constraints)
 
 
 @dataclass(frozen=True)
@@ -242,6 +244,14 @@ class AlongCurve:
         """Solve with F_z − shift·mass, bordered."""
         here, t = self._at(p)
         return here.structure.solve(*here.states(z, t), rhs, border, shift)
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p p' along changes of t, and solves with F_z."""
+        here, t = self._at(p)
+        changes = directions[:, :, :1] * here.rate(t)[:, None]
+        return here.structure.linear_system(*here.states(z, t), changes)
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian."""

@@ -1,20 +1,26 @@
 """One Newton step onto the equilibrium set and along it to the conditions of points."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.point_conditions import Condition, Directions, Move, Some
-from equimorph.structures import Equations, Structure
+from equimorph.equilibria.newton_kernels import (
+    amount_lanes,
+    move_lanes,
+    null_lanes,
+)
+from equimorph.equilibria.point_conditions import Condition, Directions, Linear, Move, Some
+from equimorph.linalg import orthonormal_rows
+from equimorph.structures import Equations, LinearSystem, Structure
 
 DOUBTFUL = 1e-4
 """Pivot ratio below which the index is counted anew."""
-SINGULAR, RANK = 1e-14, 1e-12
-"""Determinant of the slopes of conditions and their smallest singular value, relative to their
-size, that count as zero."""
+RANK = 1e-12
+"""Smallest singular value of slopes, relative to the largest one, that counts as zero; their
+determinant is `DEPENDENT` then."""
 
 Numbers = Int[np.ndarray, " lanes"]
 
@@ -84,6 +90,22 @@ Frame = Tangents | Planes | Held
 
 
 @dataclass(frozen=True)
+class Tangent:
+    """The set near points: a step onto it, directions along it, and what the factorisation told.
+
+    Steps and directions are changes of z, then of the other unknowns. null: (v, g), see `Critical`,
+    if it is needed.
+    """
+
+    onto: Lanes
+    along: Float[np.ndarray, "lanes k bordered"]
+    index: Numbers
+    sure: Flags
+    system: LinearSystem | None = None
+    null: Lanes | None = None
+
+
+@dataclass(frozen=True)
 class Problem:
     """What is solved for: directions, conditions, coordinates along the set."""
 
@@ -120,45 +142,31 @@ class Problem:
         frame = self.frame.take(some)
         return Problem(self.structure, self.directions[some], conditions, frame)
 
-    def change(
-        self, a: Float[np.ndarray, "lanes steps k"]
-    ) -> Float[np.ndarray, "lanes steps parameters"]:
-        """Changes of the parameters by steps along the directions."""
-        return np.asarray(a[:, :, : self.directions.shape[1]] @ self.directions)
-
-
-@dataclass(frozen=True)
-class Tangent:
-    """The set near points: a step onto it, directions along it, and what the factorisation told.
-
-    dz, da: the step, of z and of the other unknowns; along_z, along_a: the directions.
-    """
-
-    dz: Lanes
-    da: Float[np.ndarray, "lanes k"]
-    along_z: Float[np.ndarray, "lanes k size"]
-    along_a: Float[np.ndarray, "lanes k k"]
-    index: Numbers
-    sure: Flags
-
-    @property
-    def frames(self) -> Float[np.ndarray, "lanes k bordered"]:
-        """Directions of all unknowns."""
-        return np.concatenate([self.along_z, self.along_a], axis=2)
+    def linear(self, at: Critical, tangent: Tangent) -> Linear:
+        """Return all conditions after the step onto the set, and their slopes along it."""
+        size, k = self.structure.size, self.directions.shape[1]
+        onto, along = tangent.onto, tangent.along
+        onto_p = (onto[:, None, size : size + k] @ self.directions)[:, 0]
+        along_p = along[:, :, size : size + k] @ self.directions
+        move = Move(onto[:, :size], onto_p, along[:, :, :size], along_p)
+        found = [condition.linear(at, move) for condition in self.conditions]
+        if len(found) == 1:
+            return found[0]
+        value = np.concatenate([each.value for each in found], axis=1)
+        return Linear(value, np.concatenate([each.slopes for each in found], axis=1))
 
 
 @dataclass(frozen=True)
 class Step:
-    """A Newton step of z and the other unknowns, the set where it starts, and the null vector.
+    """A Newton step of z and the other unknowns, and the set where it starts.
 
-    slopes: those of the conditions along the directions.
+    slopes: those of the conditions along the directions; null: null vectors that renew the border.
     """
 
-    dz: Lanes
-    da: Float[np.ndarray, "lanes k"]
+    change: Lanes
     tangent: Tangent
     slopes: Float[np.ndarray, "lanes m k"]
-    null: Float[np.ndarray, "lanes border"]
+    null: Lanes | None
 
 
 @dataclass(frozen=True)
@@ -178,77 +186,84 @@ class Points:
         return Points(self.problem.take(some), *(column[some] for column in columns))
 
     def moved(self, step: Step, share: Values) -> "Points":
-        """Points after shares of a step, with the border and the rows renewed."""
-        problem, wide, moving = self.problem, share[:, None], share != 0.0
-        dz, da = wide * step.dz, wide * step.da
-        if not moving.all():  # those that do not may have steps that are no numbers
-            dz[~moving], da[~moving] = 0.0, 0.0
-        p, beta, rows = self.p, self.beta, self.rows
-        if problem.directions.shape[1]:
-            p = p + problem.change(da[:, None])[:, 0]
-        if problem.unfolded:
-            beta = beta + da[:, -1]
+        """Points after shares of a step, with the border and the rows of the points before."""
+        problem = self.problem
+        z, p, beta = np.empty_like(self.z), np.empty_like(self.p), np.empty_like(self.beta)
+        given = (step.change, problem.directions, share)
+        move_lanes(self.z, self.p, self.beta, *given, z, p, beta)
+        return Points(problem, z, p, beta, self.b, self.rows)
+
+    def renewed(self, step: Step, some: Some) -> "Points":
+        """Some of the lanes after a step, with the border and the rows that it found."""
+        if len(some) == 0:
+            return self
+        whole = len(some) == len(self.z)
+        here = self if whole else self.take(some)
+        problem, b, rows = here.problem, here.b, here.rows
+        if step.null is not None:
+            b = _unit(step.null if whole else step.null[some])
         if isinstance(problem.frame, Tangents) and problem.width:
-            rows = _dual(problem.structure, step.tangent.frames)
-        return Points(problem, self.z + dz, p, beta, step.null, rows)
+            along = step.tangent.along if whole else step.tangent.along[some]
+            rows = along * weights_of(problem.structure, along.shape[2])
+        return Points(problem, here.z, here.p, here.beta, b, rows)
 
     def step(self) -> Step:
         """Newton step onto the set and along it to the conditions."""
         problem, tangent = self.problem, self.tangent()
         if not problem.conditions:
             none = np.zeros((len(self.z), 0, problem.width))
-            return Step(tangent.dz, tangent.da, tangent, none, self.b)
+            return Step(tangent.onto, tangent, none, None)
         # conditions without use for the border get any vector in its place
-        at = Critical(problem.structure, self.z, self.p, self.b if problem.critical else self.z)
-        onto_p = problem.change(tangent.da[:, None])[:, 0]
-        move = Move(tangent.dz, onto_p, tangent.along_z, problem.change(tangent.along_a))
-        found = [condition.linear(at, move) for condition in problem.conditions]
-        slopes, value = found[0].slopes, found[0].value
-        if len(found) > 1:
-            slopes = np.concatenate([each.slopes for each in found], axis=1)
-            value = np.concatenate([each.value for each in found], axis=1)
-        spare = slopes.shape[1] < slopes.shape[2] and not isinstance(problem.frame, Held)
-        gram = _gram(problem.structure, tangent.frames) if spare else None
-        amount = _amount(slopes, value, gram)[:, None]
-        dz = tangent.dz + (amount @ tangent.along_z)[:, 0]
-        da = tangent.da + (amount @ tangent.along_a)[:, 0]
-        return Step(dz, da, tangent, slopes, _unit(at.v) if problem.renews_border else self.b)
+        border = self.b if problem.critical else self.z
+        at = Critical(problem.structure, self.z, self.p, border, tangent.system, tangent.null)
+        linear = problem.linear(at, tangent)
+        amount = _amount(linear.slopes, linear.value)
+        change = tangent.onto + (amount[:, None] @ tangent.along)[:, 0]
+        return Step(change, tangent, linear.slopes, at.v if problem.renews_border else None)
 
     def tangent(self) -> Tangent:
         """Newton step onto the set where the rows vanish, and directions along the set."""
         problem, structure = self.problem, self.problem.structure
-        (lanes, size), k = self.z.shape, self.problem.width
-        if k == 0 or isinstance(problem.frame, Held):
+        (lanes, size), width = self.z.shape, self.problem.width
+        if width == 0 or isinstance(problem.frame, Held):
             return self._over_parameters()
-        columns = np.empty((lanes, k, size))
-        rhs = np.zeros((lanes, k + 1, size + k))
-        rhs[:, 0, :size], rhs[:, 1:, size:] = -structure.residual(self.z, self.p), np.eye(k)
+        system = structure.linear_system(self.z, self.p, problem.directions)
+        columns, k = system.columns, system.columns.shape[1]
+        seeks = problem.critical and not problem.unfolded  # (v, g) needs one solution more
+        rhs = np.zeros((lanes, width + 1 + seeks, size + width))
+        rhs[:, :width, size:] = np.eye(width)
+        np.negative(system.residual, out=rhs[:, width, :size])
+        if seeks:
+            rhs[:, -1, :size] = self.b
         if problem.unfolded:
-            columns[:, -1] = self.b
-            rhs[:, 0, :size] -= self.beta[:, None] * self.b
-        if many := problem.directions.shape[1]:
-            z, p = self.z.repeat(many, axis=0), self.p.repeat(many, axis=0)
-            dp = problem.directions.reshape(-1, p.shape[1])
-            columns[:, :many] = structure.parameter_derivative(z, p, dp).reshape(lanes, many, size)
-        border = (columns, self.rows[:, :, :size], self.rows[:, :, size:])
-        solution = structure.solve(self.z, self.p, rhs, border)
+            columns = np.concatenate([columns, self.b[:, None]], axis=1)
+            rhs[:, width, :size] -= self.beta[:, None] * self.b
+        solution = system.solve(rhs, (columns, self.rows[:, :, :size], self.rows[:, :, size:]))
+        x, null = solution.x, None
+        if problem.critical:
+            null = np.empty((lanes, size + 1))
+            null_lanes(x, size, k, self.b, null)
+        index = solution.negative - structure.constraints
         sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
-        dz, along_z = np.ascontiguousarray(solution.x[:, 0, :size]), solution.x[:, 1:, :size]
-        da, along_a = solution.x[:, 0, size:], solution.x[:, 1:, size:]
-        return Tangent(dz, da, along_z, along_a, solution.negative - structure.constraints, sure)
+        # planes keep the step in them; else it is the shortest, orthogonal to the directions
+        many = width + isinstance(problem.frame, Tangents)
+        along = orthonormal_rows(x[:, :many], width, weights_of(structure, size + width))
+        onto = np.ascontiguousarray(along[:, width] if many > width else x[:, width])
+        return Tangent(onto, along[:, :width], index, sure, system, null)
 
     def _over_parameters(self) -> Tangent:
         """The same where parameters are the coordinates: the structure's fused steps."""
         (lanes, size), k = self.z.shape, self.problem.width
         still, one, none = np.zeros((lanes, size)), np.ones(lanes), np.zeros(lanes)
-        along_z, along_a = np.empty((lanes, k, size)), np.tile(np.eye(k), (lanes, 1, 1))
+        along, fixed = np.zeros((lanes, k, size + k)), np.zeros_like(self.p)
         for i in range(max(k, 1)):
-            fixed = np.zeros_like(self.p)
             dp = np.ascontiguousarray(self.problem.directions[:, i]) if k else fixed
             move = self.problem.structure.advance(self.z, self.p, dp, still, one, none)
-            along_z[:, i : i + 1] = move.tangent_z[:, None]
-        sure = np.ones(lanes, bool)
-        return Tangent(move.dz, np.zeros((lanes, k)), along_z, along_a, move.index, sure)
+            along[:, i : i + 1, :size] = move.tangent_z[:, None]
+        onto = move.dz
+        if k:
+            onto, along[:, :, size:] = np.concatenate([onto, fixed[:, :k]], axis=1), np.eye(k)
+        return Tangent(onto, along, move.index, np.ones(lanes, bool))
 
 
 def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
@@ -256,95 +271,44 @@ def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
     structure, (lanes, size), k = problem.structure, z.shape, problem.width
     border, rows, frame = np.zeros((lanes, 0)), np.zeros((lanes, 0, 0)), problem.frame
     if not isinstance(frame, Held) and frame.border is not None:
-        border = frame.border
+        border = np.ascontiguousarray(frame.border)
     elif problem.critical:
         border = null_border(structure, z, p)
     if isinstance(frame, Planes):
         by_a = frame.by_p @ problem.directions.transpose(0, 2, 1)
         by_beta = [] if frame.by_beta is None else [frame.by_beta[:, :, None]]
         rows = np.concatenate([frame.by_z, by_a, *by_beta], axis=2)
-    here = Points(problem, z, p, np.zeros(lanes), border, rows)
-    if isinstance(frame, Tangents) and k:
-        # any rows that see the tangent space will do, then its own
+    elif isinstance(frame, Tangents) and k:  # any rows that see the tangent space will do
         waves = np.cos(np.outer(np.arange(1, k + 1), 1.7 * np.arange(size + k)) + 0.4)
-        along = replace(here, rows=np.tile(waves, (lanes, 1, 1))).tangent().frames
-        return replace(here, rows=_dual(structure, along))
-    return here
+        rows = np.tile(waves, (lanes, 1, 1))
+    z, p = np.ascontiguousarray(z), np.ascontiguousarray(p)
+    return Points(problem, z, p, np.zeros(lanes), border, rows)
 
 
-def _dual(
-    structure: Equations, along: Float[np.ndarray, "lanes k bordered"]
-) -> Float[np.ndarray, "lanes k bordered"]:
-    """Rows whose products with steps are coordinates in orthonormal directions of the same space.
-
-    Not a number where the directions are dependent.
-    """
-    gram = _gram(structure, along)
-    whole = np.isfinite(gram).all(axis=(1, 2))
-    whole[whole] = np.linalg.det(gram[whole]) > 0.0
-    gram[~whole] = np.eye(along.shape[1])
-    rows = np.linalg.solve(np.linalg.cholesky(gram), along) * _weights(structure, along)
-    rows[~whole] = np.nan
-    return np.ascontiguousarray(rows)
-
-
-def _gram(
-    structure: Equations, along: Float[np.ndarray, "lanes k bordered"]
-) -> Float[np.ndarray, "lanes k k"]:
-    """Products of directions in the metric."""
-    return np.asarray((along * _weights(structure, along)) @ np.swapaxes(along, 1, 2))
-
-
-def _weights(
-    structure: Equations, along: Float[np.ndarray, "lanes k bordered"]
+def weights_of(
+    structure: Equations, bordered: int, multipliers: float = 0.0
 ) -> Float[np.ndarray, " bordered"]:
-    """Metric of (z, steps along the directions); multipliers do not count."""
-    weights = np.ones(along.shape[2])
-    weights[: structure.unknowns], weights[structure.unknowns : structure.size] = (
-        structure.mass,
-        0.0,
-    )
+    """Weights of squared changes of (z, other unknowns): the metric, and that of multipliers."""
+    weights = np.ones(bordered)
+    weights[: structure.unknowns] = structure.mass
+    weights[structure.unknowns : structure.size] = multipliers
     return weights
 
 
-def length(structure: Equations, step: Step, multipliers: float) -> Values:
-    """Length of steps in the metric and in the scaled parameters."""
-    n = structure.unknowns
-    squared = step.dz[:, :n] ** 2 @ structure.mass
-    if step.da.shape[1]:
-        squared += (step.da**2).sum(axis=1)
-    if multipliers:
-        squared += multipliers * (step.dz[:, n:] ** 2).sum(axis=1)
-    return np.asarray(np.sqrt(squared))
-
-
 def _amount(
-    slopes: Float[np.ndarray, "lanes m k"],
-    value: Float[np.ndarray, "lanes m"],
-    gram: Float[np.ndarray, "lanes k k"] | None,
+    slopes: Float[np.ndarray, "lanes m k"], value: Float[np.ndarray, "lanes m"]
 ) -> Float[np.ndarray, "lanes k"]:
-    """Steps along the set that take scalars to zero: the shortest, or those of least squares.
-
-    Lengths are measured by the products of the directions, if these are given.
-    """
+    """Steps along the set that take scalars to zero: the shortest, or those of least squares."""
     count, m, k = slopes.shape
-    spread = slopes.transpose(0, 2, 1)
-    if m < k and gram is not None:
-        spread = np.linalg.solve(gram, spread)
-    matrix = slopes if m == k else slopes @ spread
-    if m > k or k == 0:
-        regular = np.zeros(count, bool)
-    else:
-        with np.errstate(invalid="ignore", over="ignore"):
-            size = np.abs(matrix).max(axis=(1, 2), initial=0.0)
-            regular = np.abs(np.linalg.det(matrix)) > SINGULAR * size**m
-    if regular.all():
-        share = np.linalg.solve(matrix, -value[:, :, None])
-        return np.asarray((share if m == k else spread @ share)[:, :, 0])
-    amount = np.full((count, k), np.nan)
-    if regular.any():
-        some = None if gram is None else gram[regular]
-        amount[regular] = _amount(slopes[regular], value[regular], some)
+    amount, regular = np.full((count, k), np.nan), np.zeros(count, bool)
+    if m <= k:
+        # the shortest step is a combination of the gradients
+        matrix = slopes if m == k else slopes @ slopes.transpose(0, 2, 1)
+        share = np.empty((count, m))
+        amount_lanes(*map(np.ascontiguousarray, (matrix, value)), share, regular)
+        amount = share if m == k else (share[:, None] @ slopes)[:, 0]
+        if regular.all():
+            return amount
     rest = ~regular & np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(value).all(axis=1)
     if rest.any():
         inverse = np.linalg.pinv(slopes[rest], rcond=RANK)

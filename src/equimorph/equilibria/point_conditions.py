@@ -72,7 +72,7 @@ class Fold:
     def linear(self, at: Critical, move: Move) -> Linear:
         """By the exact second derivatives."""
         onto = (move.onto_z, move.onto_p)
-        seconds = _seconds(at, [(at.v, np.zeros_like(at.p))], [*move.along, onto])
+        seconds = second_derivatives(at, [(at.v, np.zeros_like(at.p))], [*move.along, onto])
         return Linear(at.g[:, None] - seconds[:, :, -1], -seconds[:, :, :-1])
 
     def take(self, some: Some) -> "Fold":
@@ -109,7 +109,7 @@ class Crossing:
         tangents = [(at.v, np.zeros_like(at.p))]
         tangents += [(answers[:, i, :-1], dp) for i, dp in enumerate(moves)]
         onto = (move.onto_z, move.onto_p)
-        seconds = _seconds(at, tangents, [*move.along, onto])
+        seconds = second_derivatives(at, tangents, [*move.along, onto])
         gradient = seconds[:, :, -1] - np.column_stack([at.g, answers[:, :, -1]])
         slopes = seconds[:, :, :-1]
         scale = np.maximum(np.abs(slopes).max(axis=(1, 2)), 1e-300)
@@ -249,7 +249,7 @@ class Vanishing:
         return Vanishing(self.tests, lanes, self.difference, self.one_sided, self.at_null)
 
 
-def _seconds(
+def second_derivatives(
     at: Critical, tangents: Sequence[Direction], directions: Sequence[Direction]
 ) -> Float[np.ndarray, "lanes tangents directions"]:
     """vᵀD²F[tangent, direction] for all pairs, by one call for all: calls cost more than lanes."""

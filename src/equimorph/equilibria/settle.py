@@ -9,13 +9,15 @@ See docs/decisions.md, "One corrector".
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Rows, Values
+from equimorph.equilibria import newton_kernels
+from equimorph.equilibria.newton_kernels import FOUND, NEAR, OPEN, judge_lanes
 from equimorph.equilibria.newton_step import (
     Frame,
     Held,
@@ -27,8 +29,8 @@ from equimorph.equilibria.newton_step import (
     Tangents,
     distances,
     free_directions,
-    length,
     start_at,
+    weights_of,
 )
 from equimorph.equilibria.point_conditions import Condition, Directions, Some
 from equimorph.model import Constraint
@@ -49,8 +51,6 @@ __all__ = [
     "settle",
 ]
 
-NEAR = 1e-5
-"""Last correction at whose start tangent space and index are those of its end."""
 SMALL_EIGENVALUE = 1e-6
 """Size below which an eigenvalue at a fold is the one that vanishes."""
 SLACK = 1e-9
@@ -60,16 +60,16 @@ SLACK = 1e-9
 class Status(IntEnum):
     """How Newton's method ended on a lane."""
 
-    OPEN = -1
+    OPEN = newton_kernels.OPEN
     """Not yet."""
-    FOUND = 0
-    UNFINISHED = 1
+    FOUND = newton_kernels.FOUND
+    UNFINISHED = newton_kernels.UNFINISHED
     """The iterations were used up."""
-    SINGULAR = 2
+    SINGULAR = newton_kernels.SINGULAR
     """A correction was not finite: the system is singular, or the structure is undefined there."""
-    TOO_LONG = 3
+    TOO_LONG = newton_kernels.TOO_LONG
     """A correction was longer than guesses near by would need."""
-    NOT_SHRINKING = 4
+    NOT_SHRINKING = newton_kernels.NOT_SHRINKING
     """Corrections did not shrink as demanded."""
     FAR = 5
     """The point is farther from where it was looked for than is trusted."""
@@ -128,12 +128,6 @@ class Guards:
     lower_index: Numbers | None = None
     index: Numbers | None = None
     within: tuple[Constraint, ...] = ()
-
-    @property
-    def plain(self) -> bool:
-        """Whether lanes go on until they converge, whatever their steps."""
-        endless = self.contraction == self.too_long == np.inf
-        return endless and self.known is None and not (self.following or self.multipliers)
 
 
 @dataclass(frozen=True)
@@ -214,8 +208,6 @@ def settle(
     The points and a status for each lane: one that fails leaves the others as they are.
     """
     guards = Guards() if guards is None else guards
-    if directions is None and frame is None and guards.plain:
-        return _believed(structure, _at_fixed_parameters(structure, z, p, guards), (z, p), guards)
     frame = Tangents() if frame is None else frame
     if directions is None:
         directions = np.zeros((len(z), 0, p.shape[1]))
@@ -224,7 +216,8 @@ def settle(
     while len(run.lanes):
         step = here.step()  # onto the set, and along it to the conditions
         status, share = run.judge(here, step)
-        here = run.without_ended(here.moved(step, share), step, status)
+        there = here.moved(step, share)
+        here = there.renewed(step, run.record(there, step, status))
     return _believed(structure, run.settled(), (z, p), guards)
 
 
@@ -238,33 +231,6 @@ def embedded_planes(structure: Structure, free: Int[np.ndarray, " d"], rows: Row
     return Planes(by_z, by_p)
 
 
-def _at_fixed_parameters(structure: Equations, z: Lanes, p: Parameters, guards: Guards) -> Settled:
-    """The same without directions, conditions and most guards: for few lanes twice as fast."""
-    count, n = len(z), structure.unknowns
-    z, status = z.copy(), np.full(count, Status.UNFINISHED.value)
-    size, first, index = np.full(count, np.inf), np.full(count, np.inf), np.full(count, -1)
-    todo = np.arange(count)
-    still, fixed, none, one = np.zeros_like(z), np.zeros_like(p), np.zeros(count), np.ones(count)
-    for number in range(guards.iterations):
-        m = len(todo)
-        if m == 0:
-            break
-        step = structure.advance(z[todo], p[todo], fixed[:m], still[:m], one[:m], none[:m])
-        long = np.sqrt(step.dz[:, :n] ** 2 @ structure.mass)
-        alive = np.isfinite(long)
-        own = np.minimum(1.0, guards.longest / np.maximum(long, 1e-300))[:, None] * step.dz
-        z[todo] += own if alive.all() else np.where(alive[:, None], own, 0.0)
-        size[todo], index[todo] = long, step.index
-        if number == 0:
-            first[:] = long
-        small = long < guards.converged
-        status[todo[small]], status[todo[~alive]] = Status.FOUND, Status.SINGULAR
-        todo = todo[alive & ~small]
-    sure, frames = np.ones(count, bool), np.zeros((count, 0, structure.size))
-    slopes, unfolding = np.zeros((count, 0, 0)), np.zeros(count)
-    return Settled(z, p.copy(), status, size, first, index, sure, frames, slopes, unfolding)
-
-
 class _Run:
     """The lanes that are still on their way, and what became of the others."""
 
@@ -274,64 +240,49 @@ class _Run:
         self.lanes, self.guards, self.number = np.arange(count), guards, 0
         self.size, self.first = np.full(count, np.inf), np.full(count, np.inf)
         self.known = guards.known
+        structure, bordered = here.problem.structure, here.z.shape[1] + width
+        self.weights = weights_of(structure, bordered, guards.multipliers)
+        self.limits = (guards.converged, guards.following, guards.contraction, guards.too_long,
+                       guards.longest)  # fmt: skip
         self.z, self.p, self.beta = here.z.copy(), here.p.copy(), here.beta.copy()
-        self.status = np.full(count, Status.OPEN.value)
+        self.status = np.full(count, OPEN)
         self.index, self.sure = np.full(count, -1), np.zeros(count, bool)
-        self.frames = np.zeros((count, width if frames else 0, here.z.shape[1] + width))
+        self.frames = np.zeros((count, width if frames else 0, bordered))
         self.slopes = np.zeros((count, 0, self.frames.shape[1]))
 
     def judge(self, here: Points, step: Step) -> tuple[Numbers, Values]:
         """Status of each lane after a step, and the share of the step that is taken."""
-        guards, before = self.guards, self.size[self.lanes]
-        size = length(here.problem.structure, step, guards.multipliers)
-        small = size < guards.converged
-        if guards.following > 0.0 and self.number:
-            small |= (size < NEAR) & (size**3 < guards.following * before**2)
+        guards, lanes = self.guards, self.lanes
+        size, share, status = np.empty(len(lanes)), np.empty(len(lanes)), np.empty(len(lanes), int)
+        factor = _lengthening(here, step, self.known)
         self.number += 1
-        goes_on = Status.OPEN if self.number < guards.iterations else Status.UNFINISHED
-        status = np.where(small, Status.FOUND.value, goes_on.value)
-        if guards.contraction < np.inf and self.number > guards.free:
-            status[~small & ~(size <= guards.contraction * before)] = Status.NOT_SHRINKING
-        if guards.too_long < np.inf:
-            status[~(size < guards.too_long)] = Status.TOO_LONG
-        long, share = size, np.ones(len(size))
-        if self.known is not None:
-            share = _lengthening(here, step, self.known)
-            long = np.abs(share) * size
-        status[~np.isfinite(long)] = Status.SINGULAR
-        if guards.longest < np.inf and not (long <= guards.longest).all():
-            share *= np.minimum(1.0, guards.longest / np.maximum(long, 1e-300))
-        share[status > Status.UNFINISHED] = 0.0
-        self.size[self.lanes] = size
+        free = guards.contraction == np.inf or self.number <= guards.free
+        last = self.number >= guards.iterations
+        given = (step.change, self.weights, factor, self.size[lanes], self.limits, free, last)
+        judge_lanes(*given, size, status, share)
+        self.size[lanes] = size
         if self.number == 1:
             self.first = size
         return status, share
 
-    def without_ended(self, here: Points, step: Step, status: Numbers) -> Points:
-        """Record the lanes that ended, and go on with the others."""
-        ended = np.flatnonzero(status != Status.OPEN)
-        if len(ended):
-            self.record(here, step, status, ended)
-            if len(ended) == len(status):
-                self.lanes = self.lanes[:0]
-                return here
-            left = np.flatnonzero(status == Status.OPEN)
-            self.lanes, here = self.lanes[left], here.take(left)
-            self.known = None if self.known is None else self.known[left]
-        return here
-
-    def record(self, here: Points, step: Step, status: Numbers, some: Some) -> None:
-        """Note where some of the lanes are, and what is known there."""
-        at = self.lanes[some]
+    def record(self, here: Points, step: Step, status: Numbers) -> Some:
+        """Note where the lanes are that ended, and what is known there; which lanes go on."""
+        left = np.flatnonzero(status == OPEN)
+        if len(left) == len(status):
+            return left
+        some = np.flatnonzero(status != OPEN) if len(left) else slice(None)
+        at, told = self.lanes[some], step.tangent
         self.status[at] = status[some]
         self.z[at], self.p[at], self.beta[at] = here.z[some], here.p[some], here.beta[some]
-        told = step.tangent
         self.index[at], self.sure[at] = told.index[some], told.sure[some]
         if self.frames.shape[1]:
-            self.frames[at] = told.frames[some]
+            self.frames[at] = told.along[some]
             if self.slopes.shape[1] != step.slopes.shape[1]:  # it is only known now
                 self.slopes = np.zeros((len(self.slopes), *step.slopes.shape[1:]))
             self.slopes[at] = step.slopes[some]
+        self.lanes = self.lanes[left]
+        self.known = None if self.known is None else self.known[left]
+        return left
 
     def settled(self) -> Settled:
         """Points and status of all lanes."""
@@ -340,17 +291,19 @@ class _Run:
 
 
 def _lengthening(
-    here: Points, step: Step, known: Float[np.ndarray, "lanes roots unknowns"]
+    here: Points, step: Step, known: Float[np.ndarray, "lanes roots unknowns"] | None
 ) -> Values:
     """Factor of Newton steps for m(u) F = 0 with m = Π (1 + 1/‖u − uᵢ‖²), uᵢ known solutions.
 
     The Newton step of the product is that of F, lengthened by 1/(1 − ∇(log m)·du)
-    [FarrellBirkissonFunke2015]_.
+    [FarrellBirkissonFunke2015]_. Without known solutions it is one.
     """
+    if known is None:
+        return np.ones(len(here.z))
     structure, n = here.problem.structure, here.problem.structure.unknowns
     gap = here.z[:, None, :n] - known
     squared = gap**2 @ structure.mass
-    along = np.einsum("lri,i,li->lr", gap, structure.mass, step.dz[:, :n])
+    along = np.einsum("lri,i,li->lr", gap, structure.mass, step.change[:, :n])
     slopes = -2.0 * along / (squared * (1.0 + squared))
     return np.asarray(1.0 / (1.0 - np.nansum(slopes, axis=1)))
 
@@ -358,14 +311,14 @@ def _lengthening(
 def _believed(
     structure: Equations, settled: Settled, start: tuple[Lanes, Parameters], guards: Guards
 ) -> Settled:
-    """The points, with those that are not believed marked."""
-    z, p, status, index = settled.z, settled.p, settled.status.copy(), settled.index.copy()
-    doubtful = (status == Status.FOUND) & ~(settled.sure & (settled.size < NEAR))
+    """The points, those that are not believed marked in place."""
+    z, p, status, index = settled.z, settled.p, settled.status, settled.index
+    doubtful = (status == FOUND) & ~(settled.sure & (settled.size < NEAR))
     if doubtful.any():
         index[doubtful] = structure.index(z[doubtful], p[doubtful])
 
     def refuse(bad: Flags, why: Status) -> None:
-        status[(status == Status.FOUND) & bad] = why
+        status[(status == FOUND) & bad] = why
 
     if guards.trust is not None:
         middle = start if guards.middle is None else guards.middle
@@ -373,16 +326,16 @@ def _believed(
     if guards.index is not None:
         refuse(index != guards.index, Status.WRONG_INDEX)
     if guards.lower_index is not None:
-        some = np.flatnonzero(status == Status.FOUND)
+        some = np.flatnonzero(status == FOUND)
         low = np.full(len(z), -1)
         low[some] = lower_index(structure, z[some], p[some])
         refuse(low != guards.lower_index, Status.WRONG_INDEX)
     for constraint in guards.within:
-        some = np.flatnonzero(status == Status.FOUND)
+        some = np.flatnonzero(status == FOUND)
         bad = np.zeros(len(z), bool)
         bad[some] = ~(constraint.excess(z[some], p[some]) < SLACK)
         refuse(bad, Status.VIOLATED)
-    return replace(settled, status=status, index=index)
+    return settled
 
 
 def lower_index(structure: Equations, z: Lanes, p: Parameters) -> Numbers:

@@ -7,6 +7,7 @@ from equimorph.linalg.dense import (
     multiply,
     negative_eigenvalues,
     no_border,
+    orthonormal_rows,
     solve_bordered,
 )
 
@@ -17,5 +18,6 @@ __all__ = [
     "multiply",
     "negative_eigenvalues",
     "no_border",
+    "orthonormal_rows",
     "solve_bordered",
 ]

@@ -43,12 +43,12 @@ class CondensedLayout:
     stiffness: Float[np.ndarray, "elements order order"]
     ends: Int[np.ndarray, "2"]
 
-    @property
+    @cached_property
     def nodes(self) -> int:
         """Number of nodes, prescribed ones included."""
         return int(self.stiffness.shape[0] * (self.stiffness.shape[1] - 1) + 1)
 
-    @property
+    @cached_property
     def unknown(self) -> slice:
         """Nodes that are unknowns."""
         held = len(self.stiffness) - int(self.ends[1])

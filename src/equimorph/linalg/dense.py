@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Values
-from equimorph.linalg.kernels import count_negative, multiply_lanes
+from equimorph.linalg.kernels import count_negative, multiply_lanes, orthonormal_lanes
 
 Border = tuple[
     Float[np.ndarray, "lanes k size"],
@@ -48,6 +48,19 @@ def multiply(x: Lanes, matrix: Float[np.ndarray, "size ..."]) -> Float[np.ndarra
     out = np.empty((len(x), wide.shape[1]))
     multiply_lanes(np.ascontiguousarray(x), wide, out)
     return out.reshape(len(x), *matrix.shape[1:])
+
+
+def orthonormal_rows(
+    rows: Float[np.ndarray, "lanes rows width"], count: int, weights: Float[np.ndarray, " width"]
+) -> Float[np.ndarray, "lanes rows width"]:
+    """Make the first `count` rows of each lane orthonormal, and the others orthogonal to these.
+
+    Gram and Schmidt in the metric with the diagonal `weights`: the first row keeps its direction.
+    Rows of NaN where the first ones are dependent.
+    """
+    out = np.array(rows, order="C")
+    orthonormal_lanes(out, count, weights)
+    return out
 
 
 def negative_eigenvalues(matrix: Float[np.ndarray, "lanes n n"]) -> Int[np.ndarray, " lanes"]:

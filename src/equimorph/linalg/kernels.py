@@ -1,5 +1,7 @@
 """Compiled kernels of small dense matrices, and the way of lanes into and out of blocks."""
 
+import numpy as np
+
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.simd import (
     LANES,
@@ -118,6 +120,30 @@ def multiply_lanes(x, matrix, out):
             factor = x[lane, i]
             for j in range(matrix.shape[1]):
                 out[lane, j] += factor * matrix[i, j]
+
+
+@njit(**FLAGS)
+def orthonormal_lanes(rows, count, weights):
+    """Make the first rows of each lane orthonormal, and the others orthogonal to these; in place.
+
+    Gram and Schmidt in the metric of the weights. NaN where rows are dependent.
+    """
+    width = rows.shape[2]
+    for lane in range(rows.shape[0]):
+        for i in range(rows.shape[1]):
+            for j in range(min(i, count)):
+                share = 0.0
+                for n in range(width):
+                    share += rows[lane, i, n] * weights[n] * rows[lane, j, n]
+                for n in range(width):
+                    rows[lane, i, n] -= share * rows[lane, j, n]
+            if i < count:
+                squared = 0.0
+                for n in range(width):
+                    squared += weights[n] * rows[lane, i, n] * rows[lane, i, n]
+                scale = 1.0 / np.sqrt(squared) if 0.0 < squared < np.inf else np.nan
+                for n in range(width):
+                    rows[lane, i, n] *= scale
 
 
 @njit(**FLAGS)

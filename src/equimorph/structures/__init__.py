@@ -9,10 +9,11 @@ from equimorph.structures.contract import (
     Direction,
     Equations,
     Growth,
+    LinearSystem,
     Majorant,
     Structure,
     Symmetry,
-    bordered_advance,
+    advance_by,
 )
 from equimorph.structures.energy import EnergyStructure, Unknown
 from equimorph.structures.frame import Frame, Member
@@ -66,6 +67,7 @@ __all__ = [
     "Growth",
     "LateralMode",
     "LineLoad",
+    "LinearSystem",
     "Majorant",
     "Member",
     "OwnSection",
@@ -85,7 +87,7 @@ __all__ = [
     "Truss",
     "Tube",
     "Unknown",
-    "bordered_advance",
+    "advance_by",
     "distance_to",
     "effort_of",
     "from_identity",

@@ -39,6 +39,21 @@ class Advance:
     determinant: Values
 
 
+Solver = Callable[[Float[np.ndarray, "lanes sides bordered"], Border | None], BorderedSolution]
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """F and its derivatives at points, computed together.
+
+    residual: F; columns: F_p·d for each of k directions; solve: with F_z, bordered or not.
+    """
+
+    residual: Lanes
+    columns: Float[np.ndarray, "lanes k size"]
+    solve: Solver
+
+
 @dataclass(frozen=True)
 class Symmetry:
     """An involution of unknowns and parameters that maps equilibria to equilibria."""
@@ -99,6 +114,11 @@ class Equations(Protocol):
         shift: Values | None = None,
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered; see `Structure.solve`."""
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z."""
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian."""
@@ -308,6 +328,21 @@ class Structure(ABC):
         del z, p
         return None
 
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z, for several solves at the same points.
+
+        Here each part is computed by its own method; a structure that computes parts together says
+        so by its own `linear_system`.
+        """
+        (lanes, k), size = directions.shape[:2], self.size
+        changes = directions.reshape(lanes * k, directions.shape[2])
+        many = (z.repeat(k, axis=0), p.repeat(k, axis=0), changes)
+        columns = self.parameter_derivative(*many) if k else np.zeros((0, size))
+        solve = partial(self.solve, z, p)
+        return LinearSystem(self.residual(z, p), columns.reshape(lanes, k, size), solve)
+
     def advance(  # the fused step of the hot path
         self,
         z: Lanes,
@@ -318,47 +353,42 @@ class Structure(ABC):
         defect: Values,
     ) -> Advance:
         """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
-        residual = self.residual(z, p)
-        column = self.parameter_derivative(z, p, dp)
-        return bordered_advance(self, z, p, residual, column, row, corner, defect)
+        system = self.linear_system(z, p, dp[:, None])
+        return advance_by(system, row, corner, defect, self.constraints)
 
 
-def bordered_advance(
-    structure: Structure,
+def joint_system(
+    linearised: Callable[[Lanes, Parameters, Parameters], tuple[np.ndarray, ...]],
+    solve: Callable[..., BorderedSolution],
     z: Lanes,
     p: Parameters,
-    residual: Lanes,
-    column: Lanes,
-    row: Lanes,
-    corner: Values,
-    defect: Values,
-) -> Advance:
-    """`Advance` for any residual and column, by the structure's general bordered solve."""
-    solve = partial(structure.solve, z, p)
-    return advance_by(solve, residual, column, row, corner, defect, structure.constraints)
+    directions: Float[np.ndarray, "lanes k parameters"],
+) -> LinearSystem:
+    """`LinearSystem` by a function that computes F, F_p·dp and the parts of F_z together.
+
+    `solve` takes z, p and these parts of F_z before the right-hand sides and the border.
+    """
+    changes = [np.ascontiguousarray(each) for each in directions.transpose(1, 0, 2)]
+    residual, column, *parts = linearised(z, p, changes[0] if changes else np.zeros_like(p))
+    others = [linearised(z, p, dp)[1] for dp in changes[1:]]
+    columns = np.stack([column, *others], axis=1)[:, : len(changes)]
+    return LinearSystem(residual, columns, partial(solve, z, p, *parts))
 
 
 def advance_by(
-    solve: Callable[[Float[np.ndarray, "lanes 2 bordered"], Border], BorderedSolution],
-    residual: Lanes,
-    column: Lanes,
-    row: Lanes,
-    corner: Values,
-    defect: Values,
-    constraints: int,
+    system: LinearSystem, row: Lanes, corner: Values, defect: Values, constraints: int
 ) -> Advance:
-    """`Advance` by a solver of the bordered system that knows its matrix."""
+    """`Advance` by the general bordered solve of a linear system with one column."""
     rhs = np.zeros((len(row), 2, row.shape[1] + 1))
-    rhs[:, 0, :-1], rhs[:, 0, -1], rhs[:, 1, -1] = -residual, -defect, 1.0
-    border = (column[:, None], row[:, None], corner[:, None, None])
-    solution = solve(rhs, border)
+    rhs[:, 0, :-1], rhs[:, 0, -1], rhs[:, 1, -1] = -system.residual, -defect, 1.0
+    solution = system.solve(rhs, (system.columns, row[:, None], corner[:, None, None]))
     step, tangent = solution.x[:, 0], solution.x[:, 1]
     return Advance(
         np.ascontiguousarray(step[:, :-1]),
         step[:, -1].copy(),
         np.ascontiguousarray(tangent[:, :-1]),
         tangent[:, -1].copy(),
-        np.abs(residual).max(axis=1),
+        np.abs(system.residual).max(axis=1),
         solution.negative - constraints,
         solution.determinant,
     )

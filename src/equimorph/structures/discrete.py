@@ -13,7 +13,12 @@ from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.contract import Advance, Structure, advance_by
+from equimorph.structures.contract import (
+    Advance,
+    LinearSystem,
+    Structure,
+    joint_system,
+)
 from equimorph.structures.states import State, natural_state
 
 STEPS = 12
@@ -112,24 +117,33 @@ class DiscreteStructure(Structure):
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
-        """One Newton step; residual, column and matrix are computed together."""
+        """One Newton step, block by block."""
         given = (z, p, dp, row, corner, defect)
         starts = range(0, max(len(z), 1), BLOCK)
-        parts = [self._advance(*(array[i : i + BLOCK] for array in given)) for i in starts]
+        step = super().advance
+        parts = [step(*(array[i : i + BLOCK] for array in given)) for i in starts]
         if len(parts) == 1:
             return parts[0]
         names = [field.name for field in fields(Advance)]
         return Advance(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
-    def _advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        residual, column, entries = self.linearised(z, p, dp)
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z; computed together."""
+        return joint_system(self.linearised, self._solve, z, p, directions)
 
-        def solve(rhs: Float[np.ndarray, "lanes 2 bordered"], border: Border) -> BorderedSolution:
-            return self.layout.solve(entries, border, rhs)
-
-        return advance_by(solve, residual, column, row, corner, defect, self.constraints)
+    def _solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        entries: Entries,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None,
+    ) -> BorderedSolution:
+        """Solve with F_z, given by its entries, bordered."""
+        del z, p
+        return self.layout.solve(entries, border, rhs)
 
     # --- the natural state ----------------------------------------------------------------------
 

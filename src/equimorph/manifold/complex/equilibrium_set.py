@@ -144,16 +144,20 @@ class EquilibriumSet:
         InputError
             For names that are not free, missing ones, or a point outside the box.
         """
+        return self._parameters(at)
+
+    def _parameters(self, at: Mapping[str, float]) -> Float[np.ndarray, " P"]:
+        """The same for numbers that were checked."""
         _check_names(self.names, at)
         point = np.array([float(at[name]) for name in self.names])
-        if not self.box.contains(point, slack=1e-12):
+        if not self.box.holds(point, slack=1e-12):
             raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
         return np.asarray(self.setting.parameters(point[None])[0])
 
     @door
     def at(self, **at: float) -> States:
         """Exact states over one point of the box, sorted by energy; see `over`."""
-        states = self._sheets.over(self.parameters_at(at)[None])[0]
+        states = self._sheets.over(self._parameters(at)[None])[0]
         return states[np.argsort(states.energy, kind="stable")] if len(states) > 1 else states
 
     @door
@@ -200,7 +204,7 @@ class EquilibriumSet:
                 f"got shapes {shapes}."
             )
         points = np.stack(columns, axis=1)
-        outside = np.flatnonzero(~self.box.contains(points, slack=1e-12))
+        outside = np.flatnonzero(~self.box.holds(points, slack=1e-12))
         if len(outside):
             worst = dict(zip(self.names, points[outside[0]].tolist(), strict=True))
             raise InputError(f"`at` must lie in {self.box}; got {worst} (point {outside[0]}).")

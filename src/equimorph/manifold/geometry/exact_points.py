@@ -22,7 +22,6 @@ from equimorph.equilibria.settle import lower_index as index_below
 from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed, principal_directions
-from equimorph.manifold.geometry.tangents import orthonormal
 
 Span = Float[np.ndarray, "lanes k d"]
 Numbers = Int[np.ndarray, " lanes"]
@@ -196,7 +195,7 @@ def corrected_amid(
     aim = Aim(setting, False, False, span, middle, rows)
     found = _settled(aim, z, p, around, None, None)
     frames, good = np.zeros_like(found.frames), found.found
-    frames[good] = orthonormal(setting, found.frames[good])
+    frames[good] = found.frames[good]
     return Corrected(found.z, found.p, frames, found.index, good)
 
 

@@ -9,7 +9,9 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.linalg import Border
+from equimorph.equilibria.newton_step import free_directions, weights_of
+from equimorph.equilibria.point_conditions import second_derivatives
+from equimorph.linalg import orthonormal_rows
 from equimorph.manifold.geometry.kernels import square_sides
 from equimorph.manifold.geometry.setting import Setting, embed
 
@@ -27,47 +29,17 @@ def tangent_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Fra
     ``[F_z F_p; R] t_i = (0, e_i)`` with rows R of the embedding that span nearby spaces, whose
     orientation the bases take over.
     """
-    out = np.empty((len(z), rows.shape[1], z.shape[1] + rows.shape[1]))
-    for at in range(0, len(z), CHUNK):
+    structure, (lanes, size), d = setting.structure, z.shape, len(setting.free)
+    frames, n = np.empty((lanes, d, size + d)), structure.unknowns
+    for at in range(0, lanes, CHUNK):
         own = slice(at, at + CHUNK)
-        out[own] = _frames(setting, z[own], p[own], rows[own])
-    return out
-
-
-def border_of(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Border:
-    """Border ``[F_z F_p; R]`` of F_z by the free parameters, in their scales, and by planes R."""
-    structure, free = setting.structure, setting.free
-    lanes, size, d, n = len(z), z.shape[1], len(free), structure.unknowns
-    columns = np.empty((lanes, d, size))
-    for k in range(d):
-        dp = np.zeros_like(p)
-        dp[:, free[k]] = setting.scales[k]
-        columns[:, k] = structure.parameter_derivative(z, p, dp)
-    by_z = np.zeros((lanes, d, size))
-    by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(structure.mass)
-    return columns, by_z, np.ascontiguousarray(rows[:, :, n:])
-
-
-def _frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Frames:
-    lanes, size, d = len(z), z.shape[1], len(setting.free)
-    rhs = np.zeros((lanes, d, size + d))
-    rhs[:, :, size:] = np.eye(d)
-    return orthonormal(
-        setting, setting.structure.solve(z, p, rhs, border_of(setting, z, p, rows)).x
-    )
-
-
-def orthonormal(setting: Setting, frames: Frames) -> Frames:
-    """Bases of the same tangent spaces, orthonormal in the metric and oriented alike."""
-    placed = placed_frames(setting, frames)
-    lower = np.linalg.cholesky(placed @ np.swapaxes(placed, 1, 2))
-    out = np.empty_like(frames)
-    for i in range(frames.shape[1]):
-        row = frames[:, i]
-        for j in range(i):
-            row = row - lower[:, i, j, None] * out[:, j]
-        out[:, i] = row / lower[:, i, i, None]
-    return out
+        some, few = rows[own], len(z[own])
+        directions = free_directions(structure, setting.free, few)
+        system = structure.linear_system(z[own], p[own], directions)
+        by_z, rhs = np.zeros((few, d, size)), np.zeros((few, d, size + d))
+        by_z[:, :, :n], rhs[:, :, size:] = some[:, :, :n] * np.sqrt(structure.mass), np.eye(d)
+        frames[own] = system.solve(rhs, (system.columns, by_z, some[:, :, n:])).x
+    return orthonormal_rows(frames, d, weights_of(structure, size + d))
 
 
 def placed_frames(setting: Setting, frames: Frames) -> Rows:
@@ -90,8 +62,8 @@ def fold_slopes(
 ) -> Float[np.ndarray, "lanes d"]:
     """Slope along the frame of the function that vanishes on folds."""
     critical = Critical(setting.structure, z, p, null_border(setting.structure, z, p))
-    steps = (split_step(setting, frames[:, k]) for k in range(frames.shape[1]))
-    return np.stack([critical.second(*step) for step in steps], axis=1)
+    steps = [split_step(setting, frames[:, k]) for k in range(frames.shape[1])]
+    return second_derivatives(critical, [(critical.v, np.zeros_like(p))], steps)[:, 0]
 
 
 def cap_slopes(

@@ -1,5 +1,6 @@
 """Points on an equilibrium set, its folds, sides of its box and its caps, and moves on these."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,12 @@ class Spot:
         z, p, rows = self.z.copy(), self.p.copy(), self.rows.copy()
         z[some], p[some], rows[some] = others.z, others.p, others.rows
         return Spot(z, p, rows)
+
+
+def joined(parts: Sequence[Spot]) -> Spot:
+    """All points of several groups."""
+    columns = zip(*(vars(each).values() for each in parts), strict=True)
+    return Spot(*(np.concatenate(column) for column in columns))
 
 
 def spots(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> Spot:
@@ -118,7 +125,7 @@ class Ground:
         middle = embed(self.setting, spot.z, spot.p)
         aim = Aim(self.setting, self.fold, self.cap, span, middle, spot.rows)
         pinned = corrected(aim, spot.z, spot.p, np.full(lanes, FAR))
-        good = pinned.found & self.eset.box.contains(pinned.p[:, self.setting.free], slack=1e-9)
+        good = pinned.found & self.eset.box.holds(pinned.p[:, self.setting.free], slack=1e-9)
         return Spot(pinned.z, pinned.p, spot.rows), good
 
 

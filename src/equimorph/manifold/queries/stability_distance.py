@@ -13,11 +13,16 @@ from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.tangents import placed_frames
 from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.queries.geodesics import Chains
 from equimorph.manifold.queries.least_squares import nearest as nearest_points
 from equimorph.manifold.queries.locate import pieces_of
-from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
+from equimorph.manifold.queries.nearest import (
+    Ground,
+    Spot,
+    local_minima,
+    spots,
+)
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.structures import State, States
 
@@ -29,9 +34,6 @@ LONGER = 1.1
 """Ways along edges of the complex are up to a tenth too long: so much longer ones are tried."""
 LINKS = (8, 16)
 """Links of the chains along the set whose lengths are extrapolated."""
-SWEEPS, STILL = 60, 1e-9
-"""Largest number of sweeps that straighten a chain, and the largest move of a link, in scaled
-parameters, after which it counts as straight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,13 +159,13 @@ def _along_the_set(
 ) -> tuple[float, States]:
     """Length of the shortest curve on the set to the boundary, and states along it."""
     best: tuple[float, States] = (np.inf, state.batch)
-    for path in _ways(eset, state, stratum, boundary):
-        chain = _Chain(eset, path)
-        lengths = [chain.straightened(links) for links in LINKS]
+    chains = Chains(eset, _ways(eset, state, stratum, boundary))
+    lengths = [chains.straighten(links) for links in LINKS]
+    for chain, short, long in zip(chains.chains, *lengths, strict=True):
         # chords fall short of arcs by the square of their length
-        length = (4.0 * lengths[1] - lengths[0]) / 3.0
+        length = (4.0 * long - short) / 3.0
         if length < best[0]:
-            best = (length, States(eset.structure, chain.spot.z, chain.spot.p))
+            best = (length, States(eset.structure, chain.z, chain.p))
     return best
 
 
@@ -221,93 +223,3 @@ def _from_state(eset: EquilibriumSet, state: State, path: Int[np.ndarray, " n"])
     on = spots(eset, path)
     z, p = np.concatenate([state.z[None], on.z]), np.concatenate([state.p[None], on.p])
     return Spot(z, p, np.concatenate([on.rows[:1], on.rows]))
-
-
-class _Chain:
-    """Points on the set from a state to a fold, pulled straight: a discrete geodesic.
-
-    The sum of squared links is least where every point lies amid its neighbours as seen along its
-    tangent space, and the last link is orthogonal to the fold.
-    """
-
-    def __init__(self, eset: EquilibriumSet, path: Spot) -> None:
-        self.setting, self.spot = eset.setting, path
-        self.on_set, self.on_fold = Ground(self.setting, eset), Ground(self.setting, eset, True)
-
-    def straightened(self, links: int) -> float:
-        """Length of the chain with so many links, after it has been straightened."""
-        self._divide(links)
-        for _ in range(SWEEPS):
-            size = self._sweep()
-            if size < STILL:
-                break
-        return float(self._links(self.spot).sum())
-
-    def _links(self, spot: Spot) -> Float[np.ndarray, " links"]:
-        return np.asarray(np.linalg.norm(np.diff(self._places(spot), axis=0), axis=1))
-
-    def _places(self, spot: Spot) -> Float[np.ndarray, "points coordinates"]:
-        return embed(self.setting, spot.z, spot.p)
-
-    def _divide(self, links: int) -> None:
-        """Put equidistant points on the set along the chain."""
-        spot = self.spot
-        length = np.concatenate([[0.0], np.cumsum(self._links(spot))])
-        at = np.linspace(0.0, length[-1], links + 1)
-        before = np.clip(np.searchsorted(length, at, side="right") - 1, 0, len(length) - 2)
-        gap = np.maximum(length[before + 1] - length[before], 1e-300)
-        share = np.clip((at - length[before]) / gap, 0.0, 1.0)[:, None]
-        z, p = (
-            (1.0 - share) * column[before] + share * column[before + 1]
-            for column in (spot.z, spot.p)
-        )
-        near = Spot(z, p, spot.rows[np.where(share[:, 0] < 0.5, before, before + 1)])
-        moved, good = self.on_set.corrected(near)
-        # the ends are what they were
-        inner = np.flatnonzero(good)[1:-1] if good[[0, -1]].all() else np.flatnonzero(good)
-        inner = inner[(inner > 0) & (inner < links)]
-        near = near.replaced(inner, moved.take(inner))
-        self.spot = near.take(np.concatenate([[0], inner, [links]]))
-
-    def _sweep(self) -> float:
-        """One step of all points towards the straight chain; its length, zero where it is done."""
-        inner = self.spot.take(np.arange(1, len(self.spot.z) - 1))
-        last = self.spot.take(np.array([-1]))
-        frames, rows = self.on_set.frames(inner)
-        edge, edge_rows = self.on_fold.frames(last)
-        inner, last = Spot(inner.z, inner.p, rows), Spot(last.z, last.p, edge_rows)
-        step, end = self._step(frames, edge)
-        energy = (self._links(self.spot) ** 2).sum()
-        for share in 0.5 ** np.arange(8):
-            middle, good = self.on_set.moved(inner, frames, share * step)
-            goal, there = last, np.ones(1, bool)
-            if edge.shape[1]:
-                goal, there = self.on_fold.moved(last, edge, share * end)
-            parts = (vars(each).values() for each in (self.spot.take(np.array([0])), middle, goal))
-            new = Spot(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-            if good.all() and there.all() and (self._links(new) ** 2).sum() < energy:
-                self.spot = new
-                return float(max(np.abs(step).max(initial=0.0), np.abs(end).max(initial=0.0)))
-        return 0.0
-
-    def _step(
-        self, frames: Float[np.ndarray, "inner d full"], edge: Float[np.ndarray, "1 k full"]
-    ) -> tuple[Float[np.ndarray, "inner d"], Float[np.ndarray, "1 k"]]:
-        """Step of Gauss–Newton for the sum of squared links."""
-        place = self._places(self.spot)
-        inner, d = frames.shape[:2]
-        k = edge.shape[1]
-        # directions of all points one below the other, and whose they are
-        rows = placed_frames(self.setting, frames).reshape(inner * d, place.shape[1])
-        rows = np.concatenate([rows, placed_frames(self.setting, edge)[0]])
-        owner = np.concatenate([np.repeat(np.arange(inner), d), np.full(k, inner)])
-        pull = np.empty_like(place[1:])
-        pull[:-1] = 2.0 * place[1:-1] - place[:-2] - place[2:]
-        pull[-1] = place[-1] - place[-2]
-        apart = np.abs(owner[:, None] - owner)
-        weight = np.where(apart == 1, -1.0, np.where(apart == 0, 2.0, 0.0))
-        weight[owner == inner] *= np.where(owner == inner, 0.5, 1.0)
-        matrix = weight * (rows @ rows.T)
-        gradient = np.einsum("rc,rc->r", rows, pull[owner])
-        step = -np.linalg.solve(matrix, gradient)
-        return step[: inner * d].reshape(inner, d), step[inner * d :].reshape(1, k)

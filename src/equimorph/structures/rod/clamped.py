@@ -1,7 +1,7 @@
 """Mechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
@@ -9,8 +9,15 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Nodal, Parameters, Values
 from equimorph.linalg import Border, BorderedSolution, CondensedLayout, multiply, no_border
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.contract import Advance, Direction, Majorant, Symmetry
+from equimorph.structures.contract import (
+    Advance,
+    Direction,
+    LinearSystem,
+    Majorant,
+    Symmetry,
+)
 from equimorph.structures.rod.clamped_derivative_kernels import (
+    linearise_lanes,
     matrix_lanes,
     parameter_lanes,
     residual_lanes,
@@ -156,9 +163,31 @@ class ClampedMechanics(Mechanics):
         shift: Values | None = None,
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered."""
-        diagonal, gradients = self.kkt(z, p, shift)
-        columns, rows, corner = no_border(len(z), self.size) if border is None else border
-        return self.layout.solve(diagonal, gradients, columns, rows, corner, rhs)
+        return self._solve(*self.kkt(z, p, shift), rhs, border)
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """One kernel for F, F_p along directions and the matrix."""
+        z, p = self.check_widths((z, p))
+        (lanes, k, _), nodes = directions.shape, self.unknowns + 2
+        given = [z, p, np.ascontiguousarray(directions)]
+        residual, columns = np.empty_like(z), np.empty((lanes, k, self.size))
+        diagonal, gradients = np.empty((lanes, nodes)), np.empty((lanes, 2, nodes))
+        out = [residual, columns, diagonal, gradients]
+        over_lanes(linearise_lanes, self._matrices, given, out)
+        return LinearSystem(residual, columns, partial(self._solve, diagonal, gradients))
+
+    def _solve(
+        self,
+        diagonal: Nodal,
+        gradients: Float[np.ndarray, "lanes 2 nodes"],
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None,
+    ) -> BorderedSolution:
+        """Solve with F_z, given by its parts, bordered."""
+        around = no_border(len(rhs), self.size) if border is None else border
+        return self.layout.solve(diagonal, gradients, *around, rhs)
 
     def advance(
         self,

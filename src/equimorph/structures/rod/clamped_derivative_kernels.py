@@ -4,6 +4,8 @@ L = Σ ½ θᵀKθ + Σᵢ (aᵢ sin θᵢ + bᵢ cos θᵢ) − λν with a = �
 `structures.rod.kernels`. At least eight lanes; the last block overlaps the one before.
 """
 
+import numpy as np
+
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, write_lanes
 from equimorph.linalg.simd import LANES, load, sincos, spread, store, work_rows
@@ -112,6 +114,20 @@ def parameter_lanes(stiffness, weights, loads, z, p, dp, out):
         (s_left, c_left), (s_right, c_right) = sincos(load(theta, 0)), sincos(load(theta, last))
         along = spread(0.0) - s_left * left - s_right * right - load(moved, 3)
         _write_closing(n, along, c_left * left + c_right * right, rows, out, start)
+
+
+@njit(**FLAGS)
+def linearise_lanes(
+    stiffness, weights, loads, z, p, directions, residual, columns, diagonal, border
+):
+    """F, F_p·d for each of the directions (lanes, k, 4), and the matrix of every lane, in turn."""
+    residual_lanes(stiffness, weights, loads, z, p, residual, np.empty((len(z), 3)))
+    matrix_lanes(weights, loads, z, p, np.zeros(len(z)), diagonal, border)
+    column = np.empty_like(z)
+    for i in range(directions.shape[1]):
+        dp = np.ascontiguousarray(directions[:, i])
+        parameter_lanes(stiffness, weights, loads, z, p, dp, column)
+        columns[:, i] = column
 
 
 @njit(**FLAGS)

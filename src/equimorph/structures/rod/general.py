@@ -12,8 +12,9 @@ from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import (
     Advance,
     Direction,
+    LinearSystem,
     Symmetry,
-    advance_by,
+    joint_system,
 )
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
@@ -265,12 +266,30 @@ class GeneralMechanics(Mechanics):
         diagonal, gradients, trailing = self.linearised(z, p, np.zeros_like(p))[2:]
         if shift is not None:
             diagonal -= shift[:, None] * self.mesh.weights
-        columns, rows, corner = no_border(len(z), self.size) if border is None else border
+        return self._solve(z, p, diagonal, gradients, trailing, rhs, border)
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z; computed together."""
+        return joint_system(self.linearised, self._solve, z, p, directions)
+
+    def _solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        diagonal: Nodal,
+        gradients: Float[np.ndarray, "lanes m nodes"],
+        trailing: Float[np.ndarray, "lanes m m"],
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None,
+    ) -> BorderedSolution:
+        """Solve with F_z, given by its parts; under pressure every angle works on every other."""
         if self._area is not None:
             entries = self._pressed_entries(self._area, z, p, diagonal, gradients, trailing)
             return self._full_layout.solve(entries, border, rhs)
-        parts = (diagonal, gradients, columns, rows, corner, rhs)
-        return self.layout.solve(*parts, trailing=trailing)
+        around = no_border(len(z), self.size) if border is None else border
+        return self.layout.solve(diagonal, gradients, *around, rhs, trailing=trailing)
 
     @cached_property
     def _full_layout(self) -> SparseLayout:
@@ -294,25 +313,12 @@ class GeneralMechanics(Mechanics):
         stiff, swept = (matrix[inner, inner] for matrix in matrices)
         return lower_triangle(angles, pull, stiff, swept, own, border[:, :, inner], trailing)
 
-    def _pressed_advance(self, *given: np.ndarray) -> Advance:
-        """`advance` with all parts of the linearisation computed once."""
-        z, p, dp, *closing = given
-        assert self._area is not None
-        residual, column, diagonal, border, trailing = self.linearised(z, p, dp)
-        entries = self._pressed_entries(self._area, z, p, diagonal, border, trailing)
-
-        def solve(rhs: Float[np.ndarray, "lanes 2 bordered"], border: Border) -> BorderedSolution:
-            return self._full_layout.solve(entries, border, rhs)
-
-        row, corner, defect = closing
-        return advance_by(solve, residual, column, row, corner, defect, self.constraints)
-
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
         """One fused kernel; rods under pressure, whose matrix is full, solve in general."""
         if self._area is not None:
-            return self._pressed_advance(z, p, dp, row, corner, defect)
+            return self.plain_advance(z, p, dp, row, corner, defect)
         shared = (self.layout.ends, *self._step_data)
         return self.fused_advance(advance_lanes, shared, z, p, dp, row, corner, defect)
 

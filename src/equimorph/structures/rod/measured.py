@@ -9,6 +9,7 @@ from equimorph.structures.approach import smooth_arcs
 from equimorph.structures.contract import (
     Advance,
     Direction,
+    LinearSystem,
     Majorant,
     Structure,
     Symmetry,
@@ -87,6 +88,12 @@ class Measured(Structure):
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered."""
         return self.mechanics.solve(z, p, rhs, border, shift)
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z; computed together."""
+        return self.mechanics.linear_system(z, p, directions)
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values

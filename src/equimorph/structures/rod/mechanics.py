@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +14,7 @@ from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import (
     Advance,
     Direction,
+    LinearSystem,
     Majorant,
     Symmetry,
     advance_by,
@@ -117,6 +117,12 @@ class Mechanics(ABC):
         """Solve with F_z − shift·mass, bordered."""
 
     @abstractmethod
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z."""
+
+    @abstractmethod
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
@@ -163,9 +169,8 @@ class Mechanics(ABC):
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
         """`advance` by the general bordered solve."""
-        residual, column = self.residual(z, p), self.parameter_derivative(z, p, dp)
-        solve = partial(self.solve, z, p)
-        return advance_by(solve, residual, column, row, corner, defect, self.constraints)
+        system = self.linear_system(z, p, dp[:, None])
+        return advance_by(system, row, corner, defect, self.constraints)
 
     @abstractmethod
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:

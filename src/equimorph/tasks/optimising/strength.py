@@ -193,7 +193,7 @@ def _sure(lmap: LimitLoadMap) -> list[Strongest]:
         if found and _level(curve) < HOPELESS * found[0].value:
             continue
         ridge = highest_point(lmap, curve)
-        if ridge is None or not lmap.grid.box.contains(ridge.setting, slack=1e-9):
+        if ridge is None or not lmap.grid.box.holds(ridge.setting, slack=1e-9):
             continue
         if ridge.slope > LEVEL:  # the end of a curve
             continue

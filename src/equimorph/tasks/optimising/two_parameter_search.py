@@ -83,7 +83,7 @@ def _parabola(
     slope = np.full(2, np.nan)
     for _ in range(6):
         at = place + share * radius * NINE
-        if not box.contains(at).all():
+        if not box.holds(at).all():
             return None
         found = function(at)
         terms = np.column_stack([np.ones(9), NINE, NINE[:, 0] ** 2, NINE.prod(1), NINE[:, 1] ** 2])

@@ -153,7 +153,7 @@ def _checked_corners(
     points = way_points(start.structure, start.p, corners) if corners else [start.p]
     free = [list(start.parameters).index(name) for name in eset.names]
     for number, point in enumerate(points[1:]):
-        if not eset.box.contains(point[free], slack=1e-12):
+        if not eset.box.holds(point[free], slack=1e-12):
             raise InputError(f"`via[{number}]` must lie in {eset.box}; got {corners[number]}.")
     if not np.allclose(points[-1], goal.p, rtol=0, atol=1e-12):
         corners.append({name: goal[name] for name in eset.names})

@@ -162,7 +162,7 @@ def _checked_ends(start: State, goal: State | None, course: LoadCourse) -> dict[
     ends = {"start": start} if goal is None else {"start": start, "goal": goal}
     for name, state in ends.items():
         check_equilibrium(name, state)
-        if not course.box.contains(state.p[course.free], slack=1e-9):
+        if not course.box.holds(state.p[course.free], slack=1e-9):
             raise InputError(f"`{name}` must lie in {course.box}; got {state.parameters}.")
         last = course.corners[-1 if name == "goal" else 0].copy()
         last[course.free] = state.p[course.free]

@@ -239,7 +239,7 @@ def _beyond(eset: EquilibriumSet, before: State, fold: State) -> dict[str, float
     size = float(np.linalg.norm(step))
     p = fold.p + BEYOND * step / max(size, 1e-300) * eset.structure.scales
     beyond = {name: float(p[k]) for k, name in enumerate(fold.parameters) if name in eset.names}
-    inside = eset.box.contains(np.array([beyond[name] for name in eset.names]))
+    inside = eset.box.holds(np.array([beyond[name] for name in eset.names]))
     return beyond if bool(inside) else None
 
 

@@ -286,7 +286,7 @@ def _solve(
     guesses, owner = _guesses(known, wanted)
     exact = states_with_values(known.setting, guesses, known.descriptors, wanted[owner])
     z, p, found = exact.z, exact.p, exact.found
-    found &= eset.box.contains(p[:, known.setting.free], slack=AT_EDGE)
+    found &= eset.box.holds(p[:, known.setting.free], slack=AT_EDGE)
     found[found] &= structure.resolved(z[found], p[found])
     for constraint in within:
         room = AT_EDGE * max(1.0, abs(constraint.bound))

@@ -1,0 +1,141 @@
+"""Compiled kernels of Newton's method with conditions: small dense algebra, lane by lane."""
+
+import numpy as np
+
+from equimorph.linalg.compiled import njit
+from equimorph.linalg.kernels import FLAGS, INNER
+
+OPEN, FOUND, UNFINISHED, SINGULAR, TOO_LONG, NOT_SHRINKING = range(-1, 5)
+"""How a lane stands after a step; `Status` of `equilibria.settle` says what these mean."""
+NEAR = 1e-5
+"""Last correction at whose start tangent space and index are those of its end."""
+DEPENDENT = 1e-14
+"""Determinant of a small matrix, relative to its entries, that counts as zero."""
+
+
+@njit(**FLAGS)
+def judge_lanes(change, weights, factor, before, limits, free, last, size, status, share):
+    """Lengths of steps, how each lane stands after its step, and the share of the step to take.
+
+    change (lanes, n) with weights (n) of the squares; factor: by which steps are lengthened;
+    before: lengths of the steps before; limits: converged, following, contraction, too long,
+    longest; free: whether lengths need not shrink yet; last: whether no more steps are taken.
+    """
+    converged, following, contraction, too_long, longest = limits
+    for lane in range(change.shape[0]):
+        squared = 0.0
+        for i in range(change.shape[1]):
+            squared += weights[i] * change[lane, i] * change[lane, i]
+        length = np.sqrt(squared)
+        old = before[lane]
+        small = length < converged
+        if following > 0.0 and length < NEAR and old < np.inf:
+            small = small or length * length * length < following * old * old
+        state = FOUND if small else (UNFINISHED if last else OPEN)
+        if not (small or free or length <= contraction * old):
+            state = NOT_SHRINKING
+        if too_long < np.inf and not length < too_long:
+            state = TOO_LONG
+        taken, long = factor[lane], abs(factor[lane]) * length
+        if not long < np.inf:
+            state = SINGULAR
+        elif long > longest:
+            taken *= longest / long
+        size[lane], status[lane] = length, state
+        share[lane] = taken if state <= UNFINISHED else 0.0
+
+
+@njit(**FLAGS)
+def move_lanes(z, p, beta, change, directions, share, new_z, new_p, new_beta):
+    """Points after shares of steps: of z, along the directions of the parameters, and of β.
+
+    Lanes with no share stay where they are, even if their steps are no numbers.
+    """
+    size, (k, parameters) = z.shape[1], directions.shape[1:]
+    for lane in range(z.shape[0]):
+        part = share[lane]
+        new_z[lane], new_p[lane], new_beta[lane] = z[lane], p[lane], beta[lane]
+        if part == 0.0:
+            continue
+        for i in range(size):
+            new_z[lane, i] += part * change[lane, i]
+        for j in range(k):
+            step = part * change[lane, size + j]
+            for i in range(parameters):
+                new_p[lane, i] += step * directions[lane, j, i]
+        if change.shape[1] > size + k:
+            new_beta[lane] += part * change[lane, size + k]
+
+
+@njit(**FLAGS)
+def amount_lanes(slopes, value, amount, regular):
+    """Solve ``slopes·amount = −value`` (lanes, k, k), and tell where the slopes are regular."""
+    k = slopes.shape[1]
+    matrix = np.empty((k, k + 1))
+    for lane in range(slopes.shape[0]):
+        size = 0.0
+        for i in range(k):
+            for j in range(k):
+                matrix[i, j] = slopes[lane, i, j]
+                size = max(size, abs(matrix[i, j]))
+            matrix[i, k] = -value[lane, i]
+        determinant = _solve_small(matrix)
+        regular[lane] = abs(determinant) > DEPENDENT * size**k
+        for i in range(k):
+            amount[lane, i] = matrix[i, k] if regular[lane] else np.nan
+
+
+@njit(**FLAGS)
+def null_lanes(x, size, k, b, null):
+    """Vectors v and scalars g with ``F_z v + g b = 0`` and ``b·v = 1``: null (lanes, size + 1).
+
+    From solutions x with columns C = F_p·directions (and b): the first k are tangents, the next one
+    too if b is a column. Otherwise the last one has the right-hand side b, so that its β is −1. The
+    combination of these without changes of the parameters is (v, g).
+    """
+    unfolded = x.shape[2] > size + k
+    last = k if unfolded else x.shape[1] - 1
+    matrix = np.empty((k + 1, k + 2))
+    for lane in range(x.shape[0]):
+        for j in range(k + 1):
+            at = last if j == k else j
+            for i in range(k):
+                matrix[i, j] = x[lane, at, size + i]
+            matrix[k, j] = 0.0
+            for n in range(size):
+                matrix[k, j] += b[lane, n] * x[lane, at, n]
+        matrix[:, k + 1] = 0.0
+        matrix[k, k + 1] = 1.0
+        _solve_small(matrix)
+        null[lane] = 0.0
+        for j in range(k + 1):
+            at, share = last if j == k else j, matrix[j, k + 1]
+            beta = x[lane, at, size + k] if unfolded else (-1.0 if j == k else 0.0)
+            for n in range(size):
+                null[lane, n] += share * x[lane, at, n]
+            null[lane, size] += share * beta
+
+
+@njit(**INNER)
+def _solve_small(a):
+    """Gauss with partial pivoting on (n, n + 1), the right-hand side last; the determinant."""
+    n, determinant = a.shape[0], 1.0
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[best, k]):
+                best = i
+        if best != k:
+            determinant = -determinant
+            for j in range(k, n + 1):
+                a[k, j], a[best, j] = a[best, j], a[k, j]
+        determinant *= a[k, k]
+        for i in range(k + 1, n):
+            factor = a[i, k] / a[k, k]
+            for j in range(k + 1, n + 1):
+                a[i, j] -= factor * a[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            a[k, n] -= a[k, j] * a[j, n]
+        a[k, n] /= a[k, k]
+    return determinant

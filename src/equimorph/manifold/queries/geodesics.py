@@ -1,0 +1,169 @@
+"""Shortest curves on a set from a state to folds, as chains of points."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.geometry.tangents import placed_frames
+from equimorph.manifold.queries.nearest import Frames, Ground, Spot, joined
+
+SWEEPS, HALVINGS = 60, 8
+"""Largest number of sweeps that straighten a chain, and of lengths of a step that are tried."""
+STILL = 1e-9
+"""Largest entry of a step that is the last, in the metric."""
+ROUND_OFF = 1e-15
+"""Decrease of the sum of squared links, relative to it, that round-off hides."""
+FIRST, LAST = np.array([0]), np.array([-1])
+
+
+@dataclass(frozen=True)
+class _Move:
+    """Step of Gauss–Newton of one chain for the sum of its squared links.
+
+    The points between its ends move by `step` along `frames`, the last one by `end` along `edge`.
+    gain: by how much the sum falls if it is quadratic.
+    """
+
+    inner: Spot
+    frames: Frames
+    step: Float[np.ndarray, "inner d"]
+    last: Spot
+    edge: Frames
+    end: Float[np.ndarray, "1 k"]
+    gain: float
+
+    @property
+    def size(self) -> float:
+        """Largest entry of the step."""
+        return float(max(np.abs(each).max(initial=0.0) for each in (self.step, self.end)))
+
+
+class Chains:
+    """Chains of points on the set from a state to folds, each pulled straight: discrete geodesics.
+
+    The sum of squared links is least where every point lies amid its neighbours as seen along its
+    tangent space, and the last link is orthogonal to the fold. All chains move side by side.
+    """
+
+    def __init__(self, eset: EquilibriumSet, ways: Sequence[Spot]) -> None:
+        self.setting, self.chains = eset.setting, list(ways)
+        self.on_set, self.on_fold = Ground(self.setting, eset), Ground(self.setting, eset, True)
+
+    def straighten(self, links: int) -> list[float]:
+        """Lengths of the chains with so many links each, after they have been straightened."""
+        self._divide(links)
+        moving = list(range(len(self.chains)))
+        for _ in range(SWEEPS):
+            if not moving:
+                break
+            moving = self._sweep(moving)
+        return [float(self._links(chain).sum()) for chain in self.chains]
+
+    def _links(self, chain: Spot) -> Float[np.ndarray, " links"]:
+        return np.asarray(np.linalg.norm(np.diff(self._places(chain), axis=0), axis=1))
+
+    def _energy(self, chain: Spot) -> float:
+        return float((self._links(chain) ** 2).sum())
+
+    def _places(self, chain: Spot) -> Float[np.ndarray, "points coordinates"]:
+        return embed(self.setting, chain.z, chain.p)
+
+    def _divide(self, links: int) -> None:
+        """Put equidistant points on the set along the chains."""
+        near = [self._equidistant(chain, links) for chain in self.chains]
+        moved, good = self.on_set.corrected(joined(near))
+        for i, chain in enumerate(near):
+            # the ends are what they were, and points that are not found are left out
+            begin = i * (links + 1)
+            inner = 1 + np.flatnonzero(good[begin + 1 : begin + links])
+            exact = chain.replaced(inner, moved.take(begin + inner))
+            self.chains[i] = exact.take(np.concatenate([[0], inner, [links]]))
+
+    def _equidistant(self, chain: Spot, links: int) -> Spot:
+        """Points at equal distances along a chain of straight links."""
+        length = np.concatenate([[0.0], np.cumsum(self._links(chain))])
+        at = np.linspace(0.0, length[-1], links + 1)
+        before = np.clip(np.searchsorted(length, at, side="right") - 1, 0, len(length) - 2)
+        gap = np.maximum(length[before + 1] - length[before], 1e-300)
+        share = np.clip((at - length[before]) / gap, 0.0, 1.0)[:, None]
+        z, p = (
+            (1.0 - share) * column[before] + share * column[before + 1]
+            for column in (chain.z, chain.p)
+        )
+        return Spot(z, p, chain.rows[np.where(share[:, 0] < 0.5, before, before + 1)])
+
+    def _sweep(self, moving: Sequence[int]) -> list[int]:
+        """One step of some chains towards straight ones; which of them are not straight yet."""
+        moves = dict(zip(moving, self._moves([self.chains[i] for i in moving]), strict=True))
+        energy = {i: self._energy(self.chains[i]) for i in moving}
+        todo = [i for i in moving if moves[i].gain > ROUND_OFF * energy[i]]
+        left = [i for i in todo if moves[i].size >= STILL]
+        for share in 0.5 ** np.arange(HALVINGS):
+            if not todo:
+                break
+            tried = self._moved([moves[i] for i in todo], float(share))
+            for i, chain in zip(todo.copy(), tried, strict=True):
+                whole = None if chain is None else joined([self.chains[i].take(FIRST), chain])
+                if whole is not None and self._energy(whole) < energy[i]:
+                    self.chains[i] = whole
+                    todo.remove(i)
+        return [i for i in left if i not in todo]
+
+    def _moves(self, chains: Sequence[Spot]) -> Iterator[_Move]:
+        """Steps of chains, with the tangent spaces of all their points from one call."""
+        inner = joined([chain.take(np.arange(1, len(chain.z) - 1)) for chain in chains])
+        last = joined([chain.take(LAST) for chain in chains])
+        frames, rows = self.on_set.frames(inner)
+        edges, edge_rows = self.on_fold.frames(last)
+        inner, last = Spot(inner.z, inner.p, rows), Spot(last.z, last.p, edge_rows)
+        ends = np.cumsum([len(chain.z) - 2 for chain in chains])[:-1]
+        for i, own in enumerate(np.split(np.arange(len(inner.z)), ends)):
+            edge = edges[i : i + 1]
+            step = self._step(chains[i], frames[own], edge)
+            tip = last.take(np.array([i]))
+            yield _Move(inner.take(own), frames[own], step[0], tip, edge, step[1], step[2])
+
+    def _moved(self, moves: Sequence[_Move], share: float) -> list[Spot | None]:
+        """Chains without their first points after a share of each step; None: not on the set."""
+        frames, step = np.concatenate([m.frames for m in moves]), [m.step for m in moves]
+        edge, end = np.concatenate([m.edge for m in moves]), [m.end for m in moves]
+        inner, goal = joined([m.inner for m in moves]), joined([m.last for m in moves])
+        middle, good = self.on_set.moved(inner, frames, share * np.concatenate(step))
+        there = np.ones(len(moves), bool)
+        if edge.shape[1]:
+            goal, there = self.on_fold.moved(goal, edge, share * np.concatenate(end))
+        ends = np.cumsum([len(m.step) for m in moves])[:-1]
+        owns = np.split(np.arange(len(frames)), ends)
+        return [
+            joined([middle.take(own), goal.take(np.array([i]))])
+            if there[i] and good[own].all()
+            else None
+            for i, own in enumerate(owns)
+        ]
+
+    def _step(
+        self, chain: Spot, frames: Frames, edge: Frames
+    ) -> tuple[Float[np.ndarray, "inner d"], Float[np.ndarray, "1 k"], float]:
+        """Step of Gauss–Newton for the sum of squared links, and the decrease that it predicts."""
+        place = self._places(chain)
+        inner, d = frames.shape[:2]
+        k = edge.shape[1]
+        # directions of all points one below the other, and whose they are
+        rows = placed_frames(self.setting, frames).reshape(inner * d, place.shape[1])
+        rows = np.concatenate([rows, placed_frames(self.setting, edge)[0]])
+        owner = np.concatenate([np.repeat(np.arange(inner), d), np.full(k, inner)])
+        pull = np.empty_like(place[1:])
+        pull[:-1] = 2.0 * place[1:-1] - place[:-2] - place[2:]
+        pull[-1] = place[-1] - place[-2]
+        apart = np.abs(owner[:, None] - owner)
+        weight = np.where(apart == 1, -1.0, np.where(apart == 0, 2.0, 0.0))
+        weight[owner == inner] *= np.where(owner == inner, 0.5, 1.0)
+        matrix = weight * (rows @ rows.T)
+        gradient = np.einsum("rc,rc->r", rows, pull[owner])
+        step = -np.linalg.solve(matrix, gradient)
+        gain = -float(step @ gradient)
+        return step[: inner * d].reshape(inner, d), step[inner * d :].reshape(1, k), gain
