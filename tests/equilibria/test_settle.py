@@ -62,7 +62,7 @@ def test_roots_at_fixed_parameters_are_those_of_the_polynomial():
 
 
 @pytest.mark.parametrize("frame", [Tangents(), Held()])
-def test_the_fast_way_at_fixed_parameters_equals_the_general_one(frame):
+def test_fixed_parameters_equal_held_ones(frame):
     """A rod's fused Newton step against the bordered system with all parameters held."""
     arch = em.Rod(load="uniform")
     rest = arch.natural_state(Theta=0.9, Delta=0.0)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equimorph.linalg import negative_eigenvalues, solve_bordered
+from equimorph.linalg import negative_eigenvalues, orthonormal_rows, solve_bordered
 from equimorph.linalg.kernels import solve_lanes
 from equimorph.linalg.simd import work_rows
 
@@ -73,3 +73,25 @@ def test_one_singular_lane_is_not_a_number_and_leaves_the_others():
     found = solve_bordered(matrix, nothing, nothing, np.zeros((3, 0, 0)), np.ones((3, 1, 2)))
     np.testing.assert_allclose(found.x[[0, 2], 0], [[1, 1], [0.5, 0.5]], rtol=1e-14)
     assert np.isnan(found.x[1]).all()
+
+
+def test_orthonormal_rows_are_those_of_the_triangular_factor():
+    """The unique Q of QR with a positive diagonal of R, in the metric; others lose their shares."""
+    generator = np.random.default_rng(3)
+    rows, weights = generator.normal(size=(9, 4, 7)), np.array([0.5, 1.0, 2.0, 3.0, 1.0, 1.0, 0.0])
+    found = orthonormal_rows(rows, 3, weights)
+    factor = np.sqrt(weights)
+    for lane in range(9):
+        q, r = np.linalg.qr((rows[lane, :3] * factor).T)
+        placed = (q * np.sign(np.diag(r))).T
+        np.testing.assert_allclose(found[lane, :3] * factor, placed, atol=1e-12)
+        rest = rows[lane, 3] - (placed @ (factor * rows[lane, 3])) @ found[lane, :3]
+        np.testing.assert_allclose(found[lane, 3], rest, atol=1e-12)
+
+
+def test_dependent_rows_become_no_numbers():
+    """Nothing is left of the second row; the other lane is as it was."""
+    rows = np.array([[[1.0, 0.0], [0.0, 2.0]], [[1.0, 0.0], [3.0, 0.0]]])
+    found = orthonormal_rows(rows, 2, np.ones(2))
+    assert np.array_equal(found[0], np.eye(2))
+    assert np.isnan(found[1, 1]).all()

@@ -16,6 +16,7 @@ from equimorph.structures import (
     from_identity,
     natural_state,
 )
+from equimorph.structures.contract import advance_by
 from equimorph.structures.discrete import DiscreteStructure
 from oracles.specimens import (
     SPECIMENS,
@@ -165,12 +166,36 @@ def test_fused_step_equals_the_plain_route(specimen):
         generator = np.random.default_rng(2)
         corner, defect = generator.normal(size=lanes), generator.normal(size=lanes)
         fused = structure.advance(z, p, dp, row, corner, defect)
-        plain = Structure.advance(structure, z, p, dp, row, corner, defect)
+        parts = Structure.linear_system(structure, z, p, dp[:, None])
+        plain = advance_by(parts, row, corner, defect, structure.constraints)
         np.testing.assert_array_equal(fused.index, plain.index)
         for name in ("dz", "dt", "tangent_z", "tangent_t", "residual"):
             exact = getattr(plain, name)
             bound = 1e-10 * max(1.0, np.abs(exact).max())
             np.testing.assert_allclose(getattr(fused, name), exact, rtol=1e-9, atol=bound)
+
+
+@every_structure
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_linear_system_is_what_its_parts_are(specimen, k):
+    """`residual`, `parameter_derivative` and `solve`, with and without a border."""
+    structure = specimen.structure
+    for lanes in (1, 5, 21):
+        z, p, row, dp = specimen.states(lanes)
+        directions = np.stack([dp, dp[::-1] - 0.3 * dp], axis=1)[:, :k]
+        system = structure.linear_system(z, p, directions)
+        np.testing.assert_allclose(system.residual, structure.residual(z, p), atol=1e-12)
+        assert system.columns.shape == (lanes, k, structure.size)
+        for i in range(k):
+            column = structure.parameter_derivative(z, p, np.ascontiguousarray(directions[:, i]))
+            np.testing.assert_allclose(system.columns[:, i], column, atol=1e-12)
+        corner = np.full((lanes, 1, 1), 0.7)
+        for border in (None, (row[:, None], row[:, None], corner)):
+            rhs = np.ones((lanes, 2, structure.size + (border is not None)))
+            found, exact = system.solve(rhs, border), structure.solve(z, p, rhs, border)
+            np.testing.assert_array_equal(found.negative, exact.negative)
+            bound = 1e-10 * max(1.0, np.abs(exact.x).max())
+            np.testing.assert_allclose(found.x, exact.x, rtol=1e-9, atol=bound)
 
 
 @every_structure

@@ -38,10 +38,10 @@ class Critical:
     p: Parameters
     b: Lanes
     system: LinearSystem | None = None
-    null: Lanes | None = None
+    null: Float[np.ndarray, "lanes extended"] | None = None
 
     @cached_property
-    def _bordered(self) -> Lanes:
+    def _bordered(self) -> Float[np.ndarray, "lanes extended"]:
         if self.null is not None:
             return self.null
         rhs = np.zeros((len(self.z), 1, self.structure.size + 1))

@@ -97,12 +97,12 @@ class Tangent:
     if it is needed.
     """
 
-    onto: Lanes
+    onto: Float[np.ndarray, "lanes bordered"]
     along: Float[np.ndarray, "lanes k bordered"]
     index: Numbers
     sure: Flags
     system: LinearSystem | None = None
-    null: Lanes | None = None
+    null: Float[np.ndarray, "lanes extended"] | None = None
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Step:
     slopes: those of the conditions along the directions; null: null vectors that renew the border.
     """
 
-    change: Lanes
+    change: Float[np.ndarray, "lanes bordered"]
     tangent: Tangent
     slopes: Float[np.ndarray, "lanes m k"]
     null: Lanes | None

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import placed_frames
-from equimorph.manifold.queries.nearest import Frames, Ground, Spot, joined
+from equimorph.manifold.queries.nearest import Ground, Spot, joined
 
 SWEEPS, HALVINGS = 60, 8
 """Largest number of sweeps that straighten a chain, and of lengths of a step that are tried."""
@@ -29,10 +29,10 @@ class _Move:
     """
 
     inner: Spot
-    frames: Frames
+    frames: Float[np.ndarray, "inner d full"]
     step: Float[np.ndarray, "inner d"]
     last: Spot
-    edge: Frames
+    edge: Float[np.ndarray, "1 k full"]
     end: Float[np.ndarray, "1 k"]
     gain: float
 
@@ -146,7 +146,10 @@ class Chains:
         ]
 
     def _step(
-        self, chain: Spot, frames: Frames, edge: Frames
+        self,
+        chain: Spot,
+        frames: Float[np.ndarray, "inner d full"],
+        edge: Float[np.ndarray, "1 k full"],
     ) -> tuple[Float[np.ndarray, "inner d"], Float[np.ndarray, "1 k"], float]:
         """Step of Gauss–Newton for the sum of squared links, and the decrease that it predicts."""
         place = self._places(chain)
