@@ -1,6 +1,6 @@
 """Curves that the tracer follows: a path in parameter space, or a homotopy."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT, squared_lengths
 from equimorph.linalg import Border, BorderedSolution
-from equimorph.structures import Advance, LinearSystem, Structure, advance_by
+from equimorph.structures import Advance, LinearSystem, Structure, bordered_advance
 from equimorph.structures.contract import Direction
 
 
@@ -168,11 +168,9 @@ class NewtonHomotopy:
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent by the general bordered solve."""
-        structure = self.structure
-        here = structure.linear_system(z, self.p, np.zeros((len(z), 0, self.p.shape[1])))
-        residual = here.residual - (1.0 - t)[:, None] * self.defect
-        system = replace(here, residual=residual, columns=self.defect[:, None])
-        return advance_by(system, row, corner, defect, structure.constraints)
+        residual = self.structure.residual(z, self.p) - (1.0 - t)[:, None] * self.defect
+        given = (self.structure, z, self.p, residual, self.defect)
+        return bordered_advance(*given, row, corner, defect)
 
 
 @dataclass(frozen=True)

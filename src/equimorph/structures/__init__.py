@@ -13,7 +13,7 @@ from equimorph.structures.contract import (
     Majorant,
     Structure,
     Symmetry,
-    advance_by,
+    bordered_advance,
 )
 from equimorph.structures.energy import EnergyStructure, Unknown
 from equimorph.structures.frame import Frame, Member
@@ -87,7 +87,7 @@ __all__ = [
     "Truss",
     "Tube",
     "Unknown",
-    "advance_by",
+    "bordered_advance",
     "distance_to",
     "effort_of",
     "from_identity",

@@ -375,6 +375,21 @@ def joint_system(
     return LinearSystem(residual, columns, partial(solve, z, p, *parts))
 
 
+def bordered_advance(
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    residual: Lanes,
+    column: Lanes,
+    row: Lanes,
+    corner: Values,
+    defect: Values,
+) -> Advance:
+    """`Advance` for any residual and column, by the structure's general bordered solve."""
+    system = LinearSystem(residual, column[:, None], partial(structure.solve, z, p))
+    return advance_by(system, row, corner, defect, structure.constraints)
+
+
 def advance_by(
     system: LinearSystem, row: Lanes, corner: Values, defect: Values, constraints: int
 ) -> Advance:
