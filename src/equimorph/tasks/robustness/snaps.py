@@ -216,7 +216,7 @@ class _Moves:
         z, base = (np.tile(each, (len(goals), 1)) for each in (state.z, state.p))
         to = {name: goals[:, k] for k, name in enumerate(self.eset.names)}
         ended = lift(States(state.structure, z, base), to)
-        inside = self.eset.box.contains(ended.states.p[:, free], slack=1e-9)
+        inside = self.eset.box.holds(ended.states.p[:, free], slack=1e-9)
         lost = np.flatnonzero(np.isin(ended.kind, ("fold", "branch point")) & inside)
         length = np.linalg.norm(self.changes(ended.states.z, ended.states.p), axis=1)
         order = lost[np.argsort(length[lost], kind="stable")]
