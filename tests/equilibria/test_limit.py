@@ -91,3 +91,20 @@ def test_rod_pulled_straight_is_lost_where_its_elements_are_too_long():
     finer = em.Rod(elements=12)
     path = em.lift(finer.natural_state(Theta=0.9, Delta=0.0), {"nu": 0.99})
     assert path.arrived
+
+
+@pytest.mark.parametrize("bound", [1e6, 1e12])
+def test_limits_do_not_depend_on_how_far_the_bound_is(bound):
+    """The spring at x_l = 0.8 snaps at F = 0.0513907783; the start is as regular as ever."""
+    spring = em.Spring()
+    near, far = (em.limit_load(spring.natural_state(x_l=0.8), "F", bound=b) for b in (1.0, bound))
+    assert (far.kind, far.detail) == (near.kind, "")
+    np.testing.assert_allclose(far.value, near.value, rtol=1e-12)
+    lifted = em.lift(spring.natural_state(x_l=1.2), {"F": bound}).end
+    assert (lifted.kind, lifted.detail) == ("lost", "no end in 2000 steps")
+
+
+def test_maps_do_not_depend_on_how_far_the_bound_is():
+    grid = em.Grid(x_l=(0.6, 0.9, 3), k=(1, 2, 3))
+    near, far = (em.limit_load_map(em.Spring(), grid, "F", bound=b) for b in (10.0, 1e12))
+    np.testing.assert_allclose(far.value, near.value, rtol=1e-12)

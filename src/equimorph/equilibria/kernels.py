@@ -46,7 +46,8 @@ HIDDEN, ENDING, EARLY = 64, 128, 256
 second steps after a first one that may hide some."""
 
 LEVEL_SLOPE = 1e-6
-"""Slope dt/ds of a start that counts as zero: it lies on a fold, and leads nowhere in t."""
+"""Slope of a start that counts as zero: it lies on a fold, and leads nowhere in t. Per length of
+the curve's own part of the metric, if that is longer than 1."""
 
 ACCEPTED, EXACT = 1e-7, 1e-10
 """Size of the last correction on the way, and where events are: Newton is quadratic, so that the

@@ -288,7 +288,8 @@ def seat(lanes, levels, knobs, start, move, mass, weight, places, numbers, count
         numbers[LENGTH, i], numbers[LARGEST, i] = knobs[0, level], knobs[1, level]
         numbers[TURNING, i], counts[MOST, i] = knobs[2, level], int(knobs[3, level])
         counts[LANE, i], counts[INDEX, i], counts[LEVEL, i] = lanes[k], index[k], level
-        if np.isfinite(total) and numbers[SLOPE, i] > LEVEL_SLOPE:
+        # the slope per length, however far the goal is
+        if np.isfinite(total) and numbers[SLOPE, i] * max(1.0, weight[k]) > LEVEL_SLOPE:
             predict(i, mass, places, numbers, counts)
         else:
             counts[STAGE, i] = STUCK
