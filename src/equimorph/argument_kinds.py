@@ -65,11 +65,12 @@ RANGES: Mapping[str, Range] = {
     "intervals": _count(2, np.inf),
     "confidence": Range(0.5, 1.0 - 1e-12, "between 0.5 and 1", "between 0.5 and 1", above=True),
     "seed": WHOLE,
-    "checks": _count(0),
+    "checks": _count(0, 100_000),
     "retries": _count(0, 20),
     **dict.fromkeys(("samples", "frames"), _count(2)),
     **dict.fromkeys(("starts", "runs", "trials", "batch", "fps"), _count(1)),
     "count": _count(1, 10_000),
+    "limit": _count(1, 100 * MANY),
     "lifts": _count(1, 100 * MANY),
     "steps": _count(1, 1000 * MANY),
 }

@@ -1,5 +1,6 @@
-"""Sets without end are refused: p = sin θ winds over p for ever."""
+"""No set is lifted without end: what winds for ever is refused, what multiplies is stopped."""
 
+import numpy as np
 import pytest
 
 import equimorph as em
@@ -14,3 +15,51 @@ def test_a_set_that_winds_for_ever_is_refused(monkeypatch):
     said = r"`within` must leave at most 12 equilibria over a point; got more over p = .* for ever"
     with unchecked(), pytest.raises(em.InputError, match=said):
         em.equilibrium_set(winding, em.Box(p=(-2, 2)), intervals=(3,))
+
+
+def test_a_set_larger_than_its_limit_is_returned_as_far_as_it_is_known():
+    """The audit says where lifting stopped; what is there are equilibria all the same."""
+    box = em.Box(x_l=(0.6, 1.3), F=(-0.5, 0.5))
+    eset = em.equilibrium_set(em.Spring(), box, intervals=(20, 20), checks=0, limit=500)
+    assert 500 < eset.audit.stopped < 900
+    assert not eset.audit.clean
+    assert ("lifting stopped", f"at {eset.audit.stopped} equilibria, more than the limit") in (
+        eset.audit.rows()
+    )
+    assert eset.points.residual.max() < 1e-9
+    assert em.equilibrium_set(em.Spring(), box, intervals=(6, 6), checks=0).audit.stopped == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"intervals": (10**6, 10**6)}, r"at most 1000000 points of the grid, .* give 1e\+12\."),
+        ({"intervals": (20, 20), "limit": 50}, r"at most 50 points of the grid, .* give 441\."),
+        (
+            {"checks": 10**12},
+            r"`checks` must be a whole number from 0 to 100000; got 1000000000000",
+        ),
+    ],
+)
+def test_absurd_sizes_are_refused_before_the_start(options, message):
+    with pytest.raises(em.InputError, match=message):
+        em.equilibrium_set(em.Spring(), em.Box(x_l=(0.6, 1.3), F=(-0.5, 0.5)), **options)
+
+
+@pytest.mark.slow
+def test_sheets_that_cross_along_the_diagonal_of_a_square_box():
+    """E' = (x−3)(x−p)(x−r): x = p and x = r cross where p = r, with which no grid line coincides.
+
+    Undecided are only the cells at the two corners of the box through which the crossing leaves.
+    """
+    parameters = [em.Parameter(name, "1", 1.0, "actuator", 0.0) for name in "pr"]
+    energy = "x**4/4 - (3+p+r)*x**3/3 + (3*p+3*r+p*r)*x**2/2 - 3*p*r*x"
+    crossed = em.EnergyStructure(energy, [em.Unknown("x", "3", guesses=(-2.5, 3.5))], parameters)
+    eset = em.equilibrium_set(crossed, em.Box(p=(-1, 1), r=(-1, 1)), intervals=(14, 14))
+    assert eset.audit.undecided <= 4
+    assert (eset.audit.missing, eset.audit.wrong, eset.audit.stopped) == (0, 0, 0)
+    p, r = np.random.default_rng(0).uniform(-0.9, 0.9, (2, 200))
+    over = eset.over(p=p, r=r)
+    for k in range(200):
+        found = np.sort(over.states.z[over.point == k, 0])
+        np.testing.assert_allclose(found, np.sort([p[k], r[k], 3.0]), atol=1e-8)

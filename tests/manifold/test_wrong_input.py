@@ -72,7 +72,7 @@ from typecheck import unchecked
         (
             Box(F=(-1, 1)),
             {"checks": -1},
-            "`checks` must be a whole number from 0 to 1000000; got -1.",
+            "`checks` must be a whole number from 0 to 100000; got -1.",
         ),
         (Box(F=(-1, 1)), {"seed": 0.5}, "`seed` must be a whole number >= 0; got 0.5."),
         (

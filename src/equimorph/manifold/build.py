@@ -1,5 +1,6 @@
 """`equilibrium_set`: lift a grid, close the loops, and check what came out."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -7,12 +8,13 @@ from functools import partial
 import numpy as np
 from jaxtyping import Int
 
+from equimorph.argument_kinds import short
 from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.description import Frame
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.kept_sets import question_of_set, recall_set
+from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import CellFinder, Cells, account
 from equimorph.manifold.lifting.completeness import check, seeds_from
@@ -48,6 +50,11 @@ RECOVERED = 50
 """Missing states, spread over all that were found, whose surroundings are lifted at once."""
 HIDDEN = 12
 """Rounds of bisection around missing states that bring no new equilibria over grid vertices."""
+LIMIT = 20_000, 30
+"""Most equilibria of a set where no limit is given: this many, or so many for each point of the
+grid."""
+MOST_POINTS = 1_000_000
+"""Points of a grid above which a set is refused, if no limit allows more: they take 6 GB."""
 HOPELESS = 50
 """Stop bisecting once more than 50 cells, and 4× the initial number, are undecided."""
 
@@ -66,6 +73,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     seed: int = 0,
     checks: int = 2,
     accuracy: float | None = None,
+    limit: int | None = None,
     progress: Progress | None = None,
     journal: Journal | None = None,
 ) -> EquilibriumSet:
@@ -98,6 +106,10 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         Largest distance of the straight cells from the set, in the metric, to which the set is
         refined (see `refine`); it is left as it was lifted if not given. If some edges cannot be
         bisected the grid is too coarse: one of twice the intervals is lifted, at most twice.
+    limit
+        Most equilibria over the grid. Where there are more, nothing further is lifted; the set is
+        what is known by then, and its audit says so (`stopped`). Default: 20 000, or 30 for each
+        point of the grid if these are more.
     progress
         Sink for progress reports; one that raises an exception cancels.
     journal
@@ -111,18 +123,20 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     Raises
     ------
     InputError
-        For a box in more than three parameters, unknown names, parameters both free and fixed,
+        For a box in more than three parameters, a grid of more points than `limit` (than a million
+        without one), unknown names, parameters both free and fixed,
         values without meaning, an accuracy that is not positive, no constraints in `within`, or a
         journal of something else.
     """
     progress = progress or Silent()
     intervals = _intervals(box, intervals)
+    effort = Effort(seed, checks, accuracy, _limit(intervals, limit))
     setting = _setting(structure, box, fixed or {}, tuple(within))
     known = dict(fixed or {})
-    compute = partial(_on_grids, setting, box, known, intervals, seed, checks, accuracy, progress)
+    compute = partial(_on_grids, setting, box, known, intervals, effort, progress)
     if journal is None:
         return compute()
-    question = question_of_set(setting, box, intervals, seed, checks, accuracy)
+    question = question_of_set(setting, box, intervals, effort)
     return recall_set(journal, question, setting, box, known, compute)
 
 
@@ -131,16 +145,16 @@ def _on_grids(
     box: Box,
     fixed: Mapping[str, float],
     intervals: tuple[int, ...],
-    seed: int,
-    checks: int,
-    accuracy: float | None,
+    effort: Effort,
     progress: Progress,
 ) -> EquilibriumSet:
     """Lift a set over a grid, or over a finer one if that is too coarse."""
     for number in range(GRIDS):
-        eset = _of_grid(setting, box, fixed, intervals, seed, checks, progress)
-        if accuracy is not None:
-            eset = refined(eset, accuracy, progress)
+        eset = _of_grid(setting, box, fixed, intervals, effort, progress)
+        if eset.audit.stopped:
+            break
+        if effort.accuracy is not None:
+            eset = refined(eset, effort.accuracy, progress)
         # over one parameter no cells are bisected to find what they hide
         hidden = eset.audit.missing if len(intervals) == 1 else 0
         if eset.audit.unrefined + hidden == 0 or number == GRIDS - 1:
@@ -155,16 +169,15 @@ def _of_grid(
     box: Box,
     fixed: Mapping[str, float],
     intervals: tuple[int, ...],
-    seed: int,
-    checks: int,
+    effort: Effort,
     progress: Progress,
 ) -> EquilibriumSet:
     """Lift a set over one grid, and what the completeness checks find that it lacks."""
     lines = grid_lines(box, intervals, _off_zero(setting))
     progress.report("seeds", 0, 1)
-    pairing = start_pairing(setting, grid_mesh(lines))
-    pairing.points.over_vertices(*_spread(pairing, lines, seed, progress))
-    generator = np.random.default_rng([seed, 1])
+    pairing = start_pairing(setting, grid_mesh(lines), effort.limit)
+    pairing.points.over_vertices(*_spread(pairing, lines, effort.seed, progress))
+    generator = np.random.default_rng([effort.seed, 1])
     recovered = 0
     finder = CellFinder()
     for number in range(SEARCHES):
@@ -172,19 +185,23 @@ def _of_grid(
         cells, bisected = _lifted(pairing, finder, progress)
         frame = Frame(setting, pairing.mesh, box, fixed, intervals)
         eset = account(pairing, cells, frame, bisected)
-        found = check(eset, generator, _checks(checks, setting), progress)
+        found = check(eset, generator, _checks(effort.checks, setting), progress)
         lacking = len(found.missing)
-        if lacking == 0 or number == SEARCHES - 1:
+        # what stays undecided in spite of bisection is not mended by more equilibria
+        ended = pairing.is_full or cells.doubtful > HOPELESS
+        if lacking == 0 or ended or number == SEARCHES - 1:
             break
         recovered += lacking
         some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
         _recover(pairing, found.missing[some])
+    stopped = pairing.points.count if pairing.is_full else 0
     audit = replace(
         eset.audit,
         checked=found.found,
         missing=lacking,
         recovered=recovered,
         descents=found.descents,
+        stopped=stopped,
     )
     return replace(eset, audit=audit)
 
@@ -206,6 +223,19 @@ def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:
         number = ("one whole number", "two whole numbers", "three whole numbers")[d - 1]
         raise InputError(f"`intervals` must be {number} >= 2; got {intervals!r}.")
     return tuple(intervals)
+
+
+def _limit(intervals: tuple[int, ...], limit: int | None) -> int:
+    """Most equilibria of a set over a grid that is not too large."""
+    points = math.prod(count + 1 for count in intervals)
+    most = MOST_POINTS if limit is None else limit
+    if points > most:
+        raise InputError(
+            f"`intervals` must give at most {most} points of the grid, or `limit` allow more; got "
+            f"{short(intervals)}, which give {points:.3g}."
+        )
+    least, each = LIMIT
+    return max(least, each * points) if limit is None else limit
 
 
 def _setting(
@@ -244,7 +274,7 @@ def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[C
         first = doubtful if number == 0 else first
         # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
         hopeless = doubtful > max(HOPELESS, 4 * first)
-        if doubtful == 0 or hopeless or number == rounds - 1:
+        if doubtful == 0 or hopeless or pairing.is_full or number == rounds - 1:
             break
         bisected += doubtful
         longest = _longest_edges(pairing, cells)
@@ -259,6 +289,8 @@ def _recover(pairing: Pairing, missing: States) -> None:
     its straight cells leave out the states, which are close to a curved fold.
     """
     for _ in range(HIDDEN):
+        if pairing.is_full:
+            return
         known, mesh = pairing.points.count, pairing.mesh
         found, origin = seeds_from(pairing.setting, mesh, missing)
         ids, _ = pairing.points.over_vertices(*found)
@@ -280,7 +312,7 @@ def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Se
     """
     setting = pairing.setting
     mesh, number = coarse_grid(lines, COARSE[len(lines)], setting.limits)
-    coarse = start_pairing(setting, mesh)
+    coarse = start_pairing(setting, mesh, pairing.limit)
     coarse.points.over_vertices(*seeds(setting, mesh, np.flatnonzero(number >= 0), seed))
     flood(coarse, progress)
     store = coarse.points

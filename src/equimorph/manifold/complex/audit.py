@@ -26,6 +26,9 @@ class Audit:
     `descents` counts how descents from vertices of the strata of index one, and from folds, ended;
     what they landed on and the set lacked has been added, too.
 
+    `stopped`, which must be zero: with how many equilibria lifting stopped because there were more
+    than the limit; much is unpaired and undecided then.
+
     Of refined sets: the `accuracy` that was asked for, the largest `deviation` of straight cells
     from the set as their edges show it, how many edges are `unrefined` (they could not be
     bisected), by how much the numbers of pieces and of boundary loops and the Euler characteristic
@@ -63,6 +66,7 @@ class Audit:
     smallest_free_angle: float = 0.0
     wrong: int = 0
     descents: tuple[tuple[str, int], ...] = ()
+    stopped: int = 0
 
     @property
     def missing_at_most(self) -> float:
@@ -89,6 +93,7 @@ class Audit:
             self.missing,
             self.unrefined,
             self.changed,
+            self.stopped,
         )
         return not any(faults) and self.largest_residual < 1e-9
 
@@ -106,7 +111,9 @@ class Audit:
             refined.append(("smallest angle off crossings", f"{self.smallest_free_angle:.1f}°"))
         if self.smallest_dihedral:
             refined.append(("smallest dihedral angle", f"{self.smallest_dihedral:.1f}°"))
+        stopped = ("lifting stopped", f"at {self.stopped} equilibria, more than the limit")
         return [
+            *([stopped] if self.stopped else []),
             ("equilibria (vertices)", str(self.vertices)),
             ("cells", str(self.cells)),
             ("curves not paired", str(self.unpaired)),

@@ -5,7 +5,7 @@ See docs/decisions.md, "Journals keep whole sets".
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, astuple, dataclass, fields
 from hashlib import sha256
 from importlib.metadata import version
 from typing import Any
@@ -36,13 +36,21 @@ from equimorph.model import (
 from equimorph.structures import States, Structure
 
 
+@dataclass(frozen=True)
+class Effort:
+    """How thoroughly a set is lifted; see `equilibrium_set`."""
+
+    seed: int
+    checks: int
+    accuracy: float | None
+    limit: int
+
+
 def question_of_set(
     setting: Setting,
     box: Box,
     intervals: tuple[int, ...],
-    seed: int,
-    checks: int,
-    accuracy: float | None,
+    effort: Effort,
 ) -> str:
     """All that a set depends on.
 
@@ -60,7 +68,7 @@ def question_of_set(
         "box": [box.names, box.lower.tolist(), box.upper.tolist()],
         "within": within,
         "intervals": intervals,
-        "effort": (seed, checks, accuracy),
+        "effort": astuple(effort),
     }
     return json.dumps(given, sort_keys=True)
 

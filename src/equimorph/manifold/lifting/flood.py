@@ -27,7 +27,7 @@ def flood(pairing: Pairing, progress: Progress) -> None:
     All rays that one step can lift go first, then those that a few equal steps can; the others wait
     and are traced many at a time.
     """
-    while True:
+    while not pairing.is_full:
         flood_directly(pairing, progress)
         long = pairing.marked(RayMark.LONG)
         if len(long.points):
@@ -43,7 +43,7 @@ def flood(pairing: Pairing, progress: Progress) -> None:
 def flood_directly(pairing: Pairing, progress: Progress) -> None:
     """Lift edges from all known points as far as single steps lead."""
     pairing.fit()
-    while len((rays := pairing.marked(RayMark.UNTRACED)).points):
+    while not pairing.is_full and len((rays := pairing.marked(RayMark.UNTRACED)).points):
         _lift(pairing, rays, 1)
         _refuse_endless(pairing)
         live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == VertexKind.GRID)

@@ -15,6 +15,9 @@ from equimorph.model import Box
 SHIFT = 0.02
 """Largest shift of a grid line off its regular place, in intervals."""
 
+APART = 0.15
+"""Shift of the inner lines of a parameter with the same lines as another one, in intervals."""
+
 MARGIN = 0.2
 """How far the coarse grid reaches beyond the box, in ranges of the parameters."""
 
@@ -41,9 +44,14 @@ def _lines(low: float, high: float, count: int, mirrored: bool) -> Float[np.ndar
 
 def grid_lines(box: Box, intervals: tuple[int, ...], mirrored: tuple[bool, ...]) -> Lines:
     """Places of the grid lines along each free parameter."""
-    return tuple(
-        _lines(box.lower[k], box.upper[k], count, mirrored[k]) for k, count in enumerate(intervals)
-    )
+    lines: list[Float[np.ndarray, " _"]] = []
+    for k, count in enumerate(intervals):
+        line = _lines(box.lower[k], box.upper[k], count, mirrored[k])
+        if any(np.array_equal(line, other) for other in lines):
+            # else diagonals lie on the line where both parameters are equal, often a singular one
+            line[1:-1] += APART * (line[-1] - line[0]) / count * np.sign(line[1:-1])
+        lines.append(line)
+    return tuple(lines)
 
 
 def grid_mesh(lines: Lines) -> BaseMesh:

@@ -85,11 +85,18 @@ class Pairing:
     incident: Int[np.ndarray, "V slots"]
     """Edges of each vertex, in the order of their slots; −1 beyond."""
     effort: Int[np.ndarray, " E"]
+    limit: int
+    """Most points; see `is_full`."""
     conflicts: int = 0
     crossings: dict[int, list[int]] = field(default_factory=dict)
     """Points of each edge at which two curves cross."""
     hubs: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points between two of these at which a fold of one of the sheets crosses, too."""
+
+    @property
+    def is_full(self) -> bool:
+        """Whether there are more points than allowed: nothing further is lifted."""
+        return self.points.count > self.limit
 
     def ray(self, point: int, edge: int) -> int:
         """Curve at a point along an edge."""
@@ -230,8 +237,8 @@ def _incidence(mesh: BaseMesh) -> tuple[Int[np.ndarray, "V slots"], Int[np.ndarr
     return incident, place.reshape(-1, 2)
 
 
-def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
-    """Empty pairing on a mesh."""
+def start_pairing(setting: Setting, mesh: BaseMesh, limit: int) -> Pairing:
+    """Empty pairing on a mesh, for at most so many points."""
     incident, slots = _incidence(mesh)
     pairing = Pairing(
         setting,
@@ -242,6 +249,7 @@ def start_pairing(setting: Setting, mesh: BaseMesh) -> Pairing:
         slots,
         incident,
         np.zeros(len(mesh.edges), int),
+        limit,
     )
     pairing.fit()
     return pairing
