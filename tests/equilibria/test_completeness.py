@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import equimorph as em
 from equimorph.equilibria import Completeness
 
 
@@ -59,3 +60,12 @@ def test_the_upper_number_holds_for_equally_easy_equilibria(chance):
 def test_one_line_says_it_all():
     line = str(Completeness(np.array([[True, True], [True, False]])))
     assert line.startswith("2 found (in single runs 2, 1); estimated 2.0, at most ")
+
+
+def test_states_beyond_the_discretisation_are_not_counted_as_none():
+    """Under q = 200 the arch has equilibria; the default mesh resolves none of them."""
+    arch = em.Rod(load="uniform")
+    found = em.find_equilibria(arch, {"Theta": 1.0, "Delta": 0.0, "q": 200.0})
+    assert len(found) == 0
+    assert found.completeness.upper == np.inf
+    assert "the discretisation does not resolve: refine it" in repr(found)

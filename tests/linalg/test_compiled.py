@@ -86,3 +86,20 @@ def test_kernels_are_made_of_sources_that_are_watched():
             ours = {name for name in froms if name and name.startswith("equimorph")}
             assert all(name.endswith(("kernels", "simd", "compiled")) for name in ours), path
         assert "numba" not in froms or path.resolve() in watched
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", ["cut", "changed", "appended"])
+def test_damaged_code_is_compiled_anew(fresh, tmp_path: Path, suffix: str, damage: str):
+    """Whatever happened to the files, kernels give what they give, and are kept again."""
+    assert fresh().double(2.0) == 4.0
+    for path in tmp_path.rglob(f"*double*.{suffix}"):
+        content = path.read_bytes()
+        middle = len(content) // 2
+        changed = content[:middle] + bytes([content[middle] ^ 255]) + content[middle + 1 :]
+        pieces = {"cut": content[:middle], "changed": changed, "appended": content + b"0123"}
+        path.write_bytes(pieces[damage])
+    assert fresh().double(2.0) == 4.0
+    again = fresh().double
+    assert again(3.0) == 6.0
+    assert _hits(again) == 1

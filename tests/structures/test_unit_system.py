@@ -254,3 +254,15 @@ def test_inconsistent_units_are_refused(make, text):
 def test_close_names_of_units_are_suggested():
     with pytest.raises(InputError, match="Did you mean kN"):
         read_unit("KN", UNITS, "EA")
+
+
+def test_a_length_without_a_unit_beside_one_with_units_is_refused():
+    said = r"^`length` must have a unit, as EI = '2 N m\^2' has one; got 0\.1\."
+    with pytest.raises(em.InputError, match=said):
+        em.Rod(load="uniform", EI="2 N m^2", length=0.1)
+    with pytest.raises(em.InputError, match=r"^`span` must have a unit, as EI = .* has one; got 0"):
+        em.Rod(load="uniform", EI="2 N m^2", length="100 mm", span=0.05)
+    units = {"force": "N", "length": "m"}
+    named = em.Rod(load="uniform", EI="2 N m^2", length=0.1, units=units)
+    written = em.Rod(load="uniform", EI="2 N m^2", length="100 mm", units=units)
+    assert named.units.value("length") == pytest.approx(written.units.value("length"), rel=1e-15)

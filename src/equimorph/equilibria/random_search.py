@@ -16,6 +16,8 @@ from equimorph.tolerances import SAME_STATE
 
 Groups = Int[np.ndarray, " lanes"]
 
+UNRESOLVED = "not resolved by the discretisation"
+"""Why a start led to no equilibrium, among the reasons in `failures`."""
 LINES = 3
 """Random lines through each equilibrium, followed both ways."""
 REACH = 4.0
@@ -176,7 +178,7 @@ class Pools:
         """Add what is resolved, not far outside the constraints, and new in its group."""
         structure = self.ground.structure
         good = structure.resolved(z, self.ground.p[group])
-        self.failures.append(("not resolved by the discretisation", group[~good]))
+        self.failures.append((UNRESOLVED, group[~good]))
         z, group = z[good], group[good]
         # a little outside, states still serve as stepping stones
         z, group = (part[self.ground.excess(z, group) < 1.0] for part in (z, group))

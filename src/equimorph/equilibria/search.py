@@ -14,7 +14,7 @@ from scipy.special import gammaln, xlogy
 from equimorph.door import door
 from equimorph.equilibria.arguments import Argument, arguments_of, contradicts
 from equimorph.equilibria.minima_graph import MinimaGraph
-from equimorph.equilibria.random_search import Ground, Pools, distinct
+from equimorph.equilibria.random_search import UNRESOLVED, Ground, Pools, distinct
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
 
@@ -35,6 +35,8 @@ class Completeness:
     captured
         Whether each run found each equilibrium; no run found those that descents and searches
         between minima have added.
+    unresolved
+        Starts that led to states which the discretisation does not resolve.
 
     References
     ----------
@@ -42,6 +44,7 @@ class Completeness:
     """
 
     captured: Bool[np.ndarray, "runs found"]
+    unresolved: int = 0
 
     @property
     def runs(self) -> int:
@@ -74,10 +77,11 @@ class Completeness:
         """Number of equilibria at about 95 % confidence, if all are as easy to find as those found.
 
         Largest number that the profile likelihood does not reject [Cormack1992]_; infinite where
-        no equilibrium was found twice. Never below `estimate`.
+        no equilibrium was found twice, or none at all but some that are not resolved. Never below
+        `estimate`.
         """
         if self.found == 0:
-            return self.estimate
+            return np.inf if self.unresolved else self.estimate
         if int(self.captured.sum()) == int(self.captured.any(axis=0).sum()):
             return np.inf
         number = int(self.captured.any(axis=0).sum())
@@ -105,6 +109,11 @@ class Completeness:
 
     def __str__(self) -> str:
         """One line with all numbers."""
+        if self.found == 0 and self.unresolved:
+            return (
+                f"0 found; {self.unresolved} starts led to states that the discretisation does not "
+                "resolve: refine it"
+            )
         runs = ", ".join(str(count) for count in self.per_run)
         return (
             f"{self.found} found (in single runs {runs}); estimated {self.estimate:.1f}, "
@@ -340,5 +349,5 @@ class _Catch:
         """Return the result."""
         z = self.z[self.kept]
         p = np.tile(self.ground.p, (len(z), 1))
-        completeness = Completeness(self.captured)
+        completeness = Completeness(self.captured, self.failures.get(UNRESOLVED, 0))
         return FoundStates(self.ground.structure, z, p, completeness, self.failures, arguments)

@@ -10,6 +10,7 @@ See docs/decisions.md, "Compiled kernels are cached by content".
 
 import fcntl
 import hashlib
+import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +24,8 @@ _HERE = Path(__file__)
 SOURCES = sorted([_HERE, _HERE.with_name("simd.py"), *_HERE.parents[1].rglob("*kernels.py")])
 """Every file with code that goes into kernels."""
 DIGEST = hashlib.sha256(b"".join(each.read_bytes() for each in SOURCES)).hexdigest()
+CHECK = 32
+"""Bytes of the checksum before compiled code: damaged code would crash the process."""
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
@@ -80,6 +83,25 @@ class _LockedFiles(IndexDataCacheFile):
     def save(self, key: Any, data: Any) -> None:
         with self._lock():
             super().save(key, data)
+
+    def _load_index(self) -> Any:
+        """Return the index; an empty one if the file is damaged, so that all is compiled anew."""
+        try:
+            return super()._load_index()
+        except Exception:  # bytes that are no index can lead to anything
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        """Return compiled code; an OSError, as of a missing file, if the file is damaged."""
+        content = Path(self._data_path(name)).read_bytes()
+        if hashlib.sha256(content[CHECK:]).digest() != content[:CHECK]:
+            raise OSError(f"{name} is damaged")
+        return pickle.loads(content[CHECK:])
+
+    def _save_data(self, name: str, data: Any) -> None:
+        content = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(hashlib.sha256(content).digest() + content)
 
     @contextmanager
     def _lock(self) -> Iterator[None]:

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from equimorph.argument_kinds import is_number
 from equimorph.errors import InputError, suggestion
 
 Dimension = tuple[int, int, int]
@@ -180,6 +181,28 @@ class UnitSystem:
                 f"{given!r}."
             )
         return float(found.group(1)) * value / unit
+
+    def check_all_have_units(self, given: Mapping[str, Any]) -> None:
+        """Refuse plain numbers beside texts with units where no units are named for them.
+
+        Parameters
+        ----------
+        given
+            Quantities by name; None where none is given.
+
+        Raises
+        ------
+        InputError
+            For the first number other than zero without a unit.
+        """
+        texts = [name for name, each in given.items() if isinstance(each, str)]
+        plain = [name for name, each in given.items() if is_number(each) and each != 0]
+        if self.plain and texts and plain:
+            beside, name = texts[0], plain[0]
+            raise InputError(
+                f"`{name}` must have a unit, as {beside} = {given[beside]!r} has one; got "
+                f"{given[name]!r}. Or add `units`, in which plain numbers are."
+            )
 
     def numbers(self, given: Any, quantity: str, what: str) -> Any:
         """The same for every entry of a list of numbers or texts."""
