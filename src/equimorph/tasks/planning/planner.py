@@ -96,9 +96,12 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         return refusal(why, corners)
     if corners is not None:
         return verify_way_points(ends, corners, demands, monitor)
-    if snap_price is not None:
-        return route_with_snaps(eset, ends, demands, snap_price, monitor)
-    return _free(eset, ends, demands, monitor)
+    free = _free(eset, ends, demands, monitor)
+    if snap_price is None:
+        return free
+    snapping = route_with_snaps(eset, ends, demands, snap_price, monitor)
+    arrived = [route for route in (free, snapping) if route.arrived]
+    return min(arrived, key=lambda route: route.cost, default=snapping)
 
 
 def _check_price(snap_price: float | None, via: Sequence[Mapping[str, float]] | None) -> None:
