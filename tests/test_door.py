@@ -216,9 +216,9 @@ def public_functions(things: Things) -> Iterator[tuple[str, Callable[..., Any]]]
     pieces = em.components(things.set)
     for owner in (things.set, things.chart, things.map, things.state, things.path.states, pieces,
                   things.spring, things.rod, things.truss, things.frame):  # fmt: skip
-        for name, method in inspect.getmembers(owner, inspect.ismethod):
+        for name, method in inspect.getmembers(type(owner), inspect.isfunction):
             if is_checked(method) and name != "__init__":
-                yield f"{type(owner).__name__}.{name}", method
+                yield f"{type(owner).__name__}.{name}", getattr(owner, name)
 
 
 def is_checked(function: Any) -> bool:

@@ -269,6 +269,24 @@ def test_an_interrupted_run_says_how_to_go_on(known: Shell, monkeypatch: pytest.
     assert "read from an earlier run" in known.out
 
 
+@pytest.mark.parametrize("where", ["compile_kernels", "read_problem"])
+def test_a_run_interrupted_before_it_begins_says_what_is_kept(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch, where: str
+):
+    """Ctrl-C at the start, and while kernels are compiled."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    Path("spring.toml").write_text(SPRING)
+    monkeypatch.setattr("equimorph.cli.run.kernels_are_in_cache", lambda: False)
+    monkeypatch.setattr(f"equimorph.cli.run.{where}", interrupt)
+    assert shell("run", "spring.toml", "--out", "out") == 130
+    kept = "kernels that are compiled are kept; the study had not begun"
+    kept = kept if where == "compile_kernels" else "what is finished is kept in out"
+    assert _says_one_line(shell, f"interrupted; {kept}. Run again to go on.")
+
+
 def test_memory_that_runs_out_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch):
     def run_out(*_: object, **__: object) -> None:
         raise MemoryError

@@ -129,6 +129,13 @@ def test_a_truncated_file_is_refused(written: Path):
         read_results(written)
 
 
+def test_a_file_to_which_something_was_appended_is_refused(written: Path):
+    """HDF5 itself does not look beyond what it wrote."""
+    written.write_bytes(written.read_bytes() + b"0123")
+    with pytest.raises(InputError, match="damaged or truncated"):
+        read_results(written)
+
+
 def test_damaged_numbers_are_found_by_their_checksum(written: Path):
     with h5py.File(written) as file:
         chunk = file["set/z"].id.get_chunk_info(0)

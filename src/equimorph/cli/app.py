@@ -63,7 +63,8 @@ def main() -> None:
     except InputError as error:
         _complain(str(error))
         sys.exit(BAD_INPUT)
-    except typer.Abort:
+    except (typer.Abort, KeyboardInterrupt):
+        _complain("interrupted.")
         sys.exit(INTERRUPTED)
     except MemoryError:
         _complain("the computation must fit into memory; reduce `set.intervals` or `set.box`.")
@@ -136,16 +137,14 @@ def run(
     ] = False,
 ) -> None:
     """Run a study: equilibrium set, equilibria, routes, figures, schedules, report."""
-    from equimorph.cli.run import run_and_show
-
     out = out or Path("results") / file.stem
     try:
+        from equimorph.cli.run import run_and_show
+
         run_and_show(file, out, replace=replace)
-    except KeyboardInterrupt:
-        typer.echo(
-            f"equimorph: interrupted; what is finished is kept in {out}. Run again to go on.",
-            err=True,
-        )
+    except KeyboardInterrupt as stop:
+        kept = str(stop) or f"what is finished is kept in {out}"
+        typer.echo(f"equimorph: interrupted; {kept}. Run again to go on.", err=True)
         raise typer.Exit(INTERRUPTED) from None
 
 

@@ -12,6 +12,9 @@ from equimorph.model import Descriptor
 from equimorph.structures import States
 from equimorph.study import Outcome, read_problem, run_study
 
+COMPILED = "kernels that are compiled are kept; the study had not begun"
+"""What is kept of a run that is interrupted while kernels are compiled."""
+
 
 def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
     """Run a study with progress on stderr, then print its answers.
@@ -29,7 +32,10 @@ def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
     _, _, problem = read_problem(file)
     if not kernels_are_in_cache():
         screen.print("The first run compiles the kernels: under a minute, and only once.")
-        compile_kernels(problem)
+        try:
+            compile_kernels(problem)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(COMPILED) from None
     with ScreenProgress() as progress:
         outcome = run_study(file, out, replace=replace, progress=progress)
     _show(outcome, screen)
