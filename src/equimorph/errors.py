@@ -12,6 +12,13 @@ class InputError(EquimorphError, ValueError):
     """The caller's mistake: what is wrong, which value was given, what is allowed."""
 
 
+class MissingError(InputError, AttributeError):
+    """A property that an object does not have, like stability in space without stiffnesses.
+
+    As an `AttributeError` it leaves `hasattr` and tools that list attributes at work.
+    """
+
+
 class CancelledError(EquimorphError):
     """Raised by a progress sink to cancel a computation; lifts of many states keep what is done."""
 

@@ -80,8 +80,17 @@ WRONG = {
     "no length": ({"EI": 2.0, "length": 0.0}, "`length` must be a positive number; got 0"),
     "span beyond the rod": (
         {"span": 1.2, "curvature": 1.0},
-        "`nu` must be a finite number between",
+        "`span` must be less than the length of the rod, 1; got 1.2",
     ),
+    "span beyond the rod in units": (
+        {"span": "320 mm", "EI": 1.0, "length": "0.3 m", "units": {"force": "N", "length": "mm"}},
+        "`span` must be less than the length of the rod, 0.3 m; got '320 mm'",
+    ),
+    "span beyond the rod in numbers": (
+        {"span": 320.0, "EI": 1.0, "length": 300.0},
+        "`span` must be less than the length of the rod, 300.0 m; got 320.0",
+    ),
+    "no span": ({"span": np.nan, "curvature": 1.0}, "`span` must be less than the length"),
 }
 
 

@@ -43,6 +43,8 @@ def test_a_rod_without_stiffnesses_is_not_judged():
         _ = state.batch.stable_in_space
     with pytest.raises(em.InputError, match="`torsion`, `lateral` must be given to judge"):
         em.Rod().lateral_margin()
+    assert not hasattr(em.Rod(), "stable_in_space")
+    assert not hasattr(state.batch, "index_out_of_plane")
 
 
 def test_what_is_unstable_in_its_plane_is_unstable_in_space():

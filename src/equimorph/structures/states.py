@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.door import door
-from equimorph.errors import InputError
+from equimorph.errors import InputError, MissingError
 from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
@@ -90,7 +90,7 @@ class States:
         """
         index = self.structure.index_out_of_plane(self.z, self.p)
         if index is None:
-            raise InputError(
+            raise MissingError(
                 "`structure` must have stiffnesses out of its plane to be judged in space, like "
                 f"Rod(..., torsion=0.77, lateral=1.0); got a {self.structure.kind} without."
             )

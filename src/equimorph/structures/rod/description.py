@@ -128,6 +128,20 @@ class Description:
                     f"axial = {self.axial!r}: pressure on a stretching axis is not modelled."
                 )
 
+    def check_span(self, span: Any, length: Any) -> None:
+        """Refuse a span that an inextensible rod cannot reach, as its user wrote it."""
+        reach = self.units.value("length")
+        held = any(axis.name == "nu" and axis.opposed for axis in support_axes(self.supports))
+        if span is None or not held or self.axial is not None or -reach < self.span < reach:
+            return
+        unit = (
+            "" if isinstance(length, str) or self.units.plain else f" {self.units.label('length')}"
+        )
+        raise InputError(
+            f"`span` must be less than the length of the rod, {length or 1}{unit}; got {span!r}. "
+            "A rod with `axial` stiffness may be stretched."
+        )
+
     def mechanics(self, elements: int, degree: int) -> tuple[GeneralMechanics, Matrix]:
         """Mechanics in raw parameters, and raw scalars as combinations of the user's."""
         model = raw_model(self.build(elements, degree))

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.door import door
-from equimorph.errors import InputError
+from equimorph.errors import InputError, MissingError
 from equimorph.model import Descriptor, Drawing, Parameter, names_of
 from equimorph.structures.contract import Growth
 from equimorph.structures.rod import descriptors
@@ -202,12 +202,14 @@ class Rod(Described):
             )
         else:
             own = {} if shape is None else {"q": LineLoad(shape, kinks=kinks)}
+            given = (span, length)
             span = DEFAULT_SPAN * self.units.value("length") if span is None else span
             self._general = Description(
                 ends, stiffness, curvature, axial, {**own, **(loads or {})}, actuators or {},
                 coordinates, number(span, "length", "span"), number(rise, "length", "rise"),
                 kinks, self.units, breaks,
             )  # fmt: skip
+            self._general.check_span(*given)
             self._become_general(self._general)
         if self.has_lateral_stiffness:
             check_terms(self.terms)
@@ -412,7 +414,7 @@ class Rod(Described):
 
     def _block(self, stiffness: LateralStiffness | None) -> OutOfPlane:
         if stiffness is None:
-            raise InputError(
+            raise MissingError(
                 "`torsion`, `lateral` must be given to judge whether a rod leaves its plane; got "
                 "neither. Give the rod these, like torsion=0.77, lateral=1.0 for a round one, or a "
                 "section."
