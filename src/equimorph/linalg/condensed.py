@@ -109,15 +109,14 @@ class CondensedLayout:
         arrays = [np.ascontiguousarray(a) for a in given]
         x, negative, ratio = self._solve(*arrays)
         pivoted, determinant = np.zeros(len(x), bool), np.full(len(x), np.nan)
-        doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
-        if len(doubtful):
+        if not ratio.min(initial=1.0) >= PIVOT_GUARD:
+            doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
             refined = doubtful[ratio[doubtful] >= REFINABLE]
             x[refined], good = self._refine([a[refined] for a in arrays], x[refined])
             pivoted[doubtful] = True
             pivoted[refined[good]] = False
-        if pivoted.any():
-            matrix = self.dense(diagonal[pivoted], border[pivoted], trailing[pivoted])
-            again = solve_bordered(matrix, *(a[pivoted] for a in arrays[2:6]))
+            full = [a[pivoted] for a in arrays]
+            again = solve_bordered(self.dense(full[0], full[1], full[6]), *full[2:6])
             x[pivoted], negative[pivoted] = again.x, again.negative
             determinant[pivoted] = again.determinant
         return BorderedSolution(x, negative, ratio, pivoted, determinant)

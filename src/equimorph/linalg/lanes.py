@@ -76,8 +76,6 @@ def over_lanes(
     They need at least eight lanes: fewer are filled up with copies of the last one.
     """
     lanes = len(inputs[0])
-    shares = lanes // SMALLEST_SHARE
-    shares = min(threads(), shares) if shares > 1 else shares  # to ask the system takes a while
     if 0 < lanes < LANES:
         at = _FILLED[lanes]
         wide = [np.empty((LANES, *array.shape[1:]), array.dtype) for array in outputs]
@@ -85,6 +83,8 @@ def over_lanes(
         for array, result in zip(outputs, wide, strict=True):
             array[:] = result[:lanes]
         return
+    shares = lanes // SMALLEST_SHARE
+    shares = min(threads(), shares) if shares > 1 else shares  # to ask the system takes a while
     if shares < 2:
         kernel(*shared, *inputs, *outputs)
         return

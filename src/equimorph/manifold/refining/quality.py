@@ -34,7 +34,7 @@ POOR = {2: np.radians(20.0), 3: np.radians(18.0)}
 """Cells with a smaller angle are made better if possible, by the dimension of the cells."""
 OVERTURNED = {2: 0.0, 3: 0.1}
 """Factor on the angle of cells that project against their index; tetrahedra beside folds may."""
-AT_ONCE = 4096
+AT_ONCE = 512
 """Cells that are seen from their corners in one array operation."""
 
 Angles = Float[np.ndarray, " cells"]
