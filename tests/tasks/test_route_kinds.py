@@ -116,6 +116,22 @@ def test_a_price_on_snaps_makes_no_route_dearer(spring_set, price):
             assert plan(spring_set, *ends, snap_price=price).cost <= free.cost * (1 + 1e-12)
 
 
+@pytest.mark.parametrize("intervals", [(12, 12), pytest.param((19, 21), marks=pytest.mark.slow)])
+def test_routes_over_a_snap_depend_on_no_direction_and_no_grid(intervals):
+    """From δ = ∓0.6435 over a snap to ±0.6435: mirror images, 0.3596 by a search over all folds.
+
+    The parameters go 5e-4 beyond the fold and back; 0.4956 and 0.5337 were the answers.
+    """
+    box = em.Box(x_l=(0.3, 1.3), F=(-0.5, 0.5))
+    with unchecked():
+        eset = em.equilibrium_set(em.Spring(), box, intervals=intervals, checks=0)
+        start, goal = (eset.at(x_l=0.8, F=0.0).stable[k] for k in (0, 1))
+        there, back = (plan(eset, *ends, snap_price=0.3) for ends in ((start, goal), (goal, start)))
+    assert len(there.snaps) == len(back.snaps) == 1
+    lengths = [route.cost - 0.3 for route in (there, back)]
+    assert lengths == pytest.approx([0.3596 + 2 * 5e-4] * 2, rel=4e-3)
+
+
 def test_sides_of_the_spring_are_joined_by_a_snap(short_spring_set):
     """x_l ≤ 0.95 parts the sides; over the fold F = (1 − x_l^⅔)^(3/2) one snaps to the other."""
     start, goal = (short_spring_set.at(x_l=0.8, F=0.0).stable[k] for k in (0, 1))

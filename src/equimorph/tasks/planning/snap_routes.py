@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from equimorph.equilibria import Landing, Path, lift, snap_landing
-from equimorph.manifold import EquilibriumSet, snap_graph
+from equimorph.manifold import EquilibriumSet, Snap, snap_graph
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.distances import distance
@@ -24,6 +24,8 @@ from equimorph.tasks.planning.network import (
     on_paths,
     walk_back,
 )
+from equimorph.tasks.planning.objectives import ROUGH
+from equimorph.tasks.planning.snap_places import cheapest_place
 from equimorph.tasks.planning.straightening import (
     route_over_corners,
     straight_corners,
@@ -35,8 +37,11 @@ from equimorph.tolerances import SAME_STATE
 
 SAMPLES = 9
 """Points of each fold whose snaps are followed to where they land."""
-BEYOND = 0.02
-"""How far beyond the fold the parameters go, in their scales, so that the structure does snap."""
+MOST_RUNS = 8
+"""Runs of the stability boundary, or sequences of them, that are compared."""
+DETOUR = 0.1
+"""Part by which paths over the mesh may be longer than what is made of them."""
+NOWHERE = "not even by snaps does the goal lie on a piece that can be reached"
 
 
 @dataclass(frozen=True)
@@ -45,16 +50,19 @@ class Gate:
 
     Parameters
     ----------
-    source
-        Stable vertex next to the fold.
-    fold
-        The fold, as it lies in the set.
+    sources
+        Stable vertices next to the fold.
+    costs
+        Of the chords from these to the fold.
+    snap
+        The run of the stability boundary that it belongs to.
     landing
         Where the snap leads.
     """
 
-    source: int
-    fold: State
+    sources: Int[np.ndarray, " sources"]
+    costs: Float[np.ndarray, " sources"]
+    snap: Snap
     landing: Landing
 
 
@@ -64,6 +72,7 @@ class SnapPath:
 
     stable: list[States]
     gates: list[int]
+    cost: float
 
 
 def gates_of(eset: EquilibriumSet, demands: Demands) -> list[Gate]:
@@ -82,8 +91,18 @@ def gates_of(eset: EquilibriumSet, demands: Demands) -> list[Gate]:
             beside = np.unique(cells)
             beside = beside[allowed[beside]]
             if len(beside):
-                gates.append(Gate(int(beside[0]), eset.points[vertex], landing))
+                costs = _chords(eset, beside, vertex, demands)
+                gates.append(Gate(beside, costs, snap, landing))
     return gates
+
+
+def _chords(
+    eset: EquilibriumSet, beside: Int[np.ndarray, " n"], fold: int, demands: Demands
+) -> Float[np.ndarray, " n"]:
+    """Costs of the chords from vertices to a fold."""
+    number = np.arange(len(beside))
+    states = eset.points[np.append(beside, fold)]
+    return demands.objective.costs(states, number, np.full(len(beside), len(beside)), ROUGH)
 
 
 def route_with_snaps(
@@ -94,19 +113,20 @@ def route_with_snaps(
     monitor: Sequence[Descriptor],
 ) -> Route:
     """Cheapest route on which every snap costs `price`, verified piece by piece."""
-    search = _Search(eset, ends, demands, price)
-    tried = 0
-    while True:
+    search, best = _Search(eset, ends, demands, price), refusal(NOWHERE)
+    for _ in range(MOST_RUNS):
         path = search.path()
-        if path is None:
-            return refusal("not even by snaps does the goal lie on a piece that can be reached")
+        if path is None or (best.arrived and path.cost > (1.0 + DETOUR) * best.cost):
+            break
         route = _verify(eset, ends, path, demands, monitor)
-        tried += 1
         if route.arrived:
-            return replace(route, cost=route.cost + price * len(route.snaps))
-        if not path.gates or tried > len(search.gates):
-            return route
+            route = replace(route, cost=route.cost + price * len(route.snaps))
+        if not best.arrived or route.cost < best.cost:
+            best = route
+        if not path.gates:
+            break
         search.close(path.gates)
+    return best
 
 
 class _Search:
@@ -136,8 +156,9 @@ class _Search:
         self.closed: set[int] = set()
 
     def close(self, gates: list[int]) -> None:
-        """Do not use gates again."""
-        self.closed.update(gates)
+        """Do not use the runs of these gates again."""
+        runs = {id(self.gates[k].snap) for k in gates}
+        self.closed.update(k for k, gate in enumerate(self.gates) if id(gate.snap) in runs)
 
     def path(self) -> SnapPath | None:
         """The cheapest path all of whose links can be lifted; None if no such path exists."""
@@ -148,46 +169,49 @@ class _Search:
         while True:
             inner = np.flatnonzero(allowed & ~broken)
             both = np.concatenate([network.pairs[inner], self.own])
-            path = self._cheapest(both, np.concatenate([costs[inner], self.own_costs]))
+            path, cost = self._cheapest(both, np.concatenate([costs[inner], self.own_costs]))
             if path is None:
                 return None
             used = inner[on_paths(network.pairs[inner], [path])]
             if network.lift_links(used, self.states, self.demands):
-                return self._divide_at_snaps(path)
+                return self._divide_at_snaps(path, cost)
 
     def _cheapest(
         self, both: Int[np.ndarray, "links 2"], weights: Float[np.ndarray, " links"]
-    ) -> Int[np.ndarray, " n"] | None:
+    ) -> tuple[Int[np.ndarray, " n"] | None, float]:
         open_gates = [k for k in range(len(self.gates)) if k not in self.closed]
-        sources = np.array([self.gates[k].source for k in open_gates], dtype=int)
-        targets = np.array([self.first + k for k in open_gates], dtype=int)
+        none = np.zeros(0, int)
+        sources = np.concatenate([none, *(self.gates[k].sources for k in open_gates)])
+        to_folds = np.concatenate([np.zeros(0), *(self.gates[k].costs for k in open_gates)])
+        many = [len(self.gates[k].sources) for k in open_gates]
+        targets = self.first + np.repeat(np.array(open_gates, dtype=int), many)
         rows = np.concatenate([both[:, 0], both[:, 1], sources])
         columns = np.concatenate([both[:, 1], both[:, 0], targets])
-        costs = np.concatenate([weights, weights, np.full(len(sources), self.price)])
+        costs = np.concatenate([weights, weights, to_folds + self.price])
         shape = (len(self.states), len(self.states))
         # of links given twice, like that from start to goal, sparse matrices would add the costs
         graph = coo_array((np.maximum(costs, 1e-300), (rows, columns)), shape=shape).tocsr()
         start, goal = self.first - 2, self.first - 1
-        _, before = dijkstra(graph, indices=start, return_predecessors=True)
-        return walk_back(before, start, goal)
+        cost, before = dijkstra(graph, indices=start, return_predecessors=True)
+        return walk_back(before, start, goal), float(cost[goal])
 
-    def _divide_at_snaps(self, path: Int[np.ndarray, " n"]) -> SnapPath:
+    def _divide_at_snaps(self, path: Int[np.ndarray, " n"], cost: float) -> SnapPath:
         """Parts of a path between its snaps."""
-        sources = {gate.source for gate in self.gates}
         cuts = [
             k + 1
             for k, (a, b) in enumerate(pairwise(path.tolist()))
-            if b >= self.first and a < self.first and a in sources and self._is_snap(a, b)
+            if b >= self.first and self._is_snap(a, b)
         ]
         parts = np.split(path, cuts)
         return SnapPath(
-            [self.states[part] for part in parts], [int(p[0]) - self.first for p in parts[1:]]
+            [self.states[part] for part in parts],
+            [int(p[0]) - self.first for p in parts[1:]],
+            cost,
         )
 
     def _is_snap(self, a: int, b: int) -> bool:
-        gate = self.gates[b - self.first]
         linked = ((self.own[:, 0] == b) & (self.own[:, 1] == a)).any()
-        return gate.source == a and not linked
+        return bool(a in self.gates[b - self.first].sources and not linked)
 
 
 def _verify(
@@ -198,22 +222,20 @@ def _verify(
     monitor: Sequence[Descriptor],
 ) -> Route:
     """Lift every part finely; snaps start from where the lifts meet the folds."""
-    stable, numbers = path.stable, path.gates
-    if not numbers:
-        return route_over_corners(
-            eset, straight_corners(eset, stable[0], demands), demands, monitor
-        )
+    if not path.gates:
+        corners = straight_corners(eset, path.stable[0], demands)
+        return route_over_corners(eset, corners, demands, monitor)
     gates = gates_of(eset, demands)
     here, paths, snaps = ends[0], list[Path](), list[Landing]()
-    corners, way_points = Corners(), Corners()
-    for part, number in zip(stable[:-1], numbers, strict=True):
+    part, begin, way_points = path.stable[0], Corners(), Corners()
+    for number, onward in zip(path.gates, path.stable[1:], strict=True):
         gate = gates[number]
-        beyond = _beyond(eset, part[-1], gate.fold)
-        if beyond is None:
-            return refusal("the parameters beyond a fold lie outside the box")
-        corners = [*corners, *_corners(eset, part, demands), beyond]
-        leg = lift(here, corners, within=demands.constraints, options=FINE)
-        way_points += corners
+        crossing = _crossing(eset, gate.snap, part, onward, demands)
+        if crossing is None:
+            return refusal("no moves lead over a fold to where its snaps are known to land")
+        legs = [*begin, *way_points_of(eset, crossing.part)[:-1], crossing.beyond(eset)]
+        leg = lift(here, legs, within=demands.constraints, options=FINE)
+        way_points += legs
         if leg.end.kind not in ("fold", "branch point"):
             return refusal(f"a part meant to end in a snap ends otherwise: {leg.end.kind}")
         landing = _landing(leg.end.state, gate)
@@ -221,26 +243,58 @@ def _verify(
             return refusal("a snap does not land where it does from the set")
         paths.append(leg)
         snaps.append(landing)
-        here, corners = landing.state, [beyond]
-    last = [*corners, *_corners(eset, stable[-1], demands)]
+        here, part, begin = landing.state, crossing.onward, [crossing.beyond(eset)]
+    last = [*begin, *way_points_of(eset, part)]
     leg = lift(here, last, within=demands.constraints, options=FINE)
     if not leg.arrived or distance(leg.end.state, ends[1]) > SAME_STATE:
         return refusal(f"the part after the last snap ends otherwise: {leg.end.kind}")
     return _join_paths([*paths, leg], tuple(snaps), [*way_points, *last], demands, monitor)
 
 
-def _corners(eset: EquilibriumSet, part: States, demands: Demands) -> Corners:
-    return way_points_of(eset, straight_corners(eset, part, demands)) if len(part) > 1 else []
+@dataclass(frozen=True)
+class _Crossing:
+    """Corners up to just before a fold, and from a little beyond it on."""
+
+    part: States
+    onward: States
+
+    def beyond(self, eset: EquilibriumSet) -> dict[str, float]:
+        """Parameters a little beyond the fold."""
+        return {name: self.onward[0][name] for name in eset.names}
 
 
-def _beyond(eset: EquilibriumSet, before: State, fold: State) -> dict[str, float] | None:
-    """Parameters a little beyond a fold, seen from a state before it."""
-    step = (fold.p - before.p) / eset.structure.scales
-    size = float(np.linalg.norm(step))
-    p = fold.p + BEYOND * step / max(size, 1e-300) * eset.structure.scales
-    beyond = {name: float(p[k]) for k, name in enumerate(fold.parameters) if name in eset.names}
-    inside = eset.box.holds(np.array([beyond[name] for name in eset.names]))
-    return beyond if bool(inside) else None
+def _crossing(
+    eset: EquilibriumSet, snap: Snap, part: States, onward: States, demands: Demands
+) -> _Crossing | None:
+    """Straighten the parts before and after a snap, which happens where that costs least.
+
+    First with straight moves from the start or the end of the part before, to the end or the start
+    of the part after; then from the last corner before to the first one after.
+    """
+    last = len(onward) - 1
+    for i, j in (
+        (0, last),
+        (0, min(1, last)),
+        (len(part) - 1, last),
+        (len(part) - 1, min(1, last)),
+    ):
+        place = cheapest_place(eset, snap, part[i], onward[j], demands)
+        if place is not None:
+            break
+    else:
+        return None
+    before = straight_corners(eset, _joined(part[: i + 1], place.approach.batch), demands)
+    after = straight_corners(eset, _joined(place.beyond.batch, onward[j:]), demands)
+    better = cheapest_place(eset, snap, before[len(before) - 2], after[1], demands)
+    place = place if better is None else better
+    return _Crossing(
+        _joined(before[:-1], place.approach.batch), _joined(place.beyond.batch, after[1:])
+    )
+
+
+def _joined(first: States, second: States) -> States:
+    z, p = (np.concatenate([getattr(each, name) for each in (first, second)]) for name in "zp")
+    return States(first.structure, z, p)
 
 
 def _landing(fold: State, gate: Gate) -> Landing | None:
