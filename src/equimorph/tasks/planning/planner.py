@@ -71,8 +71,8 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     snap_price
         Cost of a snap-through in units of the objective; None forbids them. With a price the route
         may leave its stable stratum over a fold and continue where the snap lands: `route.snaps`
-        has the landings, with the energy released; no margin is kept before a snap. It happens where
-        on its fold the route is cheapest, and no route is dearer than one without a snap.
+        has the landings, with the energy released; no margin is kept before a snap. The snap
+        happens where on its fold the route is cheapest; no route is dearer than one without.
     monitor
         Descriptors to record in the schedule, in addition to those of the constraints.
 
