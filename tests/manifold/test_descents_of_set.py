@@ -51,6 +51,27 @@ def test_the_audit_says_what_descents_mean():
     )
 
 
+@pytest.mark.parametrize("radius", [0.1, 0.03, 0.003, 0.001])
+def test_closed_pieces_far_smaller_than_a_cell_are_found(radius):
+    """Sphere x² + (p − .31)² + (r − .22)² = e² beside a sheet x = 3, in cells of 0.02 to 0.04."""
+    gap = f"((p - 0.31)**2 + (r - 0.22)**2 - {radius}**2)"
+    structure = em.EnergyStructure(
+        f"x**4/4 - x**3 + {gap}*(x**2/2 - 3*x)",
+        [em.Unknown("x", "3", guesses=(-2.5, 3.5))],
+        [
+            em.Parameter("p", "1", 1.0, "actuator", 0.0),
+            em.Parameter("r", "1", 1.0, "load", 0.0),
+        ],
+    )
+    with unchecked():
+        eset = em.equilibrium_set(structure, BOX)
+    assert eset.audit.clean
+    assert [each.euler_characteristic for each in eset.components] == [1, 2]
+    assert dict(eset.audit.rows())["closed pieces, necks"].startswith(
+        "may be missed or joined wrongly below p 0.043, r 0.025"
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("sheets", [2, 3, 4, 5, 6])
 @pytest.mark.parametrize("distance", [1e-1, 1e-2, 1e-3, 1e-4])

@@ -202,8 +202,15 @@ def _of_grid(
         recovered=recovered,
         descents=found.descents,
         stopped=stopped,
+        cell_size=_cell_size(box, intervals),
     )
     return replace(eset, audit=audit)
+
+
+def _cell_size(box: Box, intervals: tuple[int, ...]) -> tuple[tuple[str, float], ...]:
+    """Widths of the cells of the grid by parameter."""
+    widths = ((box.upper - box.lower) / np.array(intervals)).tolist()
+    return tuple(zip(box.names, widths, strict=True))
 
 
 def _checks(checks: int, setting: Setting) -> int:

@@ -58,7 +58,7 @@ class Change:
 
 
 CHANGES: Mapping[str, Change] = {
-    "Audit": Change(version=3),
+    "Audit": Change(version=4),
     "LeastSnap": Change(version=2),
 }
 """Changes by class; a class that is not listed is as it was in version 1."""

@@ -24,7 +24,8 @@ class Audit:
     been added; in the last round, `missing` of `checked` were, which must be zero too.
 
     `descents` counts how descents from vertices of the strata of index one, and from folds, ended;
-    what they landed on and the set lacked has been added, too.
+    what they landed on and the set lacked has been added, too. Closed pieces and necks narrower
+    than `cell_size`, the widths of the grid's cells by parameter, may escape all of this.
 
     `stopped`, which must be zero: with how many equilibria lifting stopped because there were more
     than the limit; much is unpaired and undecided then.
@@ -67,6 +68,7 @@ class Audit:
     wrong: int = 0
     descents: tuple[tuple[str, int], ...] = ()
     stopped: int = 0
+    cell_size: tuple[tuple[str, float], ...] = ()
 
     @property
     def missing_at_most(self) -> float:
@@ -138,8 +140,16 @@ class Audit:
                 else "not made",
             ),
             ("descents from unstable strata", self._descents),
+            *([("closed pieces, necks", self._unseen)] if self.cell_size else []),
             *(refined if self.accuracy else []),
         ]
+
+    @property
+    def _unseen(self) -> str:
+        """Below which size pieces may be missing: one line."""
+        size = ", ".join(f"{name} {width:.2g}" for name, width in self.cell_size)
+        searched = ", but for those that Newton's method met from random guesses"
+        return f"may be missed or joined wrongly below {size}" + (searched if self.checked else "")
 
     @property
     def _descents(self) -> str:

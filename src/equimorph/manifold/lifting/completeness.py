@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.equilibria import search_points
-from equimorph.equilibria.settle import Guards, settle
+from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
@@ -26,6 +26,8 @@ STARTS = 200
 """Random starts of Newton's method in each independent search."""
 SCATTERED = 2000
 """Random points, with one random guess each, from which Newton starts beside the searches."""
+FREED = 4
+"""Of these guesses one in so many is corrected with the parameters free as well."""
 ITERATIONS = 40
 """Of Newton's method from there, at most."""
 
@@ -91,15 +93,24 @@ def _together(parts: Sequence[States]) -> States:
 
 
 def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator) -> States:
-    """Equilibria to which Newton leads from random guesses, each over its own point of the box."""
+    """Equilibria to which Newton leads from random guesses, each over its own point of the box.
+
+    Twice: at fixed parameters, and with all free ones free as well, onto the nearest piece of the
+    set. The second finds closed pieces far smaller than a cell, over which no random point lies.
+    """
     structure, names = eset.structure, eset.names
     middle = dict(zip(names, (0.5 * (eset.box.lower + eset.box.upper)).tolist(), strict=True))
     p = np.tile(eset.parameters_at(middle), (count, 1))
-    free = [position(structure.parameters, name) for name in names]
+    free = np.array([position(structure.parameters, name) for name in names])
     p[:, free] = generator.uniform(eset.box.lower, eset.box.upper, (count, len(free)))
-    guess = structure.sample(p, generator)
-    near = settle(structure, guess, p, guards=Guards(iterations=ITERATIONS))
-    z, found = near.z, near.found
+    guess, guards = structure.sample(p, generator), Guards(iterations=ITERATIONS)
+    fixed = settle(structure, guess, p, guards=guards)
+    some = slice(0, count // FREED)
+    directions = free_directions(structure, free, len(p[some]))
+    freed = settle(structure, guess[some], p[some], directions, guards=guards, frames=False)
+    z, p = np.concatenate([fixed.z, freed.z]), np.concatenate([fixed.p, freed.p])
+    found = np.concatenate([fixed.found, freed.found])
+    found &= ((eset.box.lower <= p[:, free]) & (p[:, free] <= eset.box.upper)).all(axis=1)
     found[found] = structure.resolved(z[found], p[found])
     for constraint in eset.constraints:
         found[found] = constraint.excess(z[found], p[found]) <= 0.0

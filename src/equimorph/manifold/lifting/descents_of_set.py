@@ -19,6 +19,8 @@ from equimorph.structures import States
 
 VERTICES = 8
 """Vertices of each stratum of index one from which the energy is followed downwards."""
+MOST = 50
+"""Strata, the largest ones, and folds from which descents begin: a set may be in shreds."""
 BISECTIONS = 2
 """Rounds in which vertices between neighbours are added whose descents land on other strata."""
 APART = 1e-5
@@ -86,12 +88,13 @@ def descents_of_set(eset: EquilibriumSet) -> SetDescents:
 def _first(eset: EquilibriumSet) -> tuple[Some, Some]:
     """Vertices spread over each stratum of index one, and one on each fold of a stable stratum."""
     chosen, stratum = [np.zeros(0, int)], [np.zeros(0, int)]
-    for number, piece in enumerate(eset.strata):
-        if piece.index == 1:
-            own = _inside(eset, number)
-            chosen.append(own[_spread(eset.coordinates[own] / _scales(eset), VERTICES)])
-            stratum.append(np.full(len(chosen[-1]), number))
-    middles = np.array([fold.flat[fold.size // 2] for fold in eset.folds], int)
+    ones = [number for number, piece in enumerate(eset.strata) if piece.index == 1]
+    ones.sort(key=lambda number: -eset.strata[number].cells)
+    for number in ones[:MOST]:
+        own = _inside(eset, number)
+        chosen.append(own[_spread(eset.coordinates[own] / _scales(eset), VERTICES)])
+        stratum.append(np.full(len(chosen[-1]), number))
+    middles = np.array([fold.flat[fold.size // 2] for fold in eset.folds[:MOST]], int)
     lower = lower_index(eset.structure, eset.points.z[middles], eset.points.p[middles])
     stable = middles[lower == 0]
     chosen.append(stable)
