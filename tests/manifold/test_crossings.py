@@ -6,7 +6,14 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from equimorph import lift, plotting, storage
-from equimorph.manifold import EquilibriumSet, equilibrium_set, locate, refine, restricted
+from equimorph.manifold import (
+    EquilibriumSet,
+    cell_sizes,
+    equilibrium_set,
+    locate,
+    refine,
+    restricted,
+)
 from equimorph.manifold.complex.marked_complex import fabric_of
 from equimorph.manifold.geometry.topology import adjacency
 from equimorph.manifold.refining.quality import smallest_angles, squeezed
@@ -14,6 +21,7 @@ from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
 from oracles.complexes import assert_crossings, assert_faithful, assert_upright
 from oracles.polynomial import slaved
+from oracles.specimens import toggle
 from oracles.surfaces import (
     crossing_sheets,
     hilltop,
@@ -380,3 +388,71 @@ def test_plane_of_the_slice_shows_where_the_upright_arch_tilts(refined_slice):
     ax = plotting.parameter_plane(refined_slice, count="stable")
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert labels == ["stability boundary", "branch points"]
+
+
+@pytest.mark.parametrize("cap", [0.3, 0.1, 0.01])
+@pytest.mark.parametrize("slant", [-0.4, 0.3])
+def test_side_branches_that_leave_the_constraint_within_a_cell_are_strips(slant, cap):
+    """x (x² − a − slant·b), x² ≤ cap²: a strip of width 2·cap, however coarse the grid is.
+
+    Area: chords over x = 0 … ±cap lie within cap²/3 of the parabola, relatively.
+    """
+    square = Descriptor("square", "1", lambda z, p: z[:, 0] ** 2)
+    eset = lifted(pitchforks(1.0, slant), BOX, within=[square <= cap**2], intervals=(4, 5))
+    with unchecked():
+        assert_faithful(eset)
+        assert_crossings(eset)
+    assert sorted(stratum.index for stratum in eset.strata) == [0, 0, 0, 1]
+    assert (eset.audit.components, len(eset.crossings), eset.folds) == (1, 1, ())
+    assert eset.audit.bisected == 0 or cap > 0.1
+    plane = 2.1 * 2.2
+    strip = 2.0 * np.linalg.norm(np.cross([cap, cap**2, 0.0], [0.0, -2.2 * slant, 2.2]))
+    assert cell_sizes(eset).sum() == pytest.approx(plane + strip, abs=strip * cap**2)
+
+
+def test_crossing_leaves_through_the_constraint_that_bounds_its_side_branches():
+    """x (x² − a), x² ≤ 0.02·(b + 0.1): where b → −0.1 the strip gets narrower than any cell."""
+    wedge = Descriptor("wedge", "1", lambda z, p: z[:, 0] ** 2 - 0.02 * p[:, 1])
+    eset = lifted(pitchforks(1.0, 0.0), BOX, within=[wedge <= 0.002], intervals=(4, 5))
+    with unchecked():
+        assert_faithful(eset)
+        assert_crossings(eset)
+    met = np.unique(np.concatenate(eset.crossings))
+    assert eset.coordinates[met, 1].min() == pytest.approx(-0.1, abs=1e-9)
+    assert sorted(stratum.index for stratum in eset.strata) == [0, 0, 0, 1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("intervals", [(17, 11), (24, 41)])
+def test_side_branches_of_a_flat_arch_leave_the_constraint_beside_their_crossing(intervals):
+    """Over span and load at Θ = 1.642, with max |κ| ≤ 8.37: pitchforks end on the constraint."""
+    arch = Rod()
+    with unchecked():
+        eset = equilibrium_set(
+            arch,
+            Box(nu=(0.6517, 0.8763), q=(-2.1871, 8.8459)),
+            fixed={"Theta": 1.642, "Delta": 0.0},
+            within=[arch.max_curvature <= 8.37],
+            intervals=intervals,
+        )
+        assert_faithful(eset)
+    assert eset.audit.crossings > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("a", "load", "cap", "intervals"),
+    [
+        ((-0.6045, 0.6457), (-0.9097, -0.1394), 13.08, (6, 4)),
+        ((-0.8381, 0.6701), (-1.8168, 1.6665), 11.97, (7, 6)),
+        ((-0.8976, -0.12), (-1.2126, -0.8126), 14.37, (5, 10)),
+    ],
+)
+def test_side_branches_that_a_coarse_frame_does_not_resolve_are_lifted(a, load, cap, intervals):
+    """The symmetric toggle: curves through its pitchforks belong to the set all the same."""
+    frame = toggle()
+    within = [frame.max_curvature <= cap]
+    with unchecked():
+        eset = equilibrium_set(frame, Box(a=a, P=load), within=within, intervals=intervals)
+        assert_faithful(eset)
+    assert eset.audit.crossings > 0

@@ -341,7 +341,9 @@ def middles(
     members[inside] = [point for group in groups for point in group]
     share = inside / sizes[:, None]
     z = np.einsum("lm,lmi->li", share, points.z[members])
-    p = np.einsum("lm,lmi->li", share, points.p[members])
+    # relative to the first, what all have in common stays what it is, to the last digit
+    first = points.p[members[:, 0]]
+    p = first + np.einsum("lm,lmi->li", share, points.p[members] - first[:, None])
     flat = members.ravel()
     places = embed(setting, points.z[flat], points.p[flat]).reshape(*members.shape, -1)
     middle = embed(setting, z, p)

@@ -10,9 +10,11 @@ from jaxtyping import Float, Int
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.steps import Front, step_along
-from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
+from equimorph.manifold.complex.marked_complex import TRIANGLES
 from equimorph.manifold.geometry.crossings import reduction
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.edges import EFFORTS
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
@@ -25,6 +27,10 @@ TURNS = 4
 """How often a new curve may turn back before it has reached a vertex."""
 CURVES = 2
 """Through each crossing."""
+CROSSING_OF_ARC = 1
+"""Place of the crossing among the three points of an arc."""
+HALVES = 2
+"""Of each curve through a crossing."""
 
 
 def flood_crossings(pairing: Pairing, progress: Progress) -> None:
@@ -49,6 +55,8 @@ def lonely(pairing: Pairing) -> Int[np.ndarray, " n"]:
         for point in inner:
             if point in through and pairing.alive(curve):
                 through[point] += 1
+    for arc in (arc for edge, own in pairing.arcs.items() if used[edge] for arc in own):
+        through[arc[CROSSING_OF_ARC]] += 1
     return np.array([point for point, count in through.items() if 0 < count != CURVES], int)
 
 
@@ -76,17 +84,21 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> Seeds:
     ends = setting.parameters(mesh.vertices[mesh.edges[store.edge[alone]].ravel()])
     ends = ends.reshape(len(alone), 2, -1)
     line = ParameterLine(setting.structure, ends[:, 0].copy(), ends[:, 1] - ends[:, 0])
-    owner, front = _starts(pairing, alone, line)
+    halves, front = _starts(pairing, alone, line)
+    owner = halves // (CURVES * HALVES)
     towards = (front.tangent_t > 0.0).astype(int)
     z, p = front.z, line.take(owner).parameters(front.t)
     edges = store.edge[alone[owner]]
-    for _ in range(TURNS):
+    for number in range(TURNS):
         goal = mesh.edges[edges, towards]
         way = setting.parameters(mesh.vertices[goal]) - p
         options = TraceOptions(
             through_folds=True, through_branch_points=True, first_step=0.005, record=False
         )
-        outcome = trace(ParameterLine(setting.structure, p, way), z, setting.constraints, options)
+        ways = ParameterLine(setting.structure, p, way)
+        outcome = trace(ways, z, setting.constraints, options)
+        if number == 0:
+            _enter_arcs(pairing, alone, halves, ways, outcome)
         there = outcome.code == EventCode.ARRIVED
         reached.append(polished(setting, mesh, goal[there], outcome.z[there])[0])
         back = np.flatnonzero(outcome.code == EventCode.RETURNED)
@@ -100,7 +112,7 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> Seeds:
 def _starts(
     pairing: Pairing, alone: Int[np.ndarray, " n"], line: ParameterLine
 ) -> tuple[Int[np.ndarray, " m"], Front]:
-    """Points on the half-branches at each crossing, and which crossing each belongs to."""
+    """Numbers of the half-branches at all crossings, four each, and points on them."""
     store = pairing.points
     z, p = store.z[alone], store.p[alone]
     t = np.einsum("li,li->l", p - line.start, line.velocity) / (line.velocity**2).sum(axis=1)
@@ -113,16 +125,50 @@ def _starts(
         todo = np.flatnonzero(~good)
         if len(todo) == 0:
             break
-        front, found = step_along(
-            line.take(owner[todo]), here.take(todo), np.full(len(todo), distance)
-        )
+        lines = line.take(owner[todo])
+        front, found = step_along(lines, here.take(todo), np.full(len(todo), distance))
         inside = found & (front.t > 0.0) & (front.t < 1.0)
+        for constraint in pairing.setting.constraints:
+            inside &= constraint.excess(front.z, lines.parameters(front.t)) <= 0.0
         wide = Front(*(each.copy() for each in vars(there).values()))
         for name, column in vars(wide).items():
             column[todo[inside]] = getattr(front, name)[inside]
         there, good[todo[inside]] = wide, True
     at = np.flatnonzero(good)
-    return owner[at], there.take(at)
+    return at, there.take(at)
+
+
+def _enter_arcs(
+    pairing: Pairing,
+    alone: Int[np.ndarray, " n"],
+    halves: Int[np.ndarray, " m"],
+    line: ParameterLine,
+    outcome: Traces,
+) -> None:
+    """Enter curves both of whose halves leave through a constraint before they reach a vertex.
+
+    So do the side branches of pitchforks near where these leave through the constraint, at every
+    scale. `halves` are the numbers of half-branches, and `outcome` is what became of them.
+    """
+    if pairing.mesh.dimension != TRIANGLES:
+        return
+    setting, store = pairing.setting, pairing.points
+    left = outcome.code == EventCode.CONSTRAINT
+    left[outcome.passed.lanes] = False
+    p = line.parameters(outcome.t)
+    for curve in np.unique(halves[left] // HALVES).tolist():
+        lanes = np.flatnonzero(left & (halves // HALVES == curve))
+        if len(lanes) != HALVES:
+            continue
+        crossing = int(alone[curve // CURVES])
+        edge = int(store.edge[crossing])
+        index = setting.structure.index(outcome.z[lanes], p[lanes]).tolist()
+        ends = [
+            store.add(outcome.z[lane], p[lane], own, VertexKind.CAP, edge)
+            for lane, own in zip(lanes.tolist(), index, strict=True)
+        ]
+        pairing.arcs.setdefault(edge, []).append((ends[0], crossing, ends[1]))
+    pairing.fit()
 
 
 def _tangents(

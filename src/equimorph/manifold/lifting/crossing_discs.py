@@ -177,7 +177,8 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     def test(share: float) -> float:
         middle = (place[0] + share * way)[None]
         aim = Aim(setting, False, False, span, middle, rows, crossing=True)
-        guess_z, guess_p = ((1.0 - share) * each[:1] + share * each[1:] for each in (z, p))
+        # in this form what both have in common stays what it is, to the last digit
+        guess_z, guess_p = (each[:1] + share * (each[1:] - each[:1]) for each in (z, p))
         pinned = corrected(aim, guess_z, guess_p, np.array([length]))
         if not pinned.found[0]:
             raise _NoCrossingError

@@ -141,6 +141,11 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
 
     That is a fold, or where another sheet crosses.
     """
+    for plan in (plan for plan in plans if plan.polygon.gap):
+        side = (plan.points[plan.polygon.gap - 1], plan.points[plan.polygon.gap])
+        found.caps.add(chord_of(*side))
+        if _same_side(plan, side):
+            found.undecided.add(plan.polygon.triangle)
     wanted = [(plan, _through(plan)) for plan in plans if plan.polygon.open]
     found.caps.update(
         chord_of(plan.points[0], plan.points[-1]) for plan, kind in wanted if not kind

@@ -27,11 +27,13 @@ class Polygon:
     """Boundary of a disc over one triangle: points in order; `open` if closed along a constraint.
 
     An open polygon runs from its first to its last point; the closing side lies on the constraint.
+    So does, if it consists of two chains, the side that ends at the place `gap` among its points.
     """
 
     triangle: int
     points: tuple[int, ...]
     open: bool
+    gap: int = 0
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -
     ends = np.searchsorted(owner, np.stack([special, special + 1]))
     for triangle, start, stop in zip(special.tolist(), *ends.tolist(), strict=True):
         found = list(_around(pairing, triangle, set(plain[start:stop].ravel().tolist())))
+        found, joined = _with_arcs(pairing, triangle, found)
         chains = [polygon for polygon in found if polygon is not None and polygon.open]
         if any(polygon is None for polygon in found):
             broken.append(triangle)
@@ -64,7 +67,57 @@ def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -
             ambiguous.append(triangle)
         else:
             polygons.extend(polygon for polygon in found if polygon is not None)
+            polygons.extend(joined)
     return Loops(plain, owner, polygons, ambiguous, broken)
+
+
+def _with_arcs(
+    pairing: Pairing, triangle: int, found: list[Polygon | None]
+) -> tuple[list[Polygon | None], list[Polygon]]:
+    """Polygons over a triangle that no arc belongs to, and those with arcs.
+
+    The sheet of an arc goes on through the next crossing of the sheet that it crosses: along
+    another arc or an open chain. Where there is no such crossing, it leaves with the first.
+    """
+    sides = pairing.mesh.sides[triangle].tolist()
+    arcs = [Polygon(triangle, arc, True) for edge in sides for arc in pairing.arcs.get(edge, ())]
+    polygons, joined = [polygon for polygon in found if polygon is not None], []
+    if not arcs or len(polygons) < len(found):
+        return found, []
+    while arcs:
+        arc = arcs.pop()
+        met = _crossings(pairing, arc)
+        across = [polygon for polygon in polygons if met <= _crossings(pairing, polygon)]
+        following = [point for each in across for point in _crossings(pairing, each) - met]
+        if len(across) != 1 or len(following) > 1:
+            return [None], []
+        if not following:
+            joined.append(arc)
+            continue
+        others = [each for each in (*arcs, *polygons) if each not in across and each.open]
+        partners = [each for each in others if following[0] in _crossings(pairing, each)]
+        if len(partners) != 1:
+            return [None], []
+        joined.append(_joined(pairing, arc, partners[0]))
+        arcs, polygons = ([e for e in own if e != partners[0]] for own in (arcs, polygons))
+    return list(polygons), joined
+
+
+def _crossings(pairing: Pairing, polygon: Polygon) -> set[int]:
+    """Points of a polygon where another sheet crosses."""
+    kinds = pairing.points.kind
+    return {point for point in polygon.points if kinds[point] == VertexKind.CROSSING}
+
+
+def _joined(pairing: Pairing, first: Polygon, second: Polygon) -> Polygon:
+    """Polygon of two open chains whose nearer ends are joined along the constraint."""
+    chain = first.points, second.points
+    ends = np.array([own[k] for own in chain for k in (0, -1)])
+    place = embed(pairing.setting, pairing.points.z[ends], pairing.points.p[ends])
+    gap = np.linalg.norm(place[:2, None] - place[None, 2:], axis=2)
+    turned = gap[1, 1] + gap[0, 0] < gap[1, 0] + gap[0, 1]
+    points = (*chain[0], *(reversed(chain[1]) if turned else chain[1]))
+    return Polygon(first.triangle, points, True, gap=len(chain[0]))
 
 
 def _closed(pairing: Pairing, chains: list[Polygon]) -> bool:
@@ -73,10 +126,7 @@ def _closed(pairing: Pairing, chains: list[Polygon]) -> bool:
     Or its ends are near enough. A crossing that leaves and comes back in between is found out when
     its chord is given a point (see `assembly`).
     """
-    crossings = [
-        {point for point in chain.points if pairing.points.kind[point] == VertexKind.CROSSING}
-        for chain in chains
-    ]
+    crossings = [_crossings(pairing, chain) for chain in chains]
     if len(chains) == 2 and crossings[0] and crossings[0] == crossings[1]:
         return True
     return _close_themselves(pairing, chains) or _on_own_sheets(pairing, chains)

@@ -90,6 +90,8 @@ class Pairing:
     conflicts: int = 0
     crossings: dict[int, list[int]] = field(default_factory=dict)
     """Points of each edge at which two curves cross."""
+    arcs: dict[int, list[tuple[int, ...]]] = field(default_factory=dict)
+    """Curves over each edge from a constraint through a crossing to a constraint: their points."""
     hubs: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points between two of these at which a fold of one of the sheets crosses, too."""
 

@@ -40,7 +40,8 @@ def seeds(
     vertices, z = _from_natural_states(setting, *_spread(mesh))
     searched_v, searched_z = _from_search(setting, mesh, searchable, seed)
     vertices, z = np.concatenate([vertices, searched_v]), np.concatenate([z, searched_z])
-    return polished(setting, mesh, vertices, z)[0]
+    good = setting.structure.resolved(z, setting.parameters(mesh.vertices[vertices]))
+    return polished(setting, mesh, vertices[good], z[good])[0]
 
 
 def polished(
@@ -49,13 +50,16 @@ def polished(
     vertices: Int[np.ndarray, " some"],
     z: Float[np.ndarray, "some size"],
 ) -> tuple[Seeds, Bool[np.ndarray, " some"]]:
-    """Those of the states over vertices that are resolved equilibria, polished; and which."""
+    """Those of the states over vertices that are equilibria, polished; and which.
+
+    Curves of the set lead to them: so they belong to it, whether or not they are resolved.
+    """
     p = setting.parameters(mesh.vertices[vertices])
     # a line of no length polishes the points and counts their index
     still = ParameterLine(setting.structure, p, np.zeros_like(p))
     index = setting.structure.index(z, p)
     direct = lift_directly(still, z, index, setting.constraints)
-    good = direct.good & setting.structure.resolved(z, p)
+    good = direct.good
     return (vertices[good], direct.z[good], p[good], index[good]), good
 
 
