@@ -5,14 +5,19 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
 
+from equimorph.arrays import Lanes, Parameters
 from equimorph.door import door
+from equimorph.errors import MissingError
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures.rod import descriptors, space, validity
 from equimorph.structures.rod.ends import End
-from equimorph.structures.rod.lateral import OutOfPlane
+from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
 from equimorph.structures.rod.measured import Measured
+from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.space import LateralMode
+from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.states import State
 
@@ -25,10 +30,13 @@ class Described(Measured):
     def ends(self) -> tuple[End, End]:
         """How ends A and B are supported."""
 
+    lateral_stiffness: LateralStiffness | None
+    """Stiffnesses out of the plane; None: not judged."""
+
     @property
     @abstractmethod
-    def has_lateral_stiffness(self) -> bool:
-        """Whether the rod has stiffnesses out of its plane."""
+    def lagrangian(self) -> RodModel:
+        """That of the rod, in its parameters or in these and further ones that are zero."""
 
     @door
     def height(self, s: float) -> Descriptor:
@@ -85,14 +93,51 @@ class Described(Measured):
 
     # --- out of the plane -------------------------------------------------------------------
 
-    @abstractmethod
-    def out_of_plane(self, torsion: Any = None, lateral: Any = None) -> OutOfPlane:
-        """The second variation out of the plane, with the rod's stiffnesses or others."""
-
     @property
     @abstractmethod
     def terms(self) -> dict[str, tuple[Term, ...]]:
         """Loads and actuators that act on the rod, by the name of their amplitude."""
+
+    @property
+    def has_lateral_stiffness(self) -> bool:
+        """Whether the rod has stiffnesses out of its plane."""
+        return self.lateral_stiffness is not None
+
+    @property
+    def watched(self) -> tuple[Descriptor, ...]:
+        """The lateral margin, if the rod is judged in space."""
+        return (self.lateral_margin(),) if self.has_lateral_stiffness else ()
+
+    def index_out_of_plane(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"] | None:
+        """Independent movements out of the plane that lower the energy; None: not judged."""
+        return self.out_of_plane().index(z, p) if self.has_lateral_stiffness else None
+
+    def out_of_plane(self, torsion: Any = None, lateral: Any = None) -> OutOfPlane:
+        """The second variation out of the plane, with the rod's stiffnesses or others.
+
+        Raises
+        ------
+        InputError
+            Without stiffnesses, or under loads without a potential in space.
+        """
+        if torsion is None and lateral is None:
+            return self._own_block
+        space.check_terms(self.terms)
+        stiffness = SpaceOptions(torsion, lateral, None).check(None, None)
+        return self._block(stiffness.stiffness(self.units, ()))
+
+    @cached_property
+    def _own_block(self) -> OutOfPlane:
+        return self._block(self.lateral_stiffness)
+
+    def _block(self, stiffness: LateralStiffness | None) -> OutOfPlane:
+        if stiffness is None:
+            raise MissingError(
+                "`torsion`, `lateral` must be given to judge whether a rod leaves its plane; got "
+                "neither. Give the rod these, like torsion=0.77, lateral=1.0 for a round one, or a "
+                "section."
+            )
+        return OutOfPlane(self.mechanics, self.lagrangian, Holding.of(self.ends), stiffness)
 
     @door
     def lateral_index(self, torsion: Any = None, lateral: Any = None) -> Descriptor:

@@ -5,12 +5,12 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.door import door
-from equimorph.errors import InputError, MissingError
-from equimorph.model import Descriptor, Drawing, Parameter, names_of
+from equimorph.errors import InputError
+from equimorph.model import Drawing, Parameter, names_of
 from equimorph.structures.contract import Growth
 from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.clamped import ClampedMechanics
@@ -20,7 +20,6 @@ from equimorph.structures.rod.discretisation import mesh_with_kinks
 from equimorph.structures.rod.drawing import Amplitudes, rod_drawing
 from equimorph.structures.rod.ends import End
 from equimorph.structures.rod.general import GeneralMechanics
-from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
 from equimorph.structures.rod.mechanics import Mechanics
 from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch, natural_rod
@@ -185,8 +184,8 @@ class Rod(Described):
         self._space = SpaceOptions(torsion, lateral, made).check(EI, length)
         self.units = rod_units(self._space.bending_stiffness(EI, system), length, system)
         system.check_all_have_units({"EI": EI, "length": length, "span": span, "rise": rise})
-        self._stiffness = self._space.stiffness(self.units, kinks)
-        breaks = [] if self._stiffness is None else self._stiffness.breaks
+        self.lateral_stiffness = self._space.stiffness(self.units, kinks)
+        breaks = [] if self.lateral_stiffness is None else self.lateral_stiffness.breaks
         number = self.units.number
         axial = number(axial, "force", "axial")
         curvature = number(curvature, "1/length", "curvature")
@@ -371,11 +370,6 @@ class Rod(Described):
     # --- out of the plane -------------------------------------------------------------------
 
     @property
-    def has_lateral_stiffness(self) -> bool:
-        """Whether the rod has stiffnesses out of its plane."""
-        return self._stiffness is not None
-
-    @property
     def section(self) -> SectionProperties | None:
         """Stiffnesses and weight of the section in the rod's units; None if none was given."""
         return self._space.properties(self.units)
@@ -385,44 +379,8 @@ class Rod(Described):
         """Loads and actuators that act on the rod, by the name of their amplitude."""
         return {"q": (self._arch_load,)} if self._general is None else self._general.terms
 
-    @property
-    def watched(self) -> tuple[Descriptor, ...]:
-        """The lateral margin, if the rod is judged in space."""
-        return (self.lateral_margin(),) if self.has_lateral_stiffness else ()
-
-    def index_out_of_plane(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"] | None:
-        """Independent movements out of the plane that lower the energy; None: not judged."""
-        return self.out_of_plane().index(z, p) if self.has_lateral_stiffness else None
-
-    def out_of_plane(self, torsion: Any = None, lateral: Any = None) -> OutOfPlane:
-        """The second variation out of the plane, with the rod's stiffnesses or others.
-
-        Raises
-        ------
-        InputError
-            Without stiffnesses, or under loads without a potential in space.
-        """
-        if torsion is None and lateral is None:
-            return self._own_block
-        check_terms(self.terms)
-        stiffness = SpaceOptions(torsion, lateral, None).check(None, None)
-        return self._block(stiffness.stiffness(self.units, ()))
-
     @cached_property
-    def _own_block(self) -> OutOfPlane:
-        return self._block(self._stiffness)
-
-    def _block(self, stiffness: LateralStiffness | None) -> OutOfPlane:
-        if stiffness is None:
-            raise MissingError(
-                "`torsion`, `lateral` must be given to judge whether a rod leaves its plane; got "
-                "neither. Give the rod these, like torsion=0.77, lateral=1.0 for a round one, or a "
-                "section."
-            )
-        return OutOfPlane(self.mechanics, self._model, Holding.of(self.ends), stiffness)
-
-    @cached_property
-    def _model(self) -> RodModel:
+    def lagrangian(self) -> RodModel:
         """Its Lagrangian; that of the arch as of a general rod with a rise."""
         if isinstance(self.mechanics, GeneralMechanics):
             return self.mechanics.model
