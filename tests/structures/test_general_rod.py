@@ -115,7 +115,7 @@ def test_fields_obey_the_differential_equations():
 def test_a_tendon_bends_like_the_couples_at_its_anchors():
     """T d at one anchor, −T d at the other: the same moments. Round-off."""
     loads = {"M": [em.Couple(0.25), em.Couple(0.75)]}
-    with pytest.raises(em.InputError, match="must have a name"):
+    with pytest.raises(em.InputError, match="must have a different name"):
         em.Rod(ends=("clamped", "free"), loads={"nu": em.Couple(0.5)})
     arm = em.Rod(ends=("clamped", "free"), actuators={"T": em.Tendon(0.1, 0.25, 0.75)})
     bent = arm.natural_state(T=2.0)
