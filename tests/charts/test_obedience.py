@@ -81,7 +81,7 @@ def test_the_sheet_nearest_to_a_stratum_is_itself():
 
 
 def test_a_barrier_over_three_parameters_is_a_surface():
-    """Least −x (a − 0.3) of two sheets x ≈ ±3 jumps at a = 0.3; probed at 1e-6 on both sides."""
+    """Least −x (a − 0.3) of two sheets x ≈ ±3 jumps at a = 0.3; probe_at at 1e-6 on both sides."""
     sheets = Polynomial(
         lambda x, a, b, c: integral(x**3 - 9.0 * x + 0.5 * a + 0.5 * b + 0.3 * c),
         1,

@@ -1,4 +1,4 @@
-"""Reduction: the spring against closed forms, barriers probed on both sides, the arch."""
+"""Reduction: the spring against closed forms, barriers probe_at on both sides, the arch."""
 
 import numpy as np
 import pytest

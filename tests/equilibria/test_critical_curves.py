@@ -286,9 +286,9 @@ def test_without_conditions_the_general_tracer_follows_the_path_of_a_lift():
     assert path.end.kind == EventKind.FOLD
     load = np.array([[each.name for each in arch.parameters].index("q")])
     line = Locus(arch, rest.p, load, (), singular=False)
-    start, found = nearest(line, line.joined(rest.z[None], rest.p[None]))
+    start, found = nearest(line, line.join(rest.z[None], rest.p[None]))
     assert found.all()
-    start = start.turned(np.sign(start.tangent[:, -1]))
+    start = start.turn(np.sign(start.tangent[:, -1]))
     _, forward = trace_locus(line, start, [], TraceOptions(largest_step=0.2, steps=25))
     critical = forward.landmarks[0]
     assert critical.kind == EventKind.CRITICAL

@@ -5,7 +5,7 @@ import pytest
 
 from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.complex.marked_complex import fabric_of
-from equimorph.manifold.refining.quality import corner_angles, squeezed
+from equimorph.manifold.refining.quality import confined_angles, corner_angles
 from equimorph.model import Box
 from oracles.surfaces import transcriticals
 from typecheck import unchecked
@@ -23,7 +23,7 @@ def test_triangles_in_a_sharp_corner_are_told():
         eset = refine(eset, 0.01)
         fabric = fabric_of(eset)
         corners = np.degrees(corner_angles(fabric))
-        tight = squeezed(fabric, np.radians(10.0))
+        tight = confined_angles(fabric, np.radians(10.0))
     assert eset.audit.clean
     sharpest = np.degrees(np.arctan(0.1))
     met = np.degrees(np.arccos(10.0 / np.sqrt(2.0 * 101.0)))

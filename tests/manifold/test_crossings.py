@@ -16,7 +16,7 @@ from equimorph.manifold import (
 )
 from equimorph.manifold.complex.marked_complex import fabric_of
 from equimorph.manifold.geometry.topology import adjacency
-from equimorph.manifold.refining.quality import smallest_angles, squeezed
+from equimorph.manifold.refining.quality import confined_angles, smallest_angles
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod
 from oracles.complexes import assert_crossings, assert_faithful, assert_upright
@@ -324,7 +324,7 @@ def test_figure_names_the_branch_points(symmetric_slice):
 def angles_off_curves(eset: EquilibriumSet) -> np.ndarray:
     """Smallest angles, in degrees, of triangles that are not squeezed between curves."""
     fabric = fabric_of(eset)
-    return np.degrees(smallest_angles(fabric.squared)[~squeezed(fabric, np.radians(10.0))])
+    return np.degrees(smallest_angles(fabric.squared)[~confined_angles(fabric, np.radians(10.0))])
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.manifold.complex.description import contradicted, turned_off_folds
+from equimorph.manifold.complex.description import contradictions, turned_off_folds
 from equimorph.manifold.geometry.topology import adjacency, senses
 from equimorph.model import Box, Constraint, Descriptor
 from oracles.complexes import SINGULAR, assert_faithful
@@ -111,9 +111,9 @@ def test_the_audit_names_cells_of_a_wrong_index_and_sense():
     own = np.flatnonzero(regular & (np.abs(eset.points.z[:, 0]) > 0.1))[0]
     points = replace(eset.points, z=eset.points.z.copy())
     points.z[own] *= -1.0
-    bad = contradicted(points, eset.kinds, eset.cells, eset.cell_index)
+    bad = contradictions(points, eset.kinds, eset.cells, eset.cell_index)
     assert np.array_equal(bad, (eset.cells == own).any(axis=1))
-    assert not contradicted(eset.points, eset.kinds, eset.cells, eset.cell_index).any()
+    assert not contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index).any()
     # a point pushed through the opposite facet turns its cell over
     sense = senses(eset.cells, eset.cell_index, eset.coordinates, adjacency(eset.cells))
     cell = np.flatnonzero(regular[eset.cells].all(axis=1))[0]

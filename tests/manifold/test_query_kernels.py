@@ -9,7 +9,7 @@ from equimorph.equilibria import Guards, settle
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex
 from equimorph.manifold.lookup.exact_states import ROUND_OFF, exact_states
 from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
-from equimorph.manifold.lookup.over import CLOSEST, rooted
+from equimorph.manifold.lookup.over import CLOSEST, root_weights
 from equimorph.structures import Spring
 
 
@@ -72,7 +72,7 @@ def test_guesses_interpolate_and_follow_the_root_from_folds():
     within /= within.sum(axis=1, keepdims=True)
     for guess, own, share in zip(found, cells[cell], within, strict=True):
         np.testing.assert_allclose(guess, plain_root(share, folded[own]) @ z[own], atol=1e-9)
-        again = rooted(share[None], folded[own][None])[0] @ z[own]
+        again = root_weights(share[None], folded[own][None])[0] @ z[own]
         np.testing.assert_allclose(again, guess, rtol=0, atol=1e-14)
 
 

@@ -16,7 +16,7 @@ from equimorph.manifold.complex.marked_complex import (
     ON_FOLD,
     RIM,
     Fabric,
-    _bisected,
+    _bisect,
     edges_of,
     fabric_of,
 )
@@ -364,7 +364,7 @@ def test_after_a_bisection_flips_are_looked_for_around_its_vertices_only(plain_e
     flipped, ends, index = plain_edges
     with unchecked():
         found, vertices = on_edges(flipped, ends, 0, index, np.full(len(ends), 0.5))
-    halved = flipped.bisected(ends[found], vertices)
+    halved = flipped.bisect(ends[found], vertices)
     everywhere = flip(halved)
     assert not np.array_equal(everywhere.cells, halved.cells)
     assert np.array_equal(flip(halved, since=len(flipped.vertices)).cells, everywhere.cells)
@@ -401,7 +401,7 @@ def test_several_edges_of_a_cell_are_cut_alike_on_both_sides():
     cells = np.array([[0, 1, 2, 3], [4, 2, 1, 3]])
     edges, _ = edges_of(cells, 5)
     order = np.random.default_rng(0).permutation(len(edges))
-    parts, parents = _bisected(cells, edges[order], 5)
+    parts, parents = _bisect(cells, edges[order], 5)
     assert euler_characteristic(parts) == 1
     assert len(np.unique(parts)) == 5 + len(edges)
     assert (adjacency(parts).counts <= 2).all()
@@ -427,10 +427,10 @@ def test_a_patch_goes_back_as_it_is(coarse):
     near[coarse.cells[5]] = True
     patch = patch_around(coarse, near, 4)
     assert 10 < len(patch.fabric.cells) < len(coarse.cells)
-    back = patch.replaced(patch.fabric)
+    back = patch.replace_by(patch.fabric)
     for whole, again in ((coarse.cells, back.cells), (coarse.facets, back.facets)):
         assert sorted(map(tuple, whole.tolist())) == sorted(map(tuple, again.tolist()))
-    better = patch.replaced(refill(patch.fabric, Memory()))
+    better = patch.replace_by(refill(patch.fabric, Memory()))
     assert len(better.cells) < len(coarse.cells)
     assert (adjacency(better.cells).counts <= 2).all()
     assert euler_characteristic(better.cells) == euler_characteristic(coarse.cells)
@@ -444,7 +444,7 @@ def test_a_patch_of_a_patch_keeps_both_rims(coarse):
     outer = patch_around(coarse, near, 4).fabric
     inner = patch_around(outer, near, 3)
     assert ((inner.fabric.marks & RIM) > 0).sum() > 0
-    back = inner.replaced(inner.fabric)
+    back = inner.replace_by(inner.fabric)
     for whole, again in ((outer.cells, back.cells), (outer.facets, back.facets)):
         assert sorted(map(tuple, whole.tolist())) == sorted(map(tuple, again.tolist()))
     for fabric in (outer, inner.fabric):
@@ -505,9 +505,9 @@ def test_a_change_of_topology_is_no_clean_refinement():
 
 def test_vertices_that_are_added_twice_to_the_same_ones_do_not_meet(coarse):
     """They share room behind those that there are; only the first may take it."""
-    store = coarse.vertices.joined(coarse.vertices.take(np.array([0])))
-    first = store.joined(store.take(np.array([1])))
-    second = store.joined(store.take(np.array([2])))
+    store = coarse.vertices.join(coarse.vertices.take(np.array([0])))
+    first = store.join(store.take(np.array([1])))
+    second = store.join(store.take(np.array([2])))
     assert np.array_equal(first.z[-1], store.z[1])
     assert np.array_equal(second.z[-1], store.z[2])
     assert np.array_equal(first.z[:-1], second.z[:-1])

@@ -8,11 +8,11 @@ from equimorph.manifold.complex.marked_complex import fabric_of
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     adjacency,
+    cut_at_crossings,
     faces_of,
     flags_of,
     labels,
     orientation,
-    parted,
     projected_volume,
 )
 
@@ -42,7 +42,7 @@ def assert_links(eset: EquilibriumSet) -> None:
     sheets cross, that holds for each part of them.
     """
     crossings = [np.zeros((0, 3), int), *eset.crossings]
-    cells, origin = parted(eset.cells, np.concatenate(crossings), len(eset.points))
+    cells, origin = cut_at_crossings(eset.cells, np.concatenate(crossings), len(eset.points))
     count = len(origin)
     amounts = [
         np.bincount(faces.ravel(), minlength=count)

@@ -261,7 +261,7 @@ def _insert_crossings(
         new = _amid(fabric, ends, np.array(list(crossings.values())))
         if new is None:
             return None
-        fabric = fabric.bisected(ends, new)
+        fabric = fabric.bisect(ends, new)
     wall = np.array([pair for way in ways for pair in pairwise(_numbers(way, number))], int)
     base = len(fabric.vertices)
     pairs = [fabric.cells[:, list(two)] for two in ((0, 1), (1, 2), (0, 2))]

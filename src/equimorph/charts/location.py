@@ -18,7 +18,7 @@ from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
-from equimorph.manifold.lookup.over import rooted
+from equimorph.manifold.lookup.over import root_weights
 from equimorph.structures import States
 from equimorph.tolerances import SAME_STATE
 
@@ -181,7 +181,7 @@ class Cells:
         corners = self.corners[hits.cell]
         folded = self._folded[corners]
         some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
-        weights[some] = rooted(weights[some], folded[some])
+        weights[some] = root_weights(weights[some], folded[some])
         z, p = (
             np.einsum("hk,hki->hi", weights, column[corners])
             for column in (self.eset.points.z, self.eset.points.p)

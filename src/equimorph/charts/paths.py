@@ -15,7 +15,7 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
 from equimorph.manifold.lookup.exact_states import exact_states
-from equimorph.manifold.lookup.over import rooted
+from equimorph.manifold.lookup.over import root_weights
 from equimorph.structures import State, States
 
 AT_VERTEX = 1e-6
@@ -162,7 +162,7 @@ def _states_on(eset: EquilibriumSet, way: Way) -> States:
     p = np.einsum("nk,nkp->np", weights, eset.points.p[ends])
     folded = np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))[ends]
     some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
-    weights[some] = rooted(weights[some], folded[some])
+    weights[some] = root_weights(weights[some], folded[some])
     z = np.einsum("nk,nki->ni", weights, eset.points.z[ends])
     amid = np.flatnonzero(share > 0.0)
     z[amid], good, _ = exact_states(eset.structure, z[amid], p[amid])

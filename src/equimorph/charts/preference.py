@@ -24,7 +24,7 @@ from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
 from equimorph.manifold.lookup.exact_states import exact_states
-from equimorph.manifold.lookup.over import rooted
+from equimorph.manifold.lookup.over import root_weights
 from equimorph.manifold.queries.levels import part_of
 from equimorph.structures import States
 
@@ -139,7 +139,7 @@ class _Crossings:
             given = ends[own], mark, lowest[own], values[ends[own]]
             done, new = _locate_changes(preference, fabric, *given)
             keys.append(keys_of(ends[own[done]], self._base))
-            found = found.joined(new)
+            found = found.join(new)
         self._keys, self._found = np.concatenate(keys), found
 
     def between(
@@ -257,7 +257,7 @@ def _straight(fabric: Fabric, ends: Ends, mark: int, wanted: Int[np.ndarray, " n
         weights = np.stack([1.0 - t, t], axis=1)
         p = np.einsum("nk,nkp->np", weights, store.p[ends[lanes]])
         some = np.flatnonzero(folded[lanes].any(axis=1) & ~folded[lanes].all(axis=1))
-        weights[some] = rooted(weights[some], folded[lanes[some]])
+        weights[some] = root_weights(weights[some], folded[lanes[some]])
         z = np.einsum("nk,nki->ni", weights, store.z[ends[lanes]])
         good = np.zeros(len(lanes), bool)
         plain = np.flatnonzero(~bent[lanes])

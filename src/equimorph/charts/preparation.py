@@ -12,10 +12,10 @@ from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     Adjacency,
     adjacency,
+    cut_at_crossings,
     flags_of,
     keys_of,
     orientation,
-    parted,
     pieces,
 )
 from equimorph.manifold.queries.cusps import cusps_on_edges
@@ -30,7 +30,7 @@ def cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:
     if not eset.crossings:
         return eset
     crossings, folds = (_facets(curves, len(eset.names)) for curves in (eset.crossings, eset.folds))
-    cells, origin = parted(eset.cells, crossings, len(eset.points))
+    cells, origin = cut_at_crossings(eset.cells, crossings, len(eset.points))
     whole = adjacency(cells)
     folded = whole.facets[flags_of(np.sort(origin[whole.facets], axis=1), folds)]
     return replace(
@@ -81,7 +81,7 @@ def add_cusp_vertices(fabric: Fabric) -> tuple[Fabric, Int[np.ndarray, " cusps"]
     count = len(fabric.vertices)
     ends, found = cusps_on_edges(fabric)
     if len(ends):
-        fabric = fabric.bisected(ends, found)
+        fabric = fabric.bisect(ends, found)
     return fabric, np.arange(count, len(fabric.vertices))
 
 

@@ -23,7 +23,7 @@ from equimorph.equilibria.critical_tests import (
 )
 from equimorph.equilibria.lift import Event
 from equimorph.equilibria.locus import Locus, Spots, nearest
-from equimorph.equilibria.locus_events import Landmark, Watch, watched
+from equimorph.equilibria.locus_events import Landmark, Watch, watch_tests
 from equimorph.equilibria.trace_locus import Side, trace_locus
 from equimorph.equilibria.trace_options import EventKind, TraceOptions
 from equimorph.errors import InputError
@@ -101,14 +101,14 @@ def both_ways(
         If the state is not on the locus.
     """
     options = options or TraceOptions(largest_step=0.2)
-    x = locus.joined(state.z[None], state.p[None])
+    x = locus.join(state.z[None], state.p[None])
     start, found = nearest(locus, x)
     if not found[0] or locus.lengths(start.x - x)[0] > NEAR:
         raise InputError(
             f"`state` must lie on a {kind} curve in {_names(locus)}; no such state was found "
             f"within {NEAR:g} of it."
         )
-    start = start.turned(_sign(locus, start))
+    start = start.turn(_sign(locus, start))
     sides = trace_locus(locus, start, watches, options)
     return _curve(kind, locus, _at_start(locus, start, watches), sides)
 
@@ -126,7 +126,7 @@ def _sign(locus: Locus, spot: Spots) -> Values:
 
 def _at_start(locus: Locus, start: Spots, watches: list[Watch]) -> list[Landmark]:
     """Special points at the start itself."""
-    values, slopes = watched(locus, start, watches, np.zeros((1, len(watches))))
+    values, slopes = watch_tests(locus, start, watches, np.zeros((1, len(watches))))
     return [
         Landmark(watch.kind, start, 0.0, watch.detail)
         for watch, value, slope in zip(watches, values[0], slopes[0], strict=True)

@@ -105,7 +105,7 @@ def _starts(
                 break
             nudge = size * soft.length[todo, None] * modes[todo]
             h = shorter * longest[todo]
-            moved, away, solved = _relaxed(structure, z[todo], p[todo], nudge, h)
+            moved, away, solved = _relax(structure, z[todo], p[todo], nudge, h)
             told[todo[solved]] = True
             gone = todo[solved & (away > 0.0)]
             leaves[gone], start[gone] = True, moved[solved & (away > 0.0)]
@@ -114,7 +114,7 @@ def _starts(
     return _Starts(start, length, leaves, told)
 
 
-def _relaxed(
+def _relax(
     structure: Structure, z: Lanes, p: Parameters, nudge: Modes, h: Values
 ) -> tuple[Lanes, Values, Flags]:
     """Configurations near states on the constraints, and the speed of the flow away from there.

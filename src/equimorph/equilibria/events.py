@@ -41,7 +41,7 @@ class Events:
         return Events(*(column[events] for column in vars(self).values()))
 
     @classmethod
-    def joined(cls, parts: list["Events"], size: int) -> "Events":
+    def join(cls, parts: list["Events"], size: int) -> "Events":
         """All events of some parts, sorted by lane and then by arclength."""
         none = np.zeros(0, int)
         nothing = cls(
@@ -81,11 +81,11 @@ def locate_all(
         bracket = _join(brackets, bit)
         if bracket is None:
             continue
-        parts.append(located(bracket, bit, _locate(curve, bracket, bit, constraints)))
-    return Events.joined(parts, curve.metric.size)
+        parts.append(events_at(bracket, bit, _locate(curve, bracket, bit, constraints)))
+    return Events.join(parts, curve.metric.size)
 
 
-def located(bracket: Bracket, code: EventCode, place: Located) -> Events:
+def events_at(bracket: Bracket, code: EventCode, place: Located) -> Events:
     """Events of one kind at places inside steps."""
     kind, way = np.full(len(bracket.lanes), code), bracket.travelled + place.step
     index = np.stack([bracket.before.index, bracket.after.index], 1)

@@ -31,7 +31,7 @@ class Passed:
     p: Float[np.ndarray, " parameters"]
 
 
-def none_passed(lanes: int) -> Shaped[np.ndarray, " lanes"]:
+def no_critical_states(lanes: int) -> Shaped[np.ndarray, " lanes"]:
     """No critical states on any path."""
     out = np.empty(lanes, dtype=object)
     out[:] = [()] * lanes

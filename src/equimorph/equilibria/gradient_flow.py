@@ -213,7 +213,7 @@ def gradient_flow(
     for _ in range(pace.steps):
         if len(front.lanes) == 0:
             break
-        front = _advanced(structure, front, p[front.lanes], pace)
+        front = _advance(structure, front, p[front.lanes], pace)
         way.append(front.take(front.moved))
         end, last[front.lanes] = _ends(structure, front, p[front.lanes], pace)
         end[(end < 0) & (front.travelled > far)] = Ending.ESCAPED
@@ -227,7 +227,7 @@ def gradient_flow(
     return Flow(code, last, lanes[order], time[order], configurations[order])
 
 
-def _advanced(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> _Front:
+def _advance(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> _Front:
     """One step of every flow, where it is solved, downhill and short enough; the next length."""
     n, h = structure.unknowns, front.h
     guess = front.z.copy()

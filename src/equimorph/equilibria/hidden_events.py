@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.arrays import Lanes, Parameters, Some, Values
 from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.events import Events, locate_all
-from equimorph.equilibria.inside_steps import AT_EVENT, CLOSE, look_inside, probed, step_between
+from equimorph.equilibria.inside_steps import AT_EVENT, CLOSE, look_inside, probe_at, step_between
 from equimorph.equilibria.steps import Front, Points, least_inside
 from equimorph.equilibria.trace import Traces
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
@@ -47,7 +47,7 @@ def with_hidden_events(
     points = recorded_points(curve, z, outcome)
     inside = hidden_events(curve, points, options, thorough=thorough)
     last_ones = _before_ends(curve, points, outcome)
-    hidden = Events.joined([inside, last_ones], z.shape[1])
+    hidden = Events.join([inside, last_ones], z.shape[1])
     if len(hidden.code) == 0:
         return outcome
     stops = np.flatnonzero((hidden.code & options.stops != 0) | ~hidden.found)
@@ -61,7 +61,7 @@ def with_hidden_events(
     code[lanes], index[lanes] = np.where(located, end.code, EventCode.LOST), end.index[:, 0]
     places[lanes], t[lanes] = end.z, end.t
     travelled[lanes] = last[lanes] = end.travelled
-    passed = Events.joined([outcome.passed, hidden], z.shape[1])
+    passed = Events.join([outcome.passed, hidden], z.shape[1])
     why = outcome.why | {int(end.lanes[i]): _why(end, i) for i in range(len(lanes))}
     return replace(
         outcome,
@@ -96,7 +96,7 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     for i in np.flatnonzero(index != points.index[last]):
         ends, one = np.array([last[i] - 1, last[i]]), curve.take(lanes[i : i + 1])
         both = curve.take(np.repeat(lanes[i], 2))
-        probe = probed(both, fronts(both, points, ends), points.travelled[ends])
+        probe = probe_at(both, fronts(both, points, ends), points.travelled[ends])
         if np.abs(probe.value[1]) <= AT_EVENT * np.abs(probe.value[0]):
             continue
         front = replace(probe.front, index=np.array([points.index[last[i]], index[i]]))
@@ -104,7 +104,7 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
         pair = probe.at(np.array([0])), probe.at(np.array([1]))
         events = locate_all(one, [step_between(pair, None)], (), TraceOptions())
         found.append(replace(events, lanes=lanes[i : i + 1]))
-    return Events.joined(found, size)
+    return Events.join(found, size)
 
 
 def recorded_points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
@@ -114,7 +114,7 @@ def recorded_points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
     start = Points(lanes, none, z, none, index)
     end = Points(lanes, outcome.travelled, outcome.z, outcome.t, outcome.index)
     regular = end.take(np.isin(outcome.code, REGULAR_ENDS))
-    return Points.joined([start, outcome.points, regular], z.shape[1])
+    return Points.join([start, outcome.points, regular], z.shape[1])
 
 
 def hidden_events(
@@ -139,10 +139,10 @@ def hidden_events(
     found = list[Events]()
     near = np.arange(len(points.t)) if thorough else _doubtful_points(points, gaps(curve, points))
     if len(near) < 2:
-        return Events.joined(found, curve.structure.size)
+        return Events.join(found, curve.structure.size)
     lanes, index = points.lanes[near], points.index[near]
     many = curve.take(lanes)
-    probe = probed(many, fronts(many, points, near), points.travelled[near])
+    probe = probe_at(many, fronts(many, points, near), points.travelled[near])
     low = _lowest(np.abs(probe.value), _neighbours(points, near), CLOSE)
     kept = np.flatnonzero(~low)
     few, sign = probe.at(kept), np.sign(probe.value[kept])
@@ -160,7 +160,7 @@ def hidden_events(
         lane = lanes[kept[i] : kept[i] + 1]
         inside = look_inside(curve.take(lane), pair, first, options)
         found += [replace(each, lanes=np.full(len(each.code), lane[0])) for each in inside]
-    return Events.joined(found, curve.structure.size)
+    return Events.join(found, curve.structure.size)
 
 
 def gaps(curve: Curve, points: Points) -> Values:

@@ -52,7 +52,7 @@ class Probe:
         return Probe(self.front.take(some), *columns)
 
 
-def probed(curve: Curve, front: Front, length: Values) -> Probe:
+def probe_at(curve: Curve, front: Front, length: Values) -> Probe:
     """Eigenvalue nearest to zero, and its slope along the curve, at one point of each lane."""
     p = curve.parameters(front.t)
     b = null_border(curve.structure, front.z, p)
@@ -72,7 +72,7 @@ def inside_step(
     both = curve.take(np.zeros(2, int))
     columns = zip(*(vars(front).values() for front in ends), strict=True)
     front = Front(*(np.concatenate(column) for column in columns))
-    probe = probed(both, front, np.array(lengths[:2]))
+    probe = probe_at(both, front, np.array(lengths[:2]))
     smaller, larger = np.sort(np.abs(probe.value))
     # a path may start or arrive right at an event: that is no hidden one
     if smaller <= AT_EVENT * larger:
@@ -186,7 +186,7 @@ def _between(curve: Curve, start: Probe, span: tuple[Values, Values], share: flo
         length = span[0] + place * span[1]
         front, good = step_along(curve, start.front, length - start.length)
         if good[0]:
-            return probed(curve, front, length)
+            return probe_at(curve, front, length)
     return None
 
 

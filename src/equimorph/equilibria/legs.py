@@ -32,7 +32,7 @@ AT_START = 1e-8
 """Relative distance by which a curve may miss where it has to begin."""
 
 
-def listed(to: Leg | Sequence[Leg]) -> list[Leg]:
+def legs_of(to: Leg | Sequence[Leg]) -> list[Leg]:
     """All legs of `to`.
 
     Raises
@@ -63,13 +63,13 @@ def way_points(
     """
     corners = [start]
     for step in [to] if isinstance(to, Mapping) else list(to):
-        corners.append(changed(structure, corners[-1][None], step)[0])
+        corners.append(replace_parameters(structure, corners[-1][None], step)[0])
     if all(np.array_equal(corner, start) for corner in corners):
         raise InputError("`to` must change at least one parameter; got the start itself.")
     return corners
 
 
-def changed(structure: Structure, here: Parameters, values: Waypoint) -> Parameters:
+def replace_parameters(structure: Structure, here: Parameters, values: Waypoint) -> Parameters:
     """Parameters with some of them replaced by one value, or by one for each lane."""
     if not isinstance(values, Mapping):
         raise InputError(f"`to` must give {{name: value}}; got {values!r}.")
@@ -135,7 +135,7 @@ class Prepared:
     z: Lanes
 
 
-def prepared(states: States, leg: Leg) -> Prepared:
+def prepare_leg(states: States, leg: Leg) -> Prepared:
     """Curve of a leg from given states.
 
     Raises
@@ -150,15 +150,15 @@ def prepared(states: States, leg: Leg) -> Prepared:
     if not isinstance(first, Mapping):
         raise InputError(f"`to` must give {{name: value}}; got {first!r}.")
     if any(isinstance(key, Descriptor) or value is None for key, value in first.items()):
-        return _tracked(states, leg, first)
+        return _track_descriptors(states, leg, first)
     if not callable(leg):
-        stop = changed(structure, here, leg)
+        stop = replace_parameters(structure, here, leg)
         return Prepared(ParameterLine(structure, here.copy(), stop - here), states.z)
     base = here[:1] if (here == here[:1]).all() else here
 
     def at(t: float) -> Parameters:
         values = leg(t)
-        return changed(structure, here if _wide(values) else base, values)
+        return replace_parameters(structure, here if _wide(values) else base, values)
 
     names = [parameter.name for parameter in structure.parameters]
     pieces = _pieces(leg, at, here, names, structure.scales)
@@ -193,7 +193,7 @@ def _pieces(
     return approximated(at, len(here), scales)
 
 
-def _tracked(states: States, leg: Leg, first: Waypoint) -> Prepared:
+def _track_descriptors(states: States, leg: Leg, first: Waypoint) -> Prepared:
     """Curve of a leg on which descriptors are prescribed and parameters are unknown."""
     structure, here = states.structure, states.p
     descriptors = tuple(key for key in first if isinstance(key, Descriptor))
@@ -209,7 +209,7 @@ def _tracked(states: States, leg: Leg, first: Waypoint) -> Prepared:
 
     def at(t: float) -> Parameters:
         values: Waypoint = leg(t) if callable(leg) else leg
-        p = changed(structure, here, values)
+        p = replace_parameters(structure, here, values)
         p[:, free] = here[:, free]
         columns = [_numbers(d.name, values.get(d), len(here)) for d in descriptors]
         return np.concatenate([p, *(np.broadcast_to(c, len(here))[:, None] for c in columns)], 1)
@@ -263,7 +263,7 @@ def check_starts(states: States) -> None:
         )
 
 
-def violated(states: States, within: Sequence[Constraint]) -> Flags:
+def violations(states: States, within: Sequence[Constraint]) -> Flags:
     """Which states exceed a bound by more than round-off."""
     over = np.zeros(len(states), bool)
     for c in within:

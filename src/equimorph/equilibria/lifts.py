@@ -10,7 +10,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.hidden_events import with_multiple_points
-from equimorph.equilibria.legs import Leg, listed, of_some, prepared, violated
+from equimorph.equilibria.legs import Leg, legs_of, of_some, prepare_leg, violations
 from equimorph.equilibria.paths import Event
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
@@ -122,13 +122,13 @@ def lift_many(
     """Follow all legs from many states; see `lift`."""
     ledger = _Ledger(states, within)
     moved = False
-    for number, leg in enumerate(listed(to)):
+    for number, leg in enumerate(legs_of(to)):
         going = np.flatnonzero(ledger.code == EventCode.ARRIVED)
         if len(going) == 0:
             break
         everyone = len(going) == len(states)
         here = ledger.states if everyone else ledger.states[going]
-        begun = prepared(here, leg if everyone else of_some(leg, going, len(states)))
+        begun = prepare_leg(here, leg if everyone else of_some(leg, going, len(states)))
         far = np.flatnonzero(begun.curve.weight > 0.0)
         moved = moved or len(far) > 0
         if len(far) < len(going):
@@ -171,7 +171,7 @@ class _Ledger:
         self.z, self.p = self.begun.z.copy(), self.begun.p.copy()
         self.at, self.length = np.zeros(lanes), np.zeros(lanes)
         self.index = self.begun.structure.index(self.z, self.p)
-        self.over = violated(self.begun, self.within)
+        self.over = violations(self.begun, self.within)
         self.code, self.words = (
             np.where(self.over, EventCode.CONSTRAINT, EventCode.ARRIVED),
             np.full(lanes, "", WORD),

@@ -9,7 +9,7 @@ from jaxtyping import Shaped
 
 from equimorph.arrays import Values
 from equimorph.door import door
-from equimorph.equilibria.legs import check_starts, violated
+from equimorph.equilibria.legs import check_starts, violations
 from equimorph.equilibria.lift import Path, lift
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError
@@ -176,7 +176,7 @@ def _many(
     if len(unstable):
         index = int(states.index[unstable[0]])
         raise InputError(f"`state` must be stable; got index {index} in number {unstable[0]}.")
-    undefined = violated(states, within)
+    undefined = violations(states, within)
     ended = lift(states, rise, within=within, options=options, progress=progress)
     kind = np.where(ended.arrived, "none below the bound", ended.kind)
     kind = np.where(undefined, "undefined unloaded", kind)

@@ -70,7 +70,7 @@ class Locus:
         """Directions of the free parameters, for one lane."""
         return free_directions(self.structure, self.free, 1)
 
-    def joined(self, z: Lanes, p: Parameters) -> Points:
+    def join(self, z: Lanes, p: Parameters) -> Points:
         """Coordinates of states."""
         return np.concatenate([z, p[:, self.free], np.zeros((len(z), int(self.unfolded)))], axis=1)
 
@@ -115,7 +115,7 @@ class Spots:
         """Return a selection of the lanes."""
         return Spots(*(column[lanes] for column in vars(self).values()))
 
-    def turned(self, sign: Values) -> "Spots":
+    def turn(self, sign: Values) -> "Spots":
         """The same with tangents times a sign of each lane."""
         basis = self.basis.copy()
         basis[:, 0] *= sign[:, None]
@@ -204,7 +204,7 @@ def _settle(
 
 
 def _coordinates(locus: Locus, found: Settled) -> Points:
-    x = locus.joined(found.z, found.p)
+    x = locus.join(found.z, found.p)
     if locus.unfolded:
         x[:, -1] = found.unfolding
     return x

@@ -82,14 +82,14 @@ class Walks:
         pick = np.arange(len(self.length))
         pick[at] = len(pick) + np.arange(len(at))
 
-        def mixed(one: Any, other: Any) -> Any:
+        def mix(one: Any, other: Any) -> Any:
             columns = zip(vars(one).values(), vars(other).values(), strict=True)
             return [
-                mixed(*pair) if isinstance(pair[0], Spots) else np.concatenate(pair)[pick]
+                mix(*pair) if isinstance(pair[0], Spots) else np.concatenate(pair)[pick]
                 for pair in columns
             ]
 
-        spots, *rest = mixed(self, others)
+        spots, *rest = mix(self, others)
         return Walks(Spots(*spots), *rest)
 
 
@@ -116,7 +116,7 @@ def predict(locus: Locus, here: Walks, lengths: Values) -> Points:
     return there
 
 
-def watched(
+def watch_tests(
     locus: Locus, spots: Spots, watches: Sequence[Watch], before: Watched
 ) -> tuple[Watched, Watched]:
     """Watched tests with slopes; zeros keep the sign that they had `before`."""

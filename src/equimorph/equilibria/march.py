@@ -12,7 +12,7 @@ from equimorph.arrays import Flags, Lanes, Some, Values
 from equimorph.equilibria import kernels
 from equimorph.equilibria import step_kernels as stepping
 from equimorph.equilibria.curves import Curve, squared_length
-from equimorph.equilibria.events import Events, located
+from equimorph.equilibria.events import Events, events_at
 from equimorph.equilibria.inside_steps import NARROW, inside_step
 from equimorph.equilibria.kernels import (
     ARRIVAL,
@@ -236,7 +236,7 @@ class Block:
         bracket = self._bracket(at, move)
         place = locate_branch_point(self._here.take(at), bracket)
         counts[kernels.STAGE, at[~place.found]] = REFUSED
-        return located(bracket, EventCode.BRANCH_POINT, place).take(place.found)
+        return events_at(bracket, EventCode.BRANCH_POINT, place).take(place.found)
 
     def _note_branch_points(self, events: Events) -> None:
         """Note located branch points of steps that were not refused for another reason."""
@@ -279,7 +279,7 @@ class Block:
 
     def _new(self, lane: int, found: list[Events]) -> list[Events]:
         """Events of a lane but for those that were found in the step before, too."""
-        events = Events.joined(found, self.curve.metric.size)
+        events = Events.join(found, self.curve.metric.size)
         known = self._last.get(lane, -np.inf)
         events = events.take(np.abs(events.travelled - known) > NARROW)
         if len(events.t):

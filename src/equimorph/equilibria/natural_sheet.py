@@ -59,7 +59,7 @@ class NaturalSheet:
         z, found = np.full((len(p), self.structure.size), np.nan), self.found[vertex]
         here = np.flatnonzero(found)
         before = self.parameters(start[here])
-        z[here], found[here] = _stepped(self.structure, self.z[vertex[here]], before, p[here])
+        z[here], found[here] = _step(self.structure, self.z[vertex[here]], before, p[here])
         rest = np.flatnonzero(~found & self.found[vertex])
         if len(rest):
             z[rest], found[rest] = self.structure.natural(p[rest])
@@ -134,7 +134,7 @@ def _flood(
         while len(target):
             _, first = np.unique(target, return_index=True)
             a, b = start[first], target[first]
-            end, good = _stepped(structure, z[a], p[a], p[b])
+            end, good = _step(structure, z[a], p[a], p[b])
             z[b[good]], found[b[good]] = end[good], True
             reached = np.concatenate([reached, b[good]])
             rest = np.setdiff1d(np.arange(len(target)), first)
@@ -157,9 +157,7 @@ def _neighbours(
     return np.concatenate(starts), np.concatenate(targets)
 
 
-def _stepped(
-    structure: Structure, z: Lanes, p: Parameters, target: Parameters
-) -> tuple[Lanes, Flags]:
+def _step(structure: Structure, z: Lanes, p: Parameters, target: Parameters) -> tuple[Lanes, Flags]:
     """States at `target` on the sheet of the stable states (z, p), and whether they are certain."""
     n = structure.unknowns
     still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))

@@ -14,7 +14,7 @@ from equimorph.equilibria.hidden_events import (
     with_hidden_events,
     with_multiple_points,
 )
-from equimorph.equilibria.legs import Leg, listed, prepared
+from equimorph.equilibria.legs import Leg, legs_of, prepare_leg
 from equimorph.equilibria.march import UNRESOLVED
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
@@ -102,8 +102,8 @@ def lift_one(
     """Follow all legs from one state; see `lift`."""
     pieces: list[_Segment] = []
     here = state
-    for number, leg in enumerate(listed(to)):
-        begun = prepared(here.batch, leg)
+    for number, leg in enumerate(legs_of(to)):
+        begun = prepare_leg(here.batch, leg)
         if not begun.curve.weight[0] > 0.0:
             continue
         outcome = trace(begun.curve, begun.z, within, options, progress=progress)

@@ -125,7 +125,7 @@ class Pools:
         outcome = trace(curve, guess, (), WIDE_STEPS)
         arrived = outcome.code == EventCode.ARRIVED
         self.failures.append(("the Newton homotopy did not arrive", group[~arrived]))
-        self._polished(outcome.z[arrived], group[arrived])
+        self._polish(outcome.z[arrived], group[arrived])
 
     def _by_deflation(self, lanes: Int[np.ndarray, " lanes"], share: float) -> None:
         """From points on the way to random guesses."""
@@ -158,7 +158,7 @@ class Pools:
         returned = outcome.code == EventCode.RETURNED
         lost = ~returned & (outcome.code != EventCode.ARRIVED)
         self.failures.append(("a line was not followed to its end", group[lost]))
-        self._polished(outcome.z[returned], group[returned])
+        self._polish(outcome.z[returned], group[returned])
 
     def _directions(self, count: int) -> Parameters:
         """Random directions of length `REACH` among actuators and loads."""
@@ -169,7 +169,7 @@ class Pools:
         length = np.linalg.norm(direction, axis=1, keepdims=True)
         return np.asarray(direction * structure.scales * (REACH / length))
 
-    def _polished(self, z: Lanes, group: Groups) -> None:
+    def _polish(self, z: Lanes, group: Groups) -> None:
         guards = Guards(iterations=12)
         exact = settle(self.ground.structure, z, self.ground.p[group], guards=guards)
         self._take(exact.z[exact.found], group[exact.found])

@@ -237,14 +237,14 @@ def search_points(
         pools.start(guesses)
         pools.spread()
         for number, point in enumerate(todo):
-            catches[point] = catches[point].extended(pools, number * runs, runs)
+            catches[point] = catches[point].with_runs(pools, number * runs, runs)
         todo = np.array([point for point in todo if catches[point].doubtful], dtype=int)
         if len(todo) == 0:
             break
-    return _argued(structure, points, catches, generator)
+    return _complete_by_arguments(structure, points, catches, generator)
 
 
-def _argued(
+def _complete_by_arguments(
     structure: Structure,
     points: Points,
     catches: list["_Catch"],
@@ -269,7 +269,7 @@ def _argued(
         pools.spread(known)
         graph.add(pools.z[len(graph) :], pools.group[len(graph) :])
     return [
-        catch.joined(graph.z[graph.group == number]).states(arguments_of(graph, number))
+        catch.with_states(graph.z[graph.group == number]).states(arguments_of(graph, number))
         for number, catch in enumerate(catches)
     ]
 
@@ -295,7 +295,7 @@ class _Catch:
         ground = Ground(structure, point[None], within)
         return cls(ground, np.zeros((0, structure.size)), np.zeros(0, int), 0, {})
 
-    def extended(self, pools: Pools, first: int, runs: int) -> "_Catch":
+    def with_runs(self, pools: Pools, first: int, runs: int) -> "_Catch":
         """With the groups `first`, `first` + 1, ... of pools as further runs."""
         mine = np.flatnonzero((pools.group >= first) & (pools.group < first + runs))
         z, run = pools.z[mine], pools.group[mine] - first + self.runs
@@ -310,7 +310,7 @@ class _Catch:
             {reason: count for reason, count in counts.items() if count},
         )
 
-    def joined(self, z: Float[np.ndarray, "more size"]) -> "_Catch":
+    def with_states(self, z: Float[np.ndarray, "more size"]) -> "_Catch":
         """With states that no run has found."""
         run = np.concatenate([self.run, np.full(len(z), NO_RUN)])
         return replace(self, z=np.concatenate([self.z, z]), run=run)

@@ -30,7 +30,7 @@ class Front:
             self.index[lanes],
         )
 
-    def updated(self, new: "Front", where: Flags) -> "Front":
+    def update(self, new: "Front", where: Flags) -> "Front":
         """Return `new` on the flagged lanes and this on the rest."""
         wide = where[:, None]
         return Front(
@@ -144,7 +144,7 @@ class Points:
         return Points(*(column[at] for column in vars(self).values()))
 
     @classmethod
-    def joined(cls, parts: list["Points"], size: int) -> "Points":
+    def join(cls, parts: list["Points"], size: int) -> "Points":
         """All points of some parts, sorted by lane and then by length."""
         count = sum(len(part.t) for part in parts)
         lanes, index, travelled, t = np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0)

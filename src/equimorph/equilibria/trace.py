@@ -197,7 +197,7 @@ class _Job:
         curve, bracket, options = block.curve, block.events.drain(), block.options
         shown = locate_all(curve, [bracket], block.constraints, options)
         only = inside_only_steps(curve, bracket, options)
-        events = Events.joined([shown, *block.hidden, *only], curve.metric.size)
+        events = Events.join([shown, *block.hidden, *only], curve.metric.size)
         block.hidden = []
         bad = np.unique(events.lanes[~events.found])
         again = bad[ledger.retries[bad] < block.options.retries]
@@ -273,7 +273,7 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Traces:
         part if (last := _last(ledger, part, tries)).all() else part.take(last)
         for part, tries in parts
     ]
-    joined = Points.joined(points, size)
+    joined = Points.join(points, size)
     # an event that the first step hid is known after the second
     beyond = (joined.travelled > ledger.travelled[joined.lanes]) & (ledger.code[joined.lanes] > 0)
     return Traces(
@@ -283,7 +283,7 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Traces:
         ledger.index,
         ledger.travelled,
         ledger.why,
-        Events.joined(passed, size),
+        Events.join(passed, size),
         joined.take(~beyond) if beyond.any() else joined,
     )
 

@@ -18,7 +18,7 @@ from equimorph.equilibria.locus_events import (
     Watch,
     landmarks,
     predict,
-    watched,
+    watch_tests,
 )
 from equimorph.equilibria.steps import least_inside
 from equimorph.equilibria.trace_options import EventKind, TraceOptions
@@ -68,7 +68,7 @@ def trace_locus(
 
     Where they meet the curve is closed: it is the forward side, and the backward one its start.
     """
-    ways = (vars(start.turned(sign)).values() for sign in (-np.ones(1), np.ones(1)))
+    ways = (vars(start.turn(sign)).values() for sign in (-np.ones(1), np.ones(1)))
     starts = Spots(*(np.concatenate(column) for column in zip(*ways, strict=True)))
     here = begin(locus, starts, watches, options)
     lanes, sides = np.arange(2), [_side(here.take(np.array([lane])), watches) for lane in (0, 1)]
@@ -120,7 +120,7 @@ def update(here: Walks, there: Walks, good: Flags) -> Walks:
 def begin(locus: Locus, starts: Spots, watches: Sequence[Watch], options: TraceOptions) -> Walks:
     """Stand at the starts."""
     lanes = len(starts.x)
-    values, slopes = watched(locus, starts, watches, np.zeros((lanes, len(watches))))
+    values, slopes = watch_tests(locus, starts, watches, np.zeros((lanes, len(watches))))
     first, none = np.full(lanes, options.first_step), np.zeros(lanes)
     return Walks(starts, values, slopes, first, none, starts.x, starts.tangent)
 
@@ -129,7 +129,7 @@ def _look(
     locus: Locus, here: Walks, spots: Spots, watches: Sequence[Watch], options: TraceOptions
 ) -> Walks:
     """What is watched at the ends of steps, and how long the next ones should be."""
-    values, slopes = watched(locus, spots, watches, here.values)
+    values, slopes = watch_tests(locus, spots, watches, here.values)
     cosine = np.einsum("li,li->l", spots.tangent * locus.weights, here.spots.tangent)
     turning = np.arccos(np.clip(cosine, -1.0, 1.0))
     growth = np.clip(options.turning / np.maximum(turning, 1e-3), 0.5, 2.0)
@@ -238,14 +238,14 @@ def _close(locus: Locus, sides: list[Side], walks: tuple[Walks, Walks], good: Fl
                 continue
             lengths = {one: place[0] - 2e-9, other: at}
             backward, forward = (sides[k].up_to(lengths[k]) for k in (0, 1))
-            whole = _joined(backward, forward, place[0] + at)
+            whole = _join(backward, forward, place[0] + at)
             return [replace(backward, end=whole.end), whole]
     return sides
 
 
-def _joined(backward: Side, forward: Side, length: float) -> Side:
+def _join(backward: Side, forward: Side, length: float) -> Side:
     """One closed side of a length: forward, and then against the backward one to its start."""
-    spots = [each.turned(-np.ones(1)) for each in backward.spots[::-1]]
+    spots = [each.turn(-np.ones(1)) for each in backward.spots[::-1]]
     marks = [replace(mark, length=length - mark.length) for mark in backward.landmarks[::-1]]
     return Side(
         forward.spots + spots,

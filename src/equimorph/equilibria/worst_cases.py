@@ -129,14 +129,14 @@ class _Ray:
 
     def room(self, z: Lanes, p: Parameters) -> Values:
         """Share of the way at which stability is lost; −1 for unstable states."""
-        return self._ended(z, p)[0]
+        return self._end(z, p)[0]
 
     def limit(self, z: Lanes, p: Parameters) -> Values:
         """The descriptor there."""
-        share, end, at = self._ended(z, p)
+        share, end, at = self._end(z, p)
         return np.where(share >= 0.0, self.descriptor.function(end, at), np.inf)
 
-    def _ended(self, z: Lanes, p: Parameters) -> tuple[Values, Lanes, Parameters]:
+    def _end(self, z: Lanes, p: Parameters) -> tuple[Values, Lanes, Parameters]:
         share = np.full(len(z), -1.0)
         end, stable = _stable_states(self.structure, z, p)
         at, lanes = p.copy(), np.flatnonzero(stable)
@@ -269,7 +269,7 @@ class _Range:
         here, p = near[lanes], p[lanes]
         excesses: list[Values] = []
         for number, value in enumerate(self.values):
-            here, p, arrived = self._moved(here, p, value)
+            here, p, arrived = self._move(here, p, value)
             left = 1.0 - (number - 1) / (len(self.values) - 1)
             out[lanes[~arrived]] = 1.0 + min(left, 1.0)
             lanes, here, p = lanes[arrived], here[arrived], p[arrived]
@@ -277,7 +277,7 @@ class _Range:
         out[lanes] = _highest(np.stack(excesses, axis=1)) if self.within else -1.0
         return out
 
-    def _moved(self, z: Lanes, p: Parameters, value: float) -> tuple[Lanes, Parameters, Flags]:
+    def _move(self, z: Lanes, p: Parameters, value: float) -> tuple[Lanes, Parameters, Flags]:
         velocity = np.zeros_like(p)
         velocity[:, self.at] = value - p[:, self.at]
         moving = np.flatnonzero(velocity[:, self.at] != 0.0)

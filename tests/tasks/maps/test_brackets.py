@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria.first_stable import none_passed
+from equimorph.equilibria.first_stable import no_critical_states
 from equimorph.tasks.maps.brackets import (
     Brackets,
     Samples,
@@ -33,7 +33,7 @@ def sampler(function):
             np.zeros(len(value)),
             value[:, None],
             p,
-            none_passed(len(p)),
+            no_critical_states(len(p)),
         )
 
     return sample

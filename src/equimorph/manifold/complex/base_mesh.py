@@ -74,14 +74,16 @@ def mesh_of(vertices: Float[np.ndarray, "V d"], cells: Int[np.ndarray, "C corner
         return BaseMesh(vertices, np.sort(cells, axis=1))
     triangles, faces = cells, _none(4)
     if cells.shape[1] == 4:
-        triangles, faces = _numbered([np.delete(cells, k, axis=1) for k in range(4)], len(vertices))
+        triangles, faces = _number_faces(
+            [np.delete(cells, k, axis=1) for k in range(4)], len(vertices)
+        )
     pairs = [triangles[:, list(pair)] for pair in ((0, 1), (1, 2), (2, 0))]
-    edges, sides = _numbered(pairs, len(vertices))
+    edges, sides = _number_faces(pairs, len(vertices))
     tetrahedra = cells if cells.shape[1] == 4 else _none(4)
     return BaseMesh(vertices, edges, triangles, sides, tetrahedra, faces)
 
 
-def _numbered(
+def _number_faces(
     columns: list[Int[np.ndarray, "C k"]], vertices: int
 ) -> tuple[Int[np.ndarray, "F k"], Int[np.ndarray, "C columns"]]:
     """Distinct faces with sorted corners, and the number of each cell's."""

@@ -74,7 +74,7 @@ def cut_between(
         for mark in np.unique(marks[fresh]).tolist():
             own = fresh[marks[fresh] == mark]
             done, more = between(fabric, ends[own], mark, lowest[own], values[ends[own]])
-            found = found.joined(keys[own], done, more)
+            found = found.join(keys[own], done, more)
         lost = found.asked[found.row < 0]
         chosen = _one_per_cell(crossed & ~np.isin(keys, lost), of_cells)
         if len(chosen) == 0:
@@ -87,7 +87,7 @@ def cut_between(
             others = whole.take(np.arange(len(more), len(whole)))
             known = function(others) if function else np.zeros(len(others))
             known = np.where(np.abs(known) <= ROUND_OFF * np.abs(values).max(), 0.0, known)
-            fabric = fabric.bisected(cut, whole)
+            fabric = fabric.bisect(cut, whole)
             values = np.concatenate([values, np.zeros(len(more)), known])
 
 
@@ -105,14 +105,14 @@ class _Found:
         none = np.zeros(0, int)
         return cls(none, none, like.take(none))
 
-    def joined(
+    def join(
         self, keys: Int[np.ndarray, " more"], done: Bool[np.ndarray, " more"], more: Vertices
     ) -> "_Found":
         """These edges and more of them."""
         row = np.full(len(keys), -1)
         row[done] = len(self.vertices) + np.arange(len(more))
         asked = np.concatenate([self.asked, keys])
-        return _Found(asked, np.concatenate([self.row, row]), self.vertices.joined(more))
+        return _Found(asked, np.concatenate([self.row, row]), self.vertices.join(more))
 
     def of(self, keys: Int[np.ndarray, " some"]) -> Vertices:
         """Vertices on edges that have some."""
@@ -184,7 +184,7 @@ def roots(
         moved[todo] = np.where(left, -1, 1)
     whole = found[0]
     for more in found[1:]:
-        whole = whole.joined(more)
+        whole = whole.join(more)
     return done, whole.take(np.argsort(np.concatenate(lanes)))
 
 
@@ -207,5 +207,5 @@ def _somewhere(
         t[left] = low[left] + share * (high - low)[left]
         more, vertices = on_edges(fabric, ends[left], mark, index[left], t[left])
         good[left[more]] = True
-        at, order = at.joined(vertices), np.concatenate([order, left[more]])
+        at, order = at.join(vertices), np.concatenate([order, left[more]])
     return good, at.take(np.argsort(order)), t

@@ -21,14 +21,14 @@ from equimorph.manifold.geometry.topology import (
     PAIR,
     Adjacency,
     adjacency,
+    count_unbalanced,
+    cut_at_crossings,
     euler_characteristic,
     flags_of,
     keys_of,
     labels,
-    parted,
     pieces,
     senses,
-    unbalanced,
 )
 from equimorph.model import Box
 from equimorph.structures import States
@@ -79,7 +79,7 @@ class Lifting:
     bisected: int
 
 
-def described(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
+def describe(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
     """Pieces, folds, boundaries and audit of a complex."""
     corners, points = given.cells, given.points
     whole = adjacency(corners)
@@ -199,12 +199,12 @@ def _audit(
     coordinates = points.p[:, setting.free]
     # of parts of sets two cells may be left at a crossing that belong to different sheets
     if crossed.any():
-        cells, origin = parted(corners, whole.facets[crossed], len(points))
+        cells, origin = cut_at_crossings(corners, whole.facets[crossed], len(points))
         sense = senses(cells, cell_index, coordinates[origin], adjacency(cells))
     else:
         sense = senses(corners, cell_index, coordinates, whole, component)
     edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
-    wrong = contradicted(points, given.kinds, corners, cell_index)
+    wrong = contradictions(points, given.kinds, corners, cell_index)
     wrong |= turned_off_folds(given.kinds, corners, sense.overturned, coordinates / setting.scales)
     whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
     most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
@@ -216,7 +216,7 @@ def _audit(
         non_manifold=int((whole.counts > most).sum()),
         crossings=int(crossed.sum()),
         contradictions=sense.contradictions
-        + unbalanced(corners, whole, sense, crossed & whole_crossing),
+        + count_unbalanced(corners, whole, sense, crossed & whole_crossing),
         overturned=int(sense.overturned.sum()),
         wrong=int(wrong.sum()),
         euler_characteristic=euler_characteristic(corners, edges),
@@ -235,7 +235,7 @@ VANISHING = 1e-4
 """Size of the eigenvalues that may count either way at folds and where sheets cross."""
 
 
-def contradicted(
+def contradictions(
     points: States,
     kinds: Int[np.ndarray, " V"],
     cells: Int[np.ndarray, "C corners"],

@@ -135,7 +135,7 @@ def on_edges(
     again, more = _beside_sides(fabric, ends[left], mark, lowest[left], t[left], room)
     at = np.concatenate([np.flatnonzero(found), left[again]])
     found[left[again]] = True
-    return found, vertices.joined(more).take(np.argsort(at))
+    return found, vertices.join(more).take(np.argsort(at))
 
 
 def _beside_sides(
@@ -153,11 +153,11 @@ def _beside_sides(
     """
     setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
     first, second = (fabric.end(ends, side, mark) for side in range(2))
-    z, p = _predicted(fabric, ends, mark, t)
+    z, p = _predict(fabric, ends, mark, t)
     turned = first.rows @ np.swapaxes(second.rows, 1, 2)
     plane = first.rows + turned @ second.rows
     length = np.linalg.norm(second.place - first.place, axis=1)
-    place = _embedded(fabric, z, p)
+    place = _embed(fabric, z, p)
     freely = _on_curves(fabric, mark, z, p, place, plane, length, first)
     found = np.zeros(len(ends), bool)
     for k in range(d):
@@ -174,14 +174,14 @@ def _beside_sides(
         end = first.take(own)
         row = plane[own][:, :, plane.shape[2] - d + k]
         end = replace(end, slopes=np.concatenate([end.slopes, row[:, None]], axis=1))
-        place[own] = _embedded(fabric, near_z, near_p)
+        place[own] = _embed(fabric, near_z, near_p)
         given = near_z, near_p, place[own], plane[own], length[own]
         pinned = _on_curves(fabric, mark | SIDES << 2 * k, *given, end)
         z[own], p[own], found[own] = pinned.z, pinned.p, pinned.found
-    return _accepted(fabric, Places(ends, mark, lowest, t), Pinned(z, p, found), place, plane)
+    return _accept(fabric, Places(ends, mark, lowest, t), Pinned(z, p, found), place, plane)
 
 
-def _accepted(
+def _accept(
     fabric: Fabric,
     wanted: Places,
     at: Pinned,
@@ -191,7 +191,7 @@ def _accepted(
     """Those vertices on edges that are close to where they were looked for, and of the index."""
     first, second = (fabric.vertices.place[wanted.ends[:, side]] for side in range(2))
     length = np.linalg.norm(second - first, axis=1)
-    here = _embedded(fabric, at.z, at.p)
+    here = _embed(fabric, at.z, at.p)
     found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
     for end, part in ((first, wanted.t), (second, 1.0 - wanted.t)):
         found &= np.linalg.norm(here - end, axis=1) <= (part + EXCESS) * length
@@ -216,17 +216,17 @@ def _orthogonally(
     """Vertices corrected orthogonally to the mean of the tangent spaces at both ends of edges."""
     setting, store = fabric.setting, fabric.vertices
     first, second = (fabric.end(ends, side, mark) for side in range(2))
-    z, p = _predicted(fabric, ends, mark, t)
+    z, p = _predict(fabric, ends, mark, t)
     # the second space seen from the first, so that both bases point the same way
     turned = first.rows @ np.swapaxes(second.rows, 1, 2)
     plane = first.rows + turned @ second.rows
-    place = _embedded(fabric, z, p)
+    place = _embed(fabric, z, p)
     length = np.linalg.norm(second.place - first.place, axis=1)
     if mark == 0 and rough:
         at: Corrected | Pinned = corrected_amid(setting, z, p, place, plane, length)
     else:
         at = _on_curves(fabric, mark, z, p, place, plane, length, first)
-    here = _embedded(fabric, at.z, at.p)
+    here = _embed(fabric, at.z, at.p)
     found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
     for end, part in ((first, t), (second, 1.0 - t)):
         found &= np.linalg.norm(here - end.place, axis=1) <= (part + EXCESS) * length
@@ -245,7 +245,7 @@ def _orthogonally(
     return found, vertices if good.all() else vertices.take(np.flatnonzero(good))
 
 
-def _predicted(
+def _predict(
     fabric: Fabric, ends: Int[np.ndarray, "n 2"], mark: int, t: Float[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]]:
     """Points at places t on the cubics over edges."""
@@ -344,7 +344,7 @@ def _index(
     return setting.structure.index(z, p)
 
 
-def _embedded(
+def _embed(
     fabric: Fabric, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
 ) -> Float[np.ndarray, "n coordinates"]:
     setting = fabric.setting

@@ -23,7 +23,13 @@ from equimorph.manifold.geometry.tangents import (
     Ends,
     best_corners,
 )
-from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of, parted, senses
+from equimorph.manifold.geometry.topology import (
+    adjacency,
+    cut_at_crossings,
+    flags_of,
+    keys_of,
+    senses,
+)
 from equimorph.structures import States
 
 ON_FOLD, ON_CAP, SIDES = 1, 2, 4
@@ -141,16 +147,16 @@ class Fabric:
         deque(results_of(tasks), maxlen=0)
         return np.asarray(total <= 0.0)
 
-    def bisected(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
+    def bisect(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
         """Cut edges at new vertices, and all cells and facets around them.
 
         Cells with several of the edges are cut at the first of them first, so that neighbours agree
         on what they share.
         """
         base = len(self.vertices)
-        cells, of_cells = _bisected(self.cells, edges, base)
-        facets, of_facets = _bisected(self.facets, edges, base)
-        vertices = self.vertices.joined(more)
+        cells, of_cells = _bisect(self.cells, edges, base)
+        facets, of_facets = _bisect(self.facets, edges, base)
+        vertices = self.vertices.join(more)
         squared = self.squared[of_cells]
         changed = np.flatnonzero((cells >= base).any(axis=1))
         squared[changed] = squared_sides(vertices.place, cells[changed])
@@ -229,7 +235,7 @@ def fabric_of(eset: EquilibriumSet) -> Fabric:
         np.concatenate([np.zeros((0, d), int), *(_facets(piece, d) for piece in pieces)])
         for pieces in (eset.crossings, eset.folds)
     )
-    cells, origin = parted(eset.cells, crossings, len(eset.points))
+    cells, origin = cut_at_crossings(eset.cells, crossings, len(eset.points))
     cells = cells.copy()
     z, p = eset.points.z[origin], eset.points.p[origin]
     whole = adjacency(cells)
@@ -279,7 +285,7 @@ def _outer_marks(
     return np.where(marks > 0, marks, np.where(capped[facets].all(axis=1), ON_CAP, HOLE))
 
 
-def _bisected(
+def _bisect(
     rows: Int[np.ndarray, "n k"], edges: Int[np.ndarray, "E 2"], base: int
 ) -> tuple[Int[np.ndarray, "m k"], Int[np.ndarray, " m"]]:
     """Rows cut at vertices ``base + e`` on edges e that they hold, and the rows they come from."""

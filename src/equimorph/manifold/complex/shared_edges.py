@@ -64,12 +64,12 @@ def with_copies(fabric: Fabric, ends: Ends, more: Vertices) -> tuple[Ends, Verti
     own = more.take(row)
     known = own.z, own.p, own.kinds, own.index, own.grid_vertex
     new = vertices_of(fabric.setting, *known, plane)
-    whole = more.joined(new)
+    whole = more.join(new)
     whole = replace(whole, shared=np.concatenate([shared, shared[row]]))
     return np.concatenate([ends, others]), whole
 
 
-def doubled(fabric: Fabric) -> Ends:
+def duplicates(fabric: Fabric) -> Ends:
     """Edges off the crossings between points that other edges join, too."""
     ends, _ = edges_of(fabric.cells, len(fabric.vertices))
     both = (fabric.vertices.shared[ends] >= 0).all(axis=1)

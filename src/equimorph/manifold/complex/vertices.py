@@ -64,7 +64,7 @@ class Vertices:
         """Return some of the vertices."""
         return replace(self, **{k: column[some] for k, column in self.columns.items()}, room=None)
 
-    def joined(self, *more: "Vertices") -> "Vertices":
+    def join(self, *more: "Vertices") -> "Vertices":
         """Return these vertices and more.
 
         Copied only if there is no room behind them, so that many additions cost as much as few.
@@ -92,7 +92,7 @@ class Vertices:
         return _Room(arrays, len(self))
 
 
-def gathered(parts: Sequence[Vertices], place: Int[np.ndarray, " V"]) -> Vertices:
+def gather(parts: Sequence[Vertices], place: Int[np.ndarray, " V"]) -> Vertices:
     """Vertices of several parts, part by part, each in its place."""
     first, cuts = parts[0], np.cumsum([len(part) for part in parts])[:-1]
     columns = {}

@@ -288,7 +288,7 @@ def senses(
     return Senses(signs * total[component], contradictions, volume * total[component] < 0)
 
 
-def unbalanced(
+def count_unbalanced(
     cells: Cells, whole: Adjacency, sense: Senses, facets: Bool[np.ndarray, " F"]
 ) -> int:
     """Number of the facets whose cells, with the orientation of their index, do not cancel.
@@ -300,7 +300,7 @@ def unbalanced(
     return int((total[facets] != 0).sum()) if len(cells) else 0
 
 
-def parted(
+def cut_at_crossings(
     cells: Cells, crossings: Int[np.ndarray, "x d"], count: int
 ) -> tuple[Cells, Int[np.ndarray, " V"]]:
     """Cells parted at facets on crossings, and for each vertex then the one that it was.

@@ -40,7 +40,7 @@ ON_FACE = 1e-9
 Frames = Float[np.ndarray, "lanes corners d"]
 
 
-def pin_confined(
+def pin_in_cells(
     setting: Setting,
     points: Points,
     groups: Sequence[Sequence[int]],
@@ -131,7 +131,7 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     )
     own = closed.owner[parts.region_surface]
     doubtful[own[overturned & ((parts.first_curve < 0) | _large(pairing.mesh)[own])]] = True
-    filled = _coned(parts, middles, apexes, ~doubtful[closed.owner])
+    filled = _cone(parts, middles, apexes, ~doubtful[closed.owner])
     return Balls(
         np.concatenate([spheres.plain, filled.corners]),
         np.concatenate([spheres.plain_index, filled.index]),
@@ -162,7 +162,7 @@ def _caps(
     count = len(surfaces.owner)
     amount = np.bincount(surfaces.surface, minlength=count)
     around = np.bincount(surfaces.rim_surface, minlength=count)
-    at, points = _grouped(surfaces.rim_surface, surfaces.rims, count)
+    at, points = _group(surfaces.rim_surface, surfaces.rims, count)
     ends = {
         kind: pairing.points.kind[points] == kind
         for kind in (VertexKind.CORNER, VertexKind.CROSSING)
@@ -176,12 +176,12 @@ def _caps(
     for kind, own in (*singular.items(), (VertexKind.CAP, plain)):
         used = own[at] & ends.get(kind, np.True_)
         groups = _groups(at[used], points[used], np.flatnonzero(own))
-        caps[own] = _pinned(pairing, groups, kind, surfaces.owner[own], cap=True)
+        caps[own] = _pin(pairing, groups, kind, surfaces.owner[own], cap=True)
         lost |= own & (caps < 0) & ((kind != VertexKind.CAP) | (around > 3))
     return caps, lost
 
 
-def _grouped(
+def _group(
     group: Int[np.ndarray, " n"], points: Int[np.ndarray, "n k"], groups: int
 ) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
     """Distinct points of each group, in order: their groups and their numbers."""
@@ -204,7 +204,7 @@ def _middles(
 ) -> Int[np.ndarray, " curves"]:
     """Exact point inside every curve: a fold, or a crossing; it can be on the constraint."""
     count = len(parts.curve_surface)
-    at, points = _grouped(parts.curve, parts.folds, count)
+    at, points = _group(parts.curve, parts.folds, count)
     cap = parts.closed.cap[parts.curve_surface]
     middles = np.full(count, -1)
     own = points == cap[at]
@@ -213,7 +213,7 @@ def _middles(
     for kind, own in ((VertexKind.FOLD, ~parts.curve_met), (VertexKind.CROSSING, parts.curve_met)):
         chosen = np.flatnonzero(left & own)
         owner = parts.closed.owner[parts.curve_surface[chosen]]
-        middles[chosen] = _pinned(pairing, _groups(at, points, chosen), kind, owner)
+        middles[chosen] = _pin(pairing, _groups(at, points, chosen), kind, owner)
     wanted = np.flatnonzero(left)
     owner = parts.closed.owner[parts.curve_surface[wanted]]
     doubtful[owner[middles[wanted] < 0]] = True
@@ -238,15 +238,15 @@ def _apexes(
     apexes[four] = parts.closed.corners[by_region[first[four]], 0]
     whole = parts.whole[parts.region_surface]
     wanted = np.flatnonzero(~folded & (apexes < 0) & whole)
-    at, points = _grouped(parts.region, parts.closed.corners, count)
+    at, points = _group(parts.region, parts.closed.corners, count)
     owner = parts.closed.owner[parts.region_surface[wanted]]
-    found = np.array(_pinned(pairing, _groups(at, points, wanted), VertexKind.AMID, owner), int)
+    found = np.array(_pin(pairing, _groups(at, points, wanted), VertexKind.AMID, owner), int)
     apexes[wanted] = found
     doubtful[owner[found < 0]] = True
     return apexes
 
 
-def _coned(
+def _cone(
     parts: Parts,
     middles: Int[np.ndarray, " curves"],
     apexes: Int[np.ndarray, " regions"],
@@ -278,7 +278,7 @@ def _coned(
     )
 
 
-def _pinned(
+def _pin(
     pairing: Pairing,
     groups: Sequence[Sequence[int]],
     kind: int,
@@ -291,11 +291,11 @@ def _pinned(
     Crossings belong to two surfaces, whose groups are the same; `cap`: on a constraint.
     """
     if kind == VertexKind.CROSSING:
-        return _shared(pairing, groups, owner, cap=cap)
+        return _pin_shared(pairing, groups, owner, cap=cap)
     return _new(pairing, groups, kind, owner, cap=cap)
 
 
-def _shared(
+def _pin_shared(
     pairing: Pairing,
     groups: Sequence[Sequence[int]],
     owner: Int[np.ndarray, " groups"],
@@ -349,6 +349,6 @@ def _pin_inside(
         pinned = pin_crossings(setting, pairing.points, groups, span, cap)
     else:
         frames = mesh.vertices[mesh.tetrahedra[owner]]
-        pinned = pin_confined(setting, pairing.points, groups, kind, span, frames)
+        pinned = pin_in_cells(setting, pairing.points, groups, kind, span, frames)
     inside = mesh.covers(pinned.p[:, setting.free])
     return Pinned(pinned.z, pinned.p, pinned.found & inside)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.complex.description import Complex, Frame, Lifting, described
+from equimorph.manifold.complex.description import Complex, Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.balls import Balls, fill
@@ -14,7 +14,7 @@ from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.discs import Discs, assemble
 from equimorph.manifold.lifting.edges import EFFORTS
 from equimorph.manifold.lifting.loops import find_loops
-from equimorph.manifold.lifting.pairing import Pairing, abandoned
+from equimorph.manifold.lifting.pairing import Pairing, abandoned_rays
 from equimorph.structures import States
 
 
@@ -90,16 +90,16 @@ def _with_discs(new: Discs, known: Discs, same: Bool[np.ndarray, " T"]) -> Discs
 def _with_balls(new: Balls, known: Balls, kept: Bool[np.ndarray, " N"]) -> Balls:
     """New balls, and known ones over tetrahedra that are the same."""
 
-    def joined(name: str, owner: str) -> Int[np.ndarray, "..."]:
+    def join(name: str, owner: str) -> Int[np.ndarray, "..."]:
         own = kept[getattr(known, owner)]
         return np.concatenate([getattr(new, name), getattr(known, name)[own]])
 
     return replace(
         new,
-        **{name: joined(name, "owner") for name in ("corners", "index", "owner")},
-        **{name: joined(name, "fold_owner") for name in ("folds", "fold_owner")},
-        **{name: joined(name, "cap_owner") for name in ("caps", "cap_owner")},
-        **{name: joined(name, "crossing_owner") for name in ("crossings", "crossing_owner")},
+        **{name: join(name, "owner") for name in ("corners", "index", "owner")},
+        **{name: join(name, "fold_owner") for name in ("folds", "fold_owner")},
+        **{name: join(name, "cap_owner") for name in ("caps", "cap_owner")},
+        **{name: join(name, "crossing_owner") for name in ("crossings", "crossing_owner")},
     )
 
 
@@ -198,7 +198,7 @@ def account(
         _kept(number[cells.caps]),
         _kept(number[cells.crossings]),
     )
-    lost = abandoned(pairing)
+    lost = abandoned_rays(pairing)
     lifting = Lifting(
         len(lost),
         sum(int(pairing.effort[edge]) >= EFFORTS for _, edge in lost),
@@ -207,7 +207,7 @@ def account(
         cells.doubtful if len(pairing.setting.free) > 1 else len(lonely(pairing)),
         bisected,
     )
-    return described(frame, whole, lifting)
+    return describe(frame, whole, lifting)
 
 
 def _kept(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:

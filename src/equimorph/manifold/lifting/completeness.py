@@ -15,7 +15,7 @@ from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.descents_of_set import descents_of_set
-from equimorph.manifold.lifting.seeds import Seeds, polished
+from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.model import Progress, position
 from equimorph.structures import States
@@ -149,7 +149,7 @@ def seeds_from(
     origin = np.repeat(np.arange(len(states)), vertices.shape[1])
     targets = setting.parameters(mesh.vertices[vertices.ravel()])
     z, which = lift_to(states[origin], targets, setting.constraints)
-    found, good = polished(setting, mesh, vertices.ravel()[which], z)
+    found, good = polish(setting, mesh, vertices.ravel()[which], z)
     return found, origin[which][good]
 
 

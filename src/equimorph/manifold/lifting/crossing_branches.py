@@ -18,7 +18,7 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.edges import EFFORTS
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.seeds import Seeds, polished
+from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.model import Progress
 
 DISTANCES = (0.03, 0.003, 0.0003)
@@ -100,7 +100,7 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> Seeds:
         if number == 0:
             _enter_arcs(pairing, alone, halves, ways, outcome)
         there = outcome.code == EventCode.ARRIVED
-        reached.append(polished(setting, mesh, goal[there], outcome.z[there])[0])
+        reached.append(polish(setting, mesh, goal[there], outcome.z[there])[0])
         back = np.flatnonzero(outcome.code == EventCode.RETURNED)
         z, p, edges, towards = outcome.z[back], p[back], edges[back], 1 - towards[back]
         if len(back) == 0:

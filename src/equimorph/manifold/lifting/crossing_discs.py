@@ -86,7 +86,7 @@ def put_hubs(pairing: Pairing, plans: list[Plan]) -> set[int]:
     """Lead folds that cross a chord of a crossing through a hub; return triangles without one."""
     lost: set[int] = set()
     plans = [plan for plan in plans if VertexKind.CROSSING in plan.kinds.values()]
-    for hub in [plan for plan in plans if plan.those(TURN) and _joined(plan) < _singular(plan)]:
+    for hub in [plan for plan in plans if plan.those(TURN) and _join(plan) < _singular(plan)]:
         triangle, chord = hub.polygon.triangle, hub.chords[0]
         point = _hub(pairing, triangle, chord)
         if point is None:
@@ -99,7 +99,7 @@ def put_hubs(pairing: Pairing, plans: list[Plan]) -> set[int]:
     return lost
 
 
-def _joined(plan: Plan) -> int:
+def _join(plan: Plan) -> int:
     return 2 * len(plan.chords)
 
 
@@ -113,7 +113,7 @@ def split_crossings(
     """Put exact points on chords of crossings, for both sheets; return triangles without one."""
     known = {(plan.polygon.triangle, chord) for plan in plans for chord in plan.middle}
     todo = sorted(wanted - known)
-    points = _pinned(pairing, todo, cap=False)
+    points = _pin(pairing, todo, cap=False)
     at = dict(zip(todo, points, strict=True))
     for plan in plans:
         for chord in plan.chords:
@@ -132,12 +132,12 @@ def pin_ends(pairing: Pairing, plans: list[Plan]) -> list[int | None]:
         if keys.count(key) == SHEETS
     }
     first = {key: group for group, key in reversed(groups.items())}
-    points = _pinned(pairing, list(first.values()), cap=True)
+    points = _pin(pairing, list(first.values()), cap=True)
     at = dict(zip(first, points, strict=True))
     return [at.get(key) for key in keys]
 
 
-def _pinned(
+def _pin(
     pairing: Pairing, wanted: Sequence[tuple[int, tuple[int, ...]]], *, cap: bool
 ) -> list[int | None]:
     """Numbers of new crossing points amid points over triangles; None where none was found."""

@@ -152,7 +152,7 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     )
     wanted = [(plan, kind) for plan, kind in wanted if kind]
     pairs = [(plan, (plan.points[0], plan.points[-1]), kind) for plan, kind in wanted]
-    extra = _pinned(pairing, pairs)
+    extra = _pin(pairing, pairs)
     crossing = [k for k, (_, kind) in enumerate(wanted) if kind == VertexKind.CROSSING]
     ends = pin_ends(pairing, [wanted[k][0] for k in crossing])
     for k, point in zip(crossing, ends, strict=True):
@@ -259,7 +259,7 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     """Put an exact point on chords that would lie on a grid edge, or block triangulation."""
     wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
     folds = [(plan, chord) for plan, chord in wanted if plan.singular(chord[0]) == TURN]
-    extra = _pinned(pairing, [(plan, chord, VertexKind.FOLD) for plan, chord in folds])
+    extra = _pin(pairing, [(plan, chord, VertexKind.FOLD) for plan, chord in folds])
     for (plan, chord), point in zip(folds, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
@@ -289,7 +289,7 @@ def _chords_to_split(plan: Plan) -> list[Chord]:
     return [chords[chord] for chord in chosen]
 
 
-def _pinned(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int | None]:
+def _pin(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int | None]:
     """Numbers of new exact points of some kind between pairs; None where none was found."""
     out: list[int | None] = [None] * len(wanted)
     for kind in (VertexKind.FOLD, VertexKind.CAP, VertexKind.CORNER):

@@ -170,7 +170,7 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
         turning=0.25 * finer,
         look_inside=False,
     )
-    traced = _traced(pairing, rays, line, options)
+    traced = _follow(pairing, rays, line, options)
     np.add.at(pairing.effort, rays.edges[~traced.good], 1)
     ends = _ends(pairing, traced)
     inner = traced.inner
@@ -192,7 +192,7 @@ def _number(pairing: Pairing, point: Inner, edge: int) -> int:
     return pairing.points.add(point.z, point.p, point.index, point.kind, edge)
 
 
-def _traced(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOptions) -> Traced:
+def _follow(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOptions) -> Traced:
     """Follow rays to their ends."""
     mesh, setting = pairing.mesh, pairing.setting
     outcome = trace(line, pairing.points.z[rays.points], setting.constraints, options)
@@ -254,7 +254,7 @@ def _inner(
     own = np.flatnonzero(kind == VertexKind.CROSSING)
     if len(own):
         those = rays.take(passed.lanes[at[own]])
-        pinned = _pinned(pairing, those, z[own], p[own], VertexKind.CROSSING)
+        pinned = _pin(pairing, those, z[own], p[own], VertexKind.CROSSING)
         z[own], p[own] = pinned.z, pinned.p
         index[own] = lower_index(pairing.setting, pinned.z, pinned.p)
         good[passed.lanes[at[own[~pinned.found]]]] = False
@@ -262,7 +262,7 @@ def _inner(
         keep[own] = _first_ones(pairing, crossed, pinned)
         doubtful = np.flatnonzero((kind == VertexKind.FOLD) & np.isin(passed.lanes[at], crossed))
         those = rays.take(passed.lanes[at[doubtful]])
-        again = _pinned(pairing, those, z[doubtful], p[doubtful], VertexKind.FOLD)
+        again = _pin(pairing, those, z[doubtful], p[doubtful], VertexKind.FOLD)
         keep[doubtful] = again.found
     rows: dict[int, list[Inner]] = {}
     places: dict[int, float] = {}
@@ -286,7 +286,7 @@ def _first_ones(
     return np.concatenate([[True], ~again])
 
 
-def _pinned(
+def _pin(
     pairing: Pairing,
     rays: Rays,
     z: Float[np.ndarray, "n size"],

@@ -140,17 +140,17 @@ class _Growth:
     def mesh(self, old: BaseMesh) -> BaseMesh:
         """Put the rows together."""
 
-        def joined(rows: np.ndarray, more: list[list[int]]) -> np.ndarray:
+        def append_rows(rows: np.ndarray, more: list[list[int]]) -> np.ndarray:
             return np.concatenate([rows, np.array(more, int).reshape(-1, rows.shape[1])])
 
         return replace(
             old,
             vertices=np.concatenate([old.vertices, *(each[None] for each in self.vertices)]),
             edges=np.concatenate([old.edges, np.array(self.edges, int).reshape(-1, 2)]),
-            triangles=joined(self.triangles, [row[0] for row in self.more_triangles]),
-            sides=joined(self.sides, [row[1] for row in self.more_triangles]),
-            tetrahedra=joined(self.tetrahedra, [row[0] for row in self.more_tetrahedra]),
-            faces=joined(self.faces, [row[1] for row in self.more_tetrahedra]),
+            triangles=append_rows(self.triangles, [row[0] for row in self.more_triangles]),
+            sides=append_rows(self.sides, [row[1] for row in self.more_triangles]),
+            tetrahedra=append_rows(self.tetrahedra, [row[0] for row in self.more_tetrahedra]),
+            faces=append_rows(self.faces, [row[1] for row in self.more_tetrahedra]),
         )
 
 

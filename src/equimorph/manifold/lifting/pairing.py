@@ -137,7 +137,7 @@ class Pairing:
         """Whether a curve has not been taken back."""
         return self.ray(self.curves.start[curve], self.curves.edge[curve]) == curve
 
-    def marked(self, mark: RayMark) -> Rays:
+    def rays_with(self, mark: RayMark) -> Rays:
         """Rays with a certain mark: of each edge from one end, lest curves be traced twice."""
         count = self.points.count
         vertex = self.points.vertex[:count]
@@ -257,7 +257,7 @@ def start_pairing(setting: Setting, mesh: BaseMesh, limit: int) -> Pairing:
     return pairing
 
 
-def abandoned(pairing: Pairing) -> list[tuple[int, int]]:
+def abandoned_rays(pairing: Pairing) -> list[tuple[int, int]]:
     """Rays that could not be traced: (point, edge) on edges that are in use."""
     pairing.fit()
     used = np.append(pairing.mesh.edges_in_use, False)

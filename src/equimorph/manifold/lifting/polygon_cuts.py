@@ -137,7 +137,7 @@ def chords_to_split(sides: tuple[int, ...], chords: tuple[Chord, ...]) -> tuple[
         stand_in = {split: -1 - number for number, split in enumerate(chosen)}
         pieces = cut(range(len(sides)), chords, stand_in)
         if all(
-            can_be_triangulated(tuple(sides[at] if at >= 0 else 0 for at in piece))
+            has_triangulation(tuple(sides[at] if at >= 0 else 0 for at in piece))
             for piece in pieces
         ):
             break
@@ -147,7 +147,7 @@ def chords_to_split(sides: tuple[int, ...], chords: tuple[Chord, ...]) -> tuple[
 
 
 @lru_cache(maxsize=4096)
-def can_be_triangulated(sides: tuple[int, ...]) -> bool:
+def has_triangulation(sides: tuple[int, ...]) -> bool:
     """Whether corners that lie on these sides of the grid triangle have enough diagonals."""
     if len(sides) <= 3:
         return len(sides) == 3

@@ -38,7 +38,7 @@ class Hits:
         return Hits(*(column[some] for column in vars(self).values()))
 
     @classmethod
-    def joined(cls, parts: Sequence["Hits"]) -> "Hits":
+    def join(cls, parts: Sequence["Hits"]) -> "Hits":
         """All pairs of some parts, at least one."""
         columns = zip(*(vars(part).values() for part in parts), strict=True)
         return cls(*(np.concatenate(column) for column in columns))
@@ -100,7 +100,7 @@ class CellIndex:
             np.clip((side * counts).astype(int), 0, counts - 1)
             for side in (low - room, high + room)
         )
-        starts, cells = _listed(first, last, counts)
+        starts, cells = _cells_by_bin(first, last, counts)
         return cls(lower, width, counts, starts, cells, _maps(unit), overhang)
 
     def near(self, points: Float[np.ndarray, "n d"]) -> Hits:
@@ -143,7 +143,7 @@ def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "C corner
     return np.asarray(maps)
 
 
-def _listed(
+def _cells_by_bin(
     first: Int[np.ndarray, "C d"], last: Int[np.ndarray, "C d"], counts: Int[np.ndarray, " d"]
 ) -> tuple[Int[np.ndarray, " bins_and_one"], Int[np.ndarray, " entries"]]:
     """Cells by bin, from the ranges of bins that they reach."""

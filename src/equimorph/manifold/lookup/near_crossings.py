@@ -99,7 +99,7 @@ class NearCrossings:
         """How far crossings lie from the middles of their facets, in the scaled parameters."""
         number = np.arange(len(self.facets))
         p = self.points.p[self.facets].mean(axis=1)
-        pinned = self._pinned(p, number)
+        pinned = self._pin(p, number)
         away = np.linalg.norm(self._places(pinned.p - p), axis=1)
         size = np.ptp(self._places(self.points.p)[self.facets], axis=1).max(axis=1, initial=0.0)
         return np.asarray(np.where(pinned.found, away, 0.1 * size))
@@ -126,7 +126,7 @@ class NearCrossings:
         kept = away <= NEAR + 2.0 * self._bulge[facet]
         return np.unique(np.stack([point[kept], facet[kept]], axis=1), axis=0)
 
-    def _pinned(self, p: Parameters, facet: Int[np.ndarray, " lanes"]) -> Pinned:
+    def _pin(self, p: Parameters, facet: Int[np.ndarray, " lanes"]) -> Pinned:
         """Crossing points on lines through points, normal to facets."""
         own = self.facets[facet]
         place = self._places(self.points.p[own])
@@ -149,7 +149,7 @@ class NearCrossings:
     def centres(self, close: Int[np.ndarray, "m 2"], p: Parameters) -> Centres:
         """Crossing points closer than `NEAR` to points, each once."""
         point, facet = close.T
-        pinned = self._pinned(p[point], facet)
+        pinned = self._pin(p[point], facet)
         away = np.linalg.norm(self._places(pinned.p - p[point]), axis=1)
         kept = np.flatnonzero(pinned.found & (away <= NEAR))
         z, own, at = pinned.z[kept], pinned.p[kept], point[kept]

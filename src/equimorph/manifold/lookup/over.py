@@ -120,7 +120,7 @@ class Sheets:
         parts = [found for found, _ in chunks]
         doubtful = [near for _, near in chunks if near is not None]
         if doubtful:
-            parts.extend(self._searched(p, Hits.joined(doubtful)))
+            parts.extend(self._search(p, Hits.join(doubtful)))
         z, point, cell = (
             column[0] if len(parts) == 1 else np.concatenate(column)
             for column in zip(*parts, strict=True)
@@ -148,7 +148,7 @@ class Sheets:
         centres = crossings.centres(close, p)
         branches, centres = crossings.branches(centres, p)
         own = np.isin(branches.index, self.cell_index)
-        own &= self._allowed(branches.z, p[branches.point])
+        own &= self._admissible(branches.z, p[branches.point])
         of_own = (branches.z[own], branches.point[own], branches.index[own])
         kept = ~crossings.on_branches(centres, p, z, point)
         parts = [(z[kept], point[kept], cell[kept])]
@@ -198,7 +198,7 @@ class Sheets:
             found = found[sure[hits.point[found]]]
             doubtful = near.take(~sure[near.point])
             doubtful = replace(doubtful, point=first + doubtful.point)
-        kept = found[self._allowed(z[found], at[found])]
+        kept = found[self._admissible(z[found], at[found])]
         return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
 
     def _near(self, x: Float[np.ndarray, "points d"]) -> Hits:
@@ -242,13 +242,13 @@ class Sheets:
             np.maximum(longest, (u[corner] - first) ** 2 @ self.structure.mass, out=longest)
         return 2.0 * np.sqrt(longest) + SAME_STATE
 
-    def _allowed(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
+    def _admissible(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
         good = np.ones(len(z), bool)
         for constraint in self.constraints:
             good &= constraint.excess(z, p) <= 0.0
         return good
 
-    def _searched(self, p: Points, near: Hits) -> Iterator[Found]:
+    def _search(self, p: Points, near: Hits) -> Iterator[Found]:
         """States over points by lifts and Newton from all regular vertices near each of them."""
         guess = self._guess(near)
         pairs = np.stack(
@@ -334,7 +334,7 @@ class Sheets:
         """Admissible states to which Newton leads over the points of the starts; which points."""
         z, good, _ = exact_states(self.structure, starts, p[owner])
         z, owner = z[good], owner[good]
-        good = self.structure.resolved(z, p[owner]) & self._allowed(z, p[owner])
+        good = self.structure.resolved(z, p[owner]) & self._admissible(z, p[owner])
         return z[good], owner[good]
 
     def _nearest(
@@ -351,7 +351,7 @@ class Sheets:
         return np.where(near, mine.cell[best], -1)
 
 
-def rooted(
+def root_weights(
     weights: Float[np.ndarray, "n corners"], folded: Bool[np.ndarray, "n corners"]
 ) -> Float[np.ndarray, "n corners"]:
     """Weights of corners with the root of the share of those off the fold as their share."""

@@ -145,10 +145,10 @@ def components(
             known = restricted(known, each)
     sizes = np.bincount(known.component, cell_sizes(known), len(known.components))
     order = np.argsort(-sizes, kind="stable")
-    return Components(_renumbered(known, order), sizes[order], known.audit.unrefined - before)
+    return Components(_renumber(known, order), sizes[order], known.audit.unrefined - before)
 
 
-def _renumbered(eset: EquilibriumSet, order: Int[np.ndarray, " pieces"]) -> EquilibriumSet:
+def _renumber(eset: EquilibriumSet, order: Int[np.ndarray, " pieces"]) -> EquilibriumSet:
     """The set with its components in another order."""
     number = np.argsort(order)
     return replace(

@@ -106,7 +106,7 @@ def _between(
     store, setting = fabric.vertices, fabric.setting
     tests = (lambda at: at.g, lambda at: at.quadratic)
     locus = Locus(setting.structure, store.p[edge[0]], setting.free, tests)
-    x = locus.joined(store.z[edge], store.p[edge])
+    x = locus.join(store.z[edge], store.p[edge])
     length = np.linalg.norm(store.place[edge[1]] - store.place[edge[0]])
     for start in (x.mean(axis=0, keepdims=True), x[:1], x[1:]):
         spot, found = nearest(locus, start)
@@ -132,7 +132,7 @@ def with_cusps_beside(fabric: Fabric, beside: Bool[np.ndarray, " C"]) -> Fabric:
     whole = np.linalg.norm(place[ends[:, 1]] - place[ends[:, 0]], axis=1)
     whole_edges = (fabric.edge_marks(np.sort(ends, axis=1)) & (HOLE | RIM)) == 0
     apart = np.flatnonzero((gap > CLOSE * whole).all(axis=0) & whole_edges)
-    return fabric.bisected(ends[apart], found.take(apart)) if len(apart) else fabric
+    return fabric.bisect(ends[apart], found.take(apart)) if len(apart) else fabric
 
 
 def cusps_on_edges(

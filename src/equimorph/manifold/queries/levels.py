@@ -17,7 +17,7 @@ from equimorph.manifold.complex.cuts import (
     cut_between,
     roots,
 )
-from equimorph.manifold.complex.description import Frame, Lifting, described
+from equimorph.manifold.complex.description import Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import HOLE, ON_CAP, Fabric, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
@@ -107,16 +107,16 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
     """
     _check_count(eset, descriptors)
     fabric = fabric_of(eset)
-    return _divided(eset, _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors)))
+    return _divide(eset, _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors)))
 
 
 @door
 def divided_by(eset: EquilibriumSet, constraint: Constraint) -> Division:
     """Cut a set exactly along the bound of a constraint; the side is -1 where it is obeyed."""
-    return _divided(eset, _cut(fabric_of(eset), lambda v: constraint.excess(v.z, v.p)))
+    return _divide(eset, _cut(fabric_of(eset), lambda v: constraint.excess(v.z, v.p)))
 
 
-def _divided(eset: EquilibriumSet, cut: "Cut") -> Division:
+def _divide(eset: EquilibriumSet, cut: "Cut") -> Division:
     nothing = np.zeros(len(cut.values), bool)
     whole = part_of(eset, cut.fabric, np.ones(len(cut.fabric.cells), bool), nothing, cut.lost)
     side = np.sign(cut.values[cut.fabric.cells].sum(axis=1)).astype(int)
@@ -238,7 +238,7 @@ def part_of(
         audit.parity_violations, audit.undecided, audit.bisected,
     )  # fmt: skip
     frame = Frame(fabric.setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
-    out = described(frame, fabric.complex(), lifting)
+    out = describe(frame, fabric.complex(), lifting)
     kept = replace(
         out.audit,
         checked=audit.checked,

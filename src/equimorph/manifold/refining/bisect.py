@@ -5,8 +5,8 @@ from jaxtyping import Bool, Int
 
 from equimorph.manifold.complex.edge_points import Places, chunks, on_all_edges, unmet
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric
-from equimorph.manifold.complex.shared_edges import copies, doubled, first_copies, with_copies
-from equimorph.manifold.complex.vertices import Vertices, gathered
+from equimorph.manifold.complex.shared_edges import copies, duplicates, first_copies, with_copies
+from equimorph.manifold.complex.vertices import Vertices, gather
 from equimorph.manifold.geometry.topology import keys_of
 from equimorph.manifold.refining.deviation import Edges, Memory, chosen, known
 from equimorph.manifold.refining.follow_edge import follow_edge, on_plain_curves
@@ -77,14 +77,14 @@ def _settle_around(
     near[ends] = True
     patch = patch_around(fabric, near, RINGS)
     inner = memory.among(patch.inside)
-    out = patch.replaced(settle(patch.fabric, tolerance, inner))
+    out = patch.replace_by(settle(patch.fabric, tolerance, inner))
     memory.learn(inner, patch.inside)
     return out
 
 
 def part_sheets(fabric: Fabric, memory: Memory) -> Fabric:
     """Vertices on edges of several sheets that join the same two points of their crossing."""
-    ends = doubled(fabric)
+    ends = duplicates(fabric)
     if len(ends) == 0:
         return fabric
     edges, base = known(fabric, memory), len(fabric.vertices)
@@ -119,13 +119,13 @@ def bisect(fabric: Fabric, edges: Edges, at_once: Int[np.ndarray, " n"], memory:
     order = np.argsort(rank[at])
     place = np.empty(len(at), int)
     place[order] = np.arange(len(at))
-    at, more = at[order], gathered(parts, place)
+    at, more = at[order], gather(parts, place)
     if ((edges.marks[at] & CURVES) > 0).any():
         memory.stuck.clear()  # beside a fold that is better known they may succeed
     whole, more = with_copies(fabric, ends[at], more)
     memory.cut = np.concatenate([memory.cut, whole])
     memory.put = np.concatenate([memory.put, len(fabric.vertices) + np.arange(len(whole))])
-    return fabric.bisected(whole, more) if len(at) else fabric
+    return fabric.bisect(whole, more) if len(at) else fabric
 
 
 def _vertices_on(

@@ -98,7 +98,7 @@ class Memory:
         kept = ~(touched[self.keys >> 32] & touched[self.keys & 0xFFFFFFFF])
         self.keys, self.error = self.keys[kept], self.error[kept]
 
-    def barred(self, fabric: Fabric) -> tuple[Int[np.ndarray, "n 2"], Int[np.ndarray, " n"]]:
+    def past_edges(self, fabric: Fabric) -> tuple[Int[np.ndarray, "n 2"], Int[np.ndarray, " n"]]:
         """Edges that were bisected, with the vertices on them, where these are there."""
         live = np.zeros(len(fabric.vertices), bool)
         live[fabric.cells] = True
@@ -239,8 +239,8 @@ def chosen(edges: Edges, tolerance: float) -> Int[np.ndarray, " n"]:
     """
     deviating = edges.deviating(tolerance)
     few = np.count_nonzero(deviating) * FEW < len(deviating) and not deviating[edges.uneven].any()
-    coarse, _ = _closed(edges, deviating & (few | (edges.error > COARSE * tolerance)))
-    wanted, weight = _closed(edges, coarse | deviating)
+    coarse, _ = _close(edges, deviating & (few | (edges.error > COARSE * tolerance)))
+    wanted, weight = _close(edges, coarse | deviating)
     cells = edges.of_cells[wanted[edges.of_cells].any(axis=1)]
     longest = cells[np.arange(len(cells)), weight[cells].argmax(axis=1)]
     around = np.bincount(edges.of_cells.ravel(), minlength=len(weight))
@@ -249,7 +249,7 @@ def chosen(edges: Edges, tolerance: float) -> Int[np.ndarray, " n"]:
     return out[np.argsort(-weight[out], kind="stable")]
 
 
-def _closed(
+def _close(
     edges: Edges, wanted: Bool[np.ndarray, " E"]
 ) -> tuple[Bool[np.ndarray, " E"], Float[np.ndarray, " E"]]:
     """Wanted edges and what follows; and by how much cells prefer to be cut at each edge.

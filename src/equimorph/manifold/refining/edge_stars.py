@@ -57,7 +57,7 @@ def reconnections(
     rings = rings_around(part, edges)
     rings = replace(rings, cells=np.where(rings.cells < 0, -1, around[rings.cells]))
     rings = rings.take(_open_again(rings, near))
-    return _without_edges(fabric, rings, barred, facets).joined(
+    return _without_edges(fabric, rings, barred, facets).join(
         _through_facets(fabric, poor, around, barred)
     )
 
@@ -191,7 +191,7 @@ def rings_around(fabric: Fabric, ends: Edges) -> Rings:
     table = np.full((len(ends), MOST, 3), -1)
     table[edge, place] = np.concatenate([cell[:, None], arc], axis=1)
     kept = (count > 0) & (count <= MOST)
-    return _ordered(fabric, ends[kept], mark[kept], count[kept], table[kept])
+    return _order(fabric, ends[kept], mark[kept], count[kept], table[kept])
 
 
 def _single(mark: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
@@ -219,7 +219,7 @@ def _arcs(
     return np.concatenate(edges), np.concatenate(owners), np.concatenate(arcs)
 
 
-def _ordered(
+def _order(
     fabric: Fabric,
     ends: Edges,
     mark: Int[np.ndarray, " n"],

@@ -46,13 +46,13 @@ def follow_edge(
     chord = (goal.place - start.place)[0]
     way = _direction(fabric, start, mark)
     for sign in (1.0, -1.0) if way @ chord >= 0.0 else (-1.0, 1.0):
-        found = _followed(fabric, (start, goal), sign * way, mark, lowest)
+        found = _follow(fabric, (start, goal), sign * way, mark, lowest)
         if found is not None:
             return found
     return None
 
 
-def _followed(
+def _follow(
     fabric: Fabric,
     ends: tuple[Vertices, Vertices],
     way: Float[np.ndarray, " coordinates"],

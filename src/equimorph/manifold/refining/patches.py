@@ -25,7 +25,7 @@ class Patch:
     rest: Fabric
     inside: Bool[np.ndarray, " V"]
 
-    def replaced(self, by: Fabric) -> Fabric:
+    def replace_by(self, by: Fabric) -> Fabric:
         """Return the whole fabric, with another one in place of the patch."""
         kept, rest = (by.marks & RIM) == 0, self.rest
         return replace(

@@ -98,7 +98,7 @@ def qualities(vertices: Vertices, cells: Cells, index: Indices) -> Angles:
     """
     d, squared = cells.shape[1] - 1, squared_sides(vertices.place, cells)
     seen = volumes_at_corners(vertices, cells)
-    factor = np.where(overturned(vertices, cells, index), OVERTURNED[d], 1.0)
+    factor = np.where(project_against_index(vertices, cells, index), OVERTURNED[d], 1.0)
     if d > TRIANGLES:
         cosine = seen.min(axis=1) / _volumes(squared)
         factor *= np.where(cosine > 0.0, np.minimum(cosine, 1.0), 1.0)
@@ -119,12 +119,14 @@ def qualities_near(fabric: Fabric, near: Bool[np.ndarray, " V"]) -> Angles:
         out[own] = qualities(fabric.vertices, cells, index)
         return out
     angle = smallest_angles(fabric.squared[own])
-    over = np.where(overturned(fabric.vertices, cells, index), OVERTURNED[2], 1.0)
+    over = np.where(project_against_index(fabric.vertices, cells, index), OVERTURNED[2], 1.0)
     out[own] = over * angle - np.pi * fabric.looks_back(cells)
     return out
 
 
-def overturned(vertices: Vertices, cells: Cells, index: Indices) -> Bool[np.ndarray, " cells"]:
+def project_against_index(
+    vertices: Vertices, cells: Cells, index: Indices
+) -> Bool[np.ndarray, " cells"]:
     """Whether cells project against the parity of their index."""
     flat = vertices.place[:, 1 - cells.shape[1] :]
     if len(cells) > len(flat):
@@ -190,7 +192,7 @@ def smallest_free_angle(fabric: Fabric) -> float:
         return 0.0
     free = smallest_angles(fabric.squared)
     if (fabric.marks & ON_CROSSING).any():
-        free = free[~squeezed(fabric, SHARP)]
+        free = free[~confined_angles(fabric, SHARP)]
     return float(np.degrees(free.min(initial=np.inf)))
 
 
@@ -248,7 +250,7 @@ def _corner_angles(fabric: Fabric) -> Float[np.ndarray, "C 3"]:
     return out
 
 
-def squeezed(fabric: Fabric, sharp: float) -> Bool[np.ndarray, " C"]:
+def confined_angles(fabric: Fabric, sharp: float) -> Bool[np.ndarray, " C"]:
     """Triangles that cannot be expected to have no angle smaller than `sharp`.
 
     Those between curves that meet at less than that, from the corner on as long as all vertices lie

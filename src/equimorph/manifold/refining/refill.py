@@ -74,8 +74,8 @@ def refill(
         for candidates, passes in _kinds(fabric, memory, short if fine else 0.0)[: 2 + fine]:
             found = repeat(candidates, passes, fabric, quality, near, memory, limit)
             fabric, quality, own = found
-            near, changed = _extended(near, fabric), _extended(changed, fabric) | own
-        near, touched = changed, _extended(touched, fabric) | changed
+            near, changed = _extend(near, fabric), _extend(changed, fabric) | own
+        near, touched = changed, _extend(touched, fabric) | changed
         if not near.any():
             break
     memory.forget(touched)
@@ -87,14 +87,14 @@ def _reconnect(fabric: Fabric, memory: Memory) -> tuple[Fabric, Near]:
     changed = np.zeros(len(fabric.vertices), bool)
     if fabric.dimension == TRIANGLES:
         before = fabric.cells
-        fabric = flip(fabric, memory.barred(fabric)[0])
+        fabric = flip(fabric, memory.past_edges(fabric)[0])
         changed[fabric.cells[(fabric.cells != before).any(axis=1)]] = True
     return fabric, changed
 
 
 def _kinds(fabric: Fabric, memory: Memory, short: float) -> list[tuple[Candidates, int]]:
     """Functions that return candidates, and how often each is called in a round."""
-    but, _ = memory.barred(fabric)
+    but, _ = memory.past_edges(fabric)
     rings = partial(reconnections, but=but)
     return [
         (rings, RECONNECTIONS if fabric.dimension == TETRAHEDRA else 0),
@@ -124,12 +124,12 @@ def repeat(
         near = best.beaten
         near[fabric.cells[refills.gone]] = True
         near[refills.come] = True
-        changed = _extended(changed, fabric) | near
-        fabric, quality = _applied(refills, quality, come)
-    return fabric, quality, _extended(changed, fabric)
+        changed = _extend(changed, fabric) | near
+        fabric, quality = _apply(refills, quality, come)
+    return fabric, quality, _extend(changed, fabric)
 
 
-def _extended(near: Bool[np.ndarray, " old"], fabric: Fabric) -> NewNear:
+def _extend(near: Bool[np.ndarray, " old"], fabric: Fabric) -> NewNear:
     """Flags of vertices, false for those added since."""
     return np.pad(near, (0, len(fabric.vertices) - len(near)))
 
@@ -154,19 +154,19 @@ def _best(refills: Refills, quality: Quality, memory: Memory, limit: float) -> _
     gain = gains(refills, quality, come)
     kept = gain > GAIN
     come, gain, refills = come[kept[refills.come_row]], gain[kept], refills.take(kept)
-    allowed = _allowed(refills, memory, limit)
+    allowed = _admissible(refills, memory, limit)
     kept = _apart(refills, np.where(allowed, gain, -1.0))
     beaten = np.zeros(len(refills.fabric.vertices), bool)
     beaten[refills.fabric.cells[refills.gone[(allowed & ~kept)[refills.gone_row]]]] = True
     return _Best(refills.take(kept), come[kept[refills.come_row]], beaten)
 
 
-def _allowed(refills: Refills, memory: Memory, limit: float) -> Bool[np.ndarray, " refills"]:
+def _admissible(refills: Refills, memory: Memory, limit: float) -> Bool[np.ndarray, " refills"]:
     """Whether no edge comes that was bisected, while its vertex stays, or deviates too much."""
     fabric, base = refills.fabric, len(refills.fabric.vertices)
     row, key = refills.new_edges
     good = np.ones(refills.count, bool)
-    cut, on_edge = memory.barred(fabric)
+    cut, on_edge = memory.past_edges(fabric)
     order = np.argsort(keys_of(cut, base))
     known, on_edge = keys_of(cut, base)[order], on_edge[order]
     back = np.flatnonzero(among(key, known))
@@ -197,7 +197,7 @@ def _apart(refills: Refills, gain: Float[np.ndarray, " refills"]) -> Bool[np.nda
     return kept
 
 
-def _applied(
+def _apply(
     refills: Refills, quality: Quality, come: Float[np.ndarray, " come"]
 ) -> tuple[Fabric, NewQuality]:
     """Fabric and qualities of its cells after some refills."""

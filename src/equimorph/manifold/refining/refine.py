@@ -15,7 +15,7 @@ import numpy as np
 
 from equimorph.door import door
 from equimorph.manifold.complex.audit import Audit
-from equimorph.manifold.complex.description import Frame, Lifting, described
+from equimorph.manifold.complex.description import Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import question_of_refinement, recall_set
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
@@ -70,14 +70,14 @@ def refine(
     InputError
         If `accuracy` is not positive, or the journal is of something else.
     """
-    compute = partial(refined, eset, accuracy, progress or Silent())
+    compute = partial(refine_cells, eset, accuracy, progress or Silent())
     if journal is None:
         return compute()
     question = question_of_refinement(eset, accuracy)
     return recall_set(journal, question, eset.setting, eset.box, eset.fixed, compute)
 
 
-def refined(eset: EquilibriumSet, accuracy: float, progress: Progress) -> EquilibriumSet:
+def refine_cells(eset: EquilibriumSet, accuracy: float, progress: Progress) -> EquilibriumSet:
     """Return the set with cells so small that they are within a tolerance of it."""
     if len(eset.cells) == 0:
         return eset
@@ -92,7 +92,7 @@ def refined(eset: EquilibriumSet, accuracy: float, progress: Progress) -> Equili
         audit.parity_violations, audit.undecided, audit.bisected,
     )  # fmt: skip
     frame = Frame(eset.setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
-    out = described(frame, fabric.complex(), lifting)
+    out = describe(frame, fabric.complex(), lifting)
     quality = replace(
         out.audit,
         checked=audit.checked,
@@ -103,13 +103,13 @@ def refined(eset: EquilibriumSet, accuracy: float, progress: Progress) -> Equili
         unrefined=int((edges.error > SHARE[len(eset.names)] * accuracy).sum()),
         smallest_angle=smallest_angle(fabric),
         smallest_dihedral=smallest_dihedral(fabric),
-        changed=_changed(audit, out.audit),
+        changed=_topology_change(audit, out.audit),
         smallest_free_angle=smallest_free_angle(fabric),
     )
     return replace(out, audit=quality)
 
 
-def _changed(before: Audit, after: Audit) -> int:
+def _topology_change(before: Audit, after: Audit) -> int:
     """By how much the topology changed, which it must not."""
     counts = np.array(
         [

@@ -10,7 +10,12 @@ from equimorph.manifold.queries.cusps import with_cusps_beside
 from equimorph.manifold.refining.bisect import bisect, settle
 from equimorph.manifold.refining.deviation import Edges, Memory, known, near_lost
 from equimorph.manifold.refining.patches import Patch, patch_around
-from equimorph.manifold.refining.quality import SHARP, overturned, smallest_angles, squeezed
+from equimorph.manifold.refining.quality import (
+    SHARP,
+    confined_angles,
+    project_against_index,
+    smallest_angles,
+)
 from equimorph.manifold.refining.refill import flip, refill
 
 GROWN = 4
@@ -48,7 +53,7 @@ def repair(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
         out, inner = _best(patch, tolerance, memory)
         beyond = bad[~patch.inside[bad].all(axis=1)]
         bad = np.concatenate([beyond, out.cells[_bad(out)]])
-        fabric = patch.replaced(out)
+        fabric = patch.replace_by(out)
         memory.learn(inner, patch.inside)
 
 
@@ -79,7 +84,7 @@ def _best(patch: Patch, tolerance: float, memory: Memory) -> tuple[Fabric, Memor
 
 def _bad(fabric: Fabric) -> Bool[np.ndarray, " C"]:
     """Cells that are overturned, look backwards, or have a small angle where that can be helped."""
-    over = overturned(fabric.vertices, fabric.cells, fabric.cell_index)
+    over = project_against_index(fabric.vertices, fabric.cells, fabric.cell_index)
     return np.asarray(over | fabric.looks_back(fabric.cells) | _sharp(fabric))
 
 
@@ -88,13 +93,13 @@ def _sharp(fabric: Fabric) -> Bool[np.ndarray, " C"]:
     sharp = smallest_angles(fabric.squared) < SHARP
     if not (fabric.marks & ON_CROSSING).any():
         return np.asarray(sharp)
-    return np.asarray(sharp & ~squeezed(fabric, SHARP) if sharp.any() else sharp)
+    return np.asarray(sharp & ~confined_angles(fabric, SHARP) if sharp.any() else sharp)
 
 
 def _faults(fabric: Fabric, tolerance: float, memory: Memory) -> tuple[int, int, int, int]:
     """Numbers of edges that deviate, and of cells overturned, looking backwards, and sharp."""
     deviating = int((known(fabric, memory).error > tolerance).sum())
-    over = int(overturned(fabric.vertices, fabric.cells, fabric.cell_index).sum())
+    over = int(project_against_index(fabric.vertices, fabric.cells, fabric.cell_index).sum())
     return (
         deviating,
         over,
@@ -147,14 +152,14 @@ def _finer(share: float) -> Step:
         patch = patch_around(fabric, near, NEXT)
         inner = memory.among(patch.inside)
         most = GROWN * len(patch.fabric.cells)
-        out = patch.replaced(settle(patch.fabric, share * tolerance, inner, most=most))
+        out = patch.replace_by(settle(patch.fabric, share * tolerance, inner, most=most))
         memory.learn(inner, patch.inside)
         return out
 
     return step
 
 
-def _merged(short: float) -> Step:
+def _merge(short: float) -> Step:
     """Vertices merged whose distance is less than that share of the edges around."""
 
     def step(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
@@ -164,7 +169,7 @@ def _merged(short: float) -> Step:
     return step
 
 
-MERGING = (_as_it_is, *(_merged(short) for short in (0.1, 0.2, 0.4)))
+MERGING = (_as_it_is, *(_merge(short) for short in (0.1, 0.2, 0.4)))
 """What is done next where nothing but angles is bad."""
 PLANS = (
     MERGING,

@@ -133,7 +133,7 @@ class Refills:
             self.short[kept],
         )
 
-    def joined(self, more: "Refills") -> "Refills":
+    def join(self, more: "Refills") -> "Refills":
         """Return these refills and more of the same fabric."""
         count = self.count
         return Refills(

@@ -86,7 +86,7 @@ def collapses(fabric: Fabric, quality: Quality, near: Near, short: float = 0.0) 
     # links cost more to look at than angles
     good = hopeful(refills, with_exact(refills, quality))
     moves, row = moves[good[row]], row[good[row]]
-    good[row[~_linked(fabric, moves)]] = False
+    good[row[~_meets_link_condition(fabric, moves)]] = False
     return refills.take(good)
 
 
@@ -131,7 +131,7 @@ def _goes_on(fabric: Fabric, moves: Edges) -> Bool[np.ndarray, " m"]:
     return np.asarray(good & ((ends == 0) | (ends == 2)))
 
 
-def _linked(fabric: Fabric, moves: Edges) -> Bool[np.ndarray, " m"]:
+def _meets_link_condition(fabric: Fabric, moves: Edges) -> Bool[np.ndarray, " m"]:
     """Link condition, in the complex and in what the marked facets form.
 
     What the links of both ends share is the link of the edge.
@@ -213,7 +213,7 @@ def moves(fabric: Fabric, quality: Quality, near: Near, sharp: float = SHARP) ->
     gone = np.concatenate(old)
     if len(gone) == 0:
         return drawn(fabric, np.zeros((0, 2), int), gone)
-    more = replace(fabric, vertices=fabric.vertices.joined(*parts))
+    more = replace(fabric, vertices=fabric.vertices.join(*parts))
     number = np.arange(len(gone))
     return drawn(more, np.stack([gone, base + number], axis=1), number)
 

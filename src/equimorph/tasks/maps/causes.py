@@ -10,7 +10,7 @@ from jaxtyping import Bool, Int
 
 from equimorph.arrays import Edges, Flags, Settings, Values
 from equimorph.equilibria.critical import Critical, Test
-from equimorph.equilibria.first_stable import none_passed
+from equimorph.equilibria.first_stable import no_critical_states
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint, Descriptor
@@ -119,7 +119,7 @@ class Paths(ABC):
         for constraint in self.within:
             kind[at[constraint.excess(z[at], p[at]) > 0.0]] = Start.UNDEFINED_UNLOADED
         none = np.full(len(settings), np.nan)
-        return Samples(settings, none, kind, np.zeros(len(p)), z, p, none_passed(len(p)))
+        return Samples(settings, none, kind, np.zeros(len(p)), z, p, no_critical_states(len(p)))
 
 
 def equal_extrema(

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import Leg
-from equimorph.equilibria.legs import changed
+from equimorph.equilibria.legs import replace_parameters
 from equimorph.equilibria.point_conditions import Values as TargetValues
 from equimorph.equilibria.sensitivity import answers, slopes_along
 from equimorph.equilibria.settle import Guards, Held, Settled, free_directions, settle
@@ -151,7 +151,7 @@ def _columns(
     targets = np.array([float(values[each]) for each in descriptors])
     if not np.isfinite(targets).all():
         raise InputError(f"`targets` must be finite; got {targets.tolist()}.")
-    return np.concatenate([changed(structure, p, values)[0], targets])
+    return np.concatenate([replace_parameters(structure, p, values)[0], targets])
 
 
 def _check_free(values: Any, actuators: Sequence[str]) -> None:

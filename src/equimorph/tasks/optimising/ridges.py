@@ -76,7 +76,7 @@ def highest_point(lmap: LimitLoadMap, curve: MapCurve) -> Ridge | None:
     free = np.array([position(structure.parameters, name) for name in names])
     z, p = curve.states.z[number], curve.states.p[number]
     locus = Locus(structure, p, free, tests, False, singular=curve.kind != "grazing")
-    spot, found = nearest(locus, locus.joined(z[None], p[None]))
+    spot, found = nearest(locus, locus.join(z[None], p[None]))
     if not found[0]:
         return None
     beside = _beside(lmap, spot)
