@@ -22,8 +22,8 @@ class BaseMesh:
 
     edges (E, 2): vertex numbers; triangles (T, 3): corners a, b, c; sides (T, 3): edges ab, bc,
     ca; tetrahedra (N, 4): corners a, b, c, d; faces (N, 4): triangles bcd, acd, abd, abc. Edges
-    keep their numbers when others are bisected; bisected ones stay, unused. Triangles and
-    tetrahedra leave their numbers to one of their halves.
+    keep their numbers when other edges are bisected; bisected ones stay, unused. Triangles and
+    tetrahedra pass their numbers to one of their halves.
     """
 
     vertices: Float[np.ndarray, "V d"]

@@ -15,7 +15,7 @@ from equimorph.manifold.geometry.topology import keys_of
 TRIALS = 60
 """Largest number of iterations of the bracketed root finder on one edge."""
 ELSEWHERE = (0.5, 0.25, 0.75, 0.1, 0.9)
-"""Where between the bounds of a root a vertex is tried if there is none where it is expected."""
+"""Fractions between the bounds of a root that are tried if the expected place has no vertex."""
 ROUND_OFF = 1e-12
 """Part of the range of a function below which its values count as zero."""
 STILL = 1e-11
@@ -47,7 +47,7 @@ class Cut:
 def cut_between(
     fabric: Fabric, values: Values, between: Between, function: Function | None = None
 ) -> Cut:
-    """Put vertices on edges whose ends have values of different signs, until there are none.
+    """Put vertices on edges whose ends have values of different signs, until no such edge is left.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def cut_between(
 
 @dataclass(frozen=True)
 class _Found:
-    """Edges that were asked about, by their keys, and their vertices; row −1: there is none."""
+    """Examined edges, by their keys, and their vertices; row −1: no vertex."""
 
     asked: Int[np.ndarray, " n"]
     row: Int[np.ndarray, " n"]
@@ -177,7 +177,7 @@ def roots(
             break
         left = value * at_low[todo] > 0.0
         low[todo], high[todo] = np.where(left, t, low[todo]), np.where(left, high[todo], t)
-        # an end that stays twice counts half, so that it does not stay for ever
+        # an end that stays twice counts half, so that it moves eventually
         share = np.where(moved[todo] == np.where(left, -1, 1), 0.5, 1.0)
         at_low[todo] = np.where(left, value, share * at_low[todo])
         at_high[todo] = np.where(left, share * at_high[todo], value)

@@ -69,7 +69,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Lifting:
-    """The part of the audit that tells how the lifting of the grid went; see `Audit`."""
+    """The part of the audit that describes the lifting of the grid; see `Audit`."""
 
     unpaired: int
     conflicts: int
@@ -230,7 +230,7 @@ def _audit(
 
 
 SLIVER = 0.03
-"""Height of a cell, relative to its longest edge, below which it may be overturned beside folds."""
+"""Height of a cell over its longest edge, below which it may be overturned next to folds."""
 VANISHING = 1e-4
 """Size of the eigenvalues that may count either way at folds and where sheets cross."""
 

@@ -67,7 +67,7 @@ Tried = tuple[Bool[np.ndarray, " n"], Vertices]
 
 @dataclass(frozen=True)
 class Places:
-    """Edges with a mark in common, and where along them vertices are wanted.
+    """Edges with a common mark, and the places along them at which vertices are required.
 
     lowest: index of the cells around; of those with the lowest one, where they differ.
     """

@@ -57,8 +57,8 @@ def question_of_set(
     Raises
     ------
     InputError
-        If the structure cannot be written down, or a constraint is on a function whose content
-        cannot be told.
+        If the structure cannot be written down, or a constraint is on a function without known
+        content.
     """
     within = [_words(setting.structure, each) for each in setting.constraints]
     given = {

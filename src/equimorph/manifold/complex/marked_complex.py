@@ -52,7 +52,7 @@ ON_BOX = 1e-9
 class Fabric:
     """Vertices, cells with their index, and marked facets.
 
-    Where sheets cross, each of their parts has vertices of its own (see `parted_sheets`).
+    Where sheets cross, their parts have separate vertices (see `parted_sheets`).
 
     box: lower and upper bounds of the free parameters; squared: lengths of the sides of the cells,
     squared, in the order 01, 02, 12 and so on. Corners of triangles and tetrahedra are so ordered
@@ -219,7 +219,7 @@ def squared_sides(
 
 
 def shares(count: int) -> list[tuple[int, int]]:
-    """Where the shares of so many things begin and end that threads are handed."""
+    """First and last numbers of the chunks that `count` items are divided into for threads."""
     return [(at, min(at + AT_ONCE, count)) for at in range(0, count, AT_ONCE)]
 
 

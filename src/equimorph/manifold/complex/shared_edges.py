@@ -25,7 +25,7 @@ def crossing_edges(fabric: Fabric) -> tuple[Ends, Rows]:
 
 
 def first_copies(fabric: Fabric, ends: Ends, marks: Rows) -> Bool[np.ndarray, " _"]:
-    """Which of some edges are no copies of others before them."""
+    """Which edges are no copies of earlier ones."""
     out = np.ones(len(ends), bool)
     own = np.flatnonzero((marks & ON_CROSSING) > 0)
     if len(own):

@@ -44,7 +44,7 @@ class Vertices:
     frame: Float[np.ndarray, "V d full"]
     rows: Float[np.ndarray, "V d coordinates"]
     fold_slope: Float[np.ndarray, "V d"]
-    """Slope, along the frame, of what vanishes on folds; zero off folds. So for the others."""
+    """Slope, along the frame, of the fold test; zero off folds. The next columns are alike."""
     cap_slope: Float[np.ndarray, "V d"]
     crossing_slope: Float[np.ndarray, "V d"]
     shared: Int[np.ndarray, " V"]
@@ -61,7 +61,7 @@ class Vertices:
         return {name: column for name, column in vars(self).items() if name != "room"}
 
     def take(self, some: Int[np.ndarray, " some"]) -> "Vertices":
-        """Return some of the vertices."""
+        """Return a selection of the vertices."""
         return replace(self, **{k: column[some] for k, column in self.columns.items()}, room=None)
 
     def join(self, *more: "Vertices") -> "Vertices":

@@ -3,8 +3,9 @@
 Lyapunov–Schmidt reduction with a border b [Govaerts2000]_: where the residual is r b, the set is
 ``r(ξ, π) = 0`` in the amplitude ξ of the null vector and steps π of the parameters. It crosses
 itself where the gradient of r vanishes together with r. There ``[F_z F_p]`` has one null vector
-more than a sheet has dimensions, so that a linear system does not tell its tangent space: the two
-sheets are tangent to the planes on which the Hessian of r, of rank two and indefinite, vanishes.
+more than a sheet has dimensions, so that a linear system does not determine its tangent space: the
+two sheets are tangent to the planes on which the Hessian of r, of rank two and indefinite,
+vanishes.
 """
 
 from dataclasses import dataclass
@@ -83,7 +84,7 @@ def crossing_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> tu
     Parameters
     ----------
     rows
-        Bases of nearby spaces; they tell which of both sheets is meant, and its orientation.
+        Bases of nearby spaces; they select one of the two sheets, and its orientation.
 
     Returns
     -------

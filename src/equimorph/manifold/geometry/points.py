@@ -24,7 +24,7 @@ class VertexKind(IntEnum):
     CORNER = 4
     """A fold and a constraint at once."""
     AMID = 5
-    """The inside of a grid tetrahedron, amid others."""
+    """The inside of a grid tetrahedron, between given vertices."""
     REFINED = 6
     """An edge of the set that was bisected."""
     CROSSING = 7
@@ -54,7 +54,7 @@ class Points:
 
     @classmethod
     def empty(cls, structure: Structure, vertices: int) -> "Points":
-        """Return a store without points over so many grid vertices."""
+        """Return an empty store for a number of grid vertices."""
         none = np.zeros(0, int)
         return cls(
             structure,

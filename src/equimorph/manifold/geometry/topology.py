@@ -60,7 +60,7 @@ def rows_of(keys: Int[np.ndarray, " n"], base: int, length: int) -> Int[np.ndarr
 
 
 def faces_of(cells: Cells, size: int) -> Int[np.ndarray, "n size"]:
-    """All distinct faces of cells with so many corners."""
+    """All distinct faces of cells with `size` corners."""
     base = int(cells.max(initial=0)) + 1
     sides = [cells[:, list(chosen)] for chosen in combinations(range(cells.shape[1]), size)]
     keys = distinct(np.concatenate([keys_of(side, base) for side in sides]))
@@ -322,7 +322,7 @@ def cut_at_crossings(
     graph = coo_array((np.ones(len(first)), (first, second)), shape=(cells.size, cells.size))
     _, around = connected_components(graph, directed=False)
     met = np.isin(cells.ravel(), crossings)
-    # vertices off the crossings stay one, whatever their cells are like
+    # vertices off the crossings are never divided
     key = np.where(met, around, -1 - cells.ravel())
     _, first, label = np.unique(key, return_index=True, return_inverse=True)
     origin = cells.ravel()[first]

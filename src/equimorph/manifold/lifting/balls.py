@@ -2,7 +2,8 @@
 
 A sphere of four triangles of one index bounds one tetrahedron. Others are coned from an exact point
 inside: on the fold surface that parts two indices, on the constraint that cuts the ball off, else
-amid all its vertices. Several closed fold curves on a sphere each bound a disc of the fold surface.
+near the centroid of its vertices. Several closed fold curves on a sphere each bound a disc of the
+fold surface.
 """
 
 from collections.abc import Sequence
@@ -90,7 +91,8 @@ def depths(frames: Frames, points: Float[np.ndarray, "lanes d"]) -> Values:
 SHEETS = 2
 """To each of which a crossing belongs."""
 DIVIDED = 1 / 100
-"""Share of the largest grid tetrahedron below which none is divided lest a fold turn cells over."""
+"""Share of the largest grid tetrahedron below which none is divided, although a fold may overturn
+cells there."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ class Balls:
     """Tetrahedra with their index, their facets on folds, on constraints and where sheets cross.
 
     owner, fold_owner, cap_owner, crossing_owner: grid tetrahedra below them; doubtful: those over
-    which a ball could not be closed and cut without doubt.
+    which the ball is undecided.
     """
 
     corners: Int[np.ndarray, "n 4"]
@@ -114,7 +116,7 @@ class Balls:
 
 
 def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Balls:
-    """Fill all spheres over wanted grid tetrahedra."""
+    """Fill all spheres over the flagged grid tetrahedra."""
     spheres = find_spheres(pairing.mesh, discs, wanted)
     doubtful = np.zeros(len(pairing.mesh.tetrahedra), bool)
     doubtful[spheres.doubtful] = True
@@ -226,7 +228,7 @@ def _apexes(
     middles: Int[np.ndarray, " curves"],
     doubtful: Bool[np.ndarray, " N"],
 ) -> Int[np.ndarray, " regions"]:
-    """Apex of every region: on a fold, on the constraint, else amid its vertices."""
+    """Apex of every region: on a fold, on the constraint, or near the centroid of its vertices."""
     count = len(parts.region_surface)
     folded = parts.first_curve >= 0
     apexes: Int[np.ndarray, " regions"] = parts.closed.cap[parts.region_surface]
@@ -286,7 +288,7 @@ def _pin(
     *,
     cap: bool = False,
 ) -> list[int]:
-    """Numbers of new exact points of a kind amid groups over grid tetrahedra; −1 where none is.
+    """Numbers of new exact points of a kind near groups over grid tetrahedra; −1 where none is.
 
     Crossings belong to two surfaces, whose groups are the same; `cap`: on a constraint.
     """
@@ -302,7 +304,7 @@ def _pin_shared(
     *,
     cap: bool,
 ) -> list[int]:
-    """Numbers of new crossings amid groups that are given twice."""
+    """Numbers of new crossings near groups that are given twice."""
     keys = [tuple(group) for group in groups]
     once = {key: keys.count(key) for key in keys}
     over = dict(zip(keys, owner.tolist(), strict=True))
@@ -321,7 +323,7 @@ def _new(
     *,
     cap: bool,
 ) -> list[int]:
-    """Numbers of new exact points of a kind amid groups; −1 where none was found."""
+    """Numbers of new exact points of a kind near groups; −1 where none was found."""
     out = [-1] * len(groups)
     if not groups:
         return out

@@ -59,7 +59,7 @@ def volumes_over(pairing: Pairing, known: Volumes | None) -> Volumes:
 
 
 def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
-    """What tells whether something changed around each triangle: its curves and its points."""
+    """Curves and points of each triangle; if they change, its discs are computed again."""
     mesh, points, curves = pairing.mesh, pairing.points, pairing.curves
     rays = pairing.rays[: points.count]
     in_use = np.zeros(len(curves.edge), bool)
@@ -112,8 +112,7 @@ class Cells:
     """Segments, triangles or tetrahedra of points with their index, and facets of three kinds.
 
     corners (C, d + 1), index (C,); folds, caps, crossings: facets on folds, on constraints and
-    where sheets cross; the doubtful: grid cells over which the set could not be closed and cut
-    without doubt.
+    where sheets cross; doubtful: grid cells over which the set is undecided.
     """
 
     corners: Int[np.ndarray, "C corners"]

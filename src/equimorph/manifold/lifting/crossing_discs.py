@@ -33,7 +33,7 @@ SHEETS = 2
 HUB = 1e-13
 """Precision of the place of a hub, relative to its chord."""
 NEAR, FAR = 1e-6, 1e-3
-"""The same where a second eigenvalue vanishes: what is wanted, and what is good enough."""
+"""The same where a second eigenvalue vanishes: target, and largest value that is accepted."""
 SKEW = 1e-4
 """Quadratic over cubic coefficient, a length in the metric, below which it counts as zero."""
 
@@ -140,7 +140,7 @@ def pin_ends(pairing: Pairing, plans: list[Plan]) -> list[int | None]:
 def _pin(
     pairing: Pairing, wanted: Sequence[tuple[int, tuple[int, ...]]], *, cap: bool
 ) -> list[int | None]:
-    """Numbers of new crossing points amid points over triangles; None where none was found."""
+    """Numbers of new crossing points near points over triangles; None where none was found."""
     if not wanted:
         return []
     setting, store = pairing.setting, pairing.points
@@ -155,7 +155,7 @@ def _pin(
 
 
 def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
-    """Crossing between two others at which a fold of a sheet crosses, too.
+    """Crossing between two crossings at which a fold of a sheet crosses, too.
 
     There the quadratic coefficient of the reduced equation changes its sign; at pitchforks, where
     it is zero all along, the cubic one does, or its inverse if another eigenvalue vanishes.

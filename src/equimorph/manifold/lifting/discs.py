@@ -108,7 +108,7 @@ def _on(corners: Int[np.ndarray, "n 3"], chosen: Int[np.ndarray, "k 2"]) -> Bool
 
 
 def _alone(pairing: Pairing) -> list[int]:
-    """Grid triangles beside crossings through which other than two curves lead."""
+    """Grid triangles with a crossing through which the number of curves is not two."""
     edges = pairing.points.edge[lonely(pairing)]
     return np.flatnonzero(np.isin(pairing.mesh.sides, edges).any(axis=1)).tolist()
 
@@ -213,7 +213,7 @@ def _continuous(
     """Ways in which every chord joins folds whose sheets lie on the same side.
 
     In the narrow wedge behind a cusp two fold curves run side by side at every scale: there only
-    the side on which the sheets exist tells them apart.
+    the side on which the sheets exist distinguishes them.
     """
     at = [
         (number, fold)
@@ -270,7 +270,7 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
         for plan, chord in wanted
         if plan.singular(chord[0]) == MEETING
     }
-    # beside a constraint the crossing might leave between the ends of its chord
+    # near a constraint the crossing might leave between the ends of its chord
     met |= {
         (plan.polygon.triangle, chord)
         for plan in plans
@@ -282,7 +282,7 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
 
 
 def _chords_to_split(plan: Plan) -> list[Chord]:
-    """Chords that need a point of their own; see `chords_to_split`."""
+    """Chords that need a further point; see `chords_to_split`."""
     place = {point: at for at, point in enumerate(plan.points)}
     chords = {(place[a], place[b]): (a, b) for a, b in plan.chords if {a, b} <= set(place)}
     chosen = chords_to_split(tuple(plan.on(plan.points)), tuple(chords))

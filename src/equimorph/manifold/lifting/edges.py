@@ -214,7 +214,7 @@ def _follow(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOpt
 
 
 def _ends(pairing: Pairing, traced: Traced) -> Int[np.ndarray, " lanes"]:
-    """Points over the vertices at which lanes arrived or to which they returned; −1 for others."""
+    """Points over the vertices at which lanes arrived or to which they returned; −1 elsewhere."""
     lanes = np.flatnonzero(traced.good & (traced.vertices >= 0))
     vertices = traced.vertices[lanes]
     p = pairing.setting.parameters(pairing.mesh.vertices[vertices])

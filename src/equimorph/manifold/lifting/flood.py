@@ -14,17 +14,17 @@ from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 from equimorph.model import Progress
 
 STEPS = 4
-"""Into so many equal steps long edges are cut before they count as hard."""
+"""Number of equal steps into which long edges are cut before they count as hard."""
 CHUNK = 4096
 """Rays that are traced together: this bounds the memory."""
 ENDLESS = 250
-"""More equilibria than this over one point, and the set is refused: it may wind for ever."""
+"""Number of equilibria over one point beyond which the set is refused: it may be unbounded."""
 
 
 def flood(pairing: Pairing, progress: Progress) -> None:
     """Lift edges from all known points until every ray is traced or given up.
 
-    All rays that one step can lift go first, then those that a few equal steps can; the others wait
+    All rays that one step can lift go first, then those that a few equal steps can; the rest wait
     and are traced many at a time.
     """
     while not pairing.is_full:
@@ -51,7 +51,7 @@ def flood_directly(pairing: Pairing, progress: Progress) -> None:
 
 
 def _refuse_endless(pairing: Pairing) -> None:
-    """Raise InputError if a set grows without end, like one that winds around a circle for ever."""
+    """Raise InputError if a set grows without end, like one that winds around a circle."""
     store, setting = pairing.points, pairing.setting
     vertex = store.vertex[: store.count]
     sheets = np.bincount(vertex[vertex >= 0], minlength=1)
@@ -61,8 +61,8 @@ def _refuse_endless(pairing: Pairing) -> None:
         point = ", ".join(f"{name} = {value:g}" for name, value in zip(names, p, strict=True))
         raise InputError(
             f"`within` must leave at most {ENDLESS} equilibria over a point; got more over "
-            f"{point}. Bound a descriptor: one that grows as it winds if the set winds for ever, "
-            "displacements if the structure has so many states."
+            f"{point}. Bound a descriptor: one that grows with the turns of an endless set, "
+            "or displacements if the structure has that many states."
         )
 
 
@@ -75,7 +75,7 @@ def _one_of_each_pair(pairing: Pairing, rays: Rays) -> Rays:
 
 
 def _lift(pairing: Pairing, rays: Rays, steps: int) -> None:
-    """Enter the curves of rays that so many steps lift; mark the others for more effort."""
+    """Enter the curves of rays that `steps` steps lift; mark the rest for more effort."""
     pairing.mark(rays, RayMark.LONG if steps == 1 else RayMark.HARD)
     difficult = pairing.effort[rays.edges] > 0
     pairing.mark(rays.take(difficult), RayMark.HARD)

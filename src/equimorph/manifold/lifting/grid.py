@@ -76,7 +76,7 @@ def grid_mesh(lines: Lines) -> BaseMesh:
 def coarse_grid(
     lines: Lines, intervals: int, limits: Float[np.ndarray, "2 d"]
 ) -> tuple[BaseMesh, Int[np.ndarray, " vertices"]]:
-    """Mesh on some of the lines of a grid, and on a few beyond it, within limits.
+    """Mesh on selected lines of a grid, and on a few beyond it, within limits.
 
     It has at most so many intervals along each parameter of the grid. Returned with it are the
     grid's numbers of its vertices, −1 for those beyond the grid.
@@ -241,7 +241,7 @@ def _side_between(mesh: BaseMesh, triangle: int, pair: tuple[int, int]) -> int:
 def _between(
     a: Float[np.ndarray, " d"], b: Float[np.ndarray, " d"], mirrored: tuple[bool, ...]
 ) -> Float[np.ndarray, " d"]:
-    """Middle of an edge, or a point beside it if the middle lies on a line of symmetry."""
+    """Middle of an edge, or a point next to it if the middle lies on a line of symmetry."""
     middle = 0.5 * (a + b)
     on_line: Bool[np.ndarray, " d"] = np.array(mirrored)
     on_line = on_line & (np.abs(middle) < 1e-9 * np.abs(b - a).max())

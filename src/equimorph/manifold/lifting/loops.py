@@ -50,7 +50,7 @@ class Loops:
 
 
 def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -> Loops:
-    """Close the curves around every triangle, or around the wanted ones."""
+    """Close the curves around every triangle, or around the flagged ones."""
     triangles = np.arange(len(pairing.mesh.triangles))
     plain, owner, special = _plain(pairing, triangles if wanted is None else triangles[wanted])
     polygons: list[Polygon] = []
@@ -133,9 +133,9 @@ def _closed(pairing: Pairing, chains: list[Polygon]) -> bool:
 
 
 def _on_own_sheets(pairing: Pairing, chains: list[Polygon]) -> bool:
-    """Whether each chain's ends lie along the sheet at each other, but not along that of others.
+    """Whether each chain's ends lie along the sheet at each other, but not along the other sheets.
 
-    So they do just beside a crossing that lies beyond the constraint, at every scale. One of two
+    So they do next to a crossing that lies beyond the constraint, at every scale. One of two
     sheets that cross is seen along the other, if that bends away from it, but not the other way.
     """
     ends = np.array([(chain.points[0], chain.points[-1]) for chain in chains]).ravel()
@@ -170,7 +170,7 @@ def _close_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:
 def _plain(
     pairing: Pairing, triangles: Int[np.ndarray, " some"]
 ) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " P"], Int[np.ndarray, " S"]]:
-    """Loops of three curves that go straight across; triangles over which there are others."""
+    """Loops of three curves that go straight across; triangles over which other loops exist."""
     mesh, points = pairing.mesh, pairing.points
     partner = _partners(pairing)
     vertex = points.vertex[: points.count]
@@ -192,7 +192,7 @@ def _plain(
 
 
 def _partners(pairing: Pairing) -> Int[np.ndarray, "count slots"]:
-    """Point at the other end of each point's curves that go straight across; −1 for others."""
+    """Point at the other end of each point's curves that go straight across; −1 elsewhere."""
     points, curves = pairing.points, pairing.curves
     if not curves.edge:
         return np.full((points.count, pairing.rays.shape[1]), -1)

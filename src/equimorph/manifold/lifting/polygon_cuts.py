@@ -28,9 +28,9 @@ def match_folds(
     """All ways to join the folds of a polygon by chords that do not cross and part the indices.
 
     Returned are sets of chords for which every piece has one index; exactly one means that the
-    folds are joined without doubt, none that the polygon contradicts itself. `singular` tells what
-    a point is: `REGULAR`, a `TURN` (fold), or a `MEETING` with another sheet. Meetings are joined
-    with each other, and may part equal indices.
+    folds are joined with certainty, none that the polygon contradicts itself. `singular` gives the
+    kind of each point: `REGULAR`, a `TURN` (fold), or a `MEETING` with another sheet. Meetings are
+    joined with each other, and may part equal indices.
     """
     start = next((k for k, point in enumerate(polygon) if singular(point)), None)
     if start is None:
@@ -105,14 +105,14 @@ def triangulate(
     """Triangles of pieces with equally many corners, with the least sum of squared diagonals.
 
     Returned are the places of the triangles' corners in their piece, and which pieces can be
-    triangulated. `sides` tells, one bit each, on which sides of the grid triangle a corner lies: a
+    triangulated. `sides` flags, one bit each, on which sides of the grid triangle a corner lies: a
     diagonal between corners on one side could coincide with one of the neighbour's.
     """
     count = places.shape[1]
     gap = ((places[:, :, None] - places[:, None]) ** 2).sum(axis=3)
     diagonal = np.where((sides[:, :, None] & sides[:, None]) == 0, gap, np.inf)
     around = np.arange(count)
-    # the polygon's own sides cost nothing
+    # sides of the polygon cost nothing
     diagonal[:, around, around - 1] = diagonal[:, around - 1, around] = 0.0
     apex, cost = _cheapest_apexes(diagonal)
     return _fan_out(apex), np.isfinite(cost)
@@ -120,7 +120,7 @@ def triangulate(
 
 @lru_cache(maxsize=4096)
 def chords_to_split(sides: tuple[int, ...], chords: tuple[Chord, ...]) -> tuple[Chord, ...]:
-    """Chords between ends on one grid edge, and as many others as free all pieces for triangles.
+    """Chords between ends on one grid edge, and further ones until all pieces have triangles.
 
     Where a corner of the grid triangle sees two fold curves cross both its sides, one of them with
     a cusp, the sheet between them lies over the corner twice, and has no allowed diagonal.

@@ -12,13 +12,13 @@ from equimorph.manifold.lifting.edges import lift_directly
 from equimorph.model import position
 
 COARSE = 5
-"""Natural states are lifted at about so many vertices along each parameter."""
+"""Approximate number of vertices along each parameter at which natural states are lifted."""
 SEARCHED = 3
-"""Vertices, beside the middle one, at which a random search looks for equilibria that no natural
-path reaches."""
+"""Vertices, in addition to the middle one, at which a random search looks for equilibria that no
+natural path reaches."""
 MORE = 12
-"""The same in diagrams over one parameter and in slices that are their own mirror images: there
-fewer of the pieces hang together."""
+"""The same in diagrams over one parameter and in symmetric slices: their pieces are less often
+connected."""
 STARTS = 100
 """Random guesses over each of them."""
 
@@ -35,7 +35,7 @@ def seeds(
 ) -> Seeds:
     """Vertices, unknowns, parameters and index of first equilibria; deterministic for a `seed`.
 
-    Random search looks over some of the `searchable` vertices only.
+    Random search is restricted to the `searchable` vertices.
     """
     vertices, z = _from_natural_states(setting, *_spread(mesh))
     searched_v, searched_z = _from_search(setting, mesh, searchable, seed)

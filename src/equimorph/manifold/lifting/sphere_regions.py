@@ -58,9 +58,9 @@ def closed_surfaces(
     wanted: Bool[np.ndarray, " S"],
     crossing: Bool[np.ndarray, " points"],
 ) -> Closed:
-    """Close wanted surfaces along their rims: from a cap, maybe on the rim, or by one triangle.
+    """Close surfaces along their rims: from a cap, maybe on the rim, or by one triangle.
 
-    `crossing` tells which points are crossings: between two of them, lids are met.
+    `crossing` flags the points that are crossings: between two of them, lids are met.
     """
     number = np.cumsum(wanted) - 1
     own, rim = wanted[surfaces.surface], wanted[surfaces.rim_surface]

@@ -18,7 +18,7 @@ class Surfaces:
 
     corners, index, surface: of the triangles, those of one surface in a row; met: which of their
     sides ab, bc, ca lie where another sheet crosses; owner: grid tetrahedron of each surface; rims:
-    open sides, with their surface and the index beside them.
+    open sides, with their surface and the adjacent index.
     """
 
     corners: Int[np.ndarray, "n 3"]
@@ -33,7 +33,7 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class Spheres:
-    """Spheres that are tetrahedra of one index, others, and grid tetrahedra that need division."""
+    """Spheres that are tetrahedra of one index, general ones, and undecided grid tetrahedra."""
 
     plain: Int[np.ndarray, "P 4"]
     plain_index: Int[np.ndarray, " P"]
@@ -71,7 +71,7 @@ class _Copies:
 
 
 def find_spheres(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Spheres:
-    """Join the discs around wanted grid tetrahedra but those beside doubtful triangles."""
+    """Join the discs around flagged grid tetrahedra without undecided triangles."""
     copies = _copies(mesh, discs, wanted)
     starts, sizes = copies.starts, copies.sizes
     lowest, highest = (f.reduceat(copies.index, starts) for f in (np.minimum, np.maximum))
@@ -133,7 +133,7 @@ def rings(edges: Int[np.ndarray, "n 2"], group: Int[np.ndarray, " n"], groups: i
 
 
 def _copies(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> _Copies:
-    """Every triangle of a disc once for each wanted grid tetrahedron beside it."""
+    """Every triangle of a disc once for each adjacent flagged grid tetrahedron."""
     amount = np.bincount(discs.owner, minlength=len(mesh.triangles))
     first = np.concatenate([[0], np.cumsum(amount)])
     by_owner = np.argsort(discs.owner, kind="stable")

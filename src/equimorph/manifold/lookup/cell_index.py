@@ -1,4 +1,4 @@
-"""Which cells lie over points, and which beside them: at curved folds and constraints."""
+"""Cells over points, and cells near them at curved folds and constraints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -94,7 +94,7 @@ class CellIndex:
         extent = high - low
         counts = _bins(extent)
         overhang = np.ascontiguousarray(np.broadcast_to(overhang.T, (d + 1, len(corners))).T)
-        # a corner moves by what the facets across from the others do
+        # a corner moves with the facets opposite to the other corners
         room = np.sort(overhang, axis=1)[:, 1:].sum(axis=1, keepdims=True) * extent
         first, last = (
             np.clip((side * counts).astype(int), 0, counts - 1)
@@ -112,7 +112,7 @@ class CellIndex:
     def weights(
         self, points: Float[np.ndarray, "n d"], cell: Int[np.ndarray, " n"]
     ) -> Float[np.ndarray, "n corners"]:
-        """Barycentric coordinates of points, each in a cell of its own."""
+        """Barycentric coordinates of points, each in its cell."""
         unit, maps = (points - self.lower) / self.width, self.maps[cell]
         return np.asarray(np.einsum("nij,nj->ni", maps[:, :, :-1], unit) + maps[:, :, -1])
 
@@ -176,7 +176,7 @@ Facets = Int[np.ndarray, "F d"]
 
 @dataclass(frozen=True)
 class Rims:
-    """Bands along facets, and the cells beside them.
+    """Bands along facets, and the adjacent cells.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ class Rims:
         return cls(CellIndex.of(corners * width, overhang), beside)
 
     def near(self, points: Points) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
-        """Pairs of a point in a band, on either side of the facet, and a cell beside it."""
+        """Pairs of a point in a band, on either side of the facet, and an adjacent cell."""
         hits = self.bands.near(points)
         if len(hits) == 0:  # the rule
             return hits.point, hits.cell

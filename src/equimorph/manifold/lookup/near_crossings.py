@@ -33,7 +33,7 @@ WIDE = 0.03
 """Amplitude, in the metric, up to which states belong to a crossing point."""
 MERGED = 1e-5
 """Distance in the metric below which states of sheets that cross are one: there a residual at
-round-off does not tell how many there are."""
+round-off does not determine their number."""
 DEGREE = 10
 """Of the polynomial through r: its truncation is at round-off for the amplitudes here."""
 CORRECTIONS = 2
@@ -246,7 +246,7 @@ class NearCrossings:
 
 
 def of_set(setting: Setting, points: States, cells: Cells, crossings: Facets) -> NearCrossings:
-    """Facets on crossings, given by their vertices, with the cells beside them."""
+    """Facets on crossings, given by their vertices, with the adjacent cells."""
     whole = adjacency(cells)
     base = len(points)
     keys, own = keys_of(whole.facets, base), np.unique(keys_of(crossings, base))
@@ -282,7 +282,7 @@ def embed_many(
 def _nearest_weights(
     place: Float[np.ndarray, "lanes k d"], at: Float[np.ndarray, "lanes d"]
 ) -> Float[np.ndarray, "lanes k"]:
-    """Barycentric coordinates, in facets, of the points of their planes next to others."""
+    """Barycentric coordinates, in facets, of the points of their planes next to given ones."""
     sides = place[:, 1:] - place[:, :1]
     gram = sides @ np.swapaxes(sides, 1, 2)
     along = np.einsum("lkd,ld->lk", sides, at - place[:, 0])

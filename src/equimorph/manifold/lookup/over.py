@@ -162,7 +162,7 @@ class Sheets:
         return z[order], point[order], cell[order]
 
     def _in_chunks(self, p: Points) -> list[tuple[Found, Hits | None]]:
-        """States and doubtful cells as `_some` finds them, chunk by chunk, on all threads."""
+        """States and undecided cells as `_some` finds them, chunk by chunk, on all threads."""
         if len(p) <= CHUNK:
             return [self._some(p, 0)]
         starts = range(0, len(p), CHUNK)
@@ -181,7 +181,7 @@ class Sheets:
         return [out[at] for at in starts]
 
     def _some(self, p: Points, first: int) -> tuple[Found, Hits | None]:
-        """States over points that are sure, and the cells near the others; `first` is added."""
+        """Certain states over points, and the cells near undecided ones; `first` is added."""
         near = self._near(p[:, self.free])
         of_hits = near.cell, near.weights
         hits = near.take(worth_trying(of_hits, near.inside, self._brims, self.above.maps, NUDGE))
@@ -202,7 +202,7 @@ class Sheets:
         return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
 
     def _near(self, x: Float[np.ndarray, "points d"]) -> Hits:
-        """Cells near points, those beside the bands around rims that points lie in among them."""
+        """Cells near points, including those at the rims whose bands contain the points."""
         near = self.above.near(x)
         point, cell = self._rims.near(x)
         if len(point) == 0:
@@ -301,7 +301,7 @@ class Sheets:
         p: Points,
         near: Hits,
     ) -> tuple[Float[np.ndarray, "m size"], Int[np.ndarray, " m"]]:
-        """States that meet known ones in folds nearby, where parity tells that some are missing.
+        """States that meet known ones in folds nearby, where parity shows that some are missing.
 
         Out across the rims near the point, through the fold, and back.
         """

@@ -23,14 +23,14 @@ class Components:
     Parameters
     ----------
     eset
-        The part that was asked for, cut exactly along its constraints, as a set of its own. Its
+        The requested part, cut exactly along its constraints, as a set. Its
         `component` gives the number of the piece that each cell belongs to.
     sizes
         Length, area or volume of each piece in the metric of the set: configuration and scaled
         parameters.
     uncut
-        Edges across the bounds of constraints on which no state on the bound was found: cells
-        beside them are left out, and pieces may be apart that hang together there.
+        Number of edges across the bounds of constraints on which no state on the bound was found:
+        adjacent cells are omitted, and pieces may be apart that are connected there.
     """
 
     eset: EquilibriumSet
@@ -42,7 +42,7 @@ class Components:
         return len(self.sizes)
 
     def __getitem__(self, number: int) -> EquilibriumSet:
-        """One of the pieces as a set of its own."""
+        """One of the pieces as a set."""
         if not 0 <= number < len(self):
             raise IndexError(f"there are {len(self)} pieces; got number {number}")
         return part(self.eset, self.eset.component == number)
@@ -80,8 +80,8 @@ class Components:
     def joined(self, one: State, other: State) -> bool:
         """Whether two states lie on the same piece.
 
-        On the stable part that is whether one can be led to the other without a snap and within the
-        constraints, as far as the cells of the set resolve them.
+        On the stable part this means that one can be moved to the other without a snap and within
+        the constraints, as far as the cells of the set resolve them.
         """
         first, second = self.number_of(one), self.number_of(other)
         return first is not None and first == second

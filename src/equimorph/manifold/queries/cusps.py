@@ -20,7 +20,7 @@ from equimorph.structures import States
 from equimorph.tolerances import SAME_STATE
 
 REACH = 1.5
-"""How far a cusp may lie from the ends of the edge beside which it is sought, in its lengths."""
+"""Largest distance of a cusp from the ends of the edge near which it is sought, in its lengths."""
 CLOSE = 1e-3
 """Shares of an edge next to its ends in which a cusp is that of the end."""
 
@@ -102,7 +102,7 @@ def _turning(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " 
 def _between(
     fabric: Fabric, edge: Int[np.ndarray, " 2"], low: int
 ) -> tuple[Float[np.ndarray, " size"], Float[np.ndarray, " P"]] | None:
-    """Cusp beside an edge of a fold, by Newton from its middle or its ends."""
+    """Cusp near an edge of a fold, by Newton from its middle or its ends."""
     store, setting = fabric.vertices, fabric.setting
     tests = (lambda at: at.g, lambda at: at.quadratic)
     locus = Locus(setting.structure, store.p[edge[0]], setting.free, tests)
@@ -120,7 +120,7 @@ def _between(
 
 
 def with_cusps_beside(fabric: Fabric, beside: Bool[np.ndarray, " C"]) -> Fabric:
-    """The same with vertices at the cusps beside some cells.
+    """The same with vertices at the cusps next to the flagged cells.
 
     A cell that cuts a cusp off is overturned: the sheet around goes all the way round the cusp.
     """

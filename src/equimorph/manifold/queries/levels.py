@@ -60,7 +60,7 @@ def level_set(eset: EquilibriumSet, descriptor: Descriptor, value: float) -> Lev
 
 @door
 def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Level:
-    """States at which as many descriptors as there are free parameters do not steer the set.
+    """States at which the Jacobian of the descriptors, one per free parameter, is singular.
 
     ``det J_S = 0``, with derivatives of the descriptors along the set; so it is smooth at folds. It
     needs a set that can be oriented.
@@ -68,7 +68,7 @@ def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Lev
     Raises
     ------
     InputError
-        For another number of descriptors, or what is none.
+        For another number of descriptors, or anything but descriptors.
     """
     _check_count(eset, descriptors)
     return _level(eset, lambda v: jacobian(eset.setting, v, descriptors))
@@ -98,7 +98,7 @@ class Division:
 
 @door
 def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division:
-    """Cut a set exactly where descriptors do not steer it; see `singular_set`.
+    """Cut a set exactly where the Jacobian of descriptors is singular; see `singular_set`.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
 
 @door
 def part(eset: EquilibriumSet, cells: Bool[np.ndarray, " C"]) -> EquilibriumSet:
-    """Some of the cells as a set of its own, like the stable ones: ``eset.cell_index == 0``."""
+    """Selected cells as a set, like the stable ones: ``eset.cell_index == 0``."""
     fabric = fabric_of(eset)
     nothing = np.zeros(len(fabric.vertices), bool)
     return part_of(eset, fabric, cells, nothing, 0)

@@ -34,7 +34,7 @@ class Place:
     state
         The state.
     misfit
-        Root of the sum of squares of what is left, in standard errors or ranges; of shapes, the
+        Root of the sum of squared residuals, in standard errors or ranges; of shapes, the
         root-mean-square distance.
     stratum, component
         Numbers of the pieces of the set that it lies on, −1 if not known.
@@ -96,7 +96,7 @@ def locate(
 
     The vertices of the set that fit better than their neighbours are the starts of Newton's method
     for least squares on the set, stable and unstable parts alike. Different minima are candidates;
-    the gap between the best two tells how far they can be told apart.
+    the gap between the best two measures how well they are distinguished.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class ValueFit:
         return cls(eset, measured, units)
 
     def residuals(self, z: Lanes, p: Parameters) -> Values:
-        """What is left of each value."""
+        """Residual of each value."""
         parameters = self.eset.structure.parameters
         columns = [
             p[:, position(parameters, what)] if isinstance(what, str) else what.function(z, p)

@@ -16,7 +16,7 @@ from equimorph.model import Progress, Silent
 from equimorph.tolerances import SAME_SOLUTION
 
 NOWHERE = -1
-"""Instead of a stratum: the landing is not in the set, or there is none."""
+"""Instead of a stratum: the landing is not in the set, or does not exist."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Snap:
 
     @property
     def released(self) -> tuple[float, float]:
-        """Least and greatest energy that is freed."""
+        """Least and greatest energy released."""
         values = [landing.released for landing in self.landings]
         return min(values), max(values)
 
@@ -229,4 +229,4 @@ def _told(eset: EquilibriumSet, snap: Snap) -> str:
     if snap.target == NOWHERE:
         return f"snaps out of the set ({snap.status}) from {where}"
     least, most = snap.released
-    return f"snaps to stratum {snap.target}, frees {least:.3g} … {most:.3g}, from {where}"
+    return f"snaps to stratum {snap.target}, releases {least:.3g} … {most:.3g}, from {where}"

@@ -17,7 +17,7 @@ from equimorph.model import Progress, Silent
 ROUNDS = 200
 """Largest number of rounds of bisections."""
 GROWN = 1.6
-"""How much more tetrahedra there are when slivers are taken away anew."""
+"""Growth of the number of tetrahedra after which slivers are removed again."""
 PLACES = (0.5, 0.3, 0.7)
 """Where along an edge a vertex is tried, one place after the other."""
 HOPELESS = 60
@@ -25,7 +25,7 @@ HOPELESS = 60
 MOST = 4_000_000
 """Cells beyond which refinement ends."""
 LOCAL = 40
-"""Where one in so many edges deviates at most, what is around these is worked on alone."""
+"""If at most one in so many edges deviates, only their surroundings are refined."""
 RINGS = 4
 """Rings of cells around edges that deviate, which longer ones to be cut first may lie in."""
 
@@ -121,7 +121,7 @@ def bisect(fabric: Fabric, edges: Edges, at_once: Int[np.ndarray, " n"], memory:
     place[order] = np.arange(len(at))
     at, more = at[order], gather(parts, place)
     if ((edges.marks[at] & CURVES) > 0).any():
-        memory.stuck.clear()  # beside a fold that is better known they may succeed
+        memory.stuck.clear()  # near a fold that is better resolved they may succeed
     whole, more = with_copies(fabric, ends[at], more)
     memory.cut = np.concatenate([memory.cut, whole])
     memory.put = np.concatenate([memory.put, len(fabric.vertices) + np.arange(len(whole))])

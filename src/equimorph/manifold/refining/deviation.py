@@ -1,4 +1,4 @@
-"""Edges of a complex that is being refined: how far they deviate, and which are to be bisected."""
+"""Edges of a complex during refinement: their deviations, and those to bisect."""
 
 from collections import deque
 from dataclasses import dataclass, field, replace
@@ -36,14 +36,14 @@ UNEVEN = 4.0
 SIX = 6
 """Edges of a tetrahedron."""
 FEW = 50
-"""Fewer than one in so many edges are bisected all at once."""
+"""If fewer than one in so many edges are to be bisected, all are at once."""
 
 
 @dataclass(frozen=True)
 class Edges:
     """Edges of a fabric, those of each cell, their marks, length and deviation from the set.
 
-    stuck: cannot be bisected; pressing: must be, whatever they deviate; uneven: should be in the
+    stuck: cannot be bisected; pressing: must be, for any deviation; uneven: should be in the
     end, because they are much longer than an edge on a crossing in the same triangle.
     """
 
@@ -105,7 +105,7 @@ class Memory:
         return self.cut[live[self.put]], self.put[live[self.put]]
 
     def among(self, inside: Bool[np.ndarray, " V"]) -> "Memory":
-        """What is remembered of edges between some of the vertices; deviations all."""
+        """The part of the memory for edges between flagged vertices, with all deviations."""
         stuck = {(a, b) for a, b in self.stuck if inside[a] and inside[b]}
         own = inside[self.cut].all(axis=1)
         cut, put, lost = self.cut[own], self.put[own], set(self.lost)
@@ -116,7 +116,7 @@ class Memory:
         return replace(self, stuck=set(self.stuck), lost=set(self.lost))
 
     def learn(self, inner: "Memory", inside: Bool[np.ndarray, " V"]) -> None:
-        """Take over what came to be known among some of the vertices, and those added since."""
+        """Take over what was learned among flagged vertices, and those added since."""
         keys, at = np.unique(np.concatenate([inner.keys, self.keys]), return_index=True)
         self.keys, self.error = keys, np.concatenate([inner.error, self.error])[at]
         beyond = {(a, b) for a, b in self.stuck if not (inside[a] and inside[b])}
@@ -185,7 +185,7 @@ def _pressing(
 def _beside_crossings(
     fabric: Fabric, of_cells: Int[np.ndarray, "C sides"], marks: Int[np.ndarray, " E"]
 ) -> tuple[Bool[np.ndarray, " E"], Bool[np.ndarray, " E"]]:
-    """Edges on crossings opposite to a too obtuse angle, and edges that are too long beside others.
+    """Edges on crossings opposite to a too obtuse angle, and edges much longer than neighbours.
 
     A sheet may be bent strongly across a straight crossing, and another one be flat: both share the
     edges there, which no flip takes away [Ruppert1995]_. Triangles between a crossing and another

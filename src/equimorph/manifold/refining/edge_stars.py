@@ -1,4 +1,4 @@
-"""Stars of edges and facets of tetrahedra filled anew between the same vertices [Freitag1997]_.
+"""Stars of edges and facets of tetrahedra, filled again between the same vertices [Freitag1997]_.
 
 An edge inside has one polygon around it, which is filled by the best of all its triangulations. An
 edge on a surface of marked facets has one polygon on each side, both closed by the chord that takes
@@ -27,10 +27,10 @@ from equimorph.manifold.refining.quality import POOR, determinants, smallest_ang
 from equimorph.manifold.refining.stars import Kind, Refills, Rows
 
 MOST = 7
-"""Cells around edges that are looked at."""
+"""Largest number of cells around an edge whose star is refilled."""
 EDGES = (((0, 1), (2, 3)), ((0, 2), (3, 1)), ((0, 3), (1, 2)),
          ((1, 2), (0, 3)), ((1, 3), (2, 0)), ((2, 3), (0, 1)))  # fmt: skip
-"""Edges of a tetrahedron, each with the others' ends: even permutations of the corners."""
+"""Edges of a tetrahedron, each with the opposite edge: even permutations of the corners."""
 
 Keys = Int[np.ndarray, " keys"]
 """Keys of edges or facets, in order."""
@@ -148,7 +148,7 @@ def _through_facets(
 
 @dataclass(frozen=True)
 class Rings:
-    """Edges with what is around them.
+    """Edges with the cells around them.
 
     cells: around each edge, −1 where there are fewer; first, second: polygons around it that turn
     to the right about it, of so many corners, −1 beyond; second is empty but for edges on surfaces
@@ -163,7 +163,7 @@ class Rings:
     index: Int[np.ndarray, "n 2"]
 
     def take(self, some: Int[np.ndarray, " k"] | Bool[np.ndarray, " n"]) -> "Rings":
-        """Return some of the rings."""
+        """Return a selection of the rings."""
         return Rings(*(column[some] for column in vars(self).values()))
 
     @property
@@ -174,7 +174,7 @@ class Rings:
 
 
 def rings_around(fabric: Fabric, ends: Edges) -> Rings:
-    """Rings around edges, sorted ends each, that can be taken out; those of others are left out."""
+    """Rings around edges, sorted ends each, that can be removed; further edges are omitted."""
     base, mark = len(fabric.vertices), fabric.edge_marks(ends)
     ends, mark = ends[_single(mark)], mark[_single(mark)]
     keys = keys_of(ends, base)

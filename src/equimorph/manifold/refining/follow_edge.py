@@ -1,7 +1,7 @@
 """Vertices on edges of folds and constraints that bulge far out: the curve is followed to its end.
 
 Bisection predicts a vertex from both ends of an edge. Where a fold or a constraint forms a narrow
-tongue between them, the prediction fails, and steps along the curve are sure.
+tongue between them, the prediction fails, and only steps along the curve are reliable.
 """
 
 from dataclasses import replace
@@ -39,7 +39,7 @@ def follow_edge(
 ) -> Vertices | None:
     """Vertex halfway along the curve between the ends of an edge on a plain curve.
 
-    `mark` says what the edge lies on and `lowest` is the index beside it. None where the curve does
+    `mark` says what the edge lies on and `lowest` is the adjacent index. None where the curve does
     not lead from one end to the other.
     """
     start, goal = (fabric.vertices.take(edge[k : k + 1]) for k in range(2))

@@ -39,7 +39,7 @@ class Patch:
 
 
 def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Patch:
-    """Triangles around some vertices, and so many rings more; where sheets cross, of all of them.
+    """Triangles around flagged vertices, and `rings` further rings, of all sheets that cross.
 
     Edges on crossings that other sheets hold beyond the patch belong to its rim.
     """

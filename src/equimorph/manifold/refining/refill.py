@@ -1,4 +1,4 @@
-"""Refill: stars of edges and vertices are filled anew where their cells get better.
+"""Refill: stars of edges and vertices are filled again where their cells get better.
 
 Candidates are the flip of an edge (triangles), the best filling of the ring around an edge and
 three cells in place of two around a facet (tetrahedra) [Freitag1997]_, the collapse of a vertex
@@ -62,7 +62,7 @@ def refill(
     """Refill stars as long as cells get better; no edge comes that deviates by more than `limit`.
 
     Where cells are `fine` already, vertices are moved, too, and edges collapsed that are shorter
-    than a share `short` of others beside them: on coarse cells these may keep two folds apart.
+    than a share `short` of their neighbours: on coarse cells these may keep two folds apart.
     """
     if fabric.dimension < TRIANGLES:
         return fabric

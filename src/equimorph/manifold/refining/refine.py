@@ -62,8 +62,8 @@ def refine(
 
     Returns
     -------
-    The refined set; its audit tells the largest deviation that remains, how many edges could not be
-    bisected, and the smallest angle.
+    The refined set; its audit gives the largest remaining deviation, the number of edges that could
+    not be bisected, and the smallest angle.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def refine_cells(eset: EquilibriumSet, accuracy: float, progress: Progress) -> E
 
 
 def _topology_change(before: Audit, after: Audit) -> int:
-    """By how much the topology changed, which it must not."""
+    """Change of the topology, which must be zero."""
     counts = np.array(
         [
             (audit.components, audit.euler_characteristic, sum(n for _, n in audit.loops))
@@ -123,7 +123,7 @@ def _topology_change(before: Audit, after: Audit) -> int:
 def _settle_and_repair(
     fabric: Fabric, tolerance: float, memory: Memory, progress: Progress
 ) -> Fabric:
-    """Bisect and flip until nothing is left to do; then take slivers away, and begin again."""
+    """Bisect and flip until nothing changes; then remove slivers, and begin again."""
     fabric = settle(fabric, tolerance, memory, progress)
     fabric = settle(refill(fabric, memory, fine=True), tolerance, memory, progress)
     if fabric.dimension == 1:
@@ -132,7 +132,7 @@ def _settle_and_repair(
 
 
 def _better_tetrahedra(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
-    """Slivers taken away where no edge gets to deviate; else others cut, and so on."""
+    """Remove slivers where no edge deviates afterwards; else bisect further edges, and so on."""
     best, fewest = fabric, None
     for _ in range(TRIALS):
         fabric = refill(fabric, memory, fine=True, limit=tolerance)

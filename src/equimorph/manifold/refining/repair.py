@@ -23,7 +23,7 @@ GROWN = 4
 WORSE = 5
 """How many more cells may be bad until a plan is given up."""
 TANGLED = 8
-"""Edges that deviate and cannot be bisected, beyond which a patch is left alone."""
+"""Edges that deviate and cannot be bisected, beyond which a patch is not repaired."""
 RINGS, NEXT = 8, 2
 """Rings of cells around overturned ones that may be changed, and that are made finer."""
 
@@ -34,13 +34,13 @@ Step = Callable[[Fabric, float, Memory], Fabric]
 def repair(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     """Cells turned upright that bisection and flips have left overturned, as far as possible.
 
-    One group after the other, with what is around it.
+    One group after the other, with its surroundings.
     """
     tried = np.zeros(0, bool)
     bad = fabric.cells[_bad(fabric)]
     while True:
         tried = np.pad(tried, (0, len(fabric.vertices) - len(tried)))
-        bad = bad[~tried[bad].all(axis=1)]  # the others stay as they are
+        bad = bad[~tried[bad].all(axis=1)]  # the rest stays as it is
         if memory.lost:
             bad = bad[~near_lost(fabric, memory)[bad].any(axis=1)]
         if len(bad) == 0:
@@ -48,7 +48,7 @@ def repair(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
         near = np.zeros(len(fabric.vertices), bool)
         near[bad[0]] = True
         patch = patch_around(fabric, near, RINGS)
-        # cells next to the rim, which stays, may still be turned amid a patch of their own
+        # cells next to the rim, which stays, may still be turned inside another patch
         tried |= patch_around(fabric, near, RINGS // 2).inside
         out, inner = _best(patch, tolerance, memory)
         beyond = bad[~patch.inside[bad].all(axis=1)]
@@ -136,7 +136,7 @@ def _cut(
     wanted: Bool[np.ndarray, " E"],
     memory: Memory,
 ) -> Fabric:
-    """Cut those edges of cells that are wanted, the longest first."""
+    """Bisect the required edges of cells, the longest first."""
     chosen = np.unique(edges.of_cells[cells])
     chosen = chosen[wanted[chosen] & ~edges.stuck[chosen]]
     chosen = chosen[np.argsort(-edges.length[chosen], kind="stable")]

@@ -27,7 +27,7 @@ Quality = Float[np.ndarray, " cells"]
 
 
 class Kind(Enum):
-    """What is done to a star: its vertex goes or moves, or its vertices are connected anew."""
+    """Change of a star: its vertex goes or moves, or its vertices are connected differently."""
 
     COLLAPSE = "collapse"
     MOVE = "move"
@@ -87,11 +87,11 @@ def _faces(row: Rows, corners: Cells, size: int, base: int) -> Pairs:
 
 @dataclass(frozen=True)
 class Refills:
-    """Cells that could go and others that could come instead, refill by refill.
+    """Cells that could go and cells that could replace them, refill by refill.
 
     gone: numbers of cells, and gone_row: the refill that each belongs to; so for cells that come,
     with their index, and for marked facets that go and come, with their marks. short: whether an
-    edge goes that is much shorter than others beside it.
+    edge goes that is much shorter than its neighbours.
     """
 
     fabric: Fabric
@@ -110,7 +110,7 @@ class Refills:
     short: Bool[np.ndarray, " refills"]
 
     def take(self, kept: Bool[np.ndarray, " refills"]) -> "Refills":
-        """Return some of the refills."""
+        """Return a selection of the refills."""
         if kept.all():
             return self
         number = np.cumsum(kept) - 1

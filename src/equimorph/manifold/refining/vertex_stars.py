@@ -66,7 +66,7 @@ Directions = Float[np.ndarray, "n k d"]
 def collapses(fabric: Fabric, quality: Quality, near: Near, short: float = 0.0) -> Refills:
     """Collapses of the corners of poor cells with a corner near into their neighbours.
 
-    Of triangles also of edges beside them that are shorter than a share `short` of others there.
+    Of triangles also of adjacent edges that are shorter than a share `short` of their neighbours.
     """
     cells, d = fabric.cells, fabric.dimension
     poor = np.flatnonzero((quality < POOR[d]) & (count_corners(near, cells) > 0))
@@ -101,9 +101,10 @@ def _short(refills: Refills, moves: Edges, row: Rows, short: float) -> Bool[np.n
 
 
 def short_edges(fabric: Fabric, cells: Rows, short: float) -> Edges:
-    """Edges beside some cells that are shorter than a share `short` of others at their ends.
+    """Edges at given cells that are shorter than a share `short` of others at their ends.
 
-    Two vertices of a fold or constraint so close may be what keeps a third one beside them.
+    Two vertices of a fold or constraint so close may be necessary to represent a third one near
+    them.
     """
     if short == 0.0 or len(cells) == 0:
         return np.zeros((0, 2), int)
@@ -179,7 +180,7 @@ def in_all_sheets(
 
 
 def drawn(fabric: Fabric, moves: Edges, row: Rows) -> Refills:
-    """Refills that draw vertices into others; cells that vanish are left out."""
+    """Refills that collapse vertices into others, without the cells that vanish."""
     base = len(fabric.vertices)
     columns = []
     for simplices in (fabric.cells, fabric.facets):
