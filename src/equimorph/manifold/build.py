@@ -23,7 +23,7 @@ from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import Lines, bisect, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
-from equimorph.manifold.refining.refine import refined
+from equimorph.manifold.refining.refine import refine_cells
 from equimorph.model import (
     Box,
     Constraint,
@@ -154,7 +154,7 @@ def _on_grids(
         if eset.audit.stopped:
             break
         if effort.accuracy is not None:
-            eset = refined(eset, effort.accuracy, progress)
+            eset = refine_cells(eset, effort.accuracy, progress)
         # over one parameter no cells are bisected to find what they hide
         hidden = eset.audit.missing if len(intervals) == 1 else 0
         if eset.audit.unrefined + hidden == 0 or number == GRIDS - 1:

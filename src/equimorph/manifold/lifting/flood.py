@@ -29,11 +29,11 @@ def flood(pairing: Pairing, progress: Progress) -> None:
     """
     while not pairing.is_full:
         flood_directly(pairing, progress)
-        long = pairing.marked(RayMark.LONG)
+        long = pairing.rays_with(RayMark.LONG)
         if len(long.points):
             _lift(pairing, long, STEPS)
             continue
-        hard = _one_of_each_pair(pairing, pairing.marked(RayMark.HARD))
+        hard = _one_of_each_pair(pairing, pairing.rays_with(RayMark.HARD))
         if len(hard.points) == 0:
             return
         for at in range(0, len(hard.points), CHUNK):
@@ -43,7 +43,7 @@ def flood(pairing: Pairing, progress: Progress) -> None:
 def flood_directly(pairing: Pairing, progress: Progress) -> None:
     """Lift edges from all known points as far as single steps lead."""
     pairing.fit()
-    while not pairing.is_full and len((rays := pairing.marked(RayMark.UNTRACED)).points):
+    while not pairing.is_full and len((rays := pairing.rays_with(RayMark.UNTRACED)).points):
         _lift(pairing, rays, 1)
         _refuse_endless(pairing)
         live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == VertexKind.GRID)
