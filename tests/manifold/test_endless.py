@@ -12,7 +12,9 @@ def test_a_set_that_winds_for_ever_is_refused(monkeypatch):
     monkeypatch.setattr(flood, "ENDLESS", 12)
     load = em.Parameter("p", "1", 1.0, "load")
     winding = em.EnergyStructure("-cos(theta) - p*theta", ["theta"], [load])
-    said = r"`within` must leave at most 12 equilibria over a point; got more over p = .* of an endless set"
+    said = (
+        r"`within` must leave at most 12 equilibria over a point; got more over p = .* endless set"
+    )
     with unchecked(), pytest.raises(em.InputError, match=said):
         em.equilibrium_set(winding, em.Box(p=(-2, 2)), intervals=(3,))
 
