@@ -63,7 +63,7 @@ def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -
         chains = [polygon for polygon in found if polygon is not None and polygon.open]
         if any(polygon is None for polygon in found):
             broken.append(triangle)
-        elif len(chains) > 1 and not _closed(pairing, chains):
+        elif len(chains) > 1 and not _closes_alone(pairing, chains):
             ambiguous.append(triangle)
         else:
             polygons.extend(polygon for polygon in found if polygon is not None)
@@ -120,7 +120,7 @@ def _joined(pairing: Pairing, first: Polygon, second: Polygon) -> Polygon:
     return Polygon(first.triangle, points, True, gap=len(chain[0]))
 
 
-def _closed(pairing: Pairing, chains: list[Polygon]) -> bool:
+def _closes_alone(pairing: Pairing, chains: list[Polygon]) -> bool:
     """Whether each of several open chains must be closed by itself: two smooth sheets that cross.
 
     Or its ends are near enough. A crossing that leaves and comes back in between is found out when

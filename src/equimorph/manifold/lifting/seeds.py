@@ -41,10 +41,10 @@ def seeds(
     searched_v, searched_z = _from_search(setting, mesh, searchable, seed)
     vertices, z = np.concatenate([vertices, searched_v]), np.concatenate([z, searched_z])
     good = setting.structure.resolved(z, setting.parameters(mesh.vertices[vertices]))
-    return polished(setting, mesh, vertices[good], z[good])[0]
+    return polish(setting, mesh, vertices[good], z[good])[0]
 
 
-def polished(
+def polish(
     setting: Setting,
     mesh: BaseMesh,
     vertices: Int[np.ndarray, " some"],
