@@ -20,6 +20,8 @@ from typecheck import unchecked
         ((0.0, 1.0, 5), "`a` must be (lower, upper); got (0.0, 1.0, 5)."),
         ((0.0, "wide"), "`a` must be numbers (lower, upper); got (0.0, 'wide')."),
         (1.0, "`a` must be (lower, upper); got 1.0."),
+        (("0", "1"), "`a` must be numbers (lower, upper); got ('0', '1')."),
+        ((True, 2.0), "`a` must be numbers (lower, upper); got (True, 2.0)."),
     ],
 )
 def test_bounds_that_span_nothing_are_refused(bounds, said):

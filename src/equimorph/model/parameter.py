@@ -92,10 +92,9 @@ def _bounds(name: str, value: object, count: int) -> tuple[float, ...]:
     meaning = "(lower, upper)" if count == 2 else "(lower, upper, intervals)"
     if not isinstance(value, Sequence | np.ndarray) or len(value) != count:
         raise InputError(f"`{name}` must be {meaning}; got {value!r}.")
-    try:
-        numbers = tuple(float(entry) for entry in value)
-    except (TypeError, ValueError):
-        raise InputError(f"`{name}` must be numbers {meaning}; got {value!r}.") from None
+    if not all(map(is_number, value)):
+        raise InputError(f"`{name}` must be numbers {meaning}; got {value!r}.")
+    numbers = tuple(float(entry) if abs(entry) <= LARGEST else np.nan for entry in value)
     if not (np.isfinite(numbers).all() and numbers[0] < numbers[1]):
         raise InputError(f"`{name}` must have finite lower < upper; got {value!r}.")
     return numbers

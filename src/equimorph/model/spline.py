@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
+from equimorph.argument_kinds import NUMBERS
 from equimorph.errors import InputError
 
 Samples = Float[np.ndarray, "knots *lanes"]
@@ -74,10 +75,8 @@ class Spline:
 
 
 def _numbers(name: str, values: object) -> Samples:
-    try:
-        numbers = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        numbers = np.full(1, np.nan)
+    given = np.asarray(values) if NUMBERS.fits(values) else np.nan
+    numbers = np.array(given, dtype=float)
     if numbers.ndim == 0 or not np.isfinite(numbers).all():
         raise InputError(f"`{name}` must be a list of finite numbers; got {values!r}.")
     return numbers
