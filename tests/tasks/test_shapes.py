@@ -115,23 +115,29 @@ def independent_roots(arch, descriptors, wanted, near):
 
 def test_targets_have_the_solutions_that_brute_force_finds(arch_set):
     """24 of the 200 targets of the slow test."""
-    brute_force(arch_set, 24)
+    check_against_roots(arch_set, random_heights(arch_set, 24))
 
 
 @pytest.mark.slow
 def test_two_hundred_targets_have_the_solutions_that_brute_force_finds(arch_set):
     """Newton from every vertex nearby finds no solution that is not among the answers."""
-    assert brute_force(arch_set, 200) >= 300
+    assert check_against_roots(arch_set, random_heights(arch_set, 200)) >= 300
 
 
-def brute_force(arch_set, count):
-    """Compare all answers; number of solutions."""
-    arch, names = arch_set.structure, ("Theta", "Delta")
-    heights = arch.height(1 / 3), arch.height(2 / 3)
+def random_heights(arch_set, count):
+    """Heights of random vertices, and a little beside them."""
+    heights = (arch_set.structure.height(s) for s in (1 / 3, 2 / 3))
     values = np.stack([each(arch_set.points) for each in heights], axis=1)
     generator = np.random.default_rng(11)
     picked = generator.choice(len(values), count)
-    wanted = values[picked] + generator.normal(0, 3e-3, (count, 2))
+    return values[picked] + generator.normal(0, 3e-3, (count, 2))
+
+
+def check_against_roots(arch_set, wanted):
+    """Compare all answers with roots from vertices nearby; number of solutions."""
+    arch, names = arch_set.structure, ("Theta", "Delta")
+    heights = arch.height(1 / 3), arch.height(2 / 3)
+    values = np.stack([each(arch_set.points) for each in heights], axis=1)
     answers = em.solve_shapes(arch_set, dict(zip(heights, wanted.T, strict=True)))
     total = 0
     for target, answer in zip(wanted, answers, strict=True):
@@ -153,6 +159,34 @@ def brute_force(arch_set, count):
             assert np.abs(places - p[0, :2]).max(axis=1).min() < 1e-7
         total += len(answer)
     return total
+
+
+@pytest.mark.slow
+def test_solutions_beside_a_singular_map_have_their_twins(arch_set):
+    """Vertices at which the sense of the map to the heights changes: one of two was missing."""
+    cells, points = arch_set.cells[arch_set.cell_index == 0], arch_set.points
+    arch = arch_set.structure
+    values = np.stack([arch.height(s)(points) for s in (1 / 3, 2 / 3)], axis=1)
+    places = np.stack([points["Theta"], points["Delta"]], axis=1)
+    sides = (np.linalg.det(each[cells[:, 1:]] - each[cells[:, :1]]) for each in (values, places))
+    sense = np.sign(np.prod(list(sides), axis=0))
+    edge = np.intersect1d(cells[sense > 0], cells[sense < 0])
+    edge = edge[arch_set.kinds[edge] == 0]
+    assert check_against_roots(arch_set, values[edge]) > 1.5 * len(edge)
+
+
+def test_twins_of_solutions_beside_a_singular_map_are_found(arch_set):
+    """Pairs of stable states of equal heights on both sides of det J_S = 0, from a finer set."""
+    arch = arch_set.structure
+    heights = arch.height(1 / 3), arch.height(2 / 3)
+    for theta, delta in ((0.739, -0.176), (0.884, 1.011), (0.676, -0.164)):
+        state = next(
+            each
+            for each in arch_set.at(Theta=theta, Delta=delta).stable
+            if len(em.solve_shape(arch_set, {h: h(each) for h in heights}).stable) > 1
+        )
+        answer = em.solve_shape(arch_set, {each: each(state) for each in heights})
+        assert len(answer.stable) == 2
 
 
 def test_more_targets_than_actuators_are_fitted(arch_set):

@@ -133,7 +133,7 @@ def _priced(
     approach = States(structure, z, short)
     there &= _near(approach, exact, NEAR_FOLD)
     past = _beyond(eset, before.p, folds.p)
-    there &= eset.box.contains(past[:, eset.setting.free])
+    there &= eset.box.holds(past[:, eset.setting.free])
     z, onward, overshoot = lift_straight(landings, past, demands)
     beyond = States(structure, z, past)
     z, arrived, rest = lift_straight(beyond, goals.p, demands)

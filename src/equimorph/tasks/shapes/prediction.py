@@ -6,10 +6,12 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Rows, Some
 from equimorph.equilibria.point_conditions import Values
 from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Descriptor
 from equimorph.tasks.optimising.tangent_steps import SetPoints, unconstrained_setting
@@ -19,6 +21,11 @@ CLOSE = 0.5
 """Distance of two predictions, in sizes of their cell, below which one of them will do."""
 OVERHANG = 0.5
 """How far beyond a cell, in barycentric coordinates, its linear prediction is still tried."""
+
+TWIN_STEP = 0.02
+"""Step along the set, in the metric, by which the bending of the descriptors is measured."""
+FARTHEST_TWIN = 0.5
+"""Distance along the set, in the metric, within which a second solution is looked for."""
 
 GUARDS = Guards(iterations=30, longest=0.3, converged=1e-7)
 """The last correction is 1e-7, so that Newton's method leaves an error at round-off."""
@@ -174,3 +181,54 @@ def states_with_values(
     values = Values(tuple(each.function for each in descriptors), wanted)
     frame = embedded_planes(structure, free, at.rows)
     return settle(structure, at.z, at.p, directions, [values], GUARDS, frame)
+
+
+def twin_guesses(
+    known: Predictor, exact: Settled, rows: Rows, some: Some
+) -> tuple[SetPoints, Some]:
+    """Guesses of the second solution beside some solutions near det J_S = 0.
+
+    Along the direction v in which the descriptors change least, their component u follows
+    ``σ t + c t²/2``, which vanishes again at ``t = −2σ/c``. The curvature c comes from states of
+    the set on both sides along v.
+
+    Parameters
+    ----------
+    exact
+        Solutions of as many values as free parameters.
+    rows
+        Bases of spaces near the tangent spaces at each.
+    some
+        Numbers of the solutions.
+
+    Returns
+    -------
+    The guesses, and for each the number of its solution.
+    """
+    if len(some) == 0:
+        return SetPoints(exact.z[some], exact.p[some], rows[some]), some
+    left, sizes, right = np.linalg.svd(exact.slopes[some] / known.spread[:, None])
+    steps = np.einsum("lk,lkf->lf", right[:, -1], exact.frames[some])
+    dz, dp = split_step(known.setting, steps)
+    z, p, planes = exact.z[some], exact.p[some], rows[some]
+    values = []
+    for side in (-TWIN_STEP, 0.0, TWIN_STEP):
+        there = _onto_set(known.setting, SetPoints(z + side * dz, p + side * dp, planes))
+        own = [each.function(there.z, there.p) for each in known.descriptors]
+        values.append(np.stack(own, axis=1) / known.spread)
+    second = (values[0] - 2.0 * values[1] + values[2]) / TWIN_STEP**2
+    bend = np.einsum("lm,lm->l", left[:, :, -1], second)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = -2.0 * sizes[:, -1] / bend
+    near = np.flatnonzero(np.abs(t) < FARTHEST_TWIN)
+    move = t[near, None]
+    guesses = SetPoints(z[near] + move * dz[near], p[near] + move * dp[near], planes[near])
+    return guesses, np.asarray(some[near])
+
+
+def _onto_set(setting: Setting, at: SetPoints) -> Settled:
+    """States of the set orthogonally above points near it."""
+    structure, free = setting.structure, setting.free
+    directions = free_directions(structure, free, len(at))
+    frame = embedded_planes(structure, free, at.rows)
+    return settle(structure, at.z, at.p, directions, [], GUARDS, frame)

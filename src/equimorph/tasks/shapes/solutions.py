@@ -22,7 +22,12 @@ from equimorph.tasks.optimising.tangent_steps import SetPoints, points_at_vertic
 from equimorph.tasks.planning import plan
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes.fits_and_families import best_fits, solution_family
-from equimorph.tasks.shapes.prediction import Predictor, predictor, states_with_values
+from equimorph.tasks.shapes.prediction import (
+    Predictor,
+    predictor,
+    states_with_values,
+    twin_guesses,
+)
 from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
 from equimorph.tolerances import SAME_STATE
 
@@ -286,6 +291,13 @@ def _solve(
     guesses, owner = _guesses(known, wanted)
     exact = states_with_values(known.setting, guesses, known.descriptors, wanted[owner])
     z, p, found = exact.z, exact.p, exact.found
+    if wanted.shape[1] == len(eset.names):
+        starts, of = twin_guesses(known, exact, guesses.rows, np.flatnonzero(found))
+        twins = states_with_values(known.setting, starts, known.descriptors, wanted[owner[of]])
+        owner = np.concatenate([owner, owner[of]])
+        order = np.argsort(owner, kind="stable")
+        z, p = np.concatenate([z, twins.z])[order], np.concatenate([p, twins.p])[order]
+        found, owner = np.concatenate([found, twins.found])[order], owner[order]
     found &= eset.box.holds(p[:, known.setting.free], slack=AT_EDGE)
     found[found] &= structure.resolved(z[found], p[found])
     for constraint in within:
