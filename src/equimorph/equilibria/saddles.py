@@ -24,6 +24,7 @@ LEGS = 4
 FIRST_STEP, LARGEST_STEP = 0.02, 0.2
 """Of a push, relative to the smallest distance of two minima in the batch."""
 STEPS = 150
+"""Largest number of steps of one push."""
 
 
 @dataclass(frozen=True)
