@@ -185,7 +185,7 @@ def states_with_values(
 
 def twin_guesses(
     known: Predictor, exact: Settled, rows: Rows, some: Some
-) -> tuple[SetPoints, Some]:
+) -> tuple[SetPoints, Int[np.ndarray, " twins"]]:
     """Guesses of the second solution beside some solutions near det J_S = 0.
 
     Along the direction v in which the descriptors change least, their component u follows
