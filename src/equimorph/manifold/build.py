@@ -37,17 +37,17 @@ from equimorph.structures import States, Structure
 
 COARSE = {1: 12, 2: 12, 3: 7}
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
-BISECTIONS = {1: 4, 2: 16, 3: 16}
+BISECTIONS = {1: 12, 2: 24, 3: 60}
 """Rounds by the number of free parameters: each cuts the longest edges of doubtful cells. Of 218
 sets 189 needed none, and the others 9 at most."""
-GRIDS = 2
+GRIDS = 3
 """Grids that are tried, each with twice the intervals, until refinement succeeds everywhere, and
 over one parameter until nothing is missing. Of 218 sets one needed the second."""
 CHEAP = 4
 """Multiplier for the number of completeness checks in 1-D sets and symmetric slices."""
-SEARCHES = 3
+SEARCHES = 6
 """Rounds of independent checks; what one round finds missing is lifted before the next. Of 218 sets
-17 needed a second round, and none a third."""
+17 needed a second round; a coarse one under half a load needs four or more."""
 RECOVERED = 50
 """Missing states, spread over all that were found, whose surroundings are lifted at once."""
 HIDDEN = 12

@@ -21,10 +21,10 @@ from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.model import Progress
 
-DISTANCES = (0.03, 0.003)
+DISTANCES = (0.03, 0.003, 0.0003)
 """Lengths of the first step from a crossing, in the metric, tried one after the other: of 104
 curves two needed the second."""
-TURNS = 2
+TURNS = 4
 """How often a new curve is followed until it turns back: of 104 curves 96 reached a vertex at once,
 4 after one turn, and none after more."""
 CURVES = 2
