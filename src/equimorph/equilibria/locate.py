@@ -8,7 +8,7 @@ See docs/decisions.md, "Events are roots of scalars along the curve".
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -82,7 +82,8 @@ def locate_goal(curve: Curve, bracket: Bracket, goal: float) -> Located:
 
 def polish(curve: Curve, z: Lanes, t: Values) -> tuple[Lanes, Flags]:
     """Points at fixed t near guesses, exact to round-off, and which were found."""
-    found = settle(AlongCurve(curve), z, along_parameters(t), guards=AT_ROUND_OFF)
+    shrinking = replace(AT_ROUND_OFF, contraction=1.0)
+    found = settle(AlongCurve(curve), z, along_parameters(t), guards=shrinking)
     return found.z, found.found
 
 
