@@ -1,7 +1,7 @@
 """Kinds of arguments: what the annotation and the name of a parameter allow, and in which words.
 
-`door` checks the arguments of public functions by them. Nothing here knows a structure: classes
-are named in `CLASSES`, numbers whose names mean the same in all functions in `RANGES`.
+`check_arguments` checks the arguments of public functions by them. Nothing here knows a structure:
+classes are named in `CLASSES`, numbers whose names mean the same in all functions in `RANGES`.
 """
 
 import sys

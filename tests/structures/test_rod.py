@@ -252,7 +252,7 @@ def test_states_are_read_by_name_number_and_mask():
 
 
 def test_states_of_another_resolution_are_refused():
-    """Kernels read what they are told to: widths are checked at every door."""
+    """Kernels read what they are told to: widths are checked wherever they are given."""
     rod, other = Rod(elements=4, degree=4), Rod(elements=6, degree=5)
     state = other.natural_state(Theta=0.9)
     z, p = state.z[None], state.p[None]

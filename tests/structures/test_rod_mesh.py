@@ -129,7 +129,7 @@ def test_a_table_written_as_the_uniform_load_is_the_uniform_load():
         ({"degree": 17}, "`degree` must be a whole number from 3 to 16; got 17"),
     ],
 )
-def test_bad_input_is_refused_at_the_door(arguments, text):
+def test_bad_input_is_refused(arguments, text):
     with pytest.raises(InputError, match=text):
         Rod(**arguments)
 

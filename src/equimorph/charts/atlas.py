@@ -7,13 +7,13 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Points
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.paths import AtlasPath, Place, path_over_cells
 from equimorph.charts.preparation import crossing_facets, first_copies
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
@@ -89,7 +89,7 @@ class Transition:
         """Charts, kind and number of points."""
         return f"Transition({self.charts[0]} – {self.charts[1]}: {self.kind} of {len(self.states)})"
 
-    @door
+    @check_arguments
     def cross(self, coords: Points, source: int) -> Points:
         """Coordinates in the other chart of points on the curve.
 
@@ -228,7 +228,7 @@ class Atlas:
                 out.append(Transition(pair, EdgeKind.CROSSING, self.eset.points[used], both, local))
         return out
 
-    @door
+    @check_arguments
     def locate(self, states: States | State) -> tuple[Int[np.ndarray, " n"], Points]:
         """Numbers of the charts of states, −1 for those that lie on none, and their coordinates."""
         batch = states.batch if isinstance(states, State) else states
@@ -236,7 +236,7 @@ class Atlas:
         cell = self.cell_of(batch)
         return np.where(cell >= 0, self.chart[cell], -1), points
 
-    @door
+    @check_arguments
     def cell_of(self, batch: States) -> Int[np.ndarray, " n"]:
         """Cell that each state lies on, −1 if none."""
         points = self.coordinates(batch.z, batch.p)
@@ -255,7 +255,7 @@ class Atlas:
         cell[found.point[first[near]]] = found.cell[first[near]]
         return cell
 
-    @door
+    @check_arguments
     def path(self, start: State, goal: State) -> AtlasPath:
         """Continuous path between two states, from chart to chart.
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Points
 from equimorph.charts.coordinates import Coordinates, coordinates_of, frames_anywhere
 from equimorph.charts.domain import (
@@ -21,7 +22,6 @@ from equimorph.charts.domain import (
 )
 from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.preparation import cut_along_crossings, flip_inverted_triangles
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.geometry.setting import embed
@@ -134,7 +134,7 @@ class Chart(ABC):
         """Whether all states of the set have different coordinates."""
         return single_valued(self.cells)
 
-    @door
+    @check_arguments
     def state(self, coords: Points) -> Charted:
         """Exact states with given coordinates.
 
@@ -163,13 +163,13 @@ class Chart(ABC):
         code[empty[self._beyond(points[empty])]] = PointStatus.BEYOND_THE_BOX
         return self._answers(found.take(count[found.point] == 1), code)
 
-    @door
+    @check_arguments
     def coords(self, states: States | State) -> Points:
         """Coordinates of states, one row each."""
         batch = states.batch if isinstance(states, State) else states
         return self.coordinates(batch.z, batch.p)
 
-    @door
+    @check_arguments
     def jacobian(self, states: States | State) -> Float[np.ndarray, "points d d"]:
         """Derivatives of the free parameters (rows) by the coordinates (columns) at states.
 
@@ -188,7 +188,7 @@ class Chart(ABC):
         out[regular] = np.swapaxes(solved, 1, 2)
         return out
 
-    @door
+    @check_arguments
     def contains(self, states: States | State) -> Bool[np.ndarray, " points"]:
         """Whether the chart gives just these states for their coordinates."""
         batch = states.batch if isinstance(states, State) else states
@@ -243,7 +243,7 @@ class Chart(ABC):
         return Charted(States(structure, z, p), code, cell)
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False, repr=False)
 class Projection(Chart):
     """The free parameters as coordinates.
@@ -272,7 +272,7 @@ class Projection(Chart):
         return coordinates_of(self.eset, self.eset.names)
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False, repr=False)
 class DescriptorChart(Chart):
     """Descriptors and free parameters as coordinates.

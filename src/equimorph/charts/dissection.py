@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.charts.atlas import Atlas
 from equimorph.charts.chart import check_cells
 from equimorph.charts.conflicts import conflicts_of, least_cut
@@ -17,7 +18,6 @@ from equimorph.charts.preparation import (
     cut_along_crossings,
     flip_inverted_triangles,
 )
-from equimorph.door import door
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of, squared_sides
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
@@ -34,7 +34,7 @@ MOST = 40
 """Largest number of cuts; overlaps that remain are listed by `Atlas`."""
 
 
-@door
+@check_arguments
 def dissect(eset: EquilibriumSet) -> Atlas:
     """Cut a set, or a part of one, into few charts over the free parameters.
 

@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Points
 from equimorph.charts.arrangement import cross, outline, winding
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.regions import Regions, regions_within
-from equimorph.door import door
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import keys_of, labels, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex
@@ -90,7 +90,7 @@ class Domain:
             runs += _runs(loop, kinds)
         return (*self.ends, *runs)
 
-    @door
+    @check_arguments
     def contains(self, points: Points) -> Bool[np.ndarray, " points"]:
         """Which points lie in the region as its cells draw it: curved edges are chords."""
         if self.cells is not None:
@@ -101,7 +101,7 @@ class Domain:
         sides = np.concatenate([np.stack([each[:-1], each[1:]], axis=1) for each in self.loops])
         return winding(points, sides, np.ones(len(sides), int)) > 0
 
-    @door
+    @check_arguments
     def nearest_kind(self, points: Points) -> np.ndarray:
         """Kind of the edge nearest to each point; "" without edges."""
         if not self.edges or len(points) == 0:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Points
 from equimorph.charts.location import Found
 from equimorph.charts.rules import Chooser, Identity, Rule, first_of_each, highest, lowest, nearest
-from equimorph.door import door
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.first_stable import OFF, STABLE, FirstStable
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
@@ -35,7 +35,7 @@ Ends = Callable[[Lanes, Parameters, Parameters], Lanes]
 """States at the ends of paths from unloaded states, their parameters, and those of the ends."""
 
 
-@door
+@check_arguments
 def quasi_static(parameter: str) -> Rule:
     """Prefer the state that loading from the natural state reaches without any critical point.
 
@@ -51,7 +51,7 @@ def quasi_static(parameter: str) -> Rule:
     )
 
 
-@door
+@check_arguments
 def first_stable_on_path(parameter: str, bound: float = BOUND) -> Rule:
     """Prefer the first stable state on the path from the natural state, through unstable parts too.
 

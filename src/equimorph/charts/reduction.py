@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Points
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
 from equimorph.charts.chart import Chart, Charted, PointStatus, check_cells
@@ -19,7 +20,6 @@ from equimorph.charts.location import Cells
 from equimorph.charts.preference import Preference, preferred_part
 from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
 from equimorph.charts.rules import Rule, Scores, rule_of
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -117,7 +117,7 @@ class Reduction(Chart):
         return on
 
 
-@door
+@check_arguments
 def reduce(
     eset: EquilibriumSet,
     *,

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Points
 from equimorph.charts.location import Found
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
@@ -93,7 +93,7 @@ def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np
     return out
 
 
-@door
+@check_arguments
 def lowest(descriptor: Descriptor) -> Rule:
     """Prefer the lowest value of a descriptor, like the energy.
 
@@ -109,7 +109,7 @@ def lowest(descriptor: Descriptor) -> Rule:
     )
 
 
-@door
+@check_arguments
 def highest(descriptor: Descriptor) -> Rule:
     """Prefer the highest value of a descriptor.
 
@@ -125,7 +125,7 @@ def highest(descriptor: Descriptor) -> Rule:
     )
 
 
-@door
+@check_arguments
 def nearest(to: State | int) -> Rule:
     """Prefer what is nearest, in the metric, to a state or to a stratum of the set.
 

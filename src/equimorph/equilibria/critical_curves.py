@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
-from equimorph.door import door
 from equimorph.equilibria.critical import normal_form
 from equimorph.equilibria.critical_tests import (
     bound,
@@ -176,7 +176,7 @@ def _event(locus: Locus, mark: Landmark) -> Event:
     return Event(mark.kind, State(locus.structure, z[0], p[0]), mark.length, critical, detail)
 
 
-@door
+@check_arguments
 def fold_curve(
     state: State,
     parameters: Sequence[str],
@@ -219,7 +219,7 @@ def fold_curve(
     return both_ways("fold", locus, state, [*watches, *limits(state, free, box, within)], options)
 
 
-@door
+@check_arguments
 def branch_curve(
     state: State,
     parameters: Sequence[str],
@@ -261,7 +261,7 @@ def branch_curve(
     return both_ways("branch point", locus, state, watches, options)
 
 
-@door
+@check_arguments
 def cusp_curve(
     state: State,
     parameters: Sequence[str],
@@ -296,7 +296,7 @@ def cusp_curve(
     return both_ways("cusp", locus, state, [*watches, *limits(state, free, box, within)], options)
 
 
-@door
+@check_arguments
 def constraint_curve(
     state: State,
     parameters: Sequence[str],
@@ -334,7 +334,7 @@ def constraint_curve(
     return both_ways("constraint", locus, state, limits(state, free, box, within), options)
 
 
-@door
+@check_arguments
 def grazing_curve(
     state: State,
     parameters: Sequence[str],

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import overload
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.legs import Leg, check_start, check_starts, way_points
 from equimorph.equilibria.lifts import Lifts, lift_many
 from equimorph.equilibria.paths import Event, Path, lift_one
@@ -35,7 +35,7 @@ def lift(
     options: TraceOptions | None = None,
     progress: Progress | None = None,
 ) -> Lifts: ...
-@door
+@check_arguments
 def lift(
     state: State | States,
     to: Leg | Sequence[Leg],

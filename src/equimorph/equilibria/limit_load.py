@@ -7,8 +7,8 @@ from typing import overload
 import numpy as np
 from jaxtyping import Shaped
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
-from equimorph.door import door
 from equimorph.equilibria.legs import check_starts, violations
 from equimorph.equilibria.lift import Path, lift
 from equimorph.equilibria.trace_options import TraceOptions
@@ -101,7 +101,7 @@ def limit_load(
     options: TraceOptions | None = None,
     progress: Progress | None = None,
 ) -> LimitLoads: ...
-@door
+@check_arguments
 def limit_load(
     state: State | States,
     load: str,

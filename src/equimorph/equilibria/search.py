@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import gammaln, xlogy
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.arguments import Argument, arguments_of, contradicts
 from equimorph.equilibria.minima_graph import MinimaGraph
 from equimorph.equilibria.random_search import UNRESOLVED, Ground, Pools, distinct
@@ -159,7 +159,7 @@ class FoundStates(States):
         )
 
 
-@door
+@check_arguments
 def find_equilibria(
     structure: Structure,
     at: Mapping[str, float],

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import (
     FAITHFUL,
@@ -79,7 +79,7 @@ class Landing:
         return f"Landing({self.status}: {self.state}; released {self.released:.6g})"
 
 
-@door
+@check_arguments
 def snap_landing(state: State, *, at: Mapping[str, float] | None = None) -> tuple[Landing, ...]:
     """Stable states that a structure reaches from a state that it cannot keep.
 

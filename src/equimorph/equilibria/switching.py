@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.critical import NormalForm, normal_form
 from equimorph.equilibria.curves import ParameterLine, dual
 from equimorph.equilibria.lift import Path, check_start
@@ -41,7 +41,7 @@ class Branch:
     slope: float
 
 
-@door
+@check_arguments
 def branches(
     state: State, along: str, *, path: Path | None = None, distance: float = 0.05
 ) -> tuple[Branch, ...]:

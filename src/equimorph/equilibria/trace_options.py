@@ -6,7 +6,7 @@ from enum import IntEnum, StrEnum
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import kernels
 
 
@@ -66,7 +66,7 @@ class EventCode(IntEnum):
         return EventKind[self.name]
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class TraceOptions:
     """Options of the tracer.

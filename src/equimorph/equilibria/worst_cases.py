@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace
@@ -29,7 +29,7 @@ _WORST = re.compile(r"\s*worst\((.*) for (.*)\)\s*", re.DOTALL)
 _OFFSET = re.compile(r"\s*(\w+)\s*(?:±|\+-)\s*([\d.eE+-]+)\s*")
 
 
-@door
+@check_arguments
 def worst_over(
     structure: Structure, descriptor: Descriptor, offsets: Mapping[str, float]
 ) -> Descriptor:
@@ -77,7 +77,7 @@ class Corner:
     limit: Descriptor
 
 
-@door
+@check_arguments
 def corners_of(
     structure: Structure, descriptor: Descriptor, offsets: Mapping[str, float]
 ) -> tuple[Corner, ...]:
@@ -149,7 +149,7 @@ class _Ray:
         return share, end, at
 
 
-@door
+@check_arguments
 def worst_named(structure: Structure, text: str) -> Descriptor:
     """Descriptor that a text means: as `find_descriptor`, or the worst of one over a box.
 
@@ -216,7 +216,7 @@ SAMPLES = 9
 """Number of samples of a range; between them parabolas give the extremum."""
 
 
-@door
+@check_arguments
 def held_over(
     structure: Structure,
     name: str,

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 from jaxtyping import Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import short
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.description import Frame
@@ -64,7 +64,7 @@ INTERVALS = {1: (200,), 2: (47, 81), 3: (24, 24, 24)}
 """Of the grid, by the number of free parameters, if not given."""
 
 
-@door
+@check_arguments
 def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     structure: Structure,
     box: Box,

@@ -7,9 +7,9 @@ from typing import Any, Literal, Protocol, overload, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import LARGEST, is_number
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model.obstacle import Obstacle
 
@@ -74,7 +74,7 @@ class Vanishing:
     criticality: Callable[[Lanes, Parameters], list[str]]
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Descriptor:
     """A scalar of a state, with its name, unit and symbol for axes.
@@ -155,7 +155,7 @@ def _number(name: str, bound: Any) -> float:
     return number
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class Constraint:
     """A descriptor held on one side of a bound, which it may exceed by `ease`."""
@@ -186,13 +186,13 @@ class Constraint:
         sign = 1.0 if self.sense == "<=" else -1.0
         return sign * (self.descriptor.function(z, p) - self.bound) - self.ease
 
-    @door
+    @check_arguments
     def holds(self, states: ManyStates) -> Flags:
         """Whether states obey the constraint."""
         return self.excess(states.z, states.p) <= 0.0
 
 
-@door
+@check_arguments
 def combined(
     name: str, function: Callable[..., Any], *descriptors: Descriptor, unit: str = "1"
 ) -> Descriptor:
@@ -226,7 +226,7 @@ def combined(
     return Descriptor(name, unit, value, name)
 
 
-@door
+@check_arguments
 def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
     """Largest of several smooth descriptors; its minima, kinks among them, can be found exactly.
 
@@ -247,7 +247,7 @@ def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
     return Descriptor(name, unit, whole.function, name, branches=branches)
 
 
-@door
+@check_arguments
 def eased(constraint: Constraint) -> Constraint:
     """Constraint that rounding does not violate: optima lie on bounds."""
     return replace(constraint, ease=EASE * max(1.0, abs(constraint.bound)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 
 Pair = tuple[float, float]
@@ -24,7 +24,7 @@ def _pair(name: str, value: Sequence[float]) -> Pair:
     return x, y
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class HalfPlane:
     """Forbidden side of a line: places behind `point`, seen along `normal`.
@@ -64,7 +64,7 @@ class HalfPlane:
         return np.asarray(rate @ normal), np.asarray(bend @ normal)
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class Disc:
     """A forbidden disc, or with `inside` a round room that must not be left.

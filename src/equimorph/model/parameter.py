@@ -7,14 +7,14 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import LARGEST, is_number
-from equimorph.door import door
 from equimorph.errors import InputError, suggestion
 
 Role = Literal["actuator", "load", "fixed"]
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class Parameter:
     """One parameter of a structure.
@@ -116,7 +116,7 @@ class Box:
         ranges = zip(self.names, self.lower, self.upper, strict=True)
         return f"Box({', '.join(f'{name}=({low:g}, {high:g})' for name, low, high in ranges)})"
 
-    @door
+    @check_arguments
     def contains(
         self, points: Float[np.ndarray, "*lanes d"], slack: float = 0.0
     ) -> "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]":

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class Schedule:
     """All parameters of a structure, step by step along a verified route.
@@ -53,7 +53,7 @@ class Schedule:
         return f"Schedule({names or 'at rest'}: {len(self.values)} steps; margin {smallest:.4g})"
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class Rates:
     """Largest rates of parameters, in their units per unit of time: ``Rates({"Theta": 0.1})``.
@@ -76,7 +76,7 @@ class Rates:
             if not (np.isfinite(limit) and limit > 0.0):
                 raise InputError(f"`limits` must be positive; got {name}: {limit!r}.")
 
-    @door
+    @check_arguments
     def durations(
         self, names: tuple[str, ...], values: Float[np.ndarray, "steps parameters"]
     ) -> Float[np.ndarray, " pieces"]:
@@ -90,7 +90,7 @@ class Rates:
         bounds = np.array(list(self.limits.values()), dtype=float)
         return np.asarray((np.abs(np.diff(values[:, at], axis=0)) / bounds).max(axis=1))
 
-    @door
+    @check_arguments
     def times(self, schedule: Schedule) -> Float[np.ndarray, " steps"]:
         """Earliest time of each step of a schedule, from zero on."""
         spent = self.durations(schedule.names, schedule.values)

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.labels import with_unit
@@ -26,7 +26,7 @@ _LOOKS: tuple[tuple[str, str, dict[str, Any]], ...] = (
 )
 
 
-@door
+@check_arguments
 def calibration(found: Calibration, measured: MeasuredShape, ax: Axes | None = None) -> Axes:
     """Shapes at the fitted unknowns under the measured points; below, the residuals.
 

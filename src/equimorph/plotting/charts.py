@@ -12,8 +12,8 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import MaxNLocator
 
+from equimorph.argument_checks import check_arguments
 from equimorph.charts import Atlas, Chart, Domain, Edge, Reduction
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
@@ -50,7 +50,7 @@ _COLUMNS, _ENTRIES = 4, 2
 """Columns in a row of panels, and entries of the legend for each of them."""
 
 
-@door
+@check_arguments
 def chart_domain(chart: Chart, ax: Axes | None = None) -> Axes:
     """Domain of a chart over two coordinates: barriers thick, gaps hatched.
 
@@ -89,7 +89,7 @@ def chart_domain(chart: Chart, ax: Axes | None = None) -> Axes:
     return ax
 
 
-@door
+@check_arguments
 def parameterisation(
     charts: Sequence[Chart | Atlas | Sequence[Chart]], height: Descriptor
 ) -> Figure:

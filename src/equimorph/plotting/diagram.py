@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.topology import pieces
@@ -27,7 +27,7 @@ _MARGINS = (0.52, 0.4, 0.14, 0.08)
 """Inches around the axes: left, bottom, right, top."""
 
 
-@door
+@check_arguments
 def diagram(eset: EquilibriumSet, height: Descriptor | None = None, ax: Axes | None = None) -> Axes:
     """Equilibria over one parameter: stable ones as full lines, unstable ones dashed.
 

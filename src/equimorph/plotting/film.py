@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
 from equimorph.charts.regions import count_regions
-from equimorph.door import door
 from equimorph.equilibria import Path
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import position
@@ -46,7 +46,7 @@ _HUNDREDTHS = 10
 """Milliseconds in a hundredth of a second, the unit of time in GIF files."""
 
 
-@door
+@check_arguments
 def film(
     route: Route,
     path: str | FilePath,

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, parameter_label
@@ -22,7 +22,7 @@ _ROUNDING = 1e-9
 _COLOURS = {"objective": style.ROUTE_COLOUR, "actuator": style.INDEX_COLOURS[0]}
 
 
-@door
+@check_arguments
 def followed(
     found: FollowedOptimum,
     objective: Descriptor,

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.manifold.geometry.topology import chains
 from equimorph.model import Descriptor
 from equimorph.plotting import style
@@ -28,7 +28,7 @@ _LOOKS: dict[str, dict[str, Any]] = {
 _LABELS = {"stability": "barrier: stability", "preference": "barrier: preference"}
 
 
-@door
+@check_arguments
 def landscape(
     structure: Structure, found: Landscape, objective: Descriptor, ax: Axes | None = None
 ) -> Axes:

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.model import Descriptor
@@ -52,7 +52,7 @@ class _Plane:
         return np.array([self.across(state), self.up(state)])
 
 
-@door
+@check_arguments
 def level_plane(
     eset: EquilibriumSet,
     plane: tuple[Descriptor, Descriptor],

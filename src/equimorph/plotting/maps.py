@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.model.descriptor import CONSTRAINT
 from equimorph.plotting import style
 from equimorph.plotting.labels import (
@@ -258,7 +258,7 @@ _LOOKS = {
 }
 
 
-@door
+@check_arguments
 def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
     """Limit loads over two actuators, with the curves on which they jump or bend.
 
@@ -302,7 +302,7 @@ _CURVATURE_LOOKS = {
 }
 
 
-@door
+@check_arguments
 def curvature_map(cmap: CurvatureMap, ax: Axes | None = None) -> Axes:
     """Largest curvature, or another descriptor, of the first stable state at a load.
 

@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 from matplotlib.axes import Axes
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.plotting import style
@@ -24,7 +24,7 @@ _MOST_NUMBERS = 12
 """Largest number of way points that are numbered one by one."""
 
 
-@door
+@check_arguments
 def margins(route: Route, ax: Axes | None = None) -> Axes:
     """Stability margin along a route, and below it max |κ| if the schedule has it.
 

@@ -15,8 +15,8 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 from scipy import ndimage
 
+from equimorph.argument_checks import check_arguments
 from equimorph.charts.regions import Regions, count_regions
-from equimorph.door import door
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, divided_by
@@ -80,7 +80,7 @@ _LONG_LEG, _BETWEEN = 0.12, 0.6
 of them."""
 
 
-@door
+@check_arguments
 def parameter_plane(
     eset: EquilibriumSet,
     route: Route | None = None,
@@ -325,7 +325,7 @@ _STABLE: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": style.ROUTE_COLOUR, "m
 _UNSTABLE: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": "white", "mec": style.ROUTE_COLOUR}
 
 
-@door
+@check_arguments
 def solutions(eset: EquilibriumSet, states: States, ax: Axes | None = None) -> Axes:
     """Mark states on the plane of the free parameters, filled where stable.
 

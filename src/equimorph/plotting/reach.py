@@ -13,8 +13,8 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 
+from equimorph.argument_checks import check_arguments
 from equimorph.charts.regions import count_regions
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, number_way_points, parameter_label
@@ -42,7 +42,7 @@ chords."""
 Line = Float[np.ndarray, "_ 2"]
 
 
-@door
+@check_arguments
 def reach_plane(
     reach: Reach,
     motion: Tracking | None = None,
@@ -101,7 +101,7 @@ def reach_plane(
     return ax
 
 
-@door
+@check_arguments
 def reach_parameters(reach: Reach, motion: Tracking | None = None, ax: Axes | None = None) -> Axes:
     """Region of the start in the plane of two parameters, with its boundary by kinds.
 
@@ -147,7 +147,7 @@ def reach_parameters(reach: Reach, motion: Tracking | None = None, ax: Axes | No
     return ax
 
 
-@door
+@check_arguments
 def reach_panels(reach: Reach, motion: Tracking) -> Figure:
     """Reachable set and a motion in it: image, set, parameter plane and shapes.
 

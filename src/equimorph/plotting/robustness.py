@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse, Patch, Rectangle
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.plotting import style
@@ -25,7 +25,7 @@ _ENDS = ("x", "+", "1", "2", "3", "4")
 _BOX: dict[str, Any] = {"fill": False, "ec": style.ROUTE_COLOUR, "lw": 1.4, "zorder": 6}
 
 
-@door
+@check_arguments
 def sensitivities(structure: Structure, found: Sensitivity, ax: Axes | None = None) -> Axes:
     """Change of each descriptor with each parameter, for one scale of the parameter.
 
@@ -81,7 +81,7 @@ def _knows(structure: Structure, name: str) -> bool:
     return True
 
 
-@door
+@check_arguments
 def imperfection_laws(
     structure: Structure, laws: Mapping[str, ImperfectionLaw], load: str, ax: Axes | None = None
 ) -> Axes:
@@ -128,7 +128,7 @@ def imperfection_laws(
     return ax
 
 
-@door
+@check_arguments
 def room(
     state: State, found: Room, eset: EquilibriumSet | None = None, ax: Axes | None = None
 ) -> Axes:
@@ -188,7 +188,7 @@ def room(
     return ax
 
 
-@door
+@check_arguments
 def trials(structure: Structure, found: Trials, ax: Axes | None = None) -> Axes:
     """Random trials by their first two offsets, or by one offset and where they ended.
 

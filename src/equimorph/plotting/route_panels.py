@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -32,7 +32,7 @@ _SOLID, _PLANE, _SHAPES = (
 """Axes of the three panels as shares of the figure: left, bottom, width, height."""
 
 
-@door
+@check_arguments
 def route_panels(
     eset: EquilibriumSet,
     route: Route,
@@ -103,7 +103,7 @@ _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.
 _ENDS: dict[str, Any] = {"ls": "none", "ms": 5, "mec": style.ROUTE_COLOUR, "mew": 1.0, "zorder": 8}
 
 
-@door
+@check_arguments
 def alternative_routes(
     eset: EquilibriumSet, routes: Sequence[Route], ax: Axes | None = None
 ) -> Axes:

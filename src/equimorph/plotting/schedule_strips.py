@@ -7,7 +7,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.plotting import style
@@ -22,7 +22,7 @@ MOST_STRIPS = 24
 _COLOURS = {"actuator": style.INDEX_COLOURS[0], "load": style.INK}
 
 
-@door
+@check_arguments
 def schedule_strips(schedule: Schedule) -> Figure:
     """Parameters along a schedule; those of one role and unit share their scale.
 

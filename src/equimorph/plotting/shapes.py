@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 from mpl_toolkits.mplot3d import proj3d
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.model import Obstacle
@@ -90,7 +90,7 @@ _BAR = 0.5
 """Inches for the colour bar and the labels above it."""
 
 
-@door
+@check_arguments
 def shapes(
     path_or_route: Path | Route,
     count: int = 13,
@@ -168,7 +168,7 @@ _DASHES = ("solid", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
 """Line styles of successive shapes."""
 
 
-@door
+@check_arguments
 def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None) -> Axes:
     """Shapes of states, each with its label where it is farthest from the other shapes.
 

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from equimorph.argument_checks import check_arguments
 from equimorph.charts.regions import count_regions
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import Snap, SnapGraph
 from equimorph.model import Descriptor
@@ -32,7 +32,7 @@ _LOOKS = {
 _MARK: dict[str, Any] = {"zorder": 5, "linewidths": 0.5, "edgecolors": style.INK, "s": 16}
 
 
-@door
+@check_arguments
 def snap_panels(graph: SnapGraph, descriptor: Descriptor | None = None) -> Figure:
     """Stability boundary of a set with the energy that snaps free, and where they land.
 

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.plotting import style
 from equimorph.plotting.labels import number_points, parameter_label
 from equimorph.plotting.maps import load_map
@@ -21,7 +21,7 @@ _ROOM = (0.62, 0.38, 0.1, 0.34)
 _LOOKS = (("o", "-", True), ("s", "--", False))
 
 
-@door
+@check_arguments
 def strongest_settings(
     lmap: LimitLoadMap,
     sure: StrongestSettings,
@@ -60,7 +60,7 @@ def strongest_settings(
     return ax
 
 
-@door
+@check_arguments
 def beside_strongest(
     lmap: LimitLoadMap, found: Sequence[Strongest], ax: Axes | None = None
 ) -> Axes:

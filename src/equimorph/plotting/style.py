@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 
 MILLIMETRE = 1 / 25.4
 """In inches."""
@@ -83,7 +83,7 @@ _SETTINGS: dict[str, Any] = {
 }
 
 
-@door
+@check_arguments
 @contextmanager
 def house_style(changes: Mapping[str, Any] | None = None) -> Generator[None]:
     """Apply the settings of the house, with `changes`, inside a ``with`` block and only there."""
@@ -167,7 +167,7 @@ def count_shades(largest: int) -> list[tuple[float, float, float, float]]:
     return [shades(k / max(largest, 1)) for k in range(largest + 1)]
 
 
-@door
+@check_arguments
 def save(
     drawing: Axes | Figure,
     folder: str | FilePath,

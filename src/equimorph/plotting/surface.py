@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from mpl_toolkits.mplot3d import Axes3D, proj3d
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, divided_by
@@ -82,7 +82,7 @@ _HIDDEN_ROUTE: dict[str, Any] = {
 }
 
 
-@door
+@check_arguments
 def surface(
     eset: EquilibriumSet,
     height_descriptor: Descriptor,

@@ -6,6 +6,7 @@ from typing import Any
 
 import h5py
 
+from equimorph.argument_checks import check_arguments
 from equimorph.charts import (
     Atlas,
     Barrier,
@@ -15,7 +16,6 @@ from equimorph.charts import (
     Reduction,
     rule_from,
 )
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.storage.hdf import get, get_json, open_file, put, put_json, write
 from equimorph.storage.owner import Owner
@@ -30,7 +30,7 @@ ABOUT, STRUCTURE, CHART = "about", "structure", "chart"
 SET, WHOLE, BARRIERS = "set", "whole", "barriers"
 
 
-@door
+@check_arguments
 def save_chart(path: str | Path, chart: Chart | Atlas) -> Path:
     """Write a chart or an atlas, with the set that it parameterises, barriers and cuts.
 
@@ -55,7 +55,7 @@ def save_chart(path: str | Path, chart: Chart | Atlas) -> Path:
     return write(Path(path), FORMAT, VERSION, fill)
 
 
-@door
+@check_arguments
 def load_chart(path: str | Path) -> Chart | Atlas:
     """Read what `save_chart` wrote.
 

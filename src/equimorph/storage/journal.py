@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.model import Findings
 from equimorph.storage.files import checksum
@@ -24,7 +24,7 @@ LENGTH, DIGEST = 16, 64
 """Hexadecimal digits before each entry: of its length, and of its checksum."""
 
 
-@door
+@check_arguments
 @contextmanager
 def open_journal(path: Path | str, *, replace: bool = False) -> Generator["JournalFile"]:
     """Open a journal while the block lasts; its file is made when it is first written to.

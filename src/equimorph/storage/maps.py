@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.model import Grid
 from equimorph.storage.files import write_text
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json
@@ -119,7 +119,7 @@ def _split(group: h5py.Group, name: str, ends: Int[np.ndarray, " curves"]) -> li
     return np.split(get(group, f"curve_{name}"), ends[:-1])
 
 
-@door
+@check_arguments
 def write_map(amap: ActuatorMap, path: str | Path) -> tuple[Path, Path]:
     """Write the values of a map, setting by setting, and its curves, point by point.
 

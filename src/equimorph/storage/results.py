@@ -14,7 +14,7 @@ from typing import Any
 
 import h5py
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
@@ -60,7 +60,7 @@ class Results:
     unreadable: dict[str, str] = field(default_factory=dict)
 
 
-@door
+@check_arguments
 def write_results(
     path: str | Path,
     eset: EquilibriumSet | None,
@@ -120,7 +120,7 @@ def write_results(
     return write(Path(path), FORMAT, VERSION, fill)
 
 
-@door
+@check_arguments
 def append_results(
     path: str | Path,
     *,
@@ -162,7 +162,7 @@ def append_results(
     return extend(path, FORMAT, VERSION, fill)
 
 
-@door
+@check_arguments
 def save_set(path: str | Path, eset: EquilibriumSet, height: Descriptor | None = None) -> Path:
     """Write an equilibrium set alone; see `write_results`.
 
@@ -184,7 +184,7 @@ def save_set(path: str | Path, eset: EquilibriumSet, height: Descriptor | None =
     return write_results(path, eset, height or eset.structure.elevation)
 
 
-@door
+@check_arguments
 def load_set(path: str | Path) -> EquilibriumSet:
     """Read the equilibrium set of a results file.
 
@@ -216,7 +216,7 @@ def _add(
         write_record(file.create_group(f"{MAPS}/{name}"), amap)
 
 
-@door
+@check_arguments
 def read_results(path: str | Path) -> Results:
     """Read what `write_results` wrote.
 

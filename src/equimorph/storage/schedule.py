@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.storage.files import read_text, write_text
@@ -27,7 +27,7 @@ VERSION = 1
 PROGRESS, MARGIN = "progress", "stability_margin"
 
 
-@door
+@check_arguments
 def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, Path]:
     """Write a schedule to `path` (CSV) and to its sidecar with the suffix ``.json``.
 
@@ -60,7 +60,7 @@ def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, Path]:
     return table_path, sidecar_path
 
 
-@door
+@check_arguments
 def read_schedule(path: str | Path) -> Schedule:
     """Read a schedule from its table and sidecar.
 

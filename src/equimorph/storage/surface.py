@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
@@ -40,7 +40,7 @@ class _Surface:
     on_cells: dict[str, Int[np.ndarray, " C"]]
 
 
-@door
+@check_arguments
 def write_surface(path: str | Path, eset: EquilibriumSet, height: Descriptor | None = None) -> Path:
     """Write what a set looks like: its curve, its surface, or the surfaces that bound its strata.
 

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.sparse import SparseLayout
@@ -190,7 +190,7 @@ class DiscreteStructure(Structure):
         """All loads zero."""
         return {each.name: 0.0 for each in self.parameters if each.role == "load"}
 
-    @door
+    @check_arguments
     def natural_state(self, **values: float) -> State:
         """Natural state at given parameters, all loads at zero.
 

@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Box, Descriptor, position
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
@@ -19,7 +19,7 @@ from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
 
 
-@door
+@check_arguments
 def value_of(structure: Structure, name: str) -> Descriptor:
     """Value of a parameter, to bound an actuator: ``value_of(arch, "Theta") <= 2``.
 
@@ -36,7 +36,7 @@ def value_of(structure: Structure, name: str) -> Descriptor:
     return Descriptor(name, structure.parameters[at].unit, value, name, structure.signature)
 
 
-@door
+@check_arguments
 def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
     """Coordinate of the drawn shape at a share of its points: ``shape_coordinate(arch, "y", 0.3)``.
 
@@ -58,7 +58,7 @@ def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
     return Descriptor(f"shape_{axis}({s:g})", structure.length_unit, value, "", structure.signature)
 
 
-@door
+@check_arguments
 def effort_of(structure: Structure, name: str) -> Descriptor:
     """Effort ∂L/∂p of a parameter: the couple or force of an actuator, the way of a load.
 
@@ -76,7 +76,7 @@ def effort_of(structure: Structure, name: str) -> Descriptor:
     return Descriptor(f"effort({name})", label, value, f"∂L/∂{name}", structure.signature)
 
 
-@door
+@check_arguments
 def margin_of(structure: Structure) -> Descriptor:
     """Stability margin: smallest eigenvalue of the constrained Hessian in the metric."""
 
@@ -86,7 +86,7 @@ def margin_of(structure: Structure) -> Descriptor:
     return Descriptor("stability_margin", "1", value, "margin", structure.signature)
 
 
-@door
+@check_arguments
 def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
     """Signed distance of the shape from an obstacle: negative where it enters what is forbidden.
 
@@ -120,7 +120,7 @@ def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
     return Descriptor(name, unit, value, "distance", origin, place, obstacle=obstacle)
 
 
-@door
+@check_arguments
 def outside(structure: Structure, box: Box) -> Descriptor:
     """How far parameters are outside a box, in their scales; negative inside.
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.errors import InputError, suggestion
 from equimorph.linalg import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.model import (
@@ -49,7 +49,7 @@ def _slopes(term: Term, names: str = "") -> list[tuple[str, Term]]:
     return out
 
 
-@door
+@check_arguments
 class Spring(Structure):
     """Spring of natural length 1 from A = (x_l, 0) to B on the line x = 0, force F on B.
 
@@ -199,7 +199,7 @@ class Spring(Structure):
         """F = 0."""
         return {"F": 0.0}
 
-    @door
+    @check_arguments
     def natural_state(self, **values: float) -> State:
         """Unloaded state with B above A."""
         return natural_state(self, **values)

@@ -9,8 +9,8 @@ from typing import Any, overload
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
@@ -132,7 +132,7 @@ class States:
         """Whether the discretisation represents the states."""
         return self.structure.resolved(self.z, self.p)
 
-    @door
+    @check_arguments
     def shape(
         self, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points space"]:
@@ -225,7 +225,7 @@ class State:
         """Whether the discretisation represents the state."""
         return bool(self.batch.resolved[0])
 
-    @door
+    @check_arguments
     def shape(
         self, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "points space"]:
@@ -233,7 +233,7 @@ class State:
         return np.asarray(self.batch.shape(s)[0])
 
 
-@door
+@check_arguments
 def natural_state(structure: Structure, /, **values: float) -> State:
     """Natural state of any structure: unloaded, at given or default values of the parameters.
 

@@ -1,6 +1,6 @@
 """Quantities with their units: what a user writes as "12 kN m^2" as numbers in one system.
 
-See docs/decisions.md, "Units are converted at the door".
+See docs/decisions.md, "Units are converted where numbers enter".
 """
 
 import re

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import Field, ValidationError, create_model, model_validator
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.study.complaint import complaint, cut
 from equimorph.study.data_files import FOLDER
@@ -96,7 +96,7 @@ STUDY: type[Study] = create_model("Study", __base__=Study, **_tables)
 """A study with a table for each kind of question."""
 
 
-@door
+@check_arguments
 def read_study_text(path: Path) -> str:
     """Read a study file, unchecked.
 
@@ -112,7 +112,7 @@ def read_study_text(path: Path) -> str:
         raise InputError(f"`study file` must be a readable file; got {path}: {reason}.") from error
 
 
-@door
+@check_arguments
 def parse_study(text: str, name: str, folder: Path | None = None) -> Study:
     """Check the text of a study file.
 

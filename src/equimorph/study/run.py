@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent
@@ -26,7 +26,7 @@ from equimorph.study.report import draw_figures, report
 from equimorph.tasks import Route
 
 
-@door
+@check_arguments
 def run_study(
     path: Path, out: Path, *, replace: bool = False, progress: Progress | None = None
 ) -> Outcome:
@@ -72,7 +72,7 @@ def run_study(
     return outcome
 
 
-@door
+@check_arguments
 def read_problem(path: Path) -> tuple[str, Study, Problem]:
     """Read a study file that can be run here.
 

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.stats import chi2 as chi_squared
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Values
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.tangents import fold_slopes, split_step
@@ -110,7 +110,7 @@ class StateEstimate:
         return self.states[0]
 
 
-@door
+@check_arguments
 def estimate_state(
     eset: EquilibriumSet,
     measured: Measured,

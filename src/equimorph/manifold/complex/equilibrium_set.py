@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
@@ -135,7 +135,7 @@ class EquilibriumSet:
         free = [position(self.structure.parameters, name) for name in self.names]
         return Setting(self.structure, base, np.array(free), self.constraints)
 
-    @door
+    @check_arguments
     def parameters_at(self, at: Mapping[str, float]) -> Float[np.ndarray, " P"]:
         """All parameters over a point of the box.
 
@@ -154,13 +154,13 @@ class EquilibriumSet:
             raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
         return np.asarray(self.setting.parameters(point[None])[0])
 
-    @door
+    @check_arguments
     def at(self, **at: float) -> States:
         """Exact states over one point of the box, sorted by energy; see `over`."""
         states = self._sheets.over(self._parameters(at)[None])[0]
         return states[np.argsort(states.energy, kind="stable")] if len(states) > 1 else states
 
-    @door
+    @check_arguments
     def over(self, **at: Float[np.ndarray, " points"]) -> StatesOver:
         """Exact states over many points of the box, with the pieces of the set that they lie on.
 

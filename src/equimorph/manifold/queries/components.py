@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import Component, EquilibriumSet
 from equimorph.manifold.queries.levels import cell_sizes, part, restricted
@@ -56,7 +56,7 @@ class Components:
         """Cells, Euler characteristic, loops and indices of each piece."""
         return self.eset.components
 
-    @door
+    @check_arguments
     def number_of(self, state: State) -> int | None:
         """Number of the piece that a state lies on; None if it is in no piece.
 
@@ -76,7 +76,7 @@ class Components:
         cell = cell_of(self.eset, state)
         return int(self.eset.component[cell]) if cell >= 0 else None
 
-    @door
+    @check_arguments
     def joined(self, one: State, other: State) -> bool:
         """Whether two states lie on the same piece.
 
@@ -104,7 +104,7 @@ class Components:
         return "\n".join([head, *self._lines])
 
 
-@door
+@check_arguments
 def components(
     eset: EquilibriumSet, *, stable: bool = False, within: Sequence[Constraint] = ()
 ) -> Components:

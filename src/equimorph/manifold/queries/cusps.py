@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Locus, nearest
 from equimorph.errors import InputError
@@ -37,7 +37,7 @@ class Cusps:
     lost: int
 
 
-@door
+@check_arguments
 def cusps(eset: EquilibriumSet) -> Cusps:
     """Cusps on the folds of a set over two parameters, polished.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import (
     ROUND_OFF,
@@ -46,7 +46,7 @@ class Level:
     lost: int
 
 
-@door
+@check_arguments
 def level_set(eset: EquilibriumSet, descriptor: Descriptor, value: float) -> Level:
     """States of a set at which a descriptor has a value, polished to round-off.
 
@@ -58,7 +58,7 @@ def level_set(eset: EquilibriumSet, descriptor: Descriptor, value: float) -> Lev
     return _level(eset, lambda v: descriptor.function(v.z, v.p) - value)
 
 
-@door
+@check_arguments
 def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Level:
     """States at which the Jacobian of the descriptors, one per free parameter, is singular.
 
@@ -96,7 +96,7 @@ class Division:
     lost: int
 
 
-@door
+@check_arguments
 def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division:
     """Cut a set exactly where the Jacobian of descriptors is singular; see `singular_set`.
 
@@ -110,7 +110,7 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
     return _divide(eset, _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors)))
 
 
-@door
+@check_arguments
 def divided_by(eset: EquilibriumSet, constraint: Constraint) -> Division:
     """Cut a set exactly along the bound of a constraint; the side is -1 where it is obeyed."""
     return _divide(eset, _cut(fabric_of(eset), lambda v: constraint.excess(v.z, v.p)))
@@ -138,7 +138,7 @@ def jacobian(setting: Setting, at: Vertices, descriptors: Sequence[Descriptor]) 
     return np.asarray(np.linalg.det(np.moveaxis(np.stack(columns), 2, 0)))
 
 
-@door
+@check_arguments
 def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
     """Part of a set that obeys a further constraint, cut exactly along it.
 
@@ -166,7 +166,7 @@ def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
     return np.asarray(share * np.sqrt(np.maximum(np.linalg.det(gram), 0.0)))
 
 
-@door
+@check_arguments
 def part(eset: EquilibriumSet, cells: Bool[np.ndarray, " C"]) -> EquilibriumSet:
     """Selected cells as a set, like the stable ones: ``eset.cell_index == 0``."""
     fabric = fabric_of(eset)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
@@ -84,7 +84,7 @@ class Location:
         )
 
 
-@door
+@check_arguments
 def locate(
     eset: EquilibriumSet,
     measured: Measured,

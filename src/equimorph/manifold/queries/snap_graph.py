@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -70,7 +70,7 @@ class SnapGraph:
     strata: tuple[int, ...]
     snaps: tuple[Snap, ...]
 
-    @door
+    @check_arguments
     def leaving(self, stratum: int) -> tuple[Snap, ...]:
         """Snaps that leave a stratum.
 
@@ -93,7 +93,7 @@ class SnapGraph:
         return "\n".join(lines)
 
 
-@door
+@check_arguments
 def snap_graph(
     eset: EquilibriumSet, *, samples: int = 9, progress: Progress | None = None
 ) -> SnapGraph:

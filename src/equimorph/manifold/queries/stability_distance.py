@@ -7,8 +7,8 @@ from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters
-from equimorph.door import door
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -67,7 +67,7 @@ class StabilityDistance:
         )
 
 
-@door
+@check_arguments
 def stability_distance(eset: EquilibriumSet, state: State) -> StabilityDistance:
     """How far a stable state is from the edge of stability, within the box of a set.
 

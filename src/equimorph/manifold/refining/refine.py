@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.description import Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -39,7 +39,7 @@ SHARE = {1: 1.0, 2: 0.75, 3: 2.0 / 3.0}
 of the largest."""
 
 
-@door
+@check_arguments
 def refine(
     eset: EquilibriumSet,
     accuracy: float,

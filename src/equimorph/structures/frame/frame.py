@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Drawing, Parameter
 from equimorph.structures.contract import Symmetry
@@ -216,27 +216,27 @@ class Frame(FrameFields):
 
     # --- descriptors ----------------------------------------------------------------------------
 
-    @door
+    @check_arguments
     def displacement(self, joint: str, axis: str) -> Descriptor:
         """Move of a joint along x or y, from where it is drawn."""
         return descriptors.displacement(self, joint, axis)
 
-    @door
+    @check_arguments
     def rotation(self, where: str, joint: str | None = None) -> Descriptor:
         """Turn of a joint, or of the end of a member there, in radians."""
         return descriptors.rotation(self, where, joint)
 
-    @door
+    @check_arguments
     def axial(self, member: str, joint: str) -> Descriptor:
         """Axial force in a member at a joint, positive in tension."""
         return descriptors.end_force(self, "axial", member, joint)
 
-    @door
+    @check_arguments
     def shear(self, member: str, joint: str) -> Descriptor:
         """Shear force in a member at a joint, to the left of the way from its start to its end."""
         return descriptors.end_force(self, "shear", member, joint)
 
-    @door
+    @check_arguments
     def moment(self, member: str, joint: str) -> Descriptor:
         """Bending moment in a member at a joint, positive where it bends to its left."""
         return descriptors.moment(self, member, joint)
@@ -246,12 +246,12 @@ class Frame(FrameFields):
         """Largest |κ| in all members."""
         return descriptors.max_curvature(self)
 
-    @door
+    @check_arguments
     def reaction(self, joint: str, axis: str) -> Descriptor:
         """Force (axis "x" or "y"), or couple ("angle"), of a support on its joint."""
         return descriptors.reaction(self, joint, axis)
 
-    @door
+    @check_arguments
     def travel(self, load: str) -> Descriptor:
         """Displacement along a load, work per unit of its parameter."""
         return descriptors.travel(self, load)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters
-from equimorph.door import door
 from equimorph.errors import MissingError
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures.rod import descriptors, space, validity
@@ -38,22 +38,22 @@ class Described(Measured):
     def lagrangian(self) -> RodModel:
         """That of the rod, in its parameters or in these and further ones that are zero."""
 
-    @door
+    @check_arguments
     def height(self, s: float) -> Descriptor:
         """y(s), in units of L."""
         return descriptors.coordinate(self, s, 1)
 
-    @door
+    @check_arguments
     def position(self, s: float) -> tuple[Descriptor, Descriptor]:
         """(x(s), y(s)), in units of L."""
         return descriptors.coordinate(self, s, 0), descriptors.coordinate(self, s, 1)
 
-    @door
+    @check_arguments
     def angle(self, s: float) -> Descriptor:
         """θ(s) in radians."""
         return descriptors.angle(self, s)
 
-    @door
+    @check_arguments
     def curvature(self, s: float) -> Descriptor:
         """κ(s) in units of 1/L."""
         return descriptors.curvature(self, s)
@@ -68,12 +68,12 @@ class Described(Measured):
         """Potential energy E, in units of 4π²B/L."""
         return descriptors.total_energy(self)
 
-    @door
+    @check_arguments
     def support_force(self, component: str) -> Descriptor:
         """Force of the support at A on the rod: "lambda" (horizontal) or "mu" (vertical)."""
         return descriptors.support_force(self, component)
 
-    @door
+    @check_arguments
     def end_moment(self, end: int) -> Descriptor:
         """Couple of the actuator at end 0 or 1: ∂L/∂θ(end), in units of 4π²B/L."""
         return descriptors.end_moment(self, end)
@@ -83,7 +83,7 @@ class Described(Measured):
         """y(½)."""
         return self.height(0.5)
 
-    @door
+    @check_arguments
     def clearance(self, apart: float = 0.1) -> Descriptor:
         """Smallest distance between points whose arclengths differ by `apart` at least.
 
@@ -139,7 +139,7 @@ class Described(Measured):
             )
         return OutOfPlane(self.mechanics, self.lagrangian, Holding.of(self.ends), stiffness)
 
-    @door
+    @check_arguments
     def lateral_index(self, torsion: Any = None, lateral: Any = None) -> Descriptor:
         """Number of independent movements out of the plane that lower the energy.
 
@@ -148,7 +148,7 @@ class Described(Measured):
         block, written = self.out_of_plane(torsion, lateral), self._written(torsion, lateral)
         return space.lateral_index(self, block, written)
 
-    @door
+    @check_arguments
     def lateral_margin(self, torsion: Any = None, lateral: Any = None) -> Descriptor:
         """Smallest eigenvalue of the second variation for movements out of the plane.
 
@@ -182,13 +182,13 @@ class Described(Measured):
         """
         return self.lateral_margin() >= 0.0
 
-    @door
+    @check_arguments
     def lateral_mode(self, state: State, points: int = 101) -> LateralMode:
         """The movement out of the plane that a state resists least, at equidistant points."""
         s = np.linspace(0.0, 1.0, points)
         return space.lateral_mode(self, self.out_of_plane(), state.z[None], state.p[None], s)
 
-    @door
+    @check_arguments
     def warnings(
         self, state: State, thickness: float = 0.0, torsion: Any = None, lateral: Any = None
     ) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 
 Holding = str | float
@@ -19,7 +19,7 @@ WORDS: dict[str, tuple[Holding, Holding, Holding]] = {
 }
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class End:
     """Support of one end of a rod: what happens to its angle and its two coordinates.

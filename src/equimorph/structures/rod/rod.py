@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Parameter, names_of
 from equimorph.structures.contract import Growth
@@ -299,7 +299,7 @@ class Rod(Described):
         """All loads zero."""
         return {each.name: 0.0 for each in self.parameters if each.role == "load"}
 
-    @door
+    @check_arguments
     def natural_state(self, **values: float) -> State:
         """Natural state at given actuators: unloaded, continued from the stress-free rod.
 

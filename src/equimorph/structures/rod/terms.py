@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.profiles import LoadShape, at_nodes, inside, load_shape, profile
@@ -111,7 +111,7 @@ def _interior(points: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(s) for s in points if 0.0 < s < 1.0)
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class LineLoad(Term):
     """Dead load along the rod: the amplitude times ``shape(s) · direction`` per arclength.
@@ -157,7 +157,7 @@ class LineLoad(Term):
         return Effects(along=x * rho, across=y * rho, force=(x * total, y * total))
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class PointForce(Term):
     """Dead force at arclength s: the amplitude times `direction`.
@@ -192,7 +192,7 @@ class PointForce(Term):
         return Effects(along=x * step, across=y * step, force=(x, y))
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Couple(Term):
     """Couple at arclength s, positive counterclockwise: its work is the amplitude times θ(s)."""
@@ -215,7 +215,7 @@ class Couple(Term):
         return Effects(couples=((float(self.s), 1.0),))
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Curvature(Term):
     """Intrinsic curvature: the amplitude times ``pattern(s)`` from `start` to `stop`.
@@ -256,7 +256,7 @@ class Curvature(Term):
         return Effects(natural=there * at_nodes(self._profile(), mesh))
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Tendon(Term):
     """Cable guided along the rod at an offset from its axis, pulled with a given tension.

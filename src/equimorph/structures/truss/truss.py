@@ -8,8 +8,8 @@ from typing import Any, get_args
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
@@ -212,12 +212,12 @@ class Truss(TrussMechanics):
     def _symmetries(self) -> tuple[Symmetry, ...]:
         return symmetries(self)
 
-    @door
+    @check_arguments
     def force(self, bar: str) -> Descriptor:
         """Force in a bar, positive in tension."""
         return descriptors.force(self, bar)
 
-    @door
+    @check_arguments
     def utilisation(self, bar: str) -> Descriptor:
         """Compression of a bar over its Euler load π² EI/l₀²."""
         return descriptors.utilisation(self, bar)
@@ -227,12 +227,12 @@ class Truss(TrussMechanics):
         """Largest utilisation of the bars that have a bending stiffness."""
         return descriptors.max_utilisation(self)
 
-    @door
+    @check_arguments
     def displacement(self, joint: str, axis: str) -> Descriptor:
         """Displacement of a joint along an axis, from where it is drawn."""
         return descriptors.displacement(self, joint, axis)
 
-    @door
+    @check_arguments
     def travel(self, load: str) -> Descriptor:
         """Displacement along a load, work per unit of its parameter."""
         return descriptors.travel(self, load)

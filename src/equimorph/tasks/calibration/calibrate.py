@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import least_squares
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.structures import States
@@ -95,7 +95,7 @@ class Calibration:
         return float(self.residuals @ self.residuals)
 
 
-@door
+@check_arguments
 def calibrate(
     start: States,
     unknown: Wanted,

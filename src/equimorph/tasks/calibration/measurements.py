@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import NUMBERS
 from equimorph.arrays import Lanes, Parameters
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import States, Structure
@@ -35,7 +35,7 @@ class Measurement(Protocol):
         """Return what a measurement without errors would give."""
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class MeasuredValues:
     """Measured values of a descriptor, one for each state; NaN where a state was not measured.
@@ -69,7 +69,7 @@ class MeasuredValues:
         return np.asarray(own.function(z, p)[:, None])
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class MeasuredShape:
     """Measured points of the shape, the same material points in each state.

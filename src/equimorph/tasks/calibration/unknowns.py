@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Parameters
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.model import position
 from equimorph.structures import States, Structure
@@ -18,7 +18,7 @@ Wanted = Mapping[str | tuple[str, ...], Kind]
 Vector = Float[np.ndarray, " k"]
 
 
-@door
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Family:
     """Structures that differ in data which are no parameters: a stiffness, a length, a rise.

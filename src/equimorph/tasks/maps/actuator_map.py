@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Grid, Progress, Silent, parameter_vector, position
@@ -70,12 +70,12 @@ class ActuatorMap(ABC):
         """Settings of each status."""
         return {kind: int((self.status == k).sum()) for k, kind in enumerate(self.kinds)}
 
-    @door
+    @check_arguments
     def where(self, kind: str) -> Bool[np.ndarray, "rows columns"]:
         """Whether settings have a status, by its name."""
         return np.asarray(self.status == self.kinds.index(kind))
 
-    @door
+    @check_arguments
     def rest(self, setting: Mapping[str, float]) -> State:
         """Natural state at one setting of the grid's box.
 

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Bool
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Settings, Values
-from equimorph.door import door
 from equimorph.equilibria import TraceOptions
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
@@ -77,7 +77,7 @@ class CurvatureMap(ActuatorMap):
         return self.where("snaps")
 
 
-@door
+@check_arguments
 def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     structure: Structure,
     grid: Grid,

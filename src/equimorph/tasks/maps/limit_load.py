@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Bool
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
-from equimorph.door import door
 from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, limit_load, trace
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
@@ -66,7 +66,7 @@ class LimitLoadMap(ActuatorMap):
 
     kinds: ClassVar[tuple[str, ...]] = labels(RayStatus)
 
-    @door
+    @check_arguments
     def at(self, **setting: float) -> LimitLoad:
         """Limit load at one setting of the box, with its path.
 
@@ -78,7 +78,7 @@ class LimitLoadMap(ActuatorMap):
         """
         return limit_load(self.rest(setting), self.load, within=self.within, bound=self.bound)
 
-    @door
+    @check_arguments
     def rays(self, settings: Settings) -> Values:
         """Limit loads at many settings; NaN where no limit load exists."""
         place = position(self.structure.parameters, self.load)
@@ -86,7 +86,7 @@ class LimitLoadMap(ActuatorMap):
         return LimitLoadRays(self.sheet, place, self.within, self.bound, options)(settings).value
 
 
-@door
+@check_arguments
 def limit_load_map(
     structure: Structure,
     grid: Grid,

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
 from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
@@ -118,7 +118,7 @@ class Tracking:
         return dict(zip(self.actuators, change[free].tolist(), strict=True))
 
 
-@door
+@check_arguments
 def track(  # the knobs of the public face, all by keyword
     start: Start,
     targets: Leg | Sequence[Leg],

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Values
-from equimorph.door import door
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
@@ -99,7 +99,7 @@ class Landscape:
         )
 
 
-@door
+@check_arguments
 def landscape(  # the knobs of the public face, most by keyword
     eset: EquilibriumSet,
     objective: Descriptor,

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import Event, EventKind, Leg
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.setting import Setting, embed
@@ -60,7 +60,7 @@ Goal = Callable[[Float[np.ndarray, " columns"]], Objective]
 """Objective at given parameters and targets."""
 
 
-@door
+@check_arguments
 def follow_optimum(
     start: Start,
     objective: Descriptor,

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -140,7 +140,7 @@ class Optima:
         return self.best.route.schedule if self.all and self.best.route else None
 
 
-@door
+@check_arguments
 def optimise(  # the knobs of the public face, all by keyword
     eset: EquilibriumSet,
     objective: Descriptor,

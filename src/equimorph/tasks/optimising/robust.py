@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.door import door
 from equimorph.equilibria import Corner, corners_of, worst_over
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -101,7 +101,7 @@ class RobustOptimum:
         return np.nan if self.state is None else self.state.margin
 
 
-@door
+@check_arguments
 def robust_optimum(
     eset: EquilibriumSet,
     objective: Descriptor,

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Settings, Values
-from equimorph.door import door
 from equimorph.equilibria import LimitLoad
 from equimorph.errors import InputError
 from equimorph.tasks.maps import LimitLoadMap, MapCurve
@@ -130,7 +130,7 @@ class StrongestSettings:
         return self.guaranteed - self.at_risk
 
 
-@door
+@check_arguments
 def strongest(
     lmap: LimitLoadMap, *, offsets: Mapping[str, float] | None = None
 ) -> StrongestSettings:

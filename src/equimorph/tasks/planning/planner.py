@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import way_points
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -28,7 +28,7 @@ from equimorph.tasks.route import Corners, Route, refusal
 from equimorph.tasks.start import Start, start_state
 
 
-@door
+@check_arguments
 def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     eset: EquilibriumSet,
     start: Start,

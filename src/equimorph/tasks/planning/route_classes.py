@@ -7,8 +7,8 @@ from heapq import heappop, heappush
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Edges
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -39,7 +39,7 @@ LABELS = 8
 Class = tuple[int, ...]
 
 
-@door
+@check_arguments
 def alternatives(
     eset: EquilibriumSet,
     start: State,

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
-from equimorph.door import door
 from equimorph.equilibria import way_points
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, Descriptor, position
@@ -34,7 +34,7 @@ CONNECTIONS = 4
 """Nodes of the other tree that are tried for each new one."""
 
 
-@door
+@check_arguments
 @dataclass(frozen=True)
 class SamplingOptions:
     """Knobs of the sampling planner.
@@ -49,7 +49,7 @@ class SamplingOptions:
     seed: int = 0
 
 
-@door
+@check_arguments
 def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     start: State,
     goal: State | None,

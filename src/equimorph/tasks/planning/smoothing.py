@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Spline, names_of
@@ -23,7 +23,7 @@ HALVINGS = 6
 """How often the roundings are halved before a route is refused."""
 
 
-@door
+@check_arguments
 def smoothed(
     route: Route,
     tolerance: float,

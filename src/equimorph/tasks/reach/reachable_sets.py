@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet, divided, part, refine
 from equimorph.manifold.geometry.topology import adjacency, labels
@@ -76,7 +76,7 @@ class Reach:
         """Stability margin at the vertices of the start's region."""
         return self.states.margin
 
-    @door
+    @check_arguments
     def query(self, targets: Mapping[Descriptor, float]) -> Answer:
         """Whether the structure can take values of the descriptors from here; if not, why.
 
@@ -90,7 +90,7 @@ class Reach:
         return query_region(self.start, self.regions, self.whole, targets, self.within)
 
 
-@door
+@check_arguments
 def reachable(
     eset: EquilibriumSet,
     state: State,
@@ -159,7 +159,7 @@ def reachable(
     return Reach("found", why, state, tuple(descriptors), regions, piece, tuple(within))
 
 
-@door
+@check_arguments
 def attainable(
     eset: EquilibriumSet,
     state: State,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import LimitLoad, check_start
 from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
@@ -51,7 +51,7 @@ class Sensitivity:
         return float(self.descriptors[descriptor][self.names.index(name)])
 
 
-@door
+@check_arguments
 def sensitivity(
     state: State, descriptors: Sequence[Descriptor] = (), names: Sequence[str] | None = None
 ) -> Sensitivity:
@@ -90,7 +90,7 @@ def sensitivity(
     return Sensitivity(chosen, dz, slopes)
 
 
-@door
+@check_arguments
 def limit_sensitivity(
     limit: LimitLoad,
     load: str,

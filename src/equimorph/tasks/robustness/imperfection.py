@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.door import door
+from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import LimitLoad, lift, limit_load
 from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
@@ -117,7 +117,7 @@ class ImperfectionLaw:
         return f"ImperfectionLaw({formula}; {self.law})"
 
 
-@door
+@check_arguments
 def imperfection_law(
     start: State,
     load: str,

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Parameters, Values
-from equimorph.door import door
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.legs import check_starts
 from equimorph.equilibria.trace_options import EventCode
@@ -79,7 +79,7 @@ class Room:
         return float(self.scale.min())
 
 
-@door
+@check_arguments
 def stable_room(  # all but two by keyword
     states: State | States,
     tolerances: Mapping[str, float],

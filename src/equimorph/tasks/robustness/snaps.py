@@ -6,8 +6,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
-from equimorph.door import door
 from equimorph.equilibria import Landing, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, StabilityDistance, stability_distance
 from equimorph.manifold.geometry.setting import embed
@@ -79,7 +79,7 @@ class LeastSnap:
         return f"LeastSnap({moves}: {self.landing}{above})"
 
 
-@door
+@check_arguments
 def least_snap(eset: EquilibriumSet, state: State) -> LeastSnap:
     """Find the least straight change of the free parameters that makes a stable state snap.
 

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Parameters, Values
-from equimorph.door import door
 from equimorph.equilibria import lift, way_points
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Schedule, names_of, position
@@ -83,7 +83,7 @@ class Trials:
         return float(middle - half), float(middle + half)
 
 
-@door
+@check_arguments
 def random_trials(  # all but three by keyword
     start: State,
     schedule: Schedule | Sequence[Mapping[str, float]],

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
-from equimorph.door import door
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.queries.nearest import local_minima
@@ -141,7 +141,7 @@ class Shapes:
         return self.known
 
 
-@door
+@check_arguments
 def solve_shape(
     eset: EquilibriumSet,
     targets: Mapping[Descriptor, float],
@@ -185,7 +185,7 @@ def solve_shape(
     return solve_shapes(eset, columns, within=within, start=start, rank=rank)[0]
 
 
-@door
+@check_arguments
 def solve_shapes(
     eset: EquilibriumSet,
     targets: Mapping[Descriptor, Float[np.ndarray, " many"]],

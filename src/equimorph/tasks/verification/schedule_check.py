@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags
-from equimorph.door import door
 from equimorph.equilibria import (
     Event,
     Lifts,
@@ -203,7 +203,7 @@ class Verification:
         return Path(states, self.at, path_lengths(states), np.zeros(len(states), int), (end,))
 
 
-@door
+@check_arguments
 def verify(
     schedule: Schedule | Sequence[Mapping[str, float]],
     start: State | None = None,

@@ -1,7 +1,7 @@
-"""The door: where the arguments of public functions are checked, in one way.
+"""Checks of the arguments of public functions, in one way for all.
 
-`door` reads from the signature what each argument may be (see `argument_kinds`), and refuses
-anything else with one line: what, which value, what is allowed. Arguments that belong to a
+`check_arguments` reads from the signature what each argument may be (see `argument_kinds`), and
+refuses anything else with one line: what, which value, what is allowed. Arguments that belong to a
 structure must all belong to the same one. Whether names and values have a meaning for a structure
 is checked by its parameters, see `model.parameter`.
 """
@@ -50,7 +50,7 @@ REMEDIES: Mapping[str, tuple[type, str]] = {
 """What is often given by mistake, and what to do instead, by argument or by function."""
 
 
-def door(thing: Thing) -> Thing:
+def check_arguments(thing: Thing) -> Thing:
     """Check the arguments of a function, or of the constructor of a class, by its signature.
 
     Raises
@@ -60,7 +60,7 @@ def door(thing: Thing) -> Thing:
 
     Examples
     --------
-    >>> @door
+    >>> @check_arguments
     ... def twice(seed: int) -> int:
     ...     return 2 * seed
     >>> twice(2)

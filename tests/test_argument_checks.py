@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.argument_checks import Entry
 from equimorph.argument_kinds import NUMBERS
-from equimorph.door import Entry
 from equimorph.errors import InputError
 from oracles.specimens import arch_truss, toggle
 from typecheck import unchecked
@@ -222,7 +222,7 @@ def public_functions(things: Things) -> Iterator[tuple[str, Callable[..., Any]]]
 
 
 def is_checked(function: Any) -> bool:
-    """Whether a function stands behind the door."""
+    """Whether the arguments of a function are checked."""
     while function is not None:
         cells = getattr(function, "__closure__", None) or ()
         if any(isinstance(cell.cell_contents, Entry) for cell in cells):
@@ -332,7 +332,7 @@ def test_lists_are_taken_where_arrays_are_asked_for():
 
 
 def test_arguments_are_refused_under_the_name_of_their_parameter():
-    """A parameter says what it allows in its own words, at the door as elsewhere."""
+    """A parameter says what it allows in its own words, in checks of arguments as elsewhere."""
     said = r"^`k` must be a finite number greater than 0; got 'stiff'\.$"
     with unchecked(), pytest.raises(InputError, match=said):
         em.find_equilibria(em.Spring(), {"F": 0.1, "k": "stiff"})
