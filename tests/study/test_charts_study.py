@@ -75,7 +75,8 @@ def test_every_option_of_a_set_can_be_asked_for(run):
     audit = run[0].equilibrium_set.audit
     assert audit.accuracy == 0.05
     assert audit.deviation <= 0.05
-    assert run[0].problem.extents["set"].options == {"seed": 3, "checks": 1, "accuracy": 0.05}
+    options = {"seed": 3, "checks": 1, "accuracy": 0.05, "limit": None}
+    assert run[0].problem.extents["set"].options == options
 
 
 def test_the_plane_is_no_coordinates_of_the_stable_states_but_angle_and_length_are(run):

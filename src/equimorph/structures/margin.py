@@ -163,17 +163,17 @@ def _swept(
     np.multiply(vectors, mass, out=rhs[:, :, :n])
     solution = structure.solve(z, p, rhs, shift=shift)
     solved = solution.x[:, :, :n]
-    # Ritz values of the inverse: eigenvalues of Xᵀ M (K⁻¹ M X), 2 × 2
-    a, b, c = _products(rhs[:, :, :n], solved)
-    mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
-    angle = 0.5 * np.arctan2(2.0 * b, a - c)
-    cos, sin = np.cos(angle), np.sin(angle)
-    # products of the rotated vectors in the metric
-    e, f, g = _products(solved * mass, solved)
-    top, cross = cos**2 * e + 2.0 * cos * sin * f + sin**2 * g, cos * sin * (g - e)
-    cross += (cos**2 - sin**2) * f
-    low = sin**2 * e - 2.0 * cos * sin * f + cos**2 * g
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):  # a singular solve is not good
+        # Ritz values of the inverse: eigenvalues of Xᵀ M (K⁻¹ M X), 2 × 2
+        a, b, c = _products(rhs[:, :, :n], solved)
+        mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
+        angle = 0.5 * np.arctan2(2.0 * b, a - c)
+        cos, sin = np.cos(angle), np.sin(angle)
+        # products of the rotated vectors in the metric
+        e, f, g = _products(solved * mass, solved)
+        top, cross = cos**2 * e + 2.0 * cos * sin * f + sin**2 * g, cos * sin * (g - e)
+        cross += (cos**2 - sin**2) * f
+        low = sin**2 * e - 2.0 * cos * sin * f + cos**2 * g
         part = cross / top
         one = 1.0 / np.sqrt(top)
         two = 1.0 / np.sqrt(np.maximum(low - part * cross, 1e-14 * top))

@@ -122,7 +122,7 @@ def test_wrong_arguments_are_input_errors(ends, schedule):
     with pytest.raises(InputError, match=r"^`schedule` must start at an equilibrium"):
         verify(replace(schedule, values=moved))
     lost = np.concatenate([schedule.values[:1], np.full((len(moved) - 1, 4), np.nan)])
-    with pytest.raises(InputError, match=r"^`schedule` must have finite values"):
+    with pytest.raises(InputError, match=r"^`values` must be an array of finite numbers"):
         verify(replace(schedule, values=lost))
     resting = replace(schedule, values=np.repeat(schedule.values[:1], len(moved), axis=0))
     with pytest.raises(InputError, match=r"^`schedule` must change at least one parameter"):

@@ -295,8 +295,6 @@ def _legs(
             f"`schedule` must give the parameters {', '.join(names)}; "
             f"got {', '.join(schedule.names)}."
         )
-    if not np.isfinite(schedule.values).all():
-        raise InputError("`schedule` must have finite values; got some that are not.")
     check_start(begin)
     if not np.allclose(schedule.values[0], begin.p, rtol=0, atol=1e-9):
         raise InputError(
