@@ -43,6 +43,8 @@ OWNERS: Mapping[str, Callable[[Any], Any]] = {
 """How the structure is found to which objects of a class belong, by the name of the class."""
 DESCRIBED = frozenset(("Descriptor", "Constraint"))
 """Classes whose objects describe one structure, by its signature."""
+CHECKED = "_arguments_are_checked"
+"""Attribute of functions whose arguments are checked, and of what wraps them."""
 REMEDIES: Mapping[str, tuple[type, str]] = {
     "schedule": (NoneType, "A refused route has no schedule: its `why` says what stopped it."),
     "EquilibriumSet.at": (list, "Use `over` for many points."),
@@ -85,6 +87,7 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
         args, kwargs = entry.admit(args, kwargs)
         return function(*args, **kwargs)
 
+    setattr(wrapper, CHECKED, True)
     return wrapper
 
 
