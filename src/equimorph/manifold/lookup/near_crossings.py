@@ -4,6 +4,11 @@ There Newton's matrix is nearly singular, and states lie close together: Newton'
 parameters leads from every guess to any of them, and its corrections do not shrink to round-off.
 With a border b the equations ``F = r b``, ``b·(z − z₀) = s`` stay regular, and all states near the
 crossing point z₀ are the roots of r(s) [Govaerts2000]_.
+
+At a distance δ from a pitchfork these are √δ apart, and r between them is of the size of δ^(3/2):
+10⁻⁹ beside that of an arch it is 5·10⁻¹⁶, and round-off in F, 10⁻¹⁶, would move roots by a tenth
+of their distance. So r is integrated from the crossing point, where it vanishes. The round-off in
+its derivatives counts only times the way.
 """
 
 from dataclasses import dataclass
@@ -11,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.polynomial import chebyshev
+from numpy.polynomial import chebyshev, legendre
 
 from equimorph.arrays import Cells, Flags, Lanes, Values
 from equimorph.equilibria.critical import Critical, null_border
@@ -26,6 +31,7 @@ from equimorph.structures import States
 
 Parameters = Float[np.ndarray, "_ P"]
 Facets = Int[np.ndarray, "n d"]
+Series = Float[np.ndarray, "coefficients lanes"]
 
 NEAR = 1e-4
 """Distance of points from a crossing, in scaled parameters, below which they are treated here."""
@@ -35,15 +41,19 @@ MERGED = 1e-5
 """Distance in the metric below which states of sheets that cross are one: there a residual at
 round-off does not determine their number."""
 DEGREE = 10
-"""Of the polynomial through r: its truncation is at round-off for the amplitudes here."""
+"""Of the polynomial through dr/ds: its truncation is at round-off for the amplitudes here."""
+ALONG = 2
+"""Gauss points from a crossing point to a point: the error is of the order of `NEAR`⁵."""
 CORRECTIONS = 2
-"""Of roots of the polynomial as roots of r: they shift 1969 of the tests by 5e-8, 2e-9 and less."""
+"""Of eigenvalues of the companion matrix as roots of the polynomial: they shift them by 2e-10."""
 GUARDS = Guards(iterations=8, longest=np.inf, converged=1e-9)
 """Points with given amplitudes are exact after a correction below 1e-9 in the metric."""
 IMAGINARY = 1e-3
 """Imaginary part, relative to `WIDE`, up to which roots are tried as real ones."""
 RESIDUAL = 1e-12
 """Absolute value of r at a root."""
+ROUND_OFF = 1e-14
+"""Absolute value of r at a crossing point that is taken for zero, a hundred times the usual one."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +67,16 @@ class Branches:
 
 @dataclass(frozen=True)
 class Centres:
-    """Crossing points close to points: z₀, p there, border, amplitude's length, index below."""
+    """Crossing points close to points: z₀, p and r there, border, amplitude's length, index."""
 
     z: Lanes
     p: Parameters
     b: Lanes
     size: Values
     """Length in the metric of a unit of s."""
+    r: Values
     low: Int[np.ndarray, " lanes"]
+    """Number of negative eigenvalues below the one that vanishes."""
     point: Int[np.ndarray, " lanes"]
 
     def take(self, some: Int[np.ndarray, " n"] | Flags) -> "Centres":
@@ -164,50 +176,61 @@ class NearCrossings:
         b = null_border(structure, z, own)
         v = Critical(structure, z, own, b).v
         size = np.sqrt(v[:, : structure.unknowns] ** 2 @ structure.mass)
-        return Centres(z, own, b, size, lower_index(self.setting, z, own), at)
+        r = np.einsum("li,li->l", v, structure.residual(z, own))
+        r[np.abs(r) <= ROUND_OFF] = 0.0
+        return Centres(z, own, b, size, r, lower_index(self.setting, z, own), at)
 
     def branches(self, centres: Centres, p: Parameters) -> tuple[Branches, Centres]:
         """All states over points whose amplitude from their crossing points is at most `WIDE`.
 
         And the crossing points for which that is so: near others a second eigenvalue vanishes.
         """
-        nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
-        count, many = len(nodes), np.repeat(np.arange(len(centres.z)), len(nodes))
-        widest = WIDE / centres.size
-        s = (widest[:, None] * nodes).ravel()
-        _, r, _, good = self._along(centres.take(many), p, s)
-        whole = good.reshape(-1, count).all(axis=1)
+        centres, series = self._reduced(centres, p)
         owner, start = [], []
-        for lane in np.flatnonzero(whole).tolist():
-            fit = chebyshev.chebfit(nodes, r.reshape(-1, count)[lane], DEGREE)
+        for lane, fit in enumerate(series.T):
             roots = chebyshev.chebroots(fit)
             real = roots[np.abs(roots.imag) <= IMAGINARY].real
             real = real[np.abs(real) <= 1.0 + IMAGINARY]
             owner.extend(len(real) * [lane])
-            start.extend((real * widest[lane]).tolist())
-        found = self._roots(centres, p, np.array(owner, int), np.array(start, float))
-        return _distinct(*found), centres.take(np.flatnonzero(whole))
+            start.extend(real.tolist())
+        own = np.array(owner, int)
+        found = self._roots(centres.take(own), p, series[:, own], np.array(start, float))
+        return _distinct(*found), centres
+
+    def _reduced(self, centres: Centres, p: Parameters) -> tuple[Centres, Series]:
+        """Chebyshev series of r(s), with amplitudes relative to `WIDE`, where it could be found."""
+        nodes = chebyshev.chebpts1(DEGREE + 1)
+        shape, many = (-1, len(nodes)), np.repeat(np.arange(len(centres.z)), len(nodes))
+        widest = WIDE / centres.size
+        s = (widest[:, None] * nodes).ravel()
+        _, _, slope, good = self._along(centres.take(many), p[centres.point[many]], s)
+        at_centre, known = self._at_centre(centres, p[centres.point])
+        kept = np.flatnonzero(good.reshape(shape).all(axis=1) & known)
+        slopes = (slope.reshape(shape) * widest[:, None])[kept].T
+        series = chebyshev.chebint(chebyshev.chebfit(nodes, slopes, DEGREE), lbnd=0.0)
+        series[0] += at_centre[kept]
+        return centres.take(kept), series
+
+    def _at_centre(self, centres: Centres, p: Parameters) -> tuple[Values, Flags]:
+        """r at amplitude zero over p, where it could be found: the integral of vᵀF_p dp."""
+        way, r, good = p - centres.p, centres.r.copy(), np.ones(len(p), bool)
+        for node, weight in zip(*legendre.leggauss(ALONG), strict=True):
+            at = centres.p + 0.5 * (1.0 + node) * way
+            z, _, _, found = self._along(centres, at, np.zeros(len(p)))
+            r += 0.5 * weight * Critical(self.setting.structure, z, at, centres.b).along(way)
+            good &= found
+        return r, good
 
     def _roots(
-        self,
-        centres: Centres,
-        p: Parameters,
-        owner: Int[np.ndarray, " lanes"],
-        s: Values,
+        self, own: Centres, p: Parameters, series: Series, x: Values
     ) -> tuple[Branches, Values]:
-        """States at roots of r, with their amplitudes in the metric."""
-        own, most = centres.take(owner), IMAGINARY * WIDE / centres.size[owner]
-        for _ in range(CORRECTIONS):
-            _, r, slope, _ = self._along(own, p, s)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                correction = np.nan_to_num(r / slope, nan=0.0, posinf=0.0, neginf=0.0)
-            s = s - np.clip(correction, -most, most)
-        z, r, slope, good = self._along(own, p, s)
-        scale = WIDE / own.size
-        good &= (np.abs(r) <= RESIDUAL) & (np.abs(s) <= scale)
+        """States at roots of series of r near x, with their amplitudes in the metric."""
+        x = _improved(series, x)
+        z, r, slope, good = self._along(own, p[own.point], x * WIDE / own.size)
+        good &= (np.abs(r) <= RESIDUAL) & (np.abs(x) <= 1.0)
         # the slope has the sign of the eigenvalue that nearly vanishes
         index = own.low + (slope < 0.0)
-        return Branches(z[good], own.point[good], index[good]), (s * own.size)[good]
+        return Branches(z[good], own.point[good], index[good]), (x * WIDE)[good]
 
     def on_branches(
         self,
@@ -225,7 +248,7 @@ class NearCrossings:
             s = np.einsum("ln,ln->l", z[own] - same.z, same.b)
             inner = np.abs(s) <= WIDE / same.size
             own, same, s = own[inner], same.take(inner), s[inner]
-            there, _, _, good = self._along(same, p, s)
+            there, _, _, good = self._along(same, p[same.point], s)
             gap = np.sqrt((there - z[own])[:, : structure.unknowns] ** 2 @ structure.mass)
             out[own[good & (gap <= MERGED)]] = True
         return out
@@ -234,14 +257,14 @@ class NearCrossings:
         self, centres: Centres, p: Parameters, s: Values
     ) -> tuple[Lanes, Values, Values, Flags]:
         """Points with amplitudes s over p, r and its slope there, and which could be found."""
-        structure, at, b = self.setting.structure, p[centres.point], centres.b
+        structure, b = self.setting.structure, centres.b
         v = Critical(structure, centres.z, centres.p, b).v
-        rows, still = b[:, None], np.zeros((len(b), 1, at.shape[1]))
-        amplitude = Plane(centres.z + s[:, None] * b, at, rows, still)
+        rows, still = b[:, None], np.zeros((len(b), 1, p.shape[1]))
+        amplitude = Plane(centres.z + s[:, None] * b, p, rows, still)
         frame = Planes(rows, still, np.zeros((len(b), 1)), b)
         z = centres.z + s[:, None] * v
-        found = settle(structure, z, at, None, (amplitude,), GUARDS, frame, frames=False)
-        slope = -Critical(structure, found.z, at, b).g
+        found = settle(structure, z, p, None, (amplitude,), GUARDS, frame, frames=False)
+        slope = -Critical(structure, found.z, p, b).g
         return found.z, -found.unfolding, slope, found.found
 
 
@@ -254,6 +277,18 @@ def of_set(setting: Setting, points: States, cells: Cells, crossings: Facets) ->
     number = np.where(own[at] == keys, at, -1)
     facets = rows_of(own, base, crossings.shape[1])
     return NearCrossings(setting, points, facets, cells, number[whole.cell_facets])
+
+
+def _improved(series: Series, x: Values) -> Values:
+    """Roots of series by Newton's method, without steps that only follow round-off."""
+    slopes, r = chebyshev.chebder(series), chebyshev.chebval(x, series, tensor=False)
+    for _ in range(CORRECTIONS):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = np.nan_to_num(r / chebyshev.chebval(x, slopes, tensor=False), posinf=0, neginf=0)
+        there = x - np.clip(step, -IMAGINARY, IMAGINARY)
+        closer = np.abs(left := chebyshev.chebval(there, series, tensor=False)) < np.abs(r)
+        x, r = np.where(closer, there, x), np.where(closer, left, r)
+    return np.asarray(x)
 
 
 def _distinct(found: Branches, s: Values) -> Branches:
