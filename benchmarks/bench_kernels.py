@@ -42,7 +42,7 @@ def record(benchmark, rod, lanes, residual=None):
 def bench_newton_step_on_one_thread(benchmark, elements, degree, lanes):
     rod = Rod(elements=elements, degree=degree)
     z, p, dp, row = lanes_near_the_arch(rod, lanes)
-    numbers = [np.empty(lanes) for _ in range(4)]
+    numbers = [np.empty(lanes) for _ in range(5)]
     index = np.empty(lanes, np.int64)
     outputs = (np.empty_like(z), numbers[0], np.empty_like(z), numbers[1], numbers[2], index)
     shared = (
@@ -54,7 +54,7 @@ def bench_newton_step_on_one_thread(benchmark, elements, degree, lanes):
     inputs = (z, p, dp, row, np.ones(lanes), np.zeros(lanes))
     benchmark.pedantic(
         advance_lanes,
-        (*shared, *inputs, *outputs, numbers[3]),
+        (*shared, *inputs, *outputs, *numbers[3:]),
         rounds=40,
         iterations=max(1, 4096 // lanes // 4),
         warmup_rounds=2,
