@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
+from equimorph.equilibria.curves import ForceLine, NewtonHomotopy, ParameterLine
+from equimorph.equilibria.saddles import Pairs, strongest_pushes
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
@@ -24,6 +25,8 @@ REACH = 4.0
 """Length of a line to each side, in scaled parameters."""
 ROUNDS = 8
 """Times that lines are laid through newly found equilibria, at most."""
+PUSHED = 60
+"""Most states over a point that are pushed: with more, what they lead to takes most of the time."""
 HOMOTOPIES = 0.05
 """Share of the guesses from which Newton homotopy starts (where Newton found nothing)."""
 NUDGE = 0.1
@@ -116,6 +119,38 @@ class Pools:
             if len(new) == 0:
                 return
             self._along_lines(np.repeat(new, LINES))
+
+    def push(self, begin: int = 0) -> None:
+        """Push equilibria, those before `begin` left out, both ways by random forces through folds.
+
+        The forces act on all unknowns, also where no load of the structure does; where they
+        vanish again there are equilibria. Left out over points with more than `PUSHED` states.
+        """
+        few = np.bincount(self.group, minlength=1)[self.group] <= PUSHED
+        lanes = np.flatnonzero(few & (np.arange(len(self.z)) >= begin))
+        if len(lanes) == 0:
+            return
+        structure, z, group = self.ground.structure, self.z[lanes], self.group[lanes]
+        p = self.ground.p[group]
+        pairs = Pairs(z, structure.sample(p, self.generator), p)
+        apart = np.flatnonzero(pairs.distance(structure) > SAME_STATE)
+        if len(apart) == 0:
+            return
+        force = self._forces(pairs.take(apart))
+        both, ways = np.concatenate([force, -force]), pairs.take(np.tile(apart, 2))
+        line = ForceLine(structure, ways.p, both, ways.distance(structure))
+        outcome = trace(line, ways.start, (), WIDE_STEPS)
+        returned = outcome.code == EventCode.RETURNED
+        self._polish(outcome.z[returned], np.tile(group[apart], 2)[returned])
+
+    def _forces(self, pairs: Pairs) -> Lanes:
+        """Random forces, as strong as pushes from states to guesses."""
+        structure, n = self.ground.structure, self.ground.structure.unknowns
+        random = self.generator.normal(size=(len(pairs.p), n))
+        strength = strongest_pushes(structure, pairs) / np.linalg.norm(random, axis=1)
+        force = np.zeros_like(pairs.start)
+        force[:, :n] = strength[:, None] * random * np.sqrt(structure.mass)
+        return force
 
     def _by_homotopy(self, guess: Lanes, group: Groups) -> None:
         if len(guess) == 0:

@@ -89,19 +89,24 @@ def states_between(structure: Structure, pairs: Pairs) -> Met:
 
 def _pushes(structure: Structure, pairs: Pairs) -> Lanes:
     """Forces towards the goal, strong enough for the straight line between the minima."""
+    n = structure.unknowns
+    ahead = (pairs.goal - pairs.start)[:, :n] / pairs.distance(structure)[:, None]
+    push = np.zeros_like(pairs.start)
+    push[:, :n] = strongest_pushes(structure, pairs)[:, None] * structure.mass * ahead
+    return push
+
+
+def strongest_pushes(structure: Structure, pairs: Pairs) -> Values:
+    """`STRONGEST` times the largest force against a push along the line from start to goal."""
     n, count = structure.unknowns, len(pairs.p)
-    change = (pairs.goal - pairs.start)[:, :n]
-    ahead = change / pairs.distance(structure)[:, None]
+    ahead = (pairs.goal - pairs.start)[:, :n] / pairs.distance(structure)[:, None]
     share = np.linspace(0.0, 1.0, POINTS)[1:-1]
     line = pairs.start[:, None] + (pairs.goal - pairs.start)[:, None] * share[:, None]
     residual = structure.residual(
         line.reshape(-1, structure.size), np.repeat(pairs.p, len(share), axis=0)
     )
     against = np.abs((residual[:, :n].reshape(count, -1, n) * ahead[:, None]).sum(axis=2))
-    strongest = np.where(np.isfinite(against), against, 0.0).max(axis=1)
-    push = np.zeros_like(pairs.start)
-    push[:, :n] = STRONGEST * strongest[:, None] * structure.mass * ahead
-    return push
+    return np.asarray(STRONGEST * np.where(np.isfinite(against), against, 0.0).max(axis=1))
 
 
 def _options(distance: float) -> TraceOptions:

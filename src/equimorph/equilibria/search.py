@@ -123,8 +123,8 @@ class Completeness:
 
 Points = Float[np.ndarray, "points parameters"]
 
-COMPLETIONS = 4
-"""Rounds in which what descents and searches between minima found serves lines again."""
+COMPLETIONS = 8
+"""Rounds in which what descents, searches between minima and pushes found serves them again."""
 NO_RUN = -1
 """Instead of the number of a run: found by descents, or between minima."""
 REPEATS = 3
@@ -181,8 +181,10 @@ def find_equilibria(
 
     Then the energy is followed downwards from every state of index one until that leads to nothing
     new, and saddles are searched between minima that no chain of saddles joins: so no stable state
-    is missing unless every state of index one next to it is missing as well. New states serve lines
-    again. Where the energy is known to grow at infinity the sum of (−1)^index must be 1, else
+    is missing unless every state of index one next to it is missing as well. Against that, states
+    are pushed both ways by random forces on all unknowns, until the forces vanish; over points with
+    more than 60 known states pushes are left out, and many others may be missing. New states serve
+    lines again. Where the energy is known to grow at infinity the sum of (−1)^index must be 1, else
     deflation searches once more. `FoundStates.arguments` records the outcome.
 
     Parameters
@@ -256,18 +258,22 @@ def _complete_by_arguments(
     ground = Ground(structure, points, catches[0].ground.within)
     group = np.repeat(np.arange(len(points)), [len(catch.z) for catch in catches])
     graph = MinimaGraph(ground, np.concatenate([catch.z for catch in catches]), group)
+    pushed = 0
     for _ in range(COMPLETIONS):
         known = len(graph)
         graph.descend()
         graph.connect()
         lacking = [number for number in range(len(points)) if contradicts(graph, number)]
-        if len(graph) == known and not lacking:
-            break
         pools = Pools(ground, generator, graph.z, graph.group)
-        if len(graph) == known:
+        pools.push(pushed)
+        pushed = len(graph)
+        if len(pools.z) == known and not lacking:
+            break
+        if len(pools.z) == known:
             pools.deflate(np.array(lacking))
         pools.spread(known)
         graph.add(pools.z[len(graph) :], pools.group[len(graph) :])
+    graph.descend()
     return [
         catch.with_states(graph.z[graph.group == number]).states(arguments_of(graph, number))
         for number, catch in enumerate(catches)
