@@ -64,7 +64,6 @@ RANGES: Mapping[str, Range] = {
     "radius": Range(0.0, LARGEST, "a finite number >= 0", "finite numbers >= 0"),
     "intervals": _count(2, np.inf),
     "confidence": Range(0.5, 1.0 - 1e-12, "between 0.5 and 1", "between 0.5 and 1", above=True),
-    "s": Range(0.0, 1.0, "an arclength between 0 and 1", "arclengths between 0 and 1"),
     "slide": Range(
         -2.0 * np.pi, 2.0 * np.pi, "a direction in radians, within ±2π", "directions in radians"
     ),

@@ -138,7 +138,7 @@ def test_bad_input_is_refused(arguments, text):
     ("call", "text"),
     [
         (lambda rod: rod.height(1.2), "`s` must be an arclength between 0 and 1; got 1.2"),
-        (lambda rod: rod.curvature(np.nan), "`s` must be an arclength"),
+        (lambda rod: rod.curvature(np.nan), "`s` must be a finite number; got nan"),
         (lambda rod: rod.support_force("nu"), "`component` must be 'lambda' or 'mu'"),
         (lambda rod: rod.end_moment(2), "`end` must be 0 or 1; got 2"),
         (lambda rod: rod.descriptor("colour(1)"), "`descriptor` must be one of height"),

@@ -79,7 +79,7 @@ def _switch(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
     pairing.fit()
 
 
-def _beyond(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> Seeds:
+def _beyond(pairing: Pairing, alone: Int[np.ndarray, " crossings"]) -> Seeds:
     """Equilibria over vertices that the curves through crossings lead to."""
     store, mesh, setting = pairing.points, pairing.mesh, pairing.setting
     reached = []
