@@ -142,6 +142,7 @@ from .tasks import (
     Optima as Optima,
     Optimum as Optimum,
     Proof as Proof,
+    ProofStatus as ProofStatus,
     Reach as Reach,
     RobustOptimum as RobustOptimum,
     Room as Room,

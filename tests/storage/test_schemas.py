@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
 from equimorph.errors import InputError
@@ -57,6 +58,18 @@ def test_a_file_of_the_first_release_is_read(old: Path):
         assert found.answers["optimum"]["best"].best.value == pytest.approx(0.1, abs=1e-6)
         assert found.answers["sensitivity"]["here"].names == ("x_l", "F", "k")
         assert found.maps["limits"].value.shape == (3, 3)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "why", "now"),
+    [("sampled", "", "supported"), ("structural", "", "proved"), ("sampled", "no", "unproved")],
+)
+def test_a_proof_of_an_older_release_has_the_status_that_its_bounds_bear(bounds, why, now):
+    """Version 1 called sampled bounds "proved", too."""
+    states = Spring().natural_state(x_l=1.2).batch
+    values = {"status": "unproved" if why else "proved", "why": why, "states": states,
+              "error": np.zeros(1), "margin": 0.1, "bounds": bounds, "failed": None}  # fmt: skip
+    assert schemas.find_schema("Proof").build(1, values).status == now
 
 
 def test_a_file_says_which_records_it_holds(written: Path):

@@ -60,6 +60,7 @@ class Change:
 CHANGES: Mapping[str, Change] = {
     "Audit": Change(version=4),
     "LeastSnap": Change(version=2),
+    "Proof": Change(version=2, removed=("status",)),  # it follows from `why` and `bounds`
 }
 """Changes by class; a class that is not listed is as it was in version 1."""
 

@@ -60,7 +60,7 @@ from equimorph.tasks.robustness import (
 )
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes.solutions import Shapes, solve_shape, solve_shapes
-from equimorph.tasks.verification import Proof, Verification, verify
+from equimorph.tasks.verification import Proof, ProofStatus, Verification, verify
 
 __all__ = [
     "ActuatorMap",
@@ -82,6 +82,7 @@ __all__ = [
     "Optima",
     "Optimum",
     "Proof",
+    "ProofStatus",
     "Reach",
     "Resolving",
     "RobustOptimum",

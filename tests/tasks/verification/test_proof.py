@@ -10,6 +10,7 @@ from equimorph.tasks import plan, verify
 from equimorph.tasks.verification import prove
 from equimorph.tasks.verification.newton_kantorovich import segment_bounds
 from oracles.polynomial import bead_on_a_circle, fold_form
+from oracles.specimens import arch_truss, toggle
 from typecheck import unchecked
 
 VIA = [{"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0}]
@@ -108,12 +109,33 @@ def test_nothing_is_proved_across_a_fold():
     assert prove(States(structure, x, a)).status == "unproved"
 
 
-def test_sampled_bounds_are_named():
+def hanging_arm():
+    return Rod(ends=("clamped", "free"), loads={"w": em.LineLoad()}, elements=2, degree=6)
+
+
+@pytest.mark.parametrize(
+    ("make", "to"),
+    [(arch_truss, {"a": 1e-3}), (toggle, {"P": 1e-3}), (hanging_arm, {"w": 1e-3})],
+    ids=["truss", "frame", "general rod"],
+)
+def test_sampled_bounds_support_and_prove_nothing(make, to):
+    structure = make("green") if make is arch_truss else make()
+    with unchecked():
+        found = verify([to], structure.natural_state(), proof=True)
+    supported(found)
+
+
+def test_constrained_formulas_are_supported():
     structure = bead_on_a_circle()
     start = em.lift(structure.state(0.0, 1.0, 1.0, g=1.0), {"h": 0.2}).end.state
-    found = verify([{"h": -0.2}], start, proof=True)
-    assert found.proof.status == "proved"
+    supported(verify([{"h": -0.2}], start, proof=True))
+
+
+def supported(found):
     assert found.proof.bounds == "sampled"
+    assert found.proof.status is em.ProofStatus.SUPPORTED, found.proof.why
+    assert repr(found.proof).startswith("Proof(supported: sampled bounds on ")
+    assert repr(found).endswith(", supported)")
 
 
 def test_structures_with_too_many_unknowns_have_no_proof(monkeypatch):

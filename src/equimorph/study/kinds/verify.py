@@ -1,6 +1,6 @@
 """Verification of schedules: ``[[verify]]``."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Literal
@@ -14,7 +14,17 @@ from equimorph.study import html
 from equimorph.study.answers import figures_of_way, heading, pictures_of_way
 from equimorph.study.names import schedule_table
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks import Proof, Route, Verification, verify
+from equimorph.tasks import Proof, ProofStatus, Route, Verification, verify
+
+STANDINGS: Mapping[ProofStatus, tuple[str, str]] = {
+    ProofStatus.PROVED: ("Proved", ""),
+    ProofStatus.SUPPORTED: (
+        "Supported by samples",
+        " The second derivatives behind these bounds are estimated from samples, so this is "
+        "evidence and no proof.",
+    ),
+}
+"""What a page says first and last of a curve that keeps its bounds, by status."""
 
 
 class VerifyKind(Kind[Verification]):
@@ -72,12 +82,13 @@ def _sentence(why: str) -> str:
 
 
 def _proof(proof: Proof) -> str:
-    if proof.status != "proved":
+    """What is known between the states, in words that its status bears."""
+    if proof.status == ProofStatus.UNPROVED:
         return f"<p>Not proved: {escape(proof.why)}.</p>"
-    how = "" if proof.bounds == "structural" else " Bounds are estimated from samples."
+    head, rest = STANDINGS[proof.status]
     error = html.number(float(np.max(proof.error, initial=0.0)), 2)
     return (
-        f"<p><strong>Proved</strong> on {len(proof.error)} segments: between the states, too, the "
+        f"<p><strong>{head}</strong> on {len(proof.error)} segments: between the states, too, the "
         f"equilibrium exists, is the only one nearby and keeps a margin of "
-        f"{html.number(proof.margin)}; it leaves the chords by {error} at most.{how}</p>"
+        f"{html.number(proof.margin)}; it leaves the chords by {error} at most.{rest}</p>"
     )

@@ -1,6 +1,7 @@
 """Proof mode: between the states of a schedule, too, the lifted curve exists and is unique."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Literal
 
 import numpy as np
@@ -18,29 +19,41 @@ ENTRIES_AT_ONCE = 400_000
 """Entries of the inverse matrices that are held at a time."""
 
 
+class ProofStatus(StrEnum):
+    """How well it is known that one stable curve joins the states; each member equals its text."""
+
+    PROVED = "proved"
+    """The bounds hold on all segments, and with them those of the second derivatives over whole
+    boxes: the statement is a theorem up to the allowances for round-off."""
+    SUPPORTED = "supported"
+    """The bounds hold on all segments if the second derivatives nowhere exceed twice their largest
+    change seen in samples: evidence, no proof."""
+    UNPROVED = "unproved"
+    """The bounds fail somewhere, or there are none."""
+
+
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """What was proved of a polyline in parameter space between known equilibria.
+    """What is known of a polyline in parameter space between known equilibria.
 
     Parameters
     ----------
-    status
-        "proved" or "unproved" with the reason in `why`.
+    why
+        Reason if there is neither proof nor support, else empty.
     states
         Equilibria between which a bound holds, those added by bisection included.
     error
         For each segment, largest distance of the true curve from the chord between its ends: of
         any unknown or multiplier.
     margin
-        Stability margin that the curve is proved to keep everywhere.
+        Stability margin that the curve keeps everywhere, 0 if unproved.
     bounds
         "structural": of the second derivatives over whole boxes; "sampled": estimated from samples,
-        in which case nothing is proved in the strict sense.
+        as for trusses, frames and general rods.
     failed
         First segment for which the bound fails, by its ends.
     """
 
-    status: Literal["proved", "unproved"]
     why: str
     states: States
     error: Float[np.ndarray, " segments"]
@@ -48,22 +61,31 @@ class Proof:
     bounds: Literal["structural", "sampled"]
     failed: States | None = None
 
+    @property
+    def status(self) -> ProofStatus:
+        """Proved only if the bounds are structural; see `ProofStatus`."""
+        if self.why:
+            return ProofStatus.UNPROVED
+        return ProofStatus.PROVED if self.bounds == "structural" else ProofStatus.SUPPORTED
+
     def __repr__(self) -> str:
-        """Number of segments and the margin, or why there is no proof."""
-        if self.status == "unproved":
+        """Status, number of segments and the margin, or why there is no proof."""
+        if self.why:
             return f"Proof(unproved: {self.why})"
-        count = len(self.error)
-        return f"Proof({self.bounds} bounds on {count} segments; margin >= {self.margin:.4g})"
+        segments = f"{self.bounds} bounds on {len(self.error)} segments"
+        return f"Proof({self.status}: {segments}; margin >= {self.margin:.4g})"
 
 
 def prove(states: States, margin: float = 0.0) -> Proof:
-    """Prove that one curve of stable equilibria joins consecutive states.
+    """Prove that one curve of stable equilibria joins consecutive states, or support it.
 
-    Newton–Kantorovich bound on every segment; where it fails the segment is bisected. It proves,
+    Newton–Kantorovich bound on every segment; where it fails the segment is bisected. It says,
     for all parameters on the straight segments between those of the states, that an equilibrium
     exists near the chord, that it is the only one there and continuous, and that its index is 0
-    with at least `margin`. Assumed: round-off is covered by stated allowances instead of being
-    enclosed by interval arithmetic; F is taken as the structure computes it.
+    with at least `margin`. This is proved where the structure bounds its second derivatives over
+    whole boxes (spring, clamped rod, formulas), and supported where they are sampled. Assumed:
+    round-off is covered by stated allowances instead of being enclosed by interval arithmetic; F is
+    taken as the structure computes it.
     """
     structure = states.structure
     kind = _kind(states)
@@ -72,7 +94,7 @@ def prove(states: States, margin: float = 0.0) -> Proof:
             f"a {structure.kind} with {structure.size} unknowns knows no bound of its second "
             "derivatives and has too many to sample"
         )
-        return Proof("unproved", why, states, np.zeros(0), 0.0, "sampled")
+        return Proof(why, states, np.zeros(0), 0.0, "sampled")
     states = _without_repeats(states)
     bounds = _all_bounds(states[:-1], states[1:], margin)
     for _ in range(MOST_BISECTIONS):
@@ -89,7 +111,7 @@ def prove(states: States, margin: float = 0.0) -> Proof:
         return _conclude(states, bounds, kind)
     k = int(bad[0])
     why = _why(bounds, k, margin)
-    return Proof("unproved", why, states, _errors(bounds), 0.0, kind, states[k : k + 2])
+    return Proof(why, states, _errors(bounds), 0.0, kind, states[k : k + 2])
 
 
 def _kind(states: States) -> Literal["structural", "sampled", "unknown"]:
@@ -181,7 +203,7 @@ def _errors(bounds: Bounds) -> Float[np.ndarray, " segments"]:
 
 
 def _conclude(states: States, bounds: Bounds, kind: Literal["structural", "sampled"]) -> Proof:
-    return Proof("proved", "", states, _errors(bounds), float(bounds.margin.min()), kind)
+    return Proof("", states, _errors(bounds), float(bounds.margin.min()), kind)
 
 
 def _why(bounds: Bounds, k: int, margin: float) -> str:

@@ -165,7 +165,7 @@ class Verification:
     violation
         What ended the way, and where.
     proof
-        In proof mode: what is proved between the states, too.
+        In proof mode: what is proved, or supported by samples, between the states.
     """
 
     status: Literal["verified", "refused"]
@@ -236,8 +236,9 @@ def verify(
     monitor
         Further descriptors for the schedule of the result.
     proof
-        Prove, too, that between the states the curve exists, is the only one nearby and keeps its
-        index; see `Proof`. A schedule that is safe, but cannot be proved so, stays verified.
+        Bound the curve between the states, too: that it exists, is the only one nearby and keeps
+        its index. This is proved or, where the bounds are sampled, supported; see `ProofStatus`. A
+        schedule that is safe, but cannot be proved so, stays verified.
     options
         Step control of the lifts; by default that of the final check of routes.
 
@@ -256,7 +257,7 @@ def verify(
     >>> import equimorph as em
     >>> rest = em.Spring().natural_state(x_l=1.5)
     >>> em.verify([{"F": 0.2}, {"x_l": 1.2}], rest, proof=True).proof.status
-    'proved'
+    <ProofStatus.PROVED: 'proved'>
     """
     begin, rows = _legs(schedule, start, structure)
     constraints = tuple(within)
