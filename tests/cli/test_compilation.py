@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from equimorph.cli.compilation import evaluate, kernels_are_in_cache, march
+from equimorph.cli.run import evaluate, kernels_are_in_cache, march
 from equimorph.study import read_problem
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))

@@ -11,7 +11,7 @@ from equimorph.errors import InputError
 from equimorph.model import Silent
 from equimorph.storage import read_results
 from equimorph.study import Outcome, parse_study, prepare, run_study
-from equimorph.study.measured_points import _shape
+from equimorph.study.data_files import _shape
 from typecheck import unchecked
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

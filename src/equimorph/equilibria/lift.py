@@ -1,18 +1,273 @@
 """`lift`: follow curves in parameter space from known equilibria, on the equilibrium set."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import overload
 
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
 from equimorph.argument_checks import check_arguments
-from equimorph.equilibria.legs import Leg, check_start, check_starts, way_points
-from equimorph.equilibria.lifts import Lifts, lift_many
+from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.equilibria.critical import criticality
+from equimorph.equilibria.curves import Curve
+from equimorph.equilibria.hidden_events import with_multiple_points
+from equimorph.equilibria.legs import (
+    Leg,
+    check_start,
+    check_starts,
+    legs_of,
+    of_some,
+    prepare_leg,
+    violations,
+    way_points,
+)
 from equimorph.equilibria.paths import Event, Path, lift_one
-from equimorph.equilibria.trace_options import TraceOptions
+from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
+from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress
 from equimorph.structures import State, States
 
+Words = Shaped[np.ndarray, " lanes"]
+WORD = "U24"
+"""Array of kinds of events and of criticality: room for the longest."""
 __all__ = ["Event", "Lifts", "Path", "check_start", "lift", "way_points"]
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Events or points on the way of many lifts, sorted by lane and then along each.
+
+    Parameters
+    ----------
+    lane
+        Number of the state that was lifted.
+    states
+        Exact states.
+    at
+        Number of the leg + share of it.
+    kind
+        As of `Event`; "" for a regular point.
+    index
+        Negative eigenvalues of the constrained Hessian; just before an event.
+    criticality
+        Of branch points, else "".
+    """
+
+    lane: Int[np.ndarray, " marks"]
+    states: States
+    at: Float[np.ndarray, " marks"]
+    kind: Shaped[np.ndarray, " marks"]
+    index: Int[np.ndarray, " marks"]
+    criticality: Shaped[np.ndarray, " marks"]
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.lane)
+
+
+@dataclass(frozen=True, eq=False)
+class Lifts:
+    """How the lifts of many states ended, in the order of the states.
+
+    Parameters
+    ----------
+    states
+        Where each lift ended.
+    kind
+        How: as of `Event`, or "cancelled".
+    at
+        Number of the leg + share of it.
+    length
+        Length of the way in the structure's metric and scaled parameters.
+    index
+        Negative eigenvalues of the constrained Hessian; the near side's at critical ends.
+    criticality
+        Of branch points, else "".
+    detail
+        One line for lanes that need it: the constraint that was met, why a lane was lost.
+    events
+        Events that were passed; see `Marks`.
+    points
+        Points on the way if they were recorded, else None.
+    """
+
+    states: States
+    kind: Words
+    at: Values
+    length: Values
+    index: Int[np.ndarray, " lanes"]
+    criticality: Words
+    detail: dict[int, str]
+    events: Marks
+    points: Marks | None = None
+
+    def __len__(self) -> int:
+        """Number of lifts."""
+        return len(self.kind)
+
+    def __repr__(self) -> str:
+        """How many ended in which way."""
+        kinds, counts = np.unique(self.kind, return_counts=True)
+        ends = ", ".join(f"{n} {kind}" for kind, n in zip(kinds, counts, strict=True))
+        return f"Lifts({len(self)}: {ends})"
+
+    def __getitem__(self, lane: int) -> Event:
+        """How one of them ended."""
+        words = str(self.criticality[lane]) or None, self.detail.get(lane, "")
+        return Event(EventKind(self.kind[lane]), self.states[lane], float(self.at[lane]), *words)
+
+    @property
+    def arrived(self) -> Flags:
+        """Which were lifted to the end."""
+        return np.asarray(self.kind == "arrived")
+
+
+def lift_many(
+    states: States,
+    to: Leg | Sequence[Leg],
+    within: tuple[Constraint, ...],
+    options: TraceOptions,
+    progress: Progress | None,
+) -> Lifts:
+    """Follow all legs from many states; see `lift`."""
+    ledger = _Ledger(states, within)
+    moved = False
+    for number, leg in enumerate(legs_of(to)):
+        going = np.flatnonzero(ledger.code == EventCode.ARRIVED)
+        if len(going) == 0:
+            break
+        everyone = len(going) == len(states)
+        here = ledger.states if everyone else ledger.states[going]
+        begun = prepare_leg(here, leg if everyone else of_some(leg, going, len(states)))
+        far = np.flatnonzero(begun.curve.weight > 0.0)
+        moved = moved or len(far) > 0
+        if len(far) < len(going):
+            begun = replace(begun, curve=begun.curve.take(far), z=begun.z[far])
+        if len(far):
+            outcome = trace(begun.curve, begun.z, within, options, progress=progress)
+            outcome = with_multiple_points(begun.curve, begun.z, outcome)
+            ledger.enter(going[far], begun.curve, outcome, number)
+        ledger.at[ledger.code == EventCode.ARRIVED] = number + 1.0
+        if (ledger.code == EventCode.CANCELLED).any():
+            break
+    if not moved and (ledger.code == EventCode.ARRIVED).any():
+        raise InputError("`to` must change at least one parameter; got the starts themselves.")
+    return ledger.lifts(within, options.record)
+
+
+@dataclass
+class _Part:
+    """Events or points of one leg."""
+
+    lane: Some
+    z: Lanes
+    p: Parameters
+    at: Float[np.ndarray, " some"]
+    code: Some
+    index: Some
+    words: Shaped[np.ndarray, " some"]
+
+
+@dataclass
+class _Ledger:
+    """How each lane stands."""
+
+    begun: States
+    within: tuple[Constraint, ...]
+    code: Int[np.ndarray, " lanes"] = field(init=False)
+
+    def __post_init__(self) -> None:
+        lanes = len(self.begun)
+        self.z, self.p = self.begun.z.copy(), self.begun.p.copy()
+        self.at, self.length = np.zeros(lanes), np.zeros(lanes)
+        self.index = self.begun.structure.index(self.z, self.p)
+        self.over = violations(self.begun, self.within)
+        self.code, self.words = (
+            np.where(self.over, EventCode.CONSTRAINT, EventCode.ARRIVED),
+            np.full(lanes, "", WORD),
+        )
+        self.detail: dict[int, str] = {}
+        self.events: list[_Part] = []
+        self.points: list[_Part] = []
+
+    @property
+    def states(self) -> States:
+        """Where the lanes are."""
+        return States(self.begun.structure, self.z, self.p)
+
+    def enter(self, lanes: Some, curve: Curve, outcome: Traces, number: int) -> None:
+        """Take up the outcome of a leg."""
+        self.z[lanes], self.p[lanes] = curve.states(outcome.z, outcome.t)
+        self.code[lanes], self.index[lanes] = outcome.code, outcome.index
+        self.at[lanes] = number + outcome.t
+        self.length[lanes] += outcome.travelled
+        self.detail.update({int(lanes[lane]): why for lane, why in outcome.why.items()})
+        branched = np.flatnonzero(outcome.code == EventCode.BRANCH_POINT)
+        self.words[lanes[branched]] = _criticality(
+            curve.take(branched), outcome.z[branched], outcome.t[branched]
+        )
+        passed = outcome.passed
+        words = np.full(len(passed.code), "", WORD)
+        at = np.flatnonzero(passed.code == EventCode.BRANCH_POINT)
+        words[at] = _criticality(curve.take(passed.lanes[at]), passed.z[at], passed.t[at])
+        z, p = curve.take(passed.lanes).states(passed.z, passed.t)
+        event = (passed.code, passed.index[:, 0], words)
+        self.events.append(_Part(lanes[passed.lanes], z, p, number + passed.t, *event))
+        points = outcome.points
+        if len(points.t):
+            z, p = curve.take(points.lanes).states(points.z, points.t)
+            none = np.full(len(points.t), "", "U1")
+            regular = (np.full(len(points.t), EventCode.REGULAR), points.index, none)
+            self.points.append(_Part(lanes[points.lanes], z, p, number + points.t, *regular))
+
+    def lifts(self, within: tuple[Constraint, ...], recorded: bool) -> Lifts:
+        """Everything together."""
+        kind = _kinds(self.code)
+        met = np.flatnonzero(self.code == EventCode.CONSTRAINT)
+        if len(met):
+            excess = np.array([c.excess(self.z[met], self.p[met]) for c in within])
+            worst = excess.argmax(axis=0)
+            for lane, which in zip(met, worst, strict=True):
+                self.detail[int(lane)] = str(within[which])
+            for which in np.unique(worst):  # lanes that begin beyond have met nothing
+                lanes = met[(worst == which) & ~self.over[met]]
+                kind[lanes] = within[which].event
+                self.words[lanes] = within[which].criticality(self.z[lanes], self.p[lanes])
+        ends = (self.at, self.length, self.index, self.words, self.detail)
+        points = self._marks(self.points) if recorded else None
+        return Lifts(self.states, kind, *ends, self._marks(self.events), points)
+
+    def _marks(self, parts: list[_Part]) -> Marks:
+        size, count = self.z.shape[1], self.p.shape[1]
+        none = np.zeros(0, int)
+        first = _Part(
+            none, np.zeros((0, size)), np.zeros((0, count)), np.zeros(0), none, none,
+            np.zeros(0, "U1"),
+        )  # fmt: skip
+        columns = {
+            name: np.concatenate([vars(part)[name] for part in (first, *parts)])
+            for name in vars(first)
+        }
+        order = np.lexsort((columns["at"], columns["lane"])) if len(parts) > 1 else slice(None)
+        lane, z, p, at, code, index, words = (column[order] for column in columns.values())
+        states = States(self.begun.structure, z, p)
+        return Marks(lane, states, at, _kinds(code), index, words)
+
+
+def _kinds(code: Int[np.ndarray, " some"]) -> Shaped[np.ndarray, " some"]:
+    known, which = np.unique(code, return_inverse=True)
+    names = np.array([EventCode(each).kind for each in known], WORD)
+    return np.asarray(names[which])
+
+
+def _criticality(
+    curve: Curve, z: Lanes, t: Float[np.ndarray, " some"]
+) -> Shaped[np.ndarray, " some"]:
+    if len(t) == 0:
+        return np.zeros(0, WORD)
+    return np.array(criticality(curve, z, t), WORD)
 
 
 @overload

@@ -6,25 +6,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes
+from equimorph.arrays import Lanes, Some, Values
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.hidden_events import (
+    fronts,
     recorded_points,
     with_hidden_events,
     with_multiple_points,
 )
 from equimorph.equilibria.legs import Leg, legs_of, prepare_leg
+from equimorph.equilibria.locate import locate_root
 from equimorph.equilibria.march import UNRESOLVED
+from equimorph.equilibria.steps import Bracket, Points
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
-from equimorph.equilibria.vanishing import vanishing_points
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Progress
+from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.structures import State, States
 
 JOINED = 1e-8
 """Distance in the metric within which a leg ends where the next one begins."""
+NOTHING = 1e-9
+"""Value, relative to the largest on the path, that counts as zero: it may begin or end there."""
 
 
 @dataclass(frozen=True)
@@ -263,3 +267,39 @@ def _joined(start: State, pieces: list[_Segment]) -> Path:
     middle = [piece.events[-1] for piece in pieces[-1:]]
     states = States(start.structure, z, p)
     return Path(states, at, np.concatenate(lengths), index, (*passed, *middle))
+
+
+def vanishing_points(curve: Curve, points: Points, descriptor: Descriptor) -> Points:
+    """Exact states between the points of paths at which a descriptor changes its sign.
+
+    Parameters
+    ----------
+    curve
+        The curves of all lanes.
+    points
+        Their points, from the start on, sorted by lane and length. Where the sign changes twice
+        between two of them, it is not seen.
+    descriptor
+        Any that is continuous along the paths.
+    """
+    values = descriptor.function(*curve.take(points.lanes).states(points.z, points.t))
+    known = np.abs(values) > NOTHING * np.abs(values).max(initial=0.0)
+    step = (np.diff(points.lanes) == 0) & known[1:] & known[:-1]
+    first = np.flatnonzero(step & (values[1:] * values[:-1] < 0.0))
+    if len(first) == 0:
+        return points.take(first)
+    here, sign = curve.take(points.lanes[first]), np.sign(values[first])
+
+    def against(some: Some, z: Lanes, t: Values) -> Values:
+        return np.asarray(-sign[some] * descriptor.function(*here.take(some).states(z, t)))
+
+    before, after = (fronts(curve.take(points.lanes[at]), points, at) for at in (first, first + 1))
+    way, what = points.travelled[first + 1] - points.travelled[first], np.zeros(len(first), int)
+    numbers, begun = np.arange(len(first)), points.travelled[first]
+    bracket = Bracket(numbers, before, after, way, begun, what)
+    root = locate_root(here, bracket, against)
+    found = Points(
+        points.lanes[first], points.travelled[first] + root.step, root.z, root.t,
+        points.index[first],
+    )  # fmt: skip
+    return found.take(np.flatnonzero(root.found))

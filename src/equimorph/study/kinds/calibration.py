@@ -21,10 +21,9 @@ from equimorph.model import parameter_vector
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study import html
 from equimorph.study.answers import heading, write_rows
-from equimorph.study.data_files import DataFile
+from equimorph.study.data_files import DataFile, Measured, measured_shapes
 from equimorph.study.fields import Point, Positive
 from equimorph.study.lookup import at_key
-from equimorph.study.measured_points import Measured, measured_shapes
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.tasks import Calibration, Family, calibrate
 from equimorph.tasks.calibration.unknowns import Kind as UnknownKind

@@ -23,8 +23,7 @@ from equimorph.tasks.maps.brackets import (
     sample_distance,
     suspicious_edges,
 )
-from equimorph.tasks.maps.causes import Paths, Start
-from equimorph.tasks.maps.exact_places import BESIDE, ONE_PLACE, candidates, is_sharp
+from equimorph.tasks.maps.causes import BESIDE, ONE_PLACE, Paths, Start, candidates, is_sharp
 
 ROUNDS = 3
 """How often causes are looked for, in parts of parts of a pair."""
