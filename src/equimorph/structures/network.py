@@ -214,11 +214,16 @@ def length_limits(
 
 
 def direction_of_mechanism(moves: Float[np.ndarray, "joints space"]) -> tuple[int, str]:
-    """The joint that moves most, and along which unit vector, as text."""
-    at = int(np.argmax(np.abs(moves).max(axis=1)))
-    along = moves[at] / np.linalg.norm(moves[at])
+    """The first of the joints that move most, and along which unit vector, as text.
+
+    Equal movements are compared after rounding: which of them is the largest must not depend on the
+    last digits of an eigenvector.
+    """
+    sizes = np.abs(moves).max(axis=1)
+    at = int(np.argmax(np.round(sizes / sizes.max(), 6)))
+    along = np.round(moves[at] / np.linalg.norm(moves[at]), 6)
     along = along * np.sign(along[np.argmax(np.abs(along))])
-    return at, ", ".join(f"{x:.3g}" for x in np.round(along, 6) + 0.0)
+    return at, ", ".join(f"{x:.3g}" for x in along + 0.0)
 
 
 def items(given: Any, what: str, by: str) -> Iterable[tuple[Any, Any]]:
