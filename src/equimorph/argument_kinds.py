@@ -1,10 +1,9 @@
 """Kinds of arguments: what the annotation and the name of a parameter allow, and in which words.
 
-`check_arguments` checks the arguments of public functions by them. Nothing here knows a structure:
-classes are named in `CLASSES`, numbers whose names mean the same in all functions in `RANGES`.
+`check_arguments` checks the arguments of public functions by them. Ranges of numbers and the words
+for classes are listed in `argument_vocabulary`.
 """
 
-import sys
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,98 +14,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
-LARGEST = sys.float_info.max
-"""Largest finite number."""
-MANY = 1_000_000
-"""Largest count of random starts, checks and the like: more would run for days."""
+from equimorph.argument_vocabulary import CLASSES, FINITE, RANGES, WHOLE
+
 SHOWN = 80
 """Characters of a refused value that a message shows."""
-
-
-@dataclass(frozen=True)
-class Range:
-    """Numbers that are allowed, and how they are called: one, and several."""
-
-    least: float
-    most: float
-    words: str
-    several: str
-    above: bool = False
-    """Whether `least` itself is excluded."""
-
-    def holds(self, value: Any) -> bool:
-        """Whether a real number is in the range; not a number is in none."""
-        number = value.item() if isinstance(value, np.generic) else value
-        above = self.least < number if self.above else self.least <= number
-        return bool(above and number <= self.most)
-
-
-FINITE = Range(-LARGEST, LARGEST, "a finite number", "finite numbers")
-NOT_NEGATIVE = Range(0.0, np.inf, "a number >= 0", "numbers >= 0")
-POSITIVE = Range(0.0, LARGEST, "positive and finite", "positive numbers", above=True)
-EXTENDED = Range(-np.inf, np.inf, "a number", "numbers")
-
-
-def _count(least: int, most: float = MANY) -> Range:
-    limits = f">= {least}" if np.isinf(most) else f"from {least} to {most}"
-    return Range(least, most, f"a whole number {limits}", f"whole numbers {limits}")
-
-
-WHOLE = _count(0, np.inf)
-RANGES: Mapping[str, Range] = {
-    **dict.fromkeys(("accuracy", "snap_price", "tolerance", "most", "reach", "distance"), POSITIVE),
-    **dict.fromkeys(
-        ("tolerances", "spreads", "offsets", "could_measure", "sizes", "limits", "errors"), POSITIVE
-    ),
-    **dict.fromkeys(("first_step", "largest_step", "smallest_step", "turning"), POSITIVE),
-    **dict.fromkeys(("lower", "upper"), EXTENDED),
-    "margin": NOT_NEGATIVE,
-    "radius": Range(0.0, LARGEST, "a finite number >= 0", "finite numbers >= 0"),
-    "intervals": _count(2, np.inf),
-    "confidence": Range(0.5, 1.0 - 1e-12, "between 0.5 and 1", "between 0.5 and 1", above=True),
-    "slide": Range(
-        -2.0 * np.pi, 2.0 * np.pi, "a direction in radians, within ±2π", "directions in radians"
-    ),
-    "seed": WHOLE,
-    "checks": _count(0, 100_000),
-    "retries": _count(0, 20),
-    **dict.fromkeys(("samples", "frames"), _count(2)),
-    **dict.fromkeys(("starts", "runs", "trials", "batch", "fps"), _count(1)),
-    "count": _count(1, 10_000),
-    "limit": _count(1, 100 * MANY),
-    "lifts": _count(1, 100 * MANY),
-    "steps": _count(1, 1000 * MANY),
-}
-"""Ranges of numbers whose names mean the same in all functions, alone or in lists and mappings."""
-
-CLASSES: Mapping[str, tuple[str, str]] = {
-    "Structure": ("a structure, like `Rod()`", "structures"),
-    "State": ("a state, like `rod.natural_state(Theta=1.0)`", "states"),
-    "States": ("states, like `equilibrium_set(...).at(...)`", "batches of states"),
-    "EquilibriumSet": ("an equilibrium set, like `equilibrium_set(rod, Box(...))`", "sets"),
-    "Box": ("a box, like `Box(q=(0.0, 2.5))`", "boxes"),
-    "Grid": ("a grid, like `Grid(Theta=(0.2, 2.5, 93), Delta=(-2, 2, 81))`", "grids"),
-    "Constraint": (
-        "a constraint, like `rod.max_curvature <= 6`",
-        "constraints, like `[rod.max_curvature <= 6]`",
-    ),
-    "Descriptor": (
-        "a descriptor, like `rod.max_curvature`",
-        "descriptors, like `[rod.max_curvature]`",
-    ),
-    "Progress": ("a sink with the method `report(stage, done, total)`", "sinks"),
-    "Journal": ("a journal, like `storage.open_journal(path)`", "journals"),
-    "Schedule": ("a schedule, like `route.schedule` of a route that arrived", "schedules"),
-    "Rule": ("a rule, like `lowest(descriptor)`", "rules"),
-    "LimitLoadMap": ("a map of limit loads, like `limit_load_map(...)`", "maps of limit loads"),
-    "LimitLoad": ("a limit load, like `limit_load(...)`", "limit loads"),
-    "StateEstimate": ("an answer of `estimate_state`", "answers of `estimate_state`"),
-    "Location": ("an answer of `locate`", "answers of `locate`"),
-    "Route": ("a route, like `plan(...)`", "routes"),
-    "Path": ("a path, like `lift(...)`", "paths"),
-    "Axes": ("axes of matplotlib", "axes"),
-}
-"""What objects of a class are called: one of them, and several."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
-from equimorph.argument_kinds import LARGEST, is_number
+from equimorph.argument_kinds import is_number
+from equimorph.argument_vocabulary import LARGEST
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model.obstacle import Obstacle

@@ -6,8 +6,8 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces, Support
+from equimorph.model.drawing import supports_of_point, unit_vectors
 from equimorph.structures.frame.fields import FrameFields
-from equimorph.structures.supports import supports_of_point, unit_vectors
 
 STATIONS = np.linspace(0.0, 1.0, 9)
 """Shares of a member's length at which its line load is drawn."""

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces, Support
+from equimorph.model.drawing import supports_of_point, unit_vectors
 from equimorph.structures.rod.ends import FREE, HELD, End, Holding
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.profiles import profile
@@ -19,7 +20,6 @@ from equimorph.structures.rod.terms import (
     Tendon,
     Term,
 )
-from equimorph.structures.supports import supports_of_point, unit_vectors
 
 STATIONS = np.linspace(0.05, 0.95, 13)
 """Arclengths at which line loads are drawn."""

@@ -1,4 +1,4 @@
-"""Internal parameterisations of a set: ``[[chart]]``."""
+"""Internal parameterisations: ``[[chart]]``, and ``[[reduction]]`` to one state over each point."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from pydantic import Field
 from rich.markup import escape as plain
 
 from equimorph import plotting
-from equimorph.charts import Atlas, Chart, DescriptorChart, Projection, dissect
+from equimorph.charts import Atlas, Chart, DescriptorChart, Projection, Reduction, dissect, reduce
 from equimorph.manifold import EquilibriumSet, part
 from equimorph.study import html
 from equimorph.study.answers import heading
@@ -79,17 +79,17 @@ class ChartKind(Kind[Chart | Atlas]):
         caption = "Above, the part of the set that is covered; below, the domain of each chart."
         return [
             heading(question),
-            f"<p>{escape(_in_words(answer))}</p>",
+            f"<p>{escape(_chart_in_words(answer))}</p>",
             html.pictures(folder, {f"{question.files}.png": caption}, {}),
             *([] if isinstance(answer, Atlas) else _overlaps(answer)),
         ]
 
     def verdict(self, question: Question, answer: Chart | Atlas) -> str:
         """Whether it is single-valued, or how many charts there are."""
-        return f"{question.title}: {plain(_in_words(answer))}"
+        return f"{question.title}: {plain(_chart_in_words(answer))}"
 
 
-def _in_words(chart: Chart | Atlas) -> str:
+def _chart_in_words(chart: Chart | Atlas) -> str:
     names = ", ".join(chart.coordinates.names)
     if isinstance(chart, Atlas):
         kinds = Counter(each.kind for each in chart.transitions)
@@ -109,3 +109,47 @@ def _overlaps(chart: Chart) -> list[str]:
         for each in chart.overlaps
     ]
     return [html.table(["overlap", "sheets", "size"], rows)]
+
+
+class ReductionKind(Kind[Reduction]):
+    """A set reduced to at most one preferred state over each point, with barriers and gaps."""
+
+    table = "reduction"
+    tasks = (reduce,)
+
+    def figures(
+        self, question: Question, eset: EquilibriumSet | None, answer: Reduction
+    ) -> Sequence[Figure]:
+        """Return the preferred part of the set above, its domain with barriers and gaps below."""
+        if len(answer.names) != 2:
+            return []
+        draw = partial(plotting.parameterisation, [answer], question.ground.height)
+        return [still(question.files, draw)]
+
+    def report(self, question: Question, answer: Reduction, folder: Path) -> list[str]:
+        """Barriers with their jumps, and gaps."""
+        caption = "Above, the preferred part of the set; below, its domain with barriers and gaps."
+        rows = [
+            [escape(each.kind), *(html.number(jump) for jump in (each.jump.min(), each.jump.max()))]
+            for each in answer.barriers
+        ]
+        head = ["barrier", "least jump", "largest jump"]
+        return [
+            heading(question),
+            f"<p>{escape(_reduction_in_words(answer))}</p>",
+            html.pictures(folder, {f"{question.files}.png": caption}, {}),
+            *([html.table(head, rows)] if rows else []),
+        ]
+
+    def verdict(self, question: Question, answer: Reduction) -> str:
+        """How many barriers and gaps there are."""
+        return f"{question.title}: {plain(_reduction_in_words(answer))}"
+
+
+def _reduction_in_words(found: Reduction) -> str:
+    barriers = len(found.barriers)
+    count = {0: "no barriers", 1: "1 barrier"}.get(barriers, f"{barriers} barriers")
+    size = found.gaps.size
+    gaps = f"gaps of size {html.number(size)}" if size > 0.0 else "no gaps"
+    lost = f" {found.lost} edges end where no end was found." if found.lost else ""
+    return f"{found.rule}: {count}, {gaps}.{lost}"

@@ -1,22 +1,33 @@
-"""Least changes that lead to a snap: ``[[snap]]``."""
+"""Snaps: the least change that leads to one, ``[[snap]]``, and all of them, ``[[snap_graph]]``."""
 
+import csv
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
+from pydantic import Field
 from rich.markup import escape as plain
 
-from equimorph.manifold import EquilibriumSet
+from equimorph import plotting
+from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
+from equimorph.model import Descriptor
 from equimorph.structures import State, States
 from equimorph.study import html
-from equimorph.study.answers import (
-    figures_of_states,
-    heading,
-    report_of_states,
-)
-from equimorph.study.question import Arguments, Figure, Kind, Question
+from equimorph.study.answers import figures_of_states, heading, report_of_states
+from equimorph.study.lookup import descriptor_at
+from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.tasks import LeastSnap, least_snap
+
+Snaps = tuple[tuple[int, ...], tuple[Snap, ...], tuple[States, ...]]
+"""Stable strata, runs of their boundaries, and the states from which the snaps of each begin."""
+CAPTION = (
+    "The stability boundary in runs from which all snaps lead to the same stratum, numbered as in "
+    "the table: over the parameters, and states before and after the snap along it."
+)
 
 
 class SnapKind(Kind[tuple[State, LeastSnap]]):
@@ -74,3 +85,130 @@ def _snap_in_words(snap: LeastSnap) -> str:
     end = snap.landing
     least = f" ({snap.why})" if snap.why else ""
     return f"the least way to a snap is {moves}; {end.status}, {end.released:.4g} released{least}."
+
+
+class SnapGraphKind(Kind[Snaps]):
+    """Runs of the stability boundary, where snaps from them land, and the energy released."""
+
+    table = "snap_graph"
+    tasks = (snap_graph,)
+    own = MappingProxyType(
+        {
+            "descriptor": (
+                str | None,
+                Field(
+                    default=None, description="Descriptor that distinguishes states in the figure."
+                ),
+            )
+        }
+    )
+
+    def look_up_more(self, question: Question) -> Descriptor:
+        """Look up the descriptor that distinguishes states."""
+        text = question.section.descriptor
+        if text is None:
+            return question.structure.elevation
+        return descriptor_at(question.structure, text, f"{question.key}.descriptor")
+
+    def answer(self, question: Question, arguments: Arguments) -> Snaps:
+        """Follow the snaps; only the ends of their ways are kept."""
+        graph = snap_graph(**arguments.of(snap_graph))
+        snaps = tuple(_lean(snap) for snap in graph.snaps)
+        return graph.strata, snaps, tuple(arguments.eset.points[each.vertices] for each in snaps)
+
+    def write_tables(self, question: Question, answer: Snaps, folder: Path) -> None:
+        """Write every snap that was followed: from where, to where, and the energy released."""
+        with (folder / f"{question.files}.csv").open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            head = ["run", "from stratum", "to stratum", "status", "energy released"]
+            value, parameters = question.extra, self._parameters(answer)
+            table.writerow([*head, *parameters, f"{value.name} before", f"{value.name} after"])
+            for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1):
+                for state, landing in zip(states, snap.landings, strict=True):
+                    after = value(landing.state) if landing.landed else ""
+                    table.writerow([
+                        number, snap.source, snap.target, landing.status, landing.released,
+                        *state.parameters.values(), value(state), after,
+                    ])  # fmt: skip
+
+    def figures(
+        self, question: Question, eset: EquilibriumSet | None, answer: Snaps
+    ) -> Sequence[Figure]:
+        """Two panels, over two parameters."""
+        assert eset is not None
+        if len(eset.names) != 2 or not answer[1]:
+            return []
+        draw = partial(plotting.snap_panels, SnapGraph(eset, *answer[:2]), question.extra)
+        return [still(question.files, draw)]
+
+    def report(self, question: Question, answer: Snaps, folder: Path) -> list[str]:
+        """Figure, and a table of the runs."""
+        title = f"<h2>Snap graph {escape(question.name)}</h2>"
+        words = f"<p>{escape(_extent(answer))}</p>"
+        if not answer[1]:
+            return [title, words]
+        varied = [
+            name
+            for name in self._parameters(answer)
+            if np.ptp(np.concatenate([states[name] for states in answer[2]])) > 0.0
+        ]
+        head = ["run", "from", "to", *map(escape, varied), "snaps followed", "energy released"]
+        rows = [
+            [
+                str(number),
+                f"stratum {snap.source}",
+                escape(_goal(snap)),
+                *(_between(states[name].min(), states[name].max()) for name in varied),
+                str(len(snap.landings)),
+                _between(*snap.released),
+            ]
+            for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1)
+        ]
+        file = f"{question.files}.csv"
+        return [
+            title,
+            words,
+            html.pictures(folder, {f"{question.files}.png": CAPTION}, {}),
+            html.table(head, rows),
+            f'<p>Every snap that was followed: <a href="{file}">{file}</a>.</p>',
+        ]
+
+    @staticmethod
+    def _parameters(answer: Snaps) -> list[str]:
+        """Names of all parameters."""
+        return list(answer[2][0][0].parameters) if answer[2] else []
+
+    def verdict(self, question: Question, answer: Snaps) -> str:
+        """Strata, runs, and the most energy that is released."""
+        return f"Snap graph {question.name}: {plain(_extent(answer))}"
+
+
+def _lean(snap: Snap) -> Snap:
+    ends = np.array([0, -1])
+    landings = (
+        replace(each, way=each.way[ends], time=each.time[ends]) if len(each.way) else each
+        for each in snap.landings
+    )
+    return replace(snap, landings=tuple(landings))
+
+
+def _goal(snap: Snap) -> str:
+    """Where the snaps of a run lead, in words."""
+    if snap.status == "held":
+        return "no snap: nothing moves"
+    return f"stratum {snap.target}" if snap.target >= 0 else f"out of the set ({snap.status})"
+
+
+def _extent(answer: Snaps) -> str:
+    strata, snaps, _ = answer
+    if not snaps:
+        return "no stability boundary in the box: nothing snaps."
+    most = max(snap.released[1] for snap in snaps)
+    stable = "1 stable stratum" if len(strata) == 1 else f"{len(strata)} stable strata"
+    runs = "1 run" if len(snaps) == 1 else f"{len(snaps)} runs"
+    return f"{stable}, {runs} of the stability boundary; a snap releases {most:.4g} at most."
+
+
+def _between(low: float, high: float) -> str:
+    one, other = html.number(low), html.number(high)
+    return one if one == other else f"{one} … {other}"
