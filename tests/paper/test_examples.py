@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.paper import reproduction
+from equimorph.paper import curvatures, reproduction
 from equimorph.paper.examples import EXAMPLES, Example
 from equimorph.paper.quoted import QUOTED, TABLES
+from equimorph.paper.reproduction import in_words
 from typecheck import unchecked
 
 COARSE = em.Grid(Theta=(0.3, 1.5, 11), Delta=(-1.4, 1.4, 14))
@@ -41,7 +42,7 @@ def test_spring(numbers_of):
     np.testing.assert_allclose(found["margin of (0.30, 0.925)"], stiffness, rtol=1e-8)
     np.testing.assert_allclose(found["x_l of the cusp"], 1.0, rtol=1e-8)
     assert found["free parameters of the set"] == 2.0
-    assert found["routes to C_t1 at fixed load"] == 1.0
+    assert found["a route to C_t1 at fixed load"] == 1.0
     np.testing.assert_allclose(found["load of C_s"], 0.009908, atol=5e-7)
     np.testing.assert_allclose(found["load of (0.40, 0.90)"], 0.008904, atol=5e-7)
     np.testing.assert_allclose(found["x_l of delta = 0.40 at the load of C_s"], 0.89763, atol=5e-6)
@@ -49,8 +50,8 @@ def test_spring(numbers_of):
     np.testing.assert_allclose(found["delta of C_t2"], np.arcsin(sine), rtol=1e-7)
     np.testing.assert_allclose(found["x_l of C_t2"], np.cos(np.arcsin(sine)) ** 3, rtol=1e-7)
     np.testing.assert_allclose(found["x_l of C_t3 at the load of C_s"], 0.82776, atol=5e-6)
-    assert found["routes to C_t3 at fixed load"] == 0.0
-    assert found["routes to C_t3 with the load free"] == 1.0
+    assert found["a route to C_t3 at fixed load"] == 0.0
+    assert found["a route to C_t3 with the load free"] == 1.0
     assert found["largest x_l on that route"] > 1.0
 
 
@@ -102,8 +103,8 @@ def test_inside_out(numbers_of):
     np.testing.assert_allclose(found["smallest margin of the route"], 0.462, atol=5e-4)
     np.testing.assert_allclose(found["largest max |kappa| of the route"], 16.4, atol=0.06)
     np.testing.assert_allclose(found["max |kappa| of the goal"], 10.55, atol=5e-3)
-    assert found["routes along the way-points"] == 1.0
-    assert found["routes within max |kappa| <= 6"] == 0.0
+    assert found["a route along the way-points"] == 1.0
+    assert found["a route within max |kappa| <= 6"] == 0.0
     assert found["thrust lambda of the inverted arch"] > 0.0  # the supports push
     assert found["stable equilibria at (1, 0)"] == 2.0
     assert found["stable equilibria at (1.3, 1.3)"] == 1.0
@@ -170,6 +171,28 @@ def test_the_report_shows_theirs_beside_ours(tmp_path):
     assert page.count("<h2>") == len(EXAMPLES)
     assert all(table.caption in plain for table in TABLES)
     assert "| 0.96, 0 | 2.1 (1.5) | 7.6 (1.5) |" in plain
+    assert "| the closed target curve can be tracked | yes | yes |  |" in plain
+
+
+def test_the_article_halves_its_angle_in_the_table():
+    """At (0.64, ±0.58) instead of the printed (0.64, 1.16): 11.39 and 3.76 for 11.7 and 3.35."""
+    with unchecked():
+        found = {
+            (load, sign): curvatures.curvature_at(em.Rod(load), 0.64, sign * 0.58)[0]
+            for load in ("uniform", "left-half")
+            for sign in (1, -1)
+        }
+    np.testing.assert_allclose([found["uniform", 1], found["uniform", -1]], 11.39, atol=5e-3)
+    np.testing.assert_allclose(found["left-half", 1], 3.76, atol=5e-3)
+
+
+def test_questions_are_answered_in_words():
+    assert [in_words(value, 4) for value in (True, False, 1.0, -0.25)] == [
+        "yes",
+        "no",
+        "1",
+        "−0.25",
+    ]
 
 
 @pytest.mark.slow

@@ -6,12 +6,14 @@ from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 from scipy.integrate import quad
 
+import equimorph as em
 from equimorph import plotting
-from equimorph.charts.regions import count_regions
+from equimorph.charts.regions import count_regions, empty_regions
 from equimorph.errors import InputError
 from equimorph.plotting.labels import label_contours
 from equimorph.tasks import Route
 from equimorph.tasks.planning import smoothed
+from typecheck import unchecked
 
 
 def fold_load(x_l):
@@ -63,6 +65,52 @@ def test_drawn_stability_boundary_is_the_closed_form(spring_set):
 def test_counts_are_written_into_their_regions(spring_set):
     assert sorted(texts(plotting.parameter_plane(spring_set))) == ["1", "3"]
     assert sorted(texts(plotting.parameter_plane(spring_set, count="stable"))) == ["1", "2"]
+
+
+@pytest.fixture(scope="module")
+def capped_set():
+    """|δ| ≤ 0.9 leaves no state over part of the box: F = (1 − x_l/cos δ) sin δ at δ = ±0.9."""
+    spring = em.Spring()
+    within = [spring.angle <= 0.9, spring.angle >= -0.9]
+    box = em.Box(x_l=(0.3, 1.4), F=(-0.6, 0.6))
+    with unchecked():
+        return em.equilibrium_set(spring, box, within=within, intervals=(12, 12), checks=0)
+
+
+def test_where_a_set_is_cut_is_not_counted_as_zero(capped_set):
+    """Beyond |δ| = 0.9 there are stable states: no 0 is written there, and it is hatched."""
+    for count in ("all", "stable"):
+        ax = plotting.parameter_plane(capped_set, count=count)
+        assert "0" not in texts(ax)
+        hatched = [patch for patch in ax.patches if patch.get_hatch()]
+        assert len(hatched) >= 2
+        assert {patch.get_label() for patch in hatched} == {"cut at δ = 0.9 or δ = -0.9"}
+        assert any("cut at" in text.get_text() for text in ax.get_legend().get_texts())
+        for x_l, force in ((0.4, 0.55), (0.4, -0.55), (1.38, 0.5), (0.9, 0.0)):
+            known = [each.stable for each in capped_set.at(x_l=x_l, F=force)]
+            empty = not (any(known) if count == "stable" else known)
+            there = any(patch.get_path().contains_point((x_l, force)) for patch in hatched)
+            assert there == empty
+
+
+def test_parts_without_equilibria_and_covered_ones_fill_the_box(capped_set):
+    regions = count_regions(capped_set.coordinates, capped_set.cells)
+    lower, upper = capped_set.box.lower, capped_set.box.upper
+    empty = empty_regions(regions, lower, upper)
+    cells = sum(0.5 * abs((a[:-1, 0] * a[1:, 1] - a[1:, 0] * a[:-1, 1]).sum()) for (a, *_) in empty)
+    assert cells + sum(regions.areas().values()) == pytest.approx(np.prod(upper - lower), rel=1e-9)
+
+
+def test_a_region_without_equilibria_inside_others_is_a_part_with_no_hole():
+    """An annulus of triangles: the square inside is empty, and so is the frame around it."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    places, k = np.concatenate([0.4 * ring, 0.8 * ring]), np.arange(8)
+    cells = np.concatenate(
+        [np.stack([k, k + 8, (k + 1) % 8], 1), np.stack([k + 8, 8 + (k + 1) % 8, (k + 1) % 8], 1)]
+    )
+    parts = empty_regions(count_regions(places, cells), np.array([-1.0, -1]), np.array([1.0, 1]))
+    assert sorted(len(loops) for loops in parts) == [1, 2]
 
 
 def test_axes_carry_symbols_units_and_the_box(spring_set):

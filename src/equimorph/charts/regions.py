@@ -12,7 +12,7 @@ of constant N, with no raster in between.
 See docs/decisions.md, "Charts are cells over coordinates".
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,8 @@ SPACINGS = (1e-9, 1e-7, 1e-5)
 The coarser ones are for edges so crowded (cells squeezed flat at a cusp) that rounding tangles
 them.
 """
+ON_FRAME = 1e-9
+"""Distance from a side of a box, relative to its width, of places that lie on it."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,59 @@ def count_regions(
     Nested regions; none at all if there is no cell.
     """
     return regions_within(coordinates, *outline(coordinates, cells))
+
+
+def empty_regions(
+    regions: Regions, lower: Float[np.ndarray, "2"], upper: Float[np.ndarray, "2"]
+) -> list[list[Float[np.ndarray, "_ 2"]]]:
+    """Connected parts of a box over which there is no equilibrium.
+
+    Returns
+    -------
+    For each part its outline, counter-clockwise, and then its holes, clockwise.
+    """
+    covered = regions.levels[0] if regions.levels else ()
+    frame = _frame(covered, lower, upper)
+    loops = [*covered, frame]
+    places = np.concatenate(loops)
+    edges, jump, first = [], [], 0
+    for loop in loops:
+        number = np.arange(first, first + len(loop))
+        edges.append(np.stack([number[:-1], number[1:]], axis=1))
+        jump.append(np.full(len(loop) - 1, 1 if loop is frame else -1))
+        first += len(loop)
+    outside = regions_within(places, np.concatenate(edges), np.concatenate(jump)).levels
+    rims = [loop for loop in (outside[0] if outside else ()) if _area(loop) > 0.0]
+    holes = [loop for loop in (outside[0] if outside else ()) if _area(loop) <= 0.0]
+    return [[rim, *(hole for hole in holes if _is_inside(hole, rim))] for rim in rims]
+
+
+def _frame(
+    loops: Sequence[Float[np.ndarray, "_ 2"]],
+    lower: Float[np.ndarray, "2"],
+    upper: Float[np.ndarray, "2"],
+) -> Float[np.ndarray, "_ 2"]:
+    """Outline of a box, counter-clockwise, through those places of loops that lie on it."""
+    slack = ON_FRAME * (upper - lower)
+    corners = np.array([lower, [upper[0], lower[1]], upper, [lower[0], upper[1]]])
+    points = np.concatenate([*loops, np.empty((0, 2))])
+    sides = []
+    for k in range(4):
+        axis, along = (1, 0) if k % 2 == 0 else (0, 1)
+        on_side = points[np.abs(points[:, axis] - corners[k, axis]) <= slack[axis]]
+        own = np.unique(np.concatenate([on_side, corners[k : k + 1]]), axis=0)
+        own = own[np.argsort(own[:, along])] if k < 2 else own[np.argsort(-own[:, along])]
+        following = corners[(k + 1) % 4, along]
+        sides.append(own[np.abs(own[:, along] - following) > slack[along]])
+    return np.concatenate([*sides, sides[0][:1]])
+
+
+def _is_inside(loop: Float[np.ndarray, "_ 2"], rim: Float[np.ndarray, "_ 2"]) -> bool:
+    """Whether a closed loop lies inside another one; they do not cross."""
+    number = np.arange(len(rim) - 1)
+    ends = np.stack([rim[number], rim[number + 1]], axis=1)
+    middle = 0.5 * (loop[:1] + loop[1:2])
+    return bool(winding(middle, ends, np.ones(len(number), int))[0] != 0)
 
 
 def regions_within(

@@ -7,6 +7,7 @@ from rich.table import Table
 
 from equimorph.cli.progress import ScreenProgress
 from equimorph.paper import reproduce
+from equimorph.paper.reproduction import in_words
 
 
 def reproduce_and_show(out: Path) -> None:
@@ -25,6 +26,8 @@ def reproduce_and_show(out: Path) -> None:
     for title in ("what", "theirs", "ours"):
         table.add_column(title, justify="left" if title == "what" else "right")
     for quoted, ours in rows:
-        table.add_row(quoted.what, f"{quoted.theirs:g}", f"{ours:.6g}")
+        asked = isinstance(quoted.theirs, bool)
+        theirs, own = in_words(quoted.theirs, 6), in_words(bool(ours) if asked else ours, 6)
+        table.add_row(quoted.what, theirs, own)
     screen.print(table)
     screen.print(f"Report: {out / 'index.html'}", soft_wrap=True)

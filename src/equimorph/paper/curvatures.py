@@ -7,8 +7,9 @@ import equimorph as em
 GRID = {"Theta": (0.2, 2.5, 121), "Delta": (-2.0, 2.0, 160)}
 LOAD = 2.5
 """Uniform load q of the map, in units of B/L³."""
-SETTINGS = ((0.96, 0.0), (0.64, 1.16), (0.64, -1.16))
-"""Of the article's table; its Δ has another sign or scale, so that both signs are tried."""
+SETTINGS = ((0.96, 0.0), (0.64, 1.16), (0.64, -1.16), (0.64, 0.58), (0.64, -0.58))
+"""Of the article's table; its Δ has another sign or scale, so that both signs and halves are tried.
+"""
 BESIDE = 1e-3
 """Width of the grid cell at a setting of which the curvature is computed, in rad."""
 
@@ -42,8 +43,8 @@ def main(folder: Path, grid: em.Grid | None = None) -> dict[str, float]:
     return numbers
 
 
-def curvature_at(arch: em.Rod, theta: float, delta: float) -> tuple[float, float]:
+def curvature_at(arch: em.Rod, theta: float, delta: float) -> tuple[float, bool]:
     """Largest curvature of the first stable state at one setting, and whether the way snaps."""
     corner = em.Grid(Theta=(theta, theta + BESIDE, 1), Delta=(delta, delta + BESIDE, 1))
     found = em.curvature_map(arch, corner, "q", LOAD)
-    return float(found.value[0, 0]), float(found.snaps[0, 0])
+    return float(found.value[0, 0]), bool(found.snaps[0, 0])

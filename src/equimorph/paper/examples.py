@@ -9,6 +9,7 @@ from equimorph.paper import (
     inside_out,
     introduction,
     limit_loads,
+    models,
     parameterisations,
     spring,
     tracking,
@@ -62,6 +63,19 @@ EXAMPLES = (
             "(hatched crosswise), and the height y(2/3) with Δ works. (c) Reduction to the state "
             "with the highest crown leaves a barrier (thick), over which neighbours jump, and a "
             "gap (hatched), over which no state is. (d) Dissection in three charts.",
+        },
+    ),
+    Example(
+        "models",
+        "The two structures",
+        models.main,
+        {
+            "spring-model": "A spring of stiffness k and natural length 1 from A to B. The "
+            "actuator sets the distance x_l of A from the line on which B slides; the vertical "
+            "load F acts on B. The angle δ is the only unknown.",
+            "rod-model": "A rod of length L between rotary actuators at A and B, a distance νL "
+            "apart, under a load q Q(s) along its arclength s. The actuators set the end angles, "
+            "θ(0) = θ_A = Δ + Θ and θ(L) = −θ_B = Δ − Θ.",
         },
     ),
     Example(
@@ -129,7 +143,8 @@ EXAMPLES = (
             "snap, along the article's way-points (red, 1 to 5). (a) The equilibrium set over both "
             "end angles, coloured by the number of unstable directions and cut at max |κ| = 20; "
             "thick: stability boundary and other folds; dashed: max |κ| = 6, paler beyond. (b) "
-            "The end angles, darker where the arch has two stable states. (c) Shapes at the "
+            "The end angles, darker where the arch has two stable states; hatched: beyond max |κ| = "
+            "20, at which the set is cut. (c) Shapes at the "
             "way-points.",
         },
     ),

@@ -39,7 +39,7 @@ def main(folder: Path) -> dict[str, float]:
         "margin of the lower state": down.margin,
         "crown at rest": crown(rest),
         "crown under the force": crown(loaded),
-        "target reached": float(adapted.arrived),
+        "target reached": adapted.arrived,
         "smallest margin on the way": adapted.margin,
         "height at 1/3 adapted": third(goal),
         "height at 2/3 adapted": other(goal),

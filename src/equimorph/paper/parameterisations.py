@@ -41,10 +41,10 @@ def main(folder: Path) -> dict[str, float]:
     cusp = cut.coords[0][cut.coords[0][:, 0].argmax()]
     twice = sum(overlap.domain.size for overlap in failing.overlaps if overlap.sheets == (0,))
     return {
-        "(a) projection is single-valued": float(projection.single_valued),
-        "(b) projection is single-valued": float(failing.single_valued),
+        "(a) projection is single-valued": projection.single_valued,
+        "(b) projection is single-valued": failing.single_valued,
         "(b) area with two stable states": twice,
-        "(b) (y(2/3), Delta) is single-valued": float(heights.single_valued),
+        "(b) (y(2/3), Delta) is single-valued": heights.single_valued,
         "(c) barriers": float(len(reduced.barriers)),
         "(c) least jump at the barrier": float(barrier.jump.min()),
         "(c) largest jump at the barrier": float(barrier.jump.max()),

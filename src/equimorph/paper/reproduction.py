@@ -29,7 +29,10 @@ HEAD = ("what", "theirs", "ours", "difference", "")
 
 @dataclass(frozen=True)
 class Reproduction:
-    """Key numbers of every example, by its name, and how long each took in seconds."""
+    """Key numbers of every example, by its name, and how long each took in seconds.
+
+    A number that is True or False answers a question, and is shown as "yes" or "no".
+    """
 
     numbers: Mapping[str, Mapping[str, float]]
     seconds: Mapping[str, float]
@@ -100,7 +103,7 @@ def markdown(found: Reproduction, examples: Sequence[Example]) -> str:
         if rows:
             lines += [*_markdown_rows(HEAD, [_cells(*row) for row in rows]), ""]
         ours = found.numbers[example.name].items()
-        lines += [*(f"- {key}: {html.number(value, 8)}" for key, value in ours), ""]
+        lines += [*(f"- {key}: {in_words(value, 8)}" for key, value in ours), ""]
     return "\n".join(lines)
 
 
@@ -122,8 +125,9 @@ def page(found: Reproduction, examples: Sequence[Example], folder: Path) -> str:
         if rows:
             body.append(html.table(HEAD, rows))
         ours = found.numbers[example.name].items()
-        listed = [[escape(key), html.number(value, 8)] for key, value in ours]
-        body += ["<h3>Our numbers</h3>", html.table([], listed, "words")]
+        listed = [[escape(key), in_words(value, 8)] for key, value in ours]
+        if listed:
+            body += ["<h3>Our numbers</h3>", html.table([], listed, "words")]
     times = ", ".join(f"{name} {value:.1f} s" for name, value in found.seconds.items())
     body.append(f'<p class="faint">Wall time: {escape(times)}.</p>')
     return html.page(TITLE, body)
@@ -142,11 +146,14 @@ def _cell(theirs: str, ours: float) -> str:
 
 def _cells(quoted: Quoted, ours: float) -> list[str]:
     """Theirs, ours, the difference, and the sentence."""
-    difference = html.number(ours - quoted.theirs, 2)
-    return [
-        quoted.what,
-        html.number(quoted.theirs, 6),
-        html.number(ours, 7),
-        difference,
-        quoted.note,
-    ]
+    asked = isinstance(quoted.theirs, bool)
+    difference = "" if asked else html.number(ours - quoted.theirs, 2)
+    words = in_words(quoted.theirs, 6), in_words(bool(ours) if asked else ours, 7)
+    return [quoted.what, *words, difference, quoted.note]
+
+
+def in_words(value: float, digits: int) -> str:
+    """Return a number for reading, or "yes" or "no"."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return html.number(value, digits)

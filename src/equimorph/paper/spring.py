@@ -11,6 +11,9 @@ START = {"delta": 0.62, "x_l": 0.80}
 LEVELS = (-0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1)
 """Loads F of the level curves that are drawn, in units of k."""
 
+SMOOTH = 1e-3
+"""Distance of the surface from its triangles up to which lines on it look smooth at its cusp."""
+
 
 def main(folder: Path) -> dict[str, float]:
     """Answer the tasks of the article from C_s, at the load of C_s."""
@@ -19,8 +22,9 @@ def main(folder: Path) -> dict[str, float]:
     within = [angle <= 1.2, angle >= -1.2]
     slice_ = em.equilibrium_set(spring, em.Box(F=(-0.1, 0.1)), fixed={"x_l": 0.8}, within=within)
     eset = em.equilibrium_set(
-        spring, em.Box(x_l=(0.5, 1.2), F=(-0.25, 0.25)), within=within, intervals=(35, 35)
-    )
+        spring, em.Box(x_l=(0.5, 1.2), F=(-0.25, 0.25)), within=within, intervals=(35, 35),
+        accuracy=SMOOTH,
+    )  # fmt: skip
     known = {angle: START["delta"], length: START["x_l"]}
     start = em.solve_shape(eset, known).stable[0]
     level = [load <= start["F"], load >= start["F"]]
@@ -51,9 +55,9 @@ def main(folder: Path) -> dict[str, float]:
         "delta of C_t2": angle(flattest),
         "x_l of C_t2": flattest["x_l"],
         "x_l of C_t3 at the load of C_s": mirrored["x_l"],
-        "routes to C_t1 at fixed load": float(len(first.stable)),
-        "routes to C_t3 at fixed load": float(fixed_load.arrived),
-        "routes to C_t3 with the load free": float(free_load.arrived),
+        "a route to C_t1 at fixed load": len(first.stable) > 0,
+        "a route to C_t3 at fixed load": fixed_load.arrived,
+        "a route to C_t3 with the load free": free_load.arrived,
         "largest x_l on that route": float(free_load.path.states["x_l"].max()),
         "x_l of the cusp": cusp["x_l"],
         "free parameters of the set": float(len(eset.names)),

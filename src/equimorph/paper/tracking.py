@@ -33,7 +33,7 @@ def main(folder: Path, intervals: tuple[int, int] = INTERVALS) -> dict[str, floa
         "Delta at (0.15, 0.15)": middle["Delta"],
         "stable states at (0.15, 0.15)": float(len(found.stable)),
         "most stable states at a corner": float(max(len(each.stable) for each in at_corners)),
-        "square tracked": float(square.arrived),
+        "square tracked": square.arrived,
         "smallest margin on the square": square.margin,
         "largest change of an actuator around it": max(map(abs, (square.holonomy or {}).values())),
         "regions of stable states": float(len(reach.regions)),

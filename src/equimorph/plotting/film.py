@@ -20,9 +20,10 @@ from equimorph.equilibria import Path
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import position
 from equimorph.plotting import style
+from equimorph.plotting.counts import hatch_cut, shade_regions
 from equimorph.plotting.curves import path_of, states_along, track
 from equimorph.plotting.labels import symbol
-from equimorph.plotting.plane import draw_folds, draw_track, frame_plane, shade_regions
+from equimorph.plotting.plane import draw_folds, draw_track, frame_plane
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
 from equimorph.structures import States
 from equimorph.tasks import Route
@@ -130,7 +131,9 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
     for outline in around.outlines[[0, -1]]:
         left.plot(*outline.T, color="#cfcfcf", linewidth=2.0, zorder=1)
     frame_plane(right, eset)
-    shade_regions(right, eset, count_regions(eset.coordinates, eset.cells))
+    regions = count_regions(eset.coordinates, eset.cells)
+    shade_regions(right, eset, regions)
+    hatch_cut(right, eset, regions, stable_only=False)
     draw_folds(right, eset)
     draw_track(right, eset, route, path_of(route)).set_linewidth(0.8)
     (shape,) = left.plot([], [], color=style.INDEX_COLOURS[0], linewidth=3.0, zorder=4)

@@ -5,23 +5,19 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path as Outline
 from matplotlib.patheffects import AbstractPathEffect, withStroke
-from mpl_toolkits.axes_grid1 import make_axes_locatable
-from scipy import ndimage
 
 from equimorph.argument_checks import check_arguments
-from equimorph.charts.regions import Regions, count_regions
+from equimorph.charts.regions import count_regions
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, divided_by
 from equimorph.model import Constraint
 from equimorph.plotting import style
+from equimorph.plotting.counts import count_bar, counted, hatch_cut, shade_regions, write_counts
 from equimorph.plotting.curves import (
     boundary_pieces,
     crossing_pieces,
@@ -69,12 +65,6 @@ _LEFT, _BOTTOM, _RIGHT, _TOP = 0.58, 0.4, 0.4, 0.08
 """Inches around the frame."""
 _LEGEND_COLUMNS, _LEGEND_ROW, _LEGEND_GAP = 2, 0.15, 0.06
 """Columns of the legend; inches of one of its rows, and of the gap above it."""
-_INVISIBLE = 1e-4
-"""Area, as a share of the box, below which slivers of the mesh are no region of their own."""
-_RASTER = 160
-"""Pixels, each way, of the raster on which the places of the counts are chosen."""
-_ROOM = 0.03
-"""Radius of the free disc that a number needs, as a share of the picture."""
 _LONG_LEG, _BETWEEN = 0.12, 0.6
 """Length, as a share of the picture, from which on a leg gets arrow heads, and length between two
 of them."""
@@ -91,7 +81,9 @@ def parameter_plane(
 ) -> Axes:
     """Number of equilibria over the parameters, with fold curves and a route.
 
-    Regions are exact for the cells of the set, see `equimorph.charts.regions`.
+    Regions are exact for the cells of the set, see `equimorph.charts.regions`. A region without
+    equilibria that a constraint of the set bounds is hatched and has no number: there may be states
+    beyond the constraint, at which the set is cut.
 
     Parameters
     ----------
@@ -128,6 +120,7 @@ def parameter_plane(
         frame_plane(ax, eset)
         largest = shade_regions(ax, eset, regions)
         lines = draw_folds(ax, eset, stable_only=count == "stable")
+        hatched = hatch_cut(ax, eset, regions, stable_only=count == "stable")
         if limit is not None:
             lines += _draw_limit(ax, eset, limit, stable_only=count == "stable")
         covered = np.empty((0, 2))
@@ -138,14 +131,16 @@ def parameter_plane(
             covered = np.concatenate(
                 [_places_along(eset, route.path), number_way_points(ax, corners)]
             )
-        _write_counts(ax, regions, largest, covered)
-        _count_bar(ax, largest, "equilibria" if count == "all" else "stable equilibria")
-        if lines:
-            legend_below(ax, lines, room=own)
+        write_counts(ax, regions, largest, covered, hatched)
+        what = "equilibria" if count == "all" else "stable equilibria"
+        count_bar(ax, largest, counted(what, eset.constraints))
+        entries = [*lines, *hatched[:1]]
+        if entries:
+            legend_below(ax, entries, room=own)
     return ax
 
 
-def legend_below(ax: Axes, lines: Sequence[Line2D], *, room: bool) -> None:
+def legend_below(ax: Axes, lines: Sequence[Artist], *, room: bool) -> None:
     """Legend below the frame, after the entries that are there; with `room`, the figure grows."""
     legend = ax.get_legend()
     known = [] if legend is None else [each for each in legend.legend_handles if each is not None]
@@ -166,17 +161,6 @@ def frame_plane(ax: Axes, eset: EquilibriumSet) -> None:
     ax.set_ylim(eset.box.lower[1], eset.box.upper[1])
     ax.set_xlabel(parameter_label(eset.structure, eset.names[0]))
     ax.set_ylabel(parameter_label(eset.structure, eset.names[1]))
-
-
-def shade_regions(ax: Axes, eset: EquilibriumSet, regions: Regions) -> int:
-    """Fill the regions of constant count; return the largest count that can be seen."""
-    visible = _INVISIBLE * float(np.prod(eset.box.upper - eset.box.lower))
-    largest = max((k for k, area in regions.areas().items() if area > visible), default=0)
-    shades = style.count_shades(largest)
-    for level, shade in zip(regions.levels[:largest], shades[1:], strict=True):
-        outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in level))
-        ax.add_patch(PathPatch(outline, facecolor=shade, edgecolor="none", zorder=1))
-    return largest
 
 
 def draw_folds(ax: Axes, eset: EquilibriumSet, *, stable_only: bool = False) -> list[Line2D]:
@@ -282,43 +266,6 @@ def _places_along(eset: EquilibriumSet, path: Path) -> Float[np.ndarray, "places
     line = track(eset, path.states)
     between = [line[:-1] + t * np.diff(line, axis=0) for t in (0.0, 0.25, 0.5, 0.75)]
     return np.concatenate([*between, line[-1:]])
-
-
-def _write_counts(
-    ax: Axes, regions: Regions, largest: int, taken: Float[np.ndarray, "places 2"]
-) -> None:
-    """Write the count into every region, at the place with the most room around it."""
-    low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
-    step = (high - low) / _RASTER
-    x, y = (low[i] + step[i] * (np.arange(_RASTER) + 0.5) for i in (0, 1))
-    count = np.minimum(regions.raster(x, y), largest)
-    column, row = np.clip(((taken - low) / step).astype(int), 0, _RASTER - 1).T
-    free = np.ones_like(count, dtype=bool)
-    free[row, column] = False
-    shades = style.count_shades(largest)
-    for number in np.unique(count).tolist():
-        pieces, many = ndimage.label(count == number)
-        for piece in range(1, many + 1):
-            # A rim of zeros: the frame of the picture is an edge, too.
-            inside = np.pad((pieces == piece) & free, 1)
-            if inside.sum() < np.pi * (_ROOM * _RASTER) ** 2:
-                continue
-            room = ndimage.distance_transform_edt(inside)[1:-1, 1:-1]
-            j, i = np.unravel_index(room.argmax(), room.shape)
-            if room[j, i] > _ROOM * _RASTER:
-                text = ax.text(x[i], y[j], str(number), ha="center", va="center", zorder=5)
-                text.set_path_effects([withStroke(linewidth=1.5, foreground=shades[number])])
-
-
-def _count_bar(ax: Axes, largest: int, what: str) -> None:
-    """Colour bar with one shade per count."""
-    shades = ListedColormap(style.count_shades(largest))
-    norm = BoundaryNorm(np.arange(largest + 2) - 0.5, largest + 1)
-    beside = make_axes_locatable(ax).append_axes("right", size=0.08, pad=0.06)
-    bar = ax.figure.colorbar(ScalarMappable(norm, shades), cax=beside)
-    bar.set_ticks(list(range(largest + 1)), labels=[str(k) for k in range(largest + 1)])
-    bar.ax.tick_params(length=0)
-    bar.set_label(f"number of {what}")
 
 
 _STABLE: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": style.ROUTE_COLOUR, "mec": "white"}

@@ -8,6 +8,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
 from matplotlib.patheffects import withStroke
 
 from equimorph.argument_checks import check_arguments
@@ -75,7 +76,7 @@ def route_panels(
         solid.set_box_aspect(ASPECT, zoom=_ZOOM)
         entries = {each.get_label(): each for each in _taken_legend(solid)}
         parameter_plane(eset, route, plane, count="stable", limit=limit)
-        _taken_legend(plane)
+        entries |= {e.get_label(): e for e in _taken_legend(plane) if isinstance(e, PathPatch)}
         states = route.path.states[corner_steps(route)]
         corners = np.column_stack([track(eset, states), height_descriptor(states)])
         number_in_space(solid, corners)

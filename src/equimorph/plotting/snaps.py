@@ -17,8 +17,9 @@ from equimorph.errors import InputError
 from equimorph.manifold import Snap, SnapGraph
 from equimorph.model import Descriptor
 from equimorph.plotting import style
+from equimorph.plotting.counts import hatch_cut, shade_regions
 from equimorph.plotting.labels import descriptor_label, number_points
-from equimorph.plotting.plane import draw_folds, frame_plane, shade_regions
+from equimorph.plotting.plane import draw_folds, frame_plane
 
 _HEIGHT = 2.75
 """Inches of the figure."""
@@ -96,6 +97,7 @@ def _draw_plane(ax: Axes, graph: SnapGraph, shades: ScalarMappable) -> list[Line
     frame_plane(ax, eset)
     regions = count_regions(eset.coordinates, eset.cells[eset.cell_index == 0])
     largest = shade_regions(ax, eset, regions)
+    hatched = hatch_cut(ax, eset, regions, stable_only=True)
     lines = draw_folds(ax, eset, stable_only=True)
     for snap in graph.snaps:
         _scatter(ax, eset.coordinates[snap.vertices], snap, shades)
@@ -104,7 +106,7 @@ def _draw_plane(ax: Axes, graph: SnapGraph, shades: ScalarMappable) -> list[Line
         Patch(fc=shade, ec=style.FAINT, lw=0.4, label=f"{k} stable")
         for k, shade in enumerate(style.count_shades(largest)[1:], start=1)
     ]
-    return [*patches, *lines]
+    return [*patches, *lines, *hatched[:1]]
 
 
 def _scatter(
