@@ -143,9 +143,8 @@ EXAMPLES = (
             "snap, along the article's way-points (red, 1 to 5). (a) The equilibrium set over both "
             "end angles, coloured by the number of unstable directions and cut at max |κ| = 20; "
             "thick: stability boundary and other folds; dashed: max |κ| = 6, paler beyond. (b) "
-            "The end angles, darker where the arch has two stable states; hatched: beyond max |κ| = "
-            "20, at which the set is cut. (c) Shapes at the "
-            "way-points.",
+            "The end angles, darker where the arch has two stable states; hatched: beyond max |κ| "
+            "= 20, at which the set is cut. (c) Shapes at the way-points.",
         },
     ),
 )
