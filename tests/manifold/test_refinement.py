@@ -13,9 +13,8 @@ from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.edge_points import on_edges, unmet
 from equimorph.manifold.complex.marked_complex import (
-    ON_FOLD,
-    RIM,
     Fabric,
+    FacetMark,
     _bisect,
     edges_of,
     fabric_of,
@@ -443,13 +442,13 @@ def test_a_patch_of_a_patch_keeps_both_rims(coarse):
     near[coarse.cells[5]] = True
     outer = patch_around(coarse, near, 4).fabric
     inner = patch_around(outer, near, 3)
-    assert ((inner.fabric.marks & RIM) > 0).sum() > 0
+    assert ((inner.fabric.marks & FacetMark.RIM) > 0).sum() > 0
     back = inner.replace_by(inner.fabric)
     for whole, again in ((outer.cells, back.cells), (outer.facets, back.facets)):
         assert sorted(map(tuple, whole.tolist())) == sorted(map(tuple, again.tolist()))
     for fabric in (outer, inner.fabric):
-        rims = fabric.facets[(fabric.marks & RIM) > 0]
-        assert (fabric.edge_marks(np.sort(rims, axis=1)) & RIM).all()
+        rims = fabric.facets[(fabric.marks & FacetMark.RIM) > 0]
+        assert (fabric.edge_marks(np.sort(rims, axis=1)) & FacetMark.RIM).all()
 
 
 def test_cusps_are_not_put_on_the_rim_of_a_patch():
@@ -461,20 +460,20 @@ def test_cusps_are_not_put_on_the_rim_of_a_patch():
     everywhere = np.ones(len(fabric.cells), bool)
     cut = with_cusps_beside(fabric, everywhere)
     assert len(cut.cells) == len(fabric.cells) + 4
-    folds = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    folds = fabric.facets[(fabric.marks & FacetMark.FOLD) > 0]
     rim = replace(
         fabric,
         facets=np.concatenate([fabric.facets, folds]),
-        marks=np.concatenate([fabric.marks, np.full(len(folds), RIM)]),
+        marks=np.concatenate([fabric.marks, np.full(len(folds), FacetMark.RIM)]),
     )
     assert with_cusps_beside(rim, everywhere) is rim
 
 
 def test_a_fold_that_bulges_far_out_is_followed_to_its_end(coarse):
     """From one of its vertices to the eighth after it, halfway; but not as one of another index."""
-    folds = chains(coarse.facets[(coarse.marks & ON_FOLD) > 0])
+    folds = chains(coarse.facets[(coarse.marks & FacetMark.FOLD) > 0])
     line = max(folds, key=len)[:9]
-    found = follow_edge(coarse, line[[0, 8]], ON_FOLD, 0)
+    found = follow_edge(coarse, line[[0, 8]], FacetMark.FOLD, 0)
     place = coarse.vertices.place[line]
     length = np.linalg.norm(np.diff(place, axis=0), axis=1)
     before = np.concatenate([[0.0], np.cumsum(length)])
@@ -482,7 +481,7 @@ def test_a_fold_that_bulges_far_out_is_followed_to_its_end(coarse):
     assert abs(before[near.argmin()] - 0.5 * before[-1]) < near.min() + 0.2 * before[-1]
     assert near.min() <= length.max()
     assert np.abs(coarse.setting.structure.residual(found.z, found.p)).max() < 1e-12
-    assert follow_edge(coarse, line[[0, 8]], ON_FOLD, 1) is None
+    assert follow_edge(coarse, line[[0, 8]], FacetMark.FOLD, 1) is None
 
 
 def test_vertices_in_use_are_not_found_again(coarse):

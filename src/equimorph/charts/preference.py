@@ -13,13 +13,7 @@ from equimorph.charts.rules import Chooser, Scoring
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.cuts import Ends, cut_between
 from equimorph.manifold.complex.edge_points import on_edges
-from equimorph.manifold.complex.marked_complex import (
-    ON_CAP,
-    ON_FOLD,
-    Fabric,
-    edges_of,
-    fabric_of,
-)
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_of, fabric_of
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
@@ -251,7 +245,7 @@ def _straight(fabric: Fabric, ends: Ends, mark: int, wanted: Int[np.ndarray, " n
     """States over straight lines between the ends of edges; those on constraints stay on them."""
     store, structure = fabric.vertices, fabric.setting.structure
     folded = np.isin(store.kinds[ends], (VertexKind.FOLD, VertexKind.CORNER))
-    bent = np.full(len(ends), bool(mark & (ON_CAP | ON_FOLD))) | folded.all(axis=1)
+    bent = np.full(len(ends), bool(mark & (FacetMark.CAP | FacetMark.FOLD))) | folded.all(axis=1)
 
     def way(lanes: Int[np.ndarray, " n"], t: Float[np.ndarray, " n"]) -> Solved:
         weights = np.stack([1.0 - t, t], axis=1)

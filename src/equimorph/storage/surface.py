@@ -7,6 +7,7 @@ Turk, The PLY polygon file format, 1994; VTK XML formats, https://docs.vtk.org/e
 
 import base64
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -20,9 +21,18 @@ from equimorph.model import Descriptor
 from equimorph.storage.files import write_bytes
 from equimorph.storage.sets import embedding
 
-FOLD, BOX, CAP, MIXED = range(4)
-"""Kinds of surfaces of sets over three parameters."""
-KINDS = {"box": BOX, "cap": CAP, "mixed": MIXED}
+
+class SurfaceKind(IntEnum):
+    """What the surfaces of a set over three parameters lie on, as files number it."""
+
+    FOLD = 0
+    BOX = 1
+    CAP = 2
+    """A constraint that bounds the set."""
+    MIXED = 3
+    """Several of these."""
+    CROSSING = 4
+
 
 PLY_TYPES = {"f": "double", "i": "int"}
 VTK_TYPES = {"f": "Float64", "i": "Int64"}
@@ -46,7 +56,8 @@ def write_surface(path: str | Path, eset: EquilibriumSet, height: Descriptor | N
 
     Points are the free parameters, then the height. Sets over one or two parameters give segments
     or triangles with their index, component and stratum; sets over three the fold surfaces and
-    the boundary, with ``kind`` 0 on folds, 1 on the box, 2 on constraints, 3 on both.
+    the boundary, with ``kind`` 0 on folds, 1 on the box, 2 on constraints, 3 on several of them and
+    4 on crossings.
 
     Parameters
     ----------
@@ -79,8 +90,8 @@ def _surface(eset: EquilibriumSet, height: Descriptor) -> _Surface:
     }
     cells = eset.cells
     if len(eset.names) == 3:
-        pieces = [(FOLD, piece) for piece in eset.folds]
-        pieces += [(KINDS[each.kind], each.vertices) for each in eset.boundaries]
+        pieces = [(SurfaceKind.FOLD, piece) for piece in eset.folds]
+        pieces += [(SurfaceKind[each.kind.upper()], each.vertices) for each in eset.boundaries]
         cells = np.concatenate([np.zeros((0, 3), int), *(piece for _, piece in pieces)])
         on_cells = {"kind": np.repeat([k for k, _ in pieces], [len(p) for _, p in pieces])}
     used, corners = np.unique(cells, return_inverse=True)

@@ -8,15 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.linalg.lanes import results_of
-from equimorph.manifold.complex.marked_complex import (
-    ON_CAP,
-    ON_CROSSING,
-    ON_FOLD,
-    SIDES,
-    TETRAHEDRA,
-    Fabric,
-    held,
-)
+from equimorph.manifold.complex.marked_complex import TETRAHEDRA, Fabric, FacetMark, held
 from equimorph.manifold.complex.vertices import Vertices, free_vertices, vertices_of
 from equimorph.manifold.geometry.exact_points import (
     Aim,
@@ -129,7 +121,7 @@ def on_edges(
     """
     found, vertices = _orthogonally(fabric, ends, mark, lowest, t, rough=refining)
     left = np.flatnonzero(~found)
-    if fabric.dimension != TETRAHEDRA or mark & ON_CROSSING or len(left) == 0:
+    if fabric.dimension != TETRAHEDRA or mark & FacetMark.CROSSING or len(left) == 0:
         return found, vertices
     room = BESIDE if refining else 0.0
     again, more = _beside_sides(fabric, ends[left], mark, lowest[left], t[left], room)
@@ -176,7 +168,7 @@ def _beside_sides(
         end = replace(end, slopes=np.concatenate([end.slopes, row[:, None]], axis=1))
         place[own] = _embed(fabric, near_z, near_p)
         given = near_z, near_p, place[own], plane[own], length[own]
-        pinned = _on_curves(fabric, mark | SIDES << 2 * k, *given, end)
+        pinned = _on_curves(fabric, mark | FacetMark.SIDE << 2 * k, *given, end)
         z[own], p[own], found[own] = pinned.z, pinned.p, pinned.found
     return _accept(fabric, Places(ends, mark, lowest, t), Pinned(z, p, found), place, plane)
 
@@ -236,7 +228,7 @@ def _orthogonally(
         found &= at.index == lowest
         vertices = free_vertices(setting, at if found.all() else at.take(found))
     else:
-        if mark & ON_CROSSING:
+        if mark & FacetMark.CROSSING:
             lowest = store.index[ends].max(axis=1)
         found &= _of_index(fabric, mark, at, found, lowest)
         vertices = _vertices_at(fabric, mark, at, found, lowest, plane)
@@ -280,12 +272,12 @@ def _on_curves(
     span = np.delete(np.eye(d), held(mark, d), axis=0)
     aim = Aim(
         setting,
-        bool(mark & ON_FOLD),
-        bool(mark & ON_CAP),
+        bool(mark & FacetMark.FOLD),
+        bool(mark & FacetMark.CAP),
         np.tile(span, (len(place), 1, 1)),
         place,
         rows,
-        bool(mark & ON_CROSSING),
+        bool(mark & FacetMark.CROSSING),
         plane if len(span) == d else None,
     )
     return corrected(aim, z, p, length)
@@ -299,7 +291,8 @@ def _of_index(
     lowest: Int[np.ndarray, " n"],
 ) -> Bool[np.ndarray, " n"]:
     """Which points, of those that were found, have the right index."""
-    good, count = found.copy(), lower_index if mark & (ON_FOLD | ON_CROSSING) else _index
+    good = found.copy()
+    count = lower_index if mark & (FacetMark.FOLD | FacetMark.CROSSING) else _index
     good[found] = count(fabric.setting, at.z[found], at.p[found]) == lowest[found]
     return good
 
@@ -313,7 +306,9 @@ def _vertices_at(
     plane: Float[np.ndarray, "n d coordinates"],
 ) -> Vertices:
     """Vertices on folds and so on where they were found."""
-    fold, cap, crossing = (bool(mark & each) for each in (ON_FOLD, ON_CAP, ON_CROSSING))
+    fold, cap, crossing = (
+        bool(mark & each) for each in (FacetMark.FOLD, FacetMark.CAP, FacetMark.CROSSING)
+    )
     kind = {
         (False, False): VertexKind.REFINED,
         (True, False): VertexKind.FOLD,

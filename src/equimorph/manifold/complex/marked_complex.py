@@ -6,6 +6,7 @@ an edge must lie on what the edge lies on.
 
 from collections import deque
 from dataclasses import dataclass, replace
+from enum import IntFlag
 from functools import partial
 from itertools import combinations
 
@@ -32,14 +33,26 @@ from equimorph.manifold.geometry.topology import (
 )
 from equimorph.structures import States
 
-ON_FOLD, ON_CAP, SIDES = 1, 2, 4
-"""Marks; from `SIDES` on two for each free parameter: its lower and its upper bound."""
-ON_CROSSING = 1 << 19
-"""Mark of facets at which another sheet crosses."""
-CURVES = ON_FOLD | ON_CAP | ON_CROSSING
-HOLE, RIM = 1 << 20, 1 << 21
-"""Marks of facets on the boundary that lie on nothing: the set is incomplete there, or cells beyond
-are set apart."""
+
+class FacetMark(IntFlag):
+    """What a facet lies on: several at once, and nothing where cells continue beyond it."""
+
+    FOLD = 1
+    CAP = 2
+    """A constraint that bounds the set."""
+    SIDE = 4
+    """The lower bound of the first free parameter; its upper bound and those of the other free
+    parameters follow, one bit each."""
+    CROSSING = 1 << 19
+    """Another sheet crosses there."""
+    HOLE = 1 << 20
+    """A boundary that lies on nothing: the set is incomplete there."""
+    RIM = 1 << 21
+    """Cells beyond are set apart."""
+
+
+CURVES = FacetMark.FOLD | FacetMark.CAP | FacetMark.CROSSING
+"""Marks of curves on which vertices must stay."""
 TRIANGLES, TETRAHEDRA = 2, 3
 """Dimension of their cells."""
 AT_ONCE = 4096
@@ -99,11 +112,11 @@ class Fabric:
         """One end of edges with a mark: its point, frame, and what stays zero along the edges."""
         store, d, at = self.vertices, self.dimension, edges[:, side]
         rows, slopes = store.rows[at], []
-        if mark & ON_FOLD:
+        if mark & FacetMark.FOLD:
             slopes.append(self._fold_slopes(edges, side))
-        if mark & ON_CAP:
+        if mark & FacetMark.CAP:
             slopes.append(store.cap_slope[at])
-        if mark & ON_CROSSING:
+        if mark & FacetMark.CROSSING:
             slopes.append(store.crossing_slope[at])
         slopes.extend(rows[:, :, rows.shape[2] - d + k] for k in held(mark, d))
         stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, d))
@@ -193,7 +206,10 @@ class Fabric:
         number = self.numbers
         _, used = np.unique(number, return_index=True)
         own, used = self.vertices, used[number[used] >= 0]
-        facets = [number[self.facets[(self.marks & m) > 0]] for m in (ON_FOLD, ON_CAP, ON_CROSSING)]
+        facets = [
+            number[self.facets[(self.marks & m) > 0]]
+            for m in (FacetMark.FOLD, FacetMark.CAP, FacetMark.CROSSING)
+        ]
         folds, caps, crossings = (each[(each >= 0).all(axis=1)] for each in facets)
         return Complex(
             States(self.setting.structure, own.z[used], own.p[used]),
@@ -225,7 +241,7 @@ def shares(count: int) -> list[tuple[int, int]]:
 
 def held(mark: int, dimension: int) -> list[int]:
     """Free parameters that sides of the box hold."""
-    return [k for k in range(dimension) if mark & (3 * SIDES << 2 * k)]
+    return [k for k in range(dimension) if mark & (3 * FacetMark.SIDE << 2 * k)]
 
 
 def fabric_of(eset: EquilibriumSet) -> Fabric:
@@ -250,10 +266,10 @@ def fabric_of(eset: EquilibriumSet) -> Fabric:
     known = origin[whole.facets]
     folded, crossed = (flags_of(known, each) for each in (folds, crossings))
     outer = whole.counts == 1
-    marks = np.where(folded, ON_FOLD, 0) | np.where(crossed, ON_CROSSING, 0)
+    marks = np.where(folded, FacetMark.FOLD, 0) | np.where(crossed, FacetMark.CROSSING, 0)
     outer_marks = _outer_marks(setting, eset, known[outer])
     # of parts of sets folds are boundaries, too
-    marks[outer] |= np.where(marks[outer] > 0, outer_marks & ~HOLE, outer_marks)
+    marks[outer] |= np.where(marks[outer] > 0, outer_marks & ~FacetMark.HOLE, outer_marks)
     marked = marks > 0
     box = np.stack([eset.box.lower, eset.box.upper])
     if d >= TRIANGLES:
@@ -278,11 +294,13 @@ def _outer_marks(
     for side, bound in enumerate((eset.box.lower, eset.box.upper)):
         on = (np.abs(places - bound) <= ON_BOX * size).all(axis=1)
         for k in range(len(size)):
-            marks |= np.where(on[:, k], SIDES << (2 * k + side), 0)
+            marks |= np.where(on[:, k], FacetMark.SIDE << (2 * k + side), 0)
     capped = np.isin(eset.kinds, (VertexKind.CAP, VertexKind.CORNER))
     met = np.flatnonzero(eset.kinds == VertexKind.CROSSING)
     capped[met] = on_constraints(setting, eset.points.z[met], eset.points.p[met])
-    return np.where(marks > 0, marks, np.where(capped[facets].all(axis=1), ON_CAP, HOLE))
+    return np.where(
+        marks > 0, marks, np.where(capped[facets].all(axis=1), FacetMark.CAP, FacetMark.HOLE)
+    )
 
 
 def _bisect(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.manifold.complex.marked_complex import ON_CROSSING, Fabric, edges_of
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_of
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.topology import keys_of
 
@@ -15,7 +15,7 @@ Rows = Int[np.ndarray, " _"]
 
 def crossing_edges(fabric: Fabric) -> tuple[Ends, Rows]:
     """Edges on crossings, of all sheets, in the order of keys that copies of one edge share."""
-    facets = fabric.facets[(fabric.marks & ON_CROSSING) > 0]
+    facets = fabric.facets[(fabric.marks & FacetMark.CROSSING) > 0]
     if len(facets) == 0 or facets.shape[1] == 1:
         return np.zeros((0, 2), int), np.zeros(0, int)
     ends, _ = edges_of(facets, len(fabric.vertices))
@@ -27,7 +27,7 @@ def crossing_edges(fabric: Fabric) -> tuple[Ends, Rows]:
 def first_copies(fabric: Fabric, ends: Ends, marks: Rows) -> Bool[np.ndarray, " _"]:
     """Which edges are no copies of earlier ones."""
     out = np.ones(len(ends), bool)
-    own = np.flatnonzero((marks & ON_CROSSING) > 0)
+    own = np.flatnonzero((marks & FacetMark.CROSSING) > 0)
     if len(own):
         _, first = np.unique(_keys(fabric, ends[own]), return_index=True)
         out[np.delete(own, first)] = False
@@ -76,7 +76,7 @@ def duplicates(fabric: Fabric) -> Ends:
     ends = ends[both]
     keys = _keys(fabric, ends)
     _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    plain = (fabric.edge_marks(ends) & ON_CROSSING) == 0
+    plain = (fabric.edge_marks(ends) & FacetMark.CROSSING) == 0
     return np.asarray(ends[plain & (counts[inverse] > 1)])
 
 

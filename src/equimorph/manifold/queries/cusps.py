@@ -11,7 +11,7 @@ from equimorph.equilibria.locus import Locus, nearest
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import roots
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.marked_complex import HOLE, ON_FOLD, RIM, Fabric, fabric_of
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.exact_points import lower_index
 from equimorph.manifold.geometry.points import VertexKind
@@ -53,7 +53,7 @@ def cusps(eset: EquilibriumSet) -> Cusps:
     if len(eset.names) != 2:
         raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
     fabric = fabric_of(eset)
-    ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    ends = fabric.facets[(fabric.marks & FacetMark.FOLD) > 0]
     hubs = _turning_hubs(fabric, ends)
     ends = ends[(fabric.vertices.kinds[ends] != VertexKind.CROSSING).all(axis=1)]
     turning = ends[_turning(fabric, ends)]
@@ -130,7 +130,7 @@ def with_cusps_beside(fabric: Fabric, beside: Bool[np.ndarray, " C"]) -> Fabric:
     place = fabric.vertices.place
     gap = np.stack([np.linalg.norm(found.place - place[end], axis=1) for end in ends.T])
     whole = np.linalg.norm(place[ends[:, 1]] - place[ends[:, 0]], axis=1)
-    whole_edges = (fabric.edge_marks(np.sort(ends, axis=1)) & (HOLE | RIM)) == 0
+    whole_edges = (fabric.edge_marks(np.sort(ends, axis=1)) & (FacetMark.HOLE | FacetMark.RIM)) == 0
     apart = np.flatnonzero((gap > CLOSE * whole).all(axis=0) & whole_edges)
     return fabric.bisect(ends[apart], found.take(apart)) if len(apart) else fabric
 
@@ -139,7 +139,7 @@ def cusps_on_edges(
     fabric: Fabric, near: Bool[np.ndarray, " V"] | None = None
 ) -> tuple[Int[np.ndarray, "n 2"], Vertices]:
     """Fold edges with cusps, of those with an end near a place, and the cusps."""
-    ends = fabric.facets[(fabric.marks & ON_FOLD) > 0]
+    ends = fabric.facets[(fabric.marks & FacetMark.FOLD) > 0]
     if near is not None:
         ends = ends[near[ends].any(axis=1)]
     store = fabric.vertices
@@ -158,7 +158,7 @@ def cusps_on_edges(
     def value(at: Vertices, lanes: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
 
-    done, found = roots(fabric, ends[turning], ON_FOLD, lowest, known[turning], value)
+    done, found = roots(fabric, ends[turning], FacetMark.FOLD, lowest, known[turning], value)
     return ends[turning[done]], found
 
 

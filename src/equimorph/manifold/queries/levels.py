@@ -19,7 +19,7 @@ from equimorph.manifold.complex.cuts import (
 )
 from equimorph.manifold.complex.description import Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.marked_complex import HOLE, ON_CAP, Fabric, fabric_of
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
@@ -218,7 +218,7 @@ def part_of(
         outer = whole.facets[whole.counts == 1]
         capped = outer[on_level[outer].all(axis=1)]
         facets = np.concatenate([facets, capped])
-        marks = np.concatenate([marks, np.full(len(capped), ON_CAP)])
+        marks = np.concatenate([marks, np.full(len(capped), FacetMark.CAP)])
     kinds = fabric.vertices.kinds.copy()
     plain = on_level & (kinds != VertexKind.CROSSING)
     kinds[plain] = np.where(
@@ -229,8 +229,8 @@ def part_of(
     fabric = replace(
         fabric.only(cells),
         vertices=replace(fabric.vertices, kinds=kinds),
-        facets=facets[(marks & HOLE) == 0],
-        marks=marks[(marks & HOLE) == 0],
+        facets=facets[(marks & FacetMark.HOLE) == 0],
+        marks=marks[(marks & FacetMark.HOLE) == 0],
     )
     audit = eset.audit
     lifting = Lifting(

@@ -11,11 +11,9 @@ from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.edge_points import chunks
 from equimorph.manifold.complex.marked_complex import (
     CURVES,
-    HOLE,
-    ON_CROSSING,
-    RIM,
     TRIANGLES,
     Fabric,
+    FacetMark,
     edges_of,
     shares,
 )
@@ -65,7 +63,7 @@ class Edges:
         """
         first = (self.error > tolerance) & ((self.marks & CURVES) > 0)
         if self.of_cells.shape[1] == SIX:
-            on = self.marks & ~(HOLE | RIM)
+            on = self.marks & ~(FacetMark.HOLE | FacetMark.RIM)
             corners = (self.error > tolerance) & (on & (on - 1) > 0) & ~self.stuck
             if corners.any():
                 return np.asarray(corners)
@@ -143,7 +141,7 @@ def known(fabric: Fabric, memory: Memory) -> Edges:
     memory.keys, memory.error = keys, error
     length = np.empty(len(ends))
     length[of_cells] = np.sqrt(fabric.squared)
-    stuck = (marks & (HOLE | RIM)) > 0
+    stuck = (marks & (FacetMark.HOLE | FacetMark.RIM)) > 0
     failed = np.zeros(len(ends), bool)
     if memory.stuck:
         refused = np.array(sorted(memory.stuck))
@@ -194,7 +192,7 @@ def _beside_crossings(
     obtuse, long = np.zeros(len(marks), bool), np.zeros(len(marks), bool)
     if fabric.dimension != TRIANGLES:
         return obtuse, long
-    cell, side = np.nonzero((marks[of_cells] & ON_CROSSING) > 0)
+    cell, side = np.nonzero((marks[of_cells] & FacetMark.CROSSING) > 0)
     # sides 01, 02, 12 are opposite to corners 2, 1, 0
     free = (fabric.vertex_marks[fabric.cells[cell, 2 - side]] & CURVES) == 0
     cell, side = cell[free], side[free]

@@ -16,9 +16,8 @@ from jaxtyping import Bool, Float, Int
 from equimorph.arrays import Cells, Edges
 from equimorph.manifold.complex.marked_complex import (
     CURVES,
-    ON_CROSSING,
-    SIDES,
     Fabric,
+    FacetMark,
     squared_sides,
 )
 from equimorph.manifold.complex.vertices import Vertices
@@ -196,7 +195,7 @@ def rings_around(fabric: Fabric, ends: Edges) -> Rings:
 
 def _single(mark: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     """Which edges lie inside, or on one surface whose facets may be exchanged."""
-    allowed = (CURVES & ~ON_CROSSING) | (63 * SIDES)
+    allowed = (CURVES & ~FacetMark.CROSSING) | (63 * FacetMark.SIDE)
     return np.asarray((mark & (mark - 1) == 0) & (mark & ~allowed == 0))
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.complex.marked_complex import ON_CAP, ON_FOLD, Fabric
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.exact_points import Aim, corrected, lower_index
 from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
@@ -31,7 +31,9 @@ def on_plain_curves(
 ) -> Bool[np.ndarray, " n"]:
     """Which edges over two parameters lie on one fold or constraint, and no other sheet crosses."""
     plain = (fabric.vertices.kinds[edges] != CROSSING).all(axis=1)
-    return np.asarray(plain & np.isin(marks, (ON_FOLD, ON_CAP)) & (fabric.dimension == 2))
+    return np.asarray(
+        plain & np.isin(marks, (FacetMark.FOLD, FacetMark.CAP)) & (fabric.dimension == 2)
+    )
 
 
 def follow_edge(
@@ -102,18 +104,18 @@ def _step(
     size = float(np.linalg.norm(step))
     middle, rows = embed(setting, z, p), (step / size)[None, None]
     span, around = np.eye(fabric.dimension)[None], np.full(1, size)
-    aim = Aim(setting, mark == ON_FOLD, mark == ON_CAP, span, middle, rows)
+    aim = Aim(setting, mark == FacetMark.FOLD, mark == FacetMark.CAP, span, middle, rows)
     pinned = corrected(aim, z, p, around)
     moved = np.linalg.norm(embed(setting, pinned.z, pinned.p) - middle)
     free = pinned.p[0, setting.free]
     inside = (free >= fabric.box[0] - 1e-12).all() and (free <= fabric.box[1] + 1e-12).all()
     if not (pinned.found[0] and inside and moved <= OFF * size):
         return None
-    count = lower_index if mark == ON_FOLD else _index
+    count = lower_index if mark == FacetMark.FOLD else _index
     index = count(setting, pinned.z, pinned.p)
     if index[0] != lowest:
         return None
-    kinds = np.array([FOLD if mark == ON_FOLD else CAP])
+    kinds = np.array([FOLD if mark == FacetMark.FOLD else CAP])
     return vertices_of(setting, pinned.z, pinned.p, kinds, index, np.array([-1]), at.rows)
 
 

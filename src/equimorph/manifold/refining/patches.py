@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Int
 
-from equimorph.manifold.complex.marked_complex import ON_CROSSING, RIM, Fabric
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark
 from equimorph.manifold.geometry.topology import count_corners
 
 
@@ -17,8 +17,8 @@ from equimorph.manifold.geometry.topology import count_corners
 class Patch:
     """Some cells of a fabric with all facets between their vertices, and the rest of it.
 
-    inside: vertices of the patch. Edges of the rest between its vertices are marked as its `RIM`:
-    they are not bisected, no vertex of them goes, and flips do not make them a second time.
+    inside: vertices of the patch. Edges of the rest between them are marked `FacetMark.RIM`: they
+    are not bisected, keep their vertices, and flips do not make them a second time.
     """
 
     fabric: Fabric
@@ -27,7 +27,7 @@ class Patch:
 
     def replace_by(self, by: Fabric) -> Fabric:
         """Return the whole fabric, with another one in place of the patch."""
-        kept, rest = (by.marks & RIM) == 0, self.rest
+        kept, rest = (by.marks & FacetMark.RIM) == 0, self.rest
         return replace(
             by,
             cells=np.concatenate([rest.cells, by.cells]),
@@ -53,18 +53,18 @@ def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Pa
     beyond[rest.cells] = True
     within = near[fabric.facets].all(axis=1)
     # the rim of a patch that this one is a part of stays that of the larger one, too
-    outer = (fabric.marks & RIM) > 0
+    outer = (fabric.marks & FacetMark.RIM) > 0
     rims = [_pairs_between(rest.cells, near & beyond), fabric.facets[within & outer]]
     rim = np.unique(np.sort(np.concatenate(rims), axis=1), axis=0)
     shared = within & ~outer
     facets, marks = fabric.facets[shared], fabric.marks[shared]
     outside = _in_all_sheets(fabric, beyond & (near | (fabric.vertices.shared >= 0)))
-    held = ((marks & ON_CROSSING) > 0) & outside[facets].any(axis=1)
+    held = ((marks & FacetMark.CROSSING) > 0) & outside[facets].any(axis=1)
     rim = np.concatenate([rim, facets[held]])
     patch = replace(
         fabric.only(own),
         facets=np.concatenate([facets, rim]),
-        marks=np.concatenate([marks, np.full(len(rim), RIM)]),
+        marks=np.concatenate([marks, np.full(len(rim), FacetMark.RIM)]),
     )
     rest = replace(rest, facets=fabric.facets[~shared], marks=fabric.marks[~shared])
     return Patch(patch, rest, near)

@@ -18,10 +18,9 @@ from jaxtyping import Bool, Float, Int
 from equimorph.arrays import Cells
 from equimorph.manifold.complex.marked_complex import (
     CURVES,
-    ON_CROSSING,
-    RIM,
     TRIANGLES,
     Fabric,
+    FacetMark,
     edges_of,
     squared_sides,
 )
@@ -191,7 +190,7 @@ def smallest_free_angle(fabric: Fabric) -> float:
     if fabric.dimension != TRIANGLES:
         return 0.0
     free = smallest_angles(fabric.squared)
-    if (fabric.marks & ON_CROSSING).any():
+    if (fabric.marks & FacetMark.CROSSING).any():
         free = free[~confined_angles(fabric, SHARP)]
     return float(np.degrees(free.min(initial=np.inf)))
 
@@ -202,7 +201,7 @@ def corner_angles(fabric: Fabric) -> Float[np.ndarray, "C 3"]:
     All triangles around a vertex up to the next curves on both sides have it in common.
     """
     ends, of_cells = edges_of(fabric.cells, len(fabric.vertices))
-    curve = (fabric.edge_marks(ends) & ~RIM) > 0
+    curve = (fabric.edge_marks(ends) & ~FacetMark.RIM) > 0
     count = len(fabric.cells)
     side = of_cells.ravel()
     order = np.argsort(side, kind="stable")
@@ -259,14 +258,14 @@ def confined_angles(fabric: Fabric, sharp: float) -> Bool[np.ndarray, " C"]:
     if fabric.dimension != TRIANGLES or len(fabric.cells) == 0:
         return np.zeros(len(fabric.cells), bool)
     corners = fabric.vertex_marks[fabric.cells]
-    met = (corners & ON_CROSSING) > 0
+    met = (corners & FacetMark.CROSSING) > 0
     between = ((corners & CURVES) > 0).all(axis=1) & met.any(axis=1) & ~met.all(axis=1)
     start = (corner_angles(fabric) < sharp).any(axis=1)
     if not start.any():
         return np.asarray(between)
-    along = ((corners & ~RIM) > 0).all(axis=1) | start
+    along = ((corners & ~FacetMark.RIM) > 0).all(axis=1) | start
     ends, of_cells = edges_of(fabric.cells, len(fabric.vertices))
-    open_side = ((fabric.edge_marks(ends) & ~RIM) == 0)[of_cells] & along[:, None]
+    open_side = ((fabric.edge_marks(ends) & ~FacetMark.RIM) == 0)[of_cells] & along[:, None]
     side = np.where(open_side, of_cells, -1).ravel()
     order = np.argsort(side, kind="stable")
     pair = np.flatnonzero((side[order[1:]] == side[order[:-1]]) & (side[order[1:]] >= 0))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Bool
 
-from equimorph.manifold.complex.marked_complex import CURVES, ON_CROSSING, Fabric
+from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
 from equimorph.manifold.queries.cusps import with_cusps_beside
 from equimorph.manifold.refining.bisect import bisect, settle
 from equimorph.manifold.refining.deviation import Edges, Memory, known, near_lost
@@ -91,7 +91,7 @@ def _bad(fabric: Fabric) -> Bool[np.ndarray, " C"]:
 def _sharp(fabric: Fabric) -> Bool[np.ndarray, " C"]:
     """Cells with a small angle, unless they lie between curves that meet at one."""
     sharp = smallest_angles(fabric.squared) < SHARP
-    if not (fabric.marks & ON_CROSSING).any():
+    if not (fabric.marks & FacetMark.CROSSING).any():
         return np.asarray(sharp)
     return np.asarray(sharp & ~confined_angles(fabric, SHARP) if sharp.any() else sharp)
 

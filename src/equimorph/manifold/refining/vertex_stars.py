@@ -14,12 +14,9 @@ from jaxtyping import Bool, Float, Int
 from equimorph.arrays import Edges
 from equimorph.manifold.complex.edge_points import chunks
 from equimorph.manifold.complex.marked_complex import (
-    ON_CAP,
-    ON_FOLD,
-    RIM,
-    SIDES,
     TRIANGLES,
     Fabric,
+    FacetMark,
     edges_of,
     held,
     squared_sides,
@@ -51,7 +48,7 @@ ROUNDS, FIRST = 8, 0.25
 """Steps of the search for a better place, and the length of the first relative to the star."""
 LEAST = np.radians(0.2)
 """Least growth of the smallest angle around a vertex that moves."""
-MOVABLE = ON_FOLD | ON_CAP | (63 * SIDES)
+MOVABLE = FacetMark.FOLD | FacetMark.CAP | (63 * FacetMark.SIDE)
 """Marks of vertices that may move."""
 TO_FRONT = {
     2: np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]]),
@@ -122,9 +119,9 @@ def short_edges(fabric: Fabric, cells: Rows, short: float) -> Edges:
 def _goes_on(fabric: Fabric, moves: Edges) -> Bool[np.ndarray, " m"]:
     """Whether what the vertex lies on goes on along the edge; nothing is drawn from or to a rim."""
     marks, gone = fabric.vertex_marks, moves[:, 0]
-    good = (marks[gone] == fabric.edge_marks(np.sort(moves, axis=1))) & ~(marks[moves] & RIM).any(
-        axis=1
-    )
+    good = (marks[gone] == fabric.edge_marks(np.sort(moves, axis=1))) & ~(
+        marks[moves] & FacetMark.RIM
+    ).any(axis=1)
     if fabric.dimension != TRIANGLES:
         return np.asarray(good & (fabric.vertices.shared[gone] < 0))
     # where curves of one kind meet, they end
@@ -242,7 +239,7 @@ def _at_better_places(
     for k in held(mark, d):
         p[:, setting.free[k]] = store.p[chosen, setting.free[k]]
     span = np.tile(np.delete(np.eye(d), held(mark, d), axis=0), (len(chosen), 1, 1))
-    fold, cap = bool(mark & ON_FOLD), bool(mark & ON_CAP)
+    fold, cap = bool(mark & FacetMark.FOLD), bool(mark & FacetMark.CAP)
     aim = Aim(setting, fold, cap, span, embed(setting, z, p), directions @ store.rows[chosen])
     if not held(mark, d):
         aim = replace(aim, tangents=store.rows[chosen])
