@@ -21,8 +21,10 @@ is given), turns about the axes of the cross-section (else there is no moment).
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import brentq
 
 PLACE, TURN, FORCE, MOMENT = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
 SIZE = 13
@@ -356,8 +358,8 @@ class Rod:
         """Moves and turns of the section, six rows, by the six variations at s = 0, along s."""
         columns, found, passed = self.start.variations(self.y[0]), [], self._passages(steps)
         for i in range(self.pieces):
-            for state in passed[: None if i == self.pieces - 1 else -1, i]:
-                found.append(_moves(state[:, 0], state[:, 1:] @ columns))
+            states = passed[: None if i == self.pieces - 1 else -1, i]
+            found += [_moves(state[:, 0], state[:, 1:] @ columns) for state in states]
             columns = passed[-1, i, :, 1:] @ columns
         return np.array(found)
 
@@ -407,8 +409,8 @@ def straight(pieces, start, end, stiffness, force=(0.0, 0.0, 0.0), twist=0.0, **
 class Point:
     """A point of a branch."""
 
-    value: float
     rod: Rod
+    value: float
 
 
 def branch(
@@ -420,13 +422,13 @@ def branch(
     change of the parameter alone.
     """
     rod = problem(value, first).solved()
-    yield Point(rod=rod, value=value)
+    yield Point(rod, value)
     tangent = None
     for _ in range(points):
         direction = _tangent(problem, rod, value, tangent, np.sign(step))
         rod, value = _corrected(problem, rod, value, direction, abs(step))
         tangent = direction
-        yield Point(rod=rod, value=value)
+        yield Point(rod, value)
 
 
 DIFFERENCE = 1e-6
@@ -469,44 +471,23 @@ def critical_points(
     problem: Callable[[float, Rod], Rod], first: Rod, value: float, step: float, points: int,
     test: Callable[[Rod], float] = lambda rod: rod.determinant,
 ) -> list[Point]:  # fmt: skip
-    """Where the determinant, or another test, vanishes along a branch, by Illinois' rule."""
-    found, before, tangent = [], None, None
-    for point in branch(problem, first, value, step, points):
-        if before is not None and test(before.rod) * test(point.rod) < 0.0:
-            tangent = _tangent(problem, before.rod, before.value, tangent, np.sign(step))
-            found.append(_zero(problem, before, tangent, abs(step), test))
-        if before is not None:
-            tangent = _tangent(problem, before.rod, before.value, tangent, np.sign(step))
-        before = point
+    """Where the determinant, or another test, changes its sign along a branch, by Brent's rule."""
+    found, tangent = [], None
+    for before, after in pairwise(branch(problem, first, value, step, points)):
+        tangent = _tangent(problem, before.rod, before.value, tangent, np.sign(step))
+        if test(before.rod) * test(after.rod) >= 0.0:
+            continue
+
+        def point(length, before=before, tangent=tangent):
+            return Point(*_corrected(problem, before.rod, before.value, tangent, length))
+
+        zero = brentq(lambda length: test(point(length).rod), 0.0, abs(step), xtol=1e-13)
+        found.append(point(zero))
     return found
 
 
-def _zero(problem, before, tangent, length, test):
-    low, high = 0.0, length
-    at_low, at_high = test(before.rod), None
-    point = before
-    for _ in range(60):
-        if at_high is None:
-            here = high
-        else:
-            here = high - at_high * (high - low) / (at_high - at_low)
-        rod, value = _corrected(problem, before.rod, before.value, tangent, here)
-        point, at = Point(value, rod), test(rod)
-        if at_high is None:
-            at_high = at
-            continue
-        if abs(high - low) < 1e-13 or at == 0.0 or abs(here - high) < 1e-14:
-            break
-        if at * at_high < 0.0:
-            low, at_low = high, at_high
-        else:
-            at_low *= 0.5
-        high, at_high = here, at
-    return point
-
-
 def double_zero(test: Callable[[float], float], low: float, high: float) -> float:
-    """Where a singular value vanishes: it is |linear| near there; by straight lines from both sides.
+    """Where a singular value vanishes, by straight lines from both sides: it is |linear| there.
 
     Determinants do not change their sign where two modes of a symmetric problem are critical.
     """

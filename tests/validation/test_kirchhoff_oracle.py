@@ -33,8 +33,8 @@ def twisted(moment: float, tension: float = 0.0) -> Rod:
 def clamped_buckling_moment(tension: float) -> float:
     """Least M of w'''' − i M w''' − T w'' = 0, w = y + i z, with w = w' = 0 at both ends.
 
-    With w' = e^{iMs/2} v there remains v'' = (T − M²/4) v; for ω² = M²/4 − T the determinant of the
-    four conditions is, divided by e^{iM/2}, 2 T (cos M/2 − cos ω) + ... = 0, found here numerically.
+    Solutions are 1, s and e^{iks} with k² − M k + T = 0. The determinant of the four conditions,
+    divided by e^{iM/2}, is real or imaginary.
     """
 
     def conditions(moment):
