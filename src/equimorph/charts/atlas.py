@@ -93,7 +93,8 @@ class Transition:
     def cross(self, coords: Points, source: int) -> Points:
         """Coordinates in the other chart of points on the curve.
 
-        Between states the curve is a chord in either chart, and points go by their share of it.
+        Between two states the curve is a chord in either chart; points keep their relative position
+        on it.
 
         Raises
         ------
@@ -230,7 +231,7 @@ class Atlas:
 
     @check_arguments
     def locate(self, states: States | State) -> tuple[Int[np.ndarray, " n"], Points]:
-        """Numbers of the charts of states, −1 for those that lie on none, and their coordinates."""
+        """Numbers of the charts of states, −1 without a chart, and their coordinates."""
         batch = states.batch if isinstance(states, State) else states
         points = self.coordinates(batch.z, batch.p)
         cell = self.cell_of(batch)
@@ -262,7 +263,7 @@ class Atlas:
         Raises
         ------
         InputError
-            If a state lies on no chart, or no way on the set joins both.
+            If a state lies on no chart, or no path on the set joins the two states.
         """
         cells = [int(self.cell_of(state.batch)[0]) for state in (start, goal)]
         for name, state, cell in zip(("start", "goal"), (start, goal), cells, strict=True):

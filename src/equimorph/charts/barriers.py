@@ -36,13 +36,13 @@ class Barrier:
     ----------
     kind
         "fold", "crossing" or "cap" where the near side ends; "tie" where the preference changes
-        between two states that both go on.
+        between two states that both continue.
     points
         Free parameters along it; a point (d = 1), a polyline (d = 2) or points of a surface.
     near, far
         Preferred states on both sides: on the curve, and just across it.
     jump
-        Their distances in the metric.
+        Distances between the two states in the metric.
     facets
         Over three parameters: triangles of points, one a row.
     """

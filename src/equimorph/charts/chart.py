@@ -151,7 +151,7 @@ class Chart(ABC):
         Raises
         ------
         InputError
-            For other numbers of coordinates or values that are not finite.
+            If a point has another number of coordinates, or a value is not finite.
         """
         points = self._check_width(coords)
         found = self._found(points)
@@ -173,7 +173,7 @@ class Chart(ABC):
     def jacobian(self, states: States | State) -> Float[np.ndarray, "points d d"]:
         """Derivatives of the free parameters (rows) by the coordinates (columns) at states.
 
-        Singular where the set has a fold; not numbers where the coordinates fail.
+        The matrix is singular where the set has a fold, and NaN where the coordinates fail.
         """
         batch = states.batch if isinstance(states, State) else states
         setting = self.coordinates.setting
@@ -190,7 +190,7 @@ class Chart(ABC):
 
     @check_arguments
     def contains(self, states: States | State) -> Bool[np.ndarray, " points"]:
-        """Whether the chart gives just these states for their coordinates."""
+        """Whether the chart returns exactly these states for their coordinates."""
         batch = states.batch if isinstance(states, State) else states
         here = self.state(self.coords(batch))
         own = np.flatnonzero(here.inside)
@@ -248,8 +248,8 @@ class Chart(ABC):
 class Projection(Chart):
     """The free parameters as coordinates.
 
-    They fail where more than one sheet lies over a point: along folds, and where a stratum lies
-    over itself. Of the stable part of a set: ``Projection(part(eset, eset.cell_index == 0))``.
+    They fail where more than one sheet lies over a point: along folds, and where a stratum overlaps
+    itself. For the stable part of a set, use ``Projection(part(eset, eset.cell_index == 0))``.
 
     Parameters
     ----------
@@ -277,8 +277,8 @@ class Projection(Chart):
 class DescriptorChart(Chart):
     """Descriptors and free parameters as coordinates.
 
-    Regular at folds of the set. They fail where the coordinates themselves fold (their Jacobian
-    along the set vanishes) and where different sheets have the same coordinates.
+    They are regular at folds of the set. They fail where the coordinates themselves fold (their
+    Jacobian along the set vanishes) and where different sheets have the same coordinates.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ class DescriptorChart(Chart):
 
     @cached_property
     def coordinates(self) -> Coordinates:
-        """What was chosen."""
+        """The chosen descriptors and parameters."""
         return coordinates_of(self.eset, self.chosen)
 
     @cached_property
@@ -334,7 +334,7 @@ class DescriptorChart(Chart):
     def single_valued(self) -> bool:
         """Whether all states have different coordinates: these fold nowhere, and nothing overlaps.
 
-        Folds are found exactly, where the overlap along them may be narrower than a cell.
+        Folds are located exactly, because the overlap along them may be narrower than a cell.
         """
         return len(self.singular.states) == 0 and single_valued(self.cells)
 

@@ -38,15 +38,15 @@ MOST = 40
 def dissect(eset: EquilibriumSet) -> Atlas:
     """Cut a set, or a part of one, into few charts over the free parameters.
 
-    Folds part strata. A stratum that lies over itself is cut between the cells that do, along the
-    least cut of its dual graph with lengths in scaled parameters. Over two parameters a cut is then
-    pulled straight, from cusp to cusp where it ends at them, and the cells are cut exactly along
-    it.
+    Folds separate strata. A stratum that overlaps itself is cut between the overlapping cells,
+    along the minimum cut of its dual graph with lengths in scaled parameters. Over two parameters a
+    cut is then pulled straight, from cusp to cusp where it ends at them, and the cells are cut
+    exactly along it.
 
     Parameters
     ----------
     eset
-        The set; of its stable part ``part(eset, eset.cell_index == 0)``.
+        The set; for its stable part pass ``part(eset, eset.cell_index == 0)``.
 
     Returns
     -------

@@ -191,8 +191,8 @@ class Overlap:
     Parameters
     ----------
     kind
-        "self-overlap": one sheet lies over itself; "fold": two sheets that join where the
-        coordinates fold; "sheets": two that do not.
+        "self-overlap": one sheet overlaps itself; "fold": two sheets that join where the
+        coordinates fold; "sheets": two sheets that do not.
     sheets
         Numbers of the sheets.
     domain

@@ -43,9 +43,9 @@ class Reduction(Chart):
     whole
         The set that was reduced, with vertices at its cusps.
     rule
-        What is preferred.
+        Rule by which a state is preferred.
     among
-        Which cells of the whole set had the choice.
+        Cells of the whole set among which the rule chooses.
     cut
         Vertices of the preferred part at which the preference changes.
     barriers
@@ -127,8 +127,8 @@ def reduce(
     """Reduce a set to at most one preferred state over each point.
 
     Vertices over which another state is preferred are left out, and edges between preferred and
-    other vertices are cut where the preference changes: by bisection of the exact choice, so that
-    ties of scores, ends of other sheets and ends of paths are all found alike.
+    other vertices are cut where the preference changes: by bisection of the exact choice. The same
+    method locates ties of scores, ends of other sheets and ends of paths.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def reduce(
         `quasi_static`, `first_stable_on_path`, `lowest`, `highest`, `nearest`, or a function of
         states whose least value is preferred.
     stable
-        Whether only stable states have the choice.
+        Whether the rule chooses among stable states only.
 
     Returns
     -------

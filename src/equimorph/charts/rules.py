@@ -127,10 +127,11 @@ def highest(descriptor: Descriptor) -> Rule:
 
 @check_arguments
 def nearest(to: State | int) -> Rule:
-    """Prefer what is nearest, in the metric, to a state or to a stratum of the set.
+    """Prefer the state nearest, in the metric, to a given state or stratum of the set.
 
-    Of a state its configuration counts. States on the stratum come first; elsewhere the distance in
-    configuration and scaled parameters to the nearest of its vertices counts.
+    The distance from a given state compares configurations only. For a stratum, its states come
+    first; elsewhere the distance in configuration and scaled parameters to the nearest of its
+    vertices decides.
 
     Parameters
     ----------
@@ -140,7 +141,7 @@ def nearest(to: State | int) -> Rule:
     Raises
     ------
     InputError
-        Later, for a stratum that the set does not have.
+        When the rule is used, if the set has no such stratum.
     """
     if isinstance(to, State):
         n, mass, u = to.structure.unknowns, to.structure.mass, to.z[: to.structure.unknowns]

@@ -49,7 +49,7 @@ class CriticalCurve:
     states
         Exact states in order.
     length
-        Length along the curve per state, in the metric and scaled parameters; 0 at the start given.
+        Arclength of each state, in the metric and scaled parameters; 0 at the given start.
     index
         Negative eigenvalues in addition to the one that vanishes, per state: 0 where the curve
         bounds stable states.
@@ -189,8 +189,8 @@ def fold_curve(
     """Follow folds in two parameters, both ways from `state`: the boundary of a stratum.
 
     ``F = 0, g = 0`` with g from a bordered system, so that every point is regular, cusps included
-    [Govaerts2000]_; pseudo-arclength in (z, p). With constraints `on` their bounds, one more
-    parameter each: where loss of stability and a bound coincide.
+    [Govaerts2000]_; pseudo-arclength in (z, p). Each constraint in `on` needs one more parameter:
+    along the curve, loss of stability and its bound coincide.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def fold_curve(
     parameters
         Names of the two (or more) parameters that vary.
     on
-        Constraints that hold with equality all along.
+        Constraints that hold with equality along the whole curve.
     box
         Limits of parameters; they end the curve.
     within
@@ -308,9 +308,9 @@ def constraint_curve(
 ) -> CriticalCurve:
     """Follow states on the bounds of constraints, both ways from `state`.
 
-    One constraint and two parameters: the boundary of what is allowed, for example where the
-    unloaded structure violates it. Two constraints and three parameters: where the
-    first one to be met changes.
+    One constraint and two parameters give the boundary of the admissible region, for example where
+    the unloaded structure violates the constraint. Two constraints and three parameters give the
+    states at which the constraint that is met first changes.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def constraint_curve(
     parameters
         Names of the parameters that vary: one more than constraints.
     on
-        Constraints that hold with equality all along.
+        Constraints that hold with equality along the whole curve.
     box, within, options
         As for `fold_curve`.
 

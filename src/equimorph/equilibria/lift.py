@@ -46,13 +46,13 @@ class Marks:
     states
         Exact states.
     at
-        Number of the leg + share of it.
+        Number of the leg plus the fraction of it.
     kind
-        As of `Event`; "" for a regular point.
+        A kind of `Event`; "" for a regular point.
     index
         Negative eigenvalues of the constrained Hessian; just before an event.
     criticality
-        Of branch points, else "".
+        Criticality of branch points; "" otherwise.
     """
 
     lane: Int[np.ndarray, " marks"]
@@ -76,15 +76,15 @@ class Lifts:
     states
         Where each lift ended.
     kind
-        How: as of `Event`, or "cancelled".
+        How each lift ended: a kind of `Event`, or "cancelled".
     at
-        Number of the leg + share of it.
+        Number of the leg plus the fraction of it.
     length
-        Length of the way in the structure's metric and scaled parameters.
+        Length of the path in the structure's metric and scaled parameters.
     index
-        Negative eigenvalues of the constrained Hessian; the near side's at critical ends.
+        Negative eigenvalues of the constrained Hessian; at a critical end, on the near side.
     criticality
-        Of branch points, else "".
+        Criticality of branch points; "" otherwise.
     detail
         One line for lanes that need it: the constraint that was met, why a lane was lost.
     events
@@ -114,13 +114,13 @@ class Lifts:
         return f"Lifts({len(self)}: {ends})"
 
     def __getitem__(self, lane: int) -> Event:
-        """How one of them ended."""
+        """How one of the lifts ended."""
         words = str(self.criticality[lane]) or None, self.detail.get(lane, "")
         return Event(EventKind(self.kind[lane]), self.states[lane], float(self.at[lane]), *words)
 
     @property
     def arrived(self) -> Flags:
-        """Which were lifted to the end."""
+        """Which lifts arrived."""
         return np.asarray(self.kind == "arrived")
 
 
@@ -340,16 +340,16 @@ def lift(
 
     Returns
     -------
-    The `Path` of one state; `Lifts` of many: ends and events, arrays (lanes). A numerical failure
-    is an end of kind "lost" with the reason.
+    The `Path` of one state; for many states `Lifts`, whose ends and events are arrays (lanes). A
+    numerical failure is an end of kind "lost" with the reason.
 
     Raises
     ------
     InputError
-        If a state is no equilibrium, one state violates a constraint (of many, those end at once),
-        or `to` has no meaning: an unknown parameter, a value outside its limits, a curve that is
-        not smooth or begins elsewhere, more or fewer unknown parameters than descriptors, or
-        nothing that moves.
+        If a state is not an equilibrium, a single state violates a constraint (of many states,
+        those that do end at once), or `to` has no meaning: an unknown parameter, a value outside
+        its limits, a curve that is not smooth or begins elsewhere, more or fewer unknown parameters
+        than descriptors, or nothing that moves.
 
     Examples
     --------

@@ -49,11 +49,11 @@ class LimitLoads:
     value
         Largest load met; not a number where it is undefined, lost or cancelled.
     kind
-        As of `LimitLoad`, or "cancelled".
+        A kind of `LimitLoad`, or "cancelled".
     states
         Where each path ended.
     criticality
-        Of branch points, else "".
+        Criticality of branch points; "" otherwise.
     detail
         One line for lanes that need it: the constraint that was met, why a lane was lost.
     """
@@ -75,7 +75,7 @@ class LimitLoads:
         return f"LimitLoads({len(self)}: {ends})"
 
     def __getitem__(self, lane: int) -> LimitLoad:
-        """One of them, without its path."""
+        """The limit load of one state, without its path."""
         words = str(self.criticality[lane]) or None, self.detail.get(lane, "")
         state = self.states[lane]
         return LimitLoad(float(self.value[lane]), str(self.kind[lane]), state, None, *words)
@@ -111,7 +111,7 @@ def limit_load(
     options: TraceOptions | None = None,
     progress: Progress | None = None,
 ) -> LimitLoad | LimitLoads:
-    """Follow the path in `load` from each state to the first loss of stability or constraint.
+    """Follow the path in `load` from each state to the first critical point or constraint.
 
     Parameters
     ----------
@@ -122,10 +122,10 @@ def limit_load(
     within
         Constraints that end the path, like ``[arch.max_curvature <= 10]``.
     bound
-        Largest load tried, in the parameter's unit; greater than its value in every state. None:
-        a hundred of the parameter's scales.
+        Largest load tried, in the parameter's unit; greater than its value in every state. By
+        default 100 times the parameter's scale.
     options, progress
-        As of `lift`.
+        As for `lift`.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def limit_load(
     Raises
     ------
     InputError
-        If a state is no stable equilibrium, or `bound` does not exceed its load.
+        If a state is not a stable equilibrium, or `bound` does not exceed its load.
 
     References
     ----------

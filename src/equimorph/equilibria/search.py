@@ -198,7 +198,7 @@ def find_equilibria(
     runs
         Number of independent runs; at most three times as many are made.
     seed
-        Of the random generator.
+        Seed of the random generator.
 
     Raises
     ------

@@ -38,7 +38,7 @@ STATUS = {
 
 @dataclass(frozen=True, eq=False)
 class Landing:
-    """Where a snap leads in one direction.
+    """Where a snap-through in one direction ends.
 
     Parameters
     ----------
@@ -52,11 +52,12 @@ class Landing:
     state
         Where it ended.
     released
-        Energy before the snap less the energy after, at the same parameters.
+        Energy before the snap minus the energy after it, at the same parameters.
     way
-        Configurations on the way, which are no equilibria; for shapes and energies.
+        Configurations along the way, which are not equilibria; for shapes and energies.
     time
-        Of the way; scale: square of the metric's unit over energy, for a mobility of one.
+        Times of these configurations. Scale: the metric's unit squared over energy, for unit
+        mobility.
     detail
         One line.
     """

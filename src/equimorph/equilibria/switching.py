@@ -22,15 +22,15 @@ SHORTEST = 1e-4
 
 @dataclass(frozen=True)
 class Branch:
-    """One way to go on from a branch point.
+    """One of the half-branches that leave a branch point.
 
     Parameters
     ----------
     state
         Equilibrium on it, near the branch point.
     curve
-        0 or 1: which of the two curves through the branch point it is half of. At pitchforks 0 is
-        the straight one.
+        0 or 1: the one of the two curves through the branch point to which it belongs. At
+        pitchforks 0 is the straight one.
     slope
         Change of the parameter per unit length at the branch point; 0 on the side branches of a
         pitchfork.

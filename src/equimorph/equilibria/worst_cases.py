@@ -35,14 +35,14 @@ def worst_over(
 ) -> Descriptor:
     """Largest value of a descriptor over a box of imperfections around a state.
 
-    The state is lifted straight to the corners of the box; the largest value there and in the state
-    itself counts, ∞ where stability is lost on the way. The values are its branches, so that its
-    minima, kinks among them, are found exactly: a robust optimum.
+    The state is lifted along straight lines to the corners of the box. The result is the largest
+    value at the corners and at the state itself, ∞ where stability is lost on the way. The single
+    values are its branches, so that `optimise` finds its minima, kinks included, exactly.
 
     Parameters
     ----------
     offsets
-        Largest errors of parameters, by name: actuators, loads or any further ones.
+        Largest errors of parameters, by name: actuators, loads or others.
 
     Raises
     ------
@@ -234,7 +234,7 @@ def held_over(
     name, ends
         The load and its range.
     within
-        Constraints that hold over the range; none: stability alone.
+        Constraints that hold over the range; without any, only stability is required.
 
     Raises
     ------

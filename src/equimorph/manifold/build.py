@@ -84,7 +84,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     Sheet lifting: equilibria at both ends of every grid edge are paired by lifting the edge;
     around each triangle the curves close into loops that bound discs of the set; around each
     tetrahedron the discs close into spheres that bound balls. Folds and constraints carry exact
-    vertices. Seeds: natural states over a coarse grid, and random search.
+    vertices. The seeds are natural states over a coarse grid and the results of a random search.
 
     Parameters
     ----------
@@ -97,26 +97,27 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     intervals
         Grid intervals along each parameter; see `INTERVALS` for the defaults.
     seed
-        Of the random generator; the result is deterministic.
+        Seed of the random generator; the result is deterministic.
     checks
         Random points, half of them below the set, half anywhere in the box, at which an independent
         search looks for equilibria that the set lacks; four times as many in diagrams over one
-        parameter and in symmetric slices. Newton's method from 2000 random states, each over its
-        own point, looks besides. What is found is lifted like seeds, and other points are checked,
-        until nothing is missing or six rounds are over. None: no checks at all.
+        parameter and in symmetric slices. In addition, Newton's method starts from 2000 random
+        states, each over a different point. Equilibria found in this way are lifted like seeds and
+        new points are checked, until nothing is missing or six rounds are over. None disables all
+        checks.
     accuracy
         Largest distance of the straight cells from the set, in the metric, to which the set is
-        refined (see `refine`); it is left as it was lifted if not given. If some edges cannot be
-        bisected the grid is too coarse: one of twice the intervals is lifted, at most twice.
+        refined (see `refine`); without it, the set is not refined. If some edges cannot be bisected
+        the grid is too coarse: one of twice the intervals is lifted, at most twice.
     limit
-        Most equilibria over the grid. Where there are more, nothing further is lifted; the set is
-        what is known by then, and its audit says so (`stopped`). Default: 20 000, or 30 for each
-        point of the grid if these are more.
+        Largest number of equilibria over the grid. Beyond it lifting stops, the set holds what is
+        known by then, and its audit reports it (`stopped`). Default: 20 000, or 30 per grid point
+        if that is more.
     progress
-        Sink for progress reports; one that raises an exception cancels.
+        Sink for progress reports; an exception that it raises cancels the computation.
     journal
-        Keeps the set when it is found, like `storage.open_journal`: called again with the same
-        journal, the set is read from there, the same bit for bit.
+        Stores the set, like `storage.open_journal`: a second call with the same journal reads it
+        from there, bit for bit.
 
     Returns
     -------

@@ -98,7 +98,7 @@ class Descriptor:
         For the largest of several smooth functions: all of them (−∞ where there are fewer) and
         their places, which identify them.
     obstacle
-        For the distance of the shape from an obstacle: this one, which figures show.
+        For the distance of the shape from an obstacle: that obstacle, for figures.
     vanishing
         For eigenvalues: the event where they vanish.
     """
@@ -177,7 +177,7 @@ class Constraint:
         return CONSTRAINT if vanishing is None else vanishing.event
 
     def criticality(self, z: Lanes, p: Parameters) -> list[str]:
-        """That of the event, state by state; empty texts where it has none."""
+        """Criticality of the event at each state; an empty text where it has none."""
         if self.event == CONSTRAINT or self.descriptor.vanishing is None:
             return [""] * len(z)
         return self.descriptor.vanishing.criticality(z, p)
@@ -202,9 +202,9 @@ def combined(
     Parameters
     ----------
     name
-        Its name, which must differ from those of other descriptors of the structure.
+        Name of the result, which must differ from those of other descriptors of the structure.
     function
-        Of as many arrays (lanes) as descriptors, entry by entry.
+        Function of as many arrays (lanes) as there are descriptors, evaluated entry by entry.
     descriptors
         At least one, of one structure.
     unit
@@ -213,7 +213,7 @@ def combined(
     Raises
     ------
     InputError
-        Without descriptors, or for those of different structures.
+        If there are no descriptors, or they belong to different structures.
     """
     if len({each.origin for each in descriptors}) != 1:
         raise InputError(

@@ -127,7 +127,7 @@ class Box:
     def holds(
         self, points: Float[np.ndarray, "*lanes d"], slack: float = 0.0
     ) -> "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]":
-        """`contains` for points that the package has made: nothing is checked."""
+        """Like `contains`, without checks, for points that the package has computed."""
         room = slack * (self.upper - self.lower)
         inside = (points >= self.lower - room) & (points <= self.upper + room)
         return np.asarray(inside.all(axis=-1))

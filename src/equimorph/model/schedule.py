@@ -19,7 +19,7 @@ class Schedule:
     Parameters
     ----------
     names, roles, units
-        Of the parameters, in the structure's order.
+        Names, roles and units of the parameters, in the structure's order.
     values
         Parameters at each step, in their units.
     progress
@@ -58,12 +58,12 @@ class Schedule:
 class Rates:
     """Largest rates of parameters, in their units per unit of time: ``Rates({"Theta": 0.1})``.
 
-    Parameters without a limit change as fast as they like.
+    Parameters without a limit may change at any rate.
 
     Raises
     ------
     InputError
-        For limits that are not positive, or none.
+        If a limit is not positive, or there is none.
     """
 
     limits: Mapping[str, float]
@@ -80,7 +80,7 @@ class Rates:
     def durations(
         self, names: tuple[str, ...], values: Float[np.ndarray, "steps parameters"]
     ) -> Float[np.ndarray, " pieces"]:
-        """Least time between each two successive settings: that of the slowest parameter."""
+        """Shortest time between successive settings, as the slowest parameter determines it."""
         unknown = [name for name in self.limits if name not in names]
         if unknown:
             raise InputError(

@@ -16,21 +16,22 @@ Samples = Float[np.ndarray, "knots *lanes"]
 class Spline:
     """Cubic spline through samples: ``Spline(Theta=[0.9, 1.1, 1.0], q=[0, 1, 3])``.
 
-    Twice continuously differentiable, third derivative continuous at the second and the last but
-    one knot ("not a knot"); a parabola through three samples, a line through two.
+    The spline is twice continuously differentiable; its third derivative is continuous at the
+    second knot and the last but one ("not a knot"). Three samples give a parabola, two a straight
+    line.
 
     Parameters
     ----------
     t
-        Knots, growing from 0 to 1; equidistant if None.
+        Knots, increasing from 0 to 1; equidistant if None.
     samples
         Values of each parameter at the knots: (knots,), or (knots, lanes) for many lanes.
 
     Raises
     ------
     InputError
-        For fewer than two samples, numbers of samples that differ, or knots that do not grow from
-        0 to 1.
+        If there are fewer than two samples, numbers of samples differ, or knots do not increase
+        from 0 to 1.
 
     Examples
     --------

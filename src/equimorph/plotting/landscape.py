@@ -40,11 +40,11 @@ def landscape(
     Parameters
     ----------
     structure
-        Whose parameters they are.
+        Structure whose parameters span the grid.
     found
         The landscape.
     objective
-        What was least or largest.
+        Descriptor that was minimised or maximised.
     ax
         Where to draw; None makes a figure one column wide.
 

@@ -60,7 +60,7 @@ def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
 
 @check_arguments
 def effort_of(structure: Structure, name: str) -> Descriptor:
-    """Effort ∂L/∂p of a parameter: the couple or force of an actuator, the way of a load.
+    """Effort ∂L/∂p of a parameter: the couple or force of an actuator, the displacement of a load.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
 
 @check_arguments
 def outside(structure: Structure, box: Box) -> Descriptor:
-    """How far parameters are outside a box, in their scales; negative inside.
+    """Distance of parameters from a box, in their scales; negative inside.
 
     The largest distance along one parameter, so that ``outside(arch, Box(...)) >= 0`` keeps
     actuators out of a region.

@@ -18,7 +18,7 @@ from equimorph.structures.margin import stability_margin
 
 
 class SpaceStability(StrEnum):
-    """Whether a planar state stays where it is in space, too; true only if it does."""
+    """Whether a planar state also resists movements out of its plane; true only if it does."""
 
     STABLE = "stable"
     UNSTABLE = "unstable"
@@ -75,7 +75,7 @@ class States:
 
     @property
     def stable(self) -> "States":
-        """The stable ones."""
+        """The stable states."""
         keep = self.index == 0
         return States(self.structure, self.z[keep], self.p[keep])
 
@@ -98,7 +98,7 @@ class States:
 
     @property
     def stable_in_space(self) -> "States":
-        """Those that are stable in their plane and do not leave it."""
+        """The states that are stable in their plane and against movements out of it."""
         keep = (self.index == 0) & (self.index_out_of_plane == 0)
         return States(self.structure, self.z[keep], self.p[keep])
 

@@ -64,20 +64,20 @@ class StateEstimate:
         "known", "ambiguous" if several candidates explain what was measured, or "refused" if none
         does, with the reason in `why`.
     states
-        Candidates: the best fit of each branch that stands a chance, best first.
+        Candidates: the best fit on each plausible branch, best first.
     chi2
         Sum of the squared residuals, each in its standard error.
     weight
-        Chance of each, if all were as likely before: ``exp(−χ²/2)``, normalised.
+        Probability of each for equal prior probabilities: ``exp(−χ²/2)``, normalised.
     margin
         Stability margin of each.
     stratum
-        Piece of the set that each lies on, −1 if not known.
+        Stratum of the set on which each lies, −1 if unknown.
     inside
         Whether each is a minimum of χ²; otherwise it lies on a fold or a side of the box, beyond
         which the fit improves.
     standard_errors
-        Of each free parameter of the set, by name, for each candidate.
+        Standard error of each free parameter of the set, by name, for each candidate.
     next_measurement
         What to measure in order to resolve an ambiguity; None if the estimate is unique.
     """
@@ -123,8 +123,8 @@ def estimate_state(
     """Estimate the state of a structure on a set from measured values with errors.
 
     Weighted least squares on the set from every vertex that fits better than its neighbours; on
-    the stability boundary where a fit would cross it. Free parameters of the set are what is to be
-    found (the load, say); prior knowledge of them is passed as a measured value.
+    the stability boundary where a fit would cross it. The free parameters of the set are estimated
+    (the load, for example); prior knowledge of them is passed as measured values.
 
     Parameters
     ----------

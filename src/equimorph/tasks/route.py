@@ -56,7 +56,7 @@ class Route:
 
     @property
     def states(self) -> States | None:
-        """States along the route; of a refused one as far as it went, None if it did not begin."""
+        """States along the route; for a refused one up to its end, None if it did not begin."""
         return self.path.states if self.path else None
 
 

@@ -27,8 +27,8 @@ class Audit:
     what they landed on and the set lacked has been added, too. Closed pieces and necks narrower
     than `cell_size`, the widths of the grid's cells by parameter, may escape all of this.
 
-    `stopped`, which must be zero: with how many equilibria lifting stopped because there were more
-    than the limit; much is unpaired and undecided then.
+    `stopped`, which must be zero, is the number of equilibria at which lifting stopped because it
+    exceeded the limit; much is unpaired and undecided then.
 
     Of refined sets: the `accuracy` that was asked for, the largest `deviation` of straight cells
     from the set as their edges show it, how many edges are `unrefined` (they could not be
@@ -72,10 +72,11 @@ class Audit:
 
     @property
     def missing_at_most(self) -> float:
-        """Share of the equilibria of the last round that may be missing, with 95 % confidence.
+        """Upper 95 % confidence limit of the share of equilibria that are missing.
 
-        Of what the independent search can find at random points: the largest share for which no
-        more than `missing` of `checked` has a chance of 5 % (Clopper, Pearson). 1 without checks.
+        It refers to what the independent search can find at random points: the largest share for
+        which at most `missing` of `checked` has a probability of 5 % (Clopper and Pearson). 1
+        without checks.
         """
         if self.missing >= self.checked:
             return 1.0
@@ -100,7 +101,7 @@ class Audit:
         return not any(faults) and self.largest_residual < 1e-9
 
     def rows(self) -> list[tuple[str, str]]:
-        """Lines to print: what, and how many."""
+        """Lines to print: each quantity with its value."""
         loops = ", ".join(f"{count} {kind}" for kind, count in self.loops) or "none"
         refined = [
             ("deviation of cells", f"{self.deviation:.1e} (asked for: {self.accuracy:.1e})"),

@@ -164,10 +164,10 @@ class EquilibriumSet:
     def over(self, **at: Float[np.ndarray, " points"]) -> StatesOver:
         """Exact states over many points of the box, with the pieces of the set that they lie on.
 
-        The cells above a point give guesses, which Newton corrects. Where they leave a doubt, as
-        close to curved folds, all known equilibria nearby are lifted to the point. Beside crossings
-        of sheets all roots of the reduced equation are returned; states of these sheets that are
-        closer together than 1e-5 in the metric are one.
+        The cells above a point give guesses, which Newton corrects. Where the guesses leave a
+        doubt, as near curved folds, all known equilibria nearby are lifted to the point. Near
+        crossings of sheets all roots of the reduced equation are returned; states of these sheets
+        that are closer together than 1e-5 in the metric are one.
 
         Parameters
         ----------

@@ -30,7 +30,7 @@ class Components:
         parameters.
     uncut
         Number of edges across the bounds of constraints on which no state on the bound was found:
-        adjacent cells are omitted, and pieces may be apart that are connected there.
+        the adjacent cells are omitted, so that pieces connected there may appear separate.
     """
 
     eset: EquilibriumSet
@@ -110,9 +110,9 @@ def components(
 ) -> Components:
     """Connected pieces of a set: of all of it, its stable part, or the part within constraints.
 
-    Cells hang together across their facets: not where they only share a cusp or another corner.
-    Stable sheets that part at a supercritical branch point are one piece, as a quasi-static motion
-    can go from one to the other.
+    Cells are connected if they share a facet; a shared cusp or other corner does not count. Stable
+    sheets that separate at a supercritical branch point are one piece, because a quasi-static
+    motion can lead from one to the other.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def components(
         Whether only stable states count.
     within
         Further constraints that states must obey. The set is cut exactly along their bounds: new
-        vertices there are polished to round-off. Bounds are seen where a constraint changes sign
-        between vertices: strips of violation that are narrower than cells are not.
+        vertices there are polished to round-off. A bound is detected where a constraint changes
+        sign between vertices; strips of violation narrower than a cell are missed.
 
     Raises
     ------

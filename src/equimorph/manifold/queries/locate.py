@@ -52,14 +52,14 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """Where on a set a structure is.
+    """Position of a structure on an equilibrium set.
 
     Parameters
     ----------
     best
         The best fit.
     runner_up
-        The next best, if there is another one.
+        The second-best fit, if there is one.
     """
 
     best: Place
@@ -105,7 +105,7 @@ def locate(
     s
         For shapes: where along the structure the points are, as in `States.shape`.
     errors
-        Standard errors of the values; without one, a value counts in ranges over the set.
+        Standard errors of the values; values without one are weighted by their range over the set.
 
     Raises
     ------

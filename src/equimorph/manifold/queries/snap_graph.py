@@ -99,14 +99,14 @@ def snap_graph(
 ) -> SnapGraph:
     """Follow snaps from all pieces of the stability boundary.
 
-    The boundary of a stable stratum, where it meets a stratum of index one, is left at some of its
-    vertices (`snap_landing`). Along curves the places where the landing changes are bisected until
-    they lie between neighbours.
+    Snaps start at sampled vertices of the boundary between a stable stratum and a stratum of index
+    one (`snap_landing`). Along curves, the places where the landing changes are bisected until they
+    lie between neighbouring vertices.
 
     Parameters
     ----------
     samples
-        Vertices that are tried on each piece at first.
+        Number of vertices tried first on each piece.
     progress
         Sink for progress reports.
 

@@ -69,17 +69,17 @@ class StabilityDistance:
 
 @check_arguments
 def stability_distance(eset: EquilibriumSet, state: State) -> StabilityDistance:
-    """How far a stable state is from the edge of stability, within the box of a set.
+    """Distance of a stable state from the loss of stability, within the box of a set.
 
     In the parameters: the nearest points of the folds around the stratum, polished on the fold by
     Newton, nearest first, until the straight move to one of them can be lifted. Along the set: the
-    shortest ways over the edges of the complex, straightened on the set, with their lengths
+    shortest paths over the edges of the complex, straightened on the set, with their lengths
     extrapolated from chains of 8 and 16 links (fourth order).
 
     Raises
     ------
     InputError
-        If the state is unstable, or no state of the set.
+        If the state is unstable or does not belong to the set.
     """
     stratum = _stratum_of(eset, state)
     boundary = stability_boundary(eset, stratum)

@@ -39,7 +39,7 @@ class Calibration:
     Attributes
     ----------
     status
-        "fitted"; "undetermined": the measurements say nothing of some combination of unknowns;
+        "fitted"; "undetermined": the measurements do not determine some combination of unknowns;
         "branch ends": least squares leads beyond the end of a branch; "limit": beyond the limits of
         a parameter's meaning; "not converged".
     why
@@ -48,12 +48,12 @@ class Calibration:
         The unknowns: what they are called and their values, also where the fit ended early.
     covariance
         Of the values, to first order in the errors of the measurements: (JᵀJ)⁻¹ with the Jacobian J
-        of the residuals over σ; without σ, times the variance of the residuals. Not numbers unless
-        fitted.
+        of the residuals over σ; without σ, times the variance of the residuals. NaN unless fitted.
     residuals
         (predicted − measured)/σ, or without σ their difference, in the order of the measurements.
     freedom
-        Measured numbers less unknowns. With σ, Σ residuals² is near it if the model holds.
+        Degrees of freedom: measured numbers minus unknowns. With σ, Σ residuals² is close to it if
+        the model holds.
     states
         Equilibria at the fitted parameters, one per measured state.
     """
@@ -112,8 +112,8 @@ def calibrate(
     Parameters
     ----------
     start
-        Equilibria at the nominal parameters, one per measured state, each on the branch of what was
-        measured.
+        Equilibria at the nominal parameters, one per measured state, each on the branch of the
+        measured state.
     unknown
         What to fit: ``{name: kind}`` with kinds "value" (the parameter itself, the same in all
         states), "offset" (of the true parameter from the nominal one) or "gain" (true over

@@ -43,9 +43,9 @@ class MeasuredValues:
     Parameters
     ----------
     descriptor
-        What was measured, in its unit.
+        The measured descriptor, in its unit.
     values
-        One per state.
+        One value per state.
     sigma
         Standard deviation of the errors, one for all states or one for each; all measurements of a
         calibration have one, or none has.
@@ -62,7 +62,7 @@ class MeasuredValues:
         return values, _deviations(self.sigma, shape, 1)
 
     def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
-        """Return the values of the descriptor, or of that of its name on another structure."""
+        """Return the values of the descriptor, or of its namesake on another structure."""
         own = self.descriptor
         if own.origin != structure.signature:
             own = structure.descriptor(own.name)

@@ -105,9 +105,9 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     load
         Name of the parameter along which the paths run.
     at
-        Its value at which states are looked for; above the unloaded one.
+        Load at which states are searched for, above its unloaded value.
     descriptor
-        What is shown; without it the structure's largest curvature.
+        Descriptor of the map; by default the structure's largest curvature.
     within
         Constraints that end the paths, like ``[arch.max_curvature <= 20]``.
     fixed
@@ -126,8 +126,8 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     Raises
     ------
     InputError
-        For a grid that does not have two parameters, a load that is one of them, unknown names, or
-        loads out of order.
+        If the grid does not have two parameters, the load is one of them, a name is unknown, or
+        loads are out of order.
 
     References
     ----------

@@ -51,7 +51,7 @@ class MapCurve:
         States on the curve, in order, at its crossings with grid lines: exact where the kind has a
         cause, else one side of a narrow bracket.
     points
-        Their settings.
+        Settings of these states.
     values
         Lower and higher value of the map on both sides, close to the curve; NaN where the map is
         not defined.

@@ -102,8 +102,8 @@ def limit_load_map(
 
     From the natural state at every setting a ray in `load` is followed to the first loss of
     stability or constraint. On grid edges whose ends differ in status, or more than those of their
-    neighbours, the cause is looked for: a state at which two tests vanish, found by Newton's method
-    and confirmed by limit loads on both sides. Edges without a cause are divided, again and again.
+    neighbours, the cause is searched for: a state at which two tests vanish, found by Newton's
+    method and confirmed by limit loads on both sides. Edges without a cause are divided repeatedly.
     Places of one kind are connected to curves across the cells.
 
     Parameters
@@ -132,8 +132,8 @@ def limit_load_map(
     Raises
     ------
     InputError
-        For a grid that does not have two parameters, a load that is one of them, unknown names, or
-        a bound that the unloaded structure exceeds.
+        If the grid does not have two parameters, the load is one of them, a name is unknown, or the
+        unloaded structure exceeds the bound.
 
     References
     ----------

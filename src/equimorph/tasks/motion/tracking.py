@@ -44,8 +44,8 @@ class Tracking:
         descriptors on (det S_a = 0). "actuator limit", "constraint": a bound is met. "lost": a
         numerical failure.
     path
-        Exact states, as far as it went; `path.at` counts legs, so that 1.5 is half-way through the
-        second one.
+        Exact states up to the end of the motion; `path.at` counts legs, so that 1.5 is half-way
+        through the second one.
     margin
         Smallest stability margin on the way.
     schedule
@@ -77,7 +77,7 @@ class Tracking:
 
     @property
     def last_good(self) -> float:
-        """Where the motion ends: the number of legs that were done."""
+        """Number of completed legs at which the motion ends."""
         return float(self.path.at[-1])
 
     @cached_property
@@ -99,7 +99,7 @@ class Tracking:
     def holonomy(self) -> Mapping[str, float] | None:
         """Change of each actuator around the loop, if the motion comes back to earlier targets.
 
-        Zero where the actuators come back, too; None if the targets do not close.
+        Zero where the actuators return, too; None if the targets do not close.
         """
         at, states = self.path.at, self.path.states
         corners = np.flatnonzero(np.isclose(at, np.round(at), rtol=0, atol=1e-12))
@@ -131,15 +131,15 @@ def track(  # the knobs of the public face, all by keyword
     """Follow targets S*(t) with as many actuators or more, while loads may move.
 
     ``S_a ȧ = Ṡ* − S_l l̇``, corrected onto the set at every step: an error-controlled continuation
-    in pseudo-arclength, once coarsely, and again finely before it is called good. Many close
-    targets are corrected side by side. With more actuators than targets the shortest motion of the
-    actuators is taken at every moment, in their scales; one that meets its limit is held there as
-    long as the remaining ones suffice.
+    in pseudo-arclength, first with coarse steps, and again with fine ones before it is accepted.
+    Many close targets are corrected side by side. With more actuators than targets the shortest
+    motion of the actuators is taken at every moment, in their scales; one that meets its limit is
+    held there as long as the remaining ones suffice.
 
     Parameters
     ----------
     start
-        A stable equilibrium; what `locate` or `estimate_state` says of a measured one will do.
+        A stable equilibrium, or the answer of `locate` or `estimate_state` for a measured one.
     targets
         One leg or several: ``{descriptor: value, "q": value}``, approached at a constant rate, or
         functions of t from 0 to 1 that return such mappings and begin at the start's values.
@@ -156,8 +156,8 @@ def track(  # the knobs of the public face, all by keyword
 
     Returns
     -------
-    The motion with its schedule, or where and why it cannot be followed. Of a motion that comes
-    back to its first targets the actuators need not come back: see `Tracking.holonomy`.
+    The motion with its schedule, or where and why it cannot be followed. If a motion returns to its
+    first targets, its actuators need not return: see `Tracking.holonomy`.
 
     Raises
     ------

@@ -53,14 +53,14 @@ class Barriers:
 
 @dataclass(frozen=True, eq=False)
 class Landscape:
-    """An objective over two parameters: that of the best allowed stable state at each setting.
+    """An objective over two parameters, at the best admissible stable state of each setting.
 
     Parameters
     ----------
     grid
         Settings.
     value
-        Objective at every vertex of the grid, row by row; not a number in gaps.
+        Objective at every vertex of the grid, row by row; NaN in gaps.
     states
         The best states, in the order of the vertices that have one.
     gaps

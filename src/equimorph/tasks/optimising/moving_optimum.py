@@ -73,10 +73,10 @@ def follow_optimum(
 ) -> FollowedOptimum:
     """Follow the optimum of an objective while loads and targets of descriptors vary.
 
-    At every step a sequential quadratic programme on the set ends at the optimum near the last one,
-    with constraints that become active or idle on the way. Steps are shortened until the optimum
-    moves as predicted; where it does not, however short the step, it jumps: a descent from there
-    leads to the other side. With targets among `to` it is the choice of spare actuators.
+    At every step, sequential quadratic programming on the set finds the optimum near the previous
+    one, while constraints become active or inactive. Steps are shortened until the optimum moves as
+    predicted; where it does not, however short the step, it jumps: a descent from there leads to
+    the other side. With targets among `to`, the optimum determines the redundant actuators.
 
     Parameters
     ----------

@@ -65,10 +65,10 @@ class Optimum:
     state, value
         The state, and the objective there.
     certificate
-        Why it is one.
+        Optimality conditions at the state.
     route
-        Way to it from the start, if there is a start and it was looked for. To the stability
-        boundary it ends 0.001 (in the metric) before.
+        Route from the start, if there is a start and a route was requested. A route to the
+        stability boundary ends 0.001 (in the metric) before it.
     """
 
     state: State
@@ -92,7 +92,7 @@ class Optima:
     all
         Local optima that were found, the best first.
     states
-        Their states.
+        States of the local optima.
     """
 
     status: Literal["found", "refused"]
@@ -118,7 +118,7 @@ class Optima:
 
     @property
     def best(self) -> Optimum:
-        """The best one.
+        """The best local optimum.
 
         Raises
         ------
@@ -136,7 +136,7 @@ class Optima:
 
     @property
     def schedule(self) -> Schedule | None:
-        """How to get to the best one, if there is a start."""
+        """Schedule that leads to the best optimum, if there is a start."""
         return self.best.route.schedule if self.all and self.best.route else None
 
 
@@ -168,8 +168,8 @@ def optimise(  # the knobs of the public face, all by keyword
     within
         Constraints in addition to those of the set.
     start
-        Stable state. With it only states count that can be reached from it without a snap, and the
-        route is planned.
+        Stable state. If given, only states that can be reached from it without a snap are
+        considered, and the route is planned.
     margin
         Smallest stability margin allowed.
 

@@ -23,7 +23,7 @@ class Jump:
     Parameters
     ----------
     at
-        Number of the leg + share of it.
+        Number of the leg plus the fraction of it.
     before, after
         States on both sides; `after` is None if there is no optimum beyond.
     values
@@ -53,11 +53,11 @@ class FollowedOptimum:
     certificates
         Where each sits: interior, constraint, box or stability boundary; see `Certificate`.
     jumps
-        Where the optimum moves at once.
+        Discontinuous moves of the optimum.
     schedule
         Parameters at every optimum, with margins and values of the objective and the constraints,
-        straight in between: `verify` checks whether that may be executed. None if refused, and
-        where it jumps, as no schedule follows that.
+        with straight lines in between; `verify` checks whether it can be executed. None if refused
+        or if the optimum jumps, which no schedule can follow.
     """
 
     status: Literal["arrived", "refused"]
@@ -78,7 +78,7 @@ class FollowedOptimum:
 
     @property
     def arrived(self) -> bool:
-        """Whether there is an optimum all the way."""
+        """Whether there is an optimum along the whole way."""
         return self.status == "arrived"
 
     @property

@@ -36,9 +36,9 @@ CURVING = 1e-3
 
 @dataclass(frozen=True)
 class Objective:
-    """What is made small: a descriptor, or its negative.
+    """The function to be minimised: a descriptor, or its negative.
 
-    A maximum of smooth functions, like max |κ|, that is made small counts by its `branches`.
+    A maximum of smooth functions, like max |κ|, is minimised through its `branches`.
     """
 
     descriptor: Descriptor
@@ -50,7 +50,7 @@ class Objective:
         return self.sign > 0.0 and self.descriptor.branches is not None
 
     def values(self, z: Lanes, p: Parameters) -> Values:
-        """Values to be made small."""
+        """Values to be minimised."""
         return np.asarray(self.sign * self.descriptor.function(z, p))
 
     def branches(self, z: Lanes, p: Parameters) -> Branches:

@@ -53,9 +53,9 @@ class RobustOptimum:
         Worst value over the box around the nominal optimum; infinite if stability is lost.
     edge
         Corner of the box at which the robust state is just about to lose its stability, by
-        parameter; empty if it keeps away from all.
+        parameter; empty if there is no such corner.
     certificate
-        Why it is one.
+        Optimality conditions at the state.
     """
 
     status: Literal["found", "refused"]
@@ -113,11 +113,11 @@ def robust_optimum(
 ) -> RobustOptimum:
     """Find the stable state whose worst case over a box of imperfections is best.
 
-    The worst case is that of the state and of the corners of the box, to which it is lifted
-    straight, see `worst_over`; it is infinite where stability is lost on the way, so that an
-    optimum may sit where the box touches the edge of stability. The share of the way at which
-    stability is lost is smooth there, and so is the objective where it is lost, its limit from
-    inside: with these the optimum on the edge is exact.
+    The worst case is taken over the state and the corners of the box, to which it is lifted along
+    straight lines (see `worst_over`). It is infinite where stability is lost on the way, so that an
+    optimum may lie where the box touches the edge of stability. There, the fraction of the way at
+    which stability is lost is smooth, and so is the limit of the objective from inside; both
+    determine the optimum on the edge exactly.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def robust_optimum(
     objective
         A descriptor of the set's structure.
     offsets
-        Largest errors of parameters, by name: actuators, loads or any further ones.
+        Largest errors of parameters, by name: actuators, loads or others.
     sense
         "min" or "max".
     within

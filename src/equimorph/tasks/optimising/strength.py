@@ -33,19 +33,19 @@ ONE_OPTIMUM = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Strongest:
-    """A setting with a locally largest limit load: with the least upper bound, at a cliff.
+    """A setting with a locally largest limit load; at a cliff, with its least upper bound.
 
     Parameters
     ----------
     setting, value
-        Where, and the limit load there. On a ridge the value is that on the ridge itself.
+        The setting and its limit load; on a ridge, the value on the ridge itself.
     kind
         "interior" where the map is smooth, else the kind of the map's curve on which it lies, with
         ", cliff" if its value is the limit from one side; or "edge": at a kink or jump whose cause
         is not known; or "robust".
     slope
-        Of the load along the curve, or largest slope of the map at an interior optimum: what is
-        left of the condition that it vanishes.
+        Slope of the load along the curve, or largest slope of the map at an interior optimum: the
+        residual of the optimality condition.
     sides
         On a curve: limit loads on both sides at `distances` across it.
     limit
@@ -92,12 +92,12 @@ class StrongestSettings:
     offsets
         Imperfections that the answer allows for; empty for a nominal optimum.
     guaranteed
-        Of a robust optimum: the smallest limit load over the imperfections, which was made as large
-        as possible. Otherwise the value of the best setting.
+        For a robust optimum, the smallest limit load over the imperfections, which is maximised;
+        otherwise the value of the best setting.
     price
-        Of a robust optimum: loss against the best nominal setting if there is no imperfection.
+        For a robust optimum, the loss against the best nominal setting without imperfections.
     at_risk
-        Of a robust optimum: the smallest limit load over the imperfections at the best nominal
+        For a robust optimum, the smallest limit load over the imperfections at the best nominal
         setting.
     nominal
         The best nominal setting.
@@ -126,7 +126,7 @@ class StrongestSettings:
 
     @property
     def margin(self) -> float:
-        """Guaranteed load less the worst case of the best nominal setting."""
+        """Guaranteed load minus the worst case of the best nominal setting."""
         return self.guaranteed - self.at_risk
 
 
@@ -157,7 +157,7 @@ def strongest(
     Raises
     ------
     InputError
-        For offsets of other names, or such that are not positive.
+        If offsets have other names or are not positive.
 
     Examples
     --------

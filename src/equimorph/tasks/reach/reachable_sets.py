@@ -30,7 +30,7 @@ class Reach:
     Parameters
     ----------
     status, why
-        "found". `why` names what could not be cut exactly.
+        Always "found"; `why` names what could not be cut exactly.
     start
         The state.
     descriptors
@@ -63,7 +63,7 @@ class Reach:
 
     @property
     def boundary(self) -> tuple[BoundaryPiece, ...]:
-        """What bounds the start's region."""
+        """Boundary of the start's region, in pieces."""
         return self.home.boundary
 
     @property
@@ -78,14 +78,15 @@ class Reach:
 
     @check_arguments
     def query(self, targets: Mapping[Descriptor, float]) -> Answer:
-        """Whether the structure can take values of the descriptors from here; if not, why.
+        """Whether the structure can reach given values of the descriptors; if not, why.
 
-        Decided by lifting: a state of the start's region that shows the values is not enough.
+        The answer is decided by lifting; a state of the start's region with these values is not
+        enough.
 
         Raises
         ------
         InputError
-            For other descriptors than those of the set, or values that are not finite.
+            If descriptors are not those of the set, or values are not finite.
         """
         return query_region(self.start, self.regions, self.whole, targets, self.within)
 

@@ -105,7 +105,7 @@ def limit_sensitivity(
     Parameters
     ----------
     limit
-        As found by `limit_load`.
+        A limit load found by `limit_load`.
     load
         The parameter that grew.
     names

@@ -86,9 +86,9 @@ class ImperfectionLaw:
         Name of the law [Koiter1945]_, see `LAWS`: smooth, one-half or two-thirds power at branch
         points; their squares where the imperfection only counts in the second order; "unknown".
     exponent
-        As fitted, with the next orders removed.
+        Fitted exponent, extrapolated to zero imperfection.
     coefficient
-        With the exponent of the law.
+        Coefficient for the exponent of the law.
     perfect
         Limit load without the imperfection.
     sizes, loads
@@ -133,7 +133,7 @@ def imperfection_law(
     root of the imperfection that belongs to the law, through the smallest sizes. Where both signs
     limit the load, their mean or difference leaves out every other order. Smaller sizes are added
     until fits with and without the largest one agree; those whose change is lost in round-off, or
-    whose path is not told from the perfect one, do not count.
+    whose path is not distinguished from the perfect one, do not count.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def imperfection_law(
     Raises
     ------
     InputError
-        For unknown names, the same twice, or sizes that do not fall to above zero.
+        If names are unknown or equal, or sizes are not positive and decreasing.
     """
     parameters = start.structure.parameters
     place = position(parameters, imperfection)

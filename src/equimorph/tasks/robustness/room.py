@@ -35,7 +35,7 @@ class Room:
     Parameters
     ----------
     states
-        In the middle.
+        States at the centres.
     scale
         Largest multiple of the tolerances that stays stable and within the constraints, of each
         state: exact along the rays that were lifted, an upper bound otherwise. At least
@@ -43,7 +43,7 @@ class Room:
     met
         Where the worst ray of each state ended.
     kind
-        What it met: as of `Event`, "arrived" if nothing.
+        Kind of the `Event` that it met; "arrived" if there was none.
     boxes
         The boxes, or those around the ellipsoids.
     """
@@ -75,7 +75,7 @@ class Room:
 
     @property
     def least(self) -> float:
-        """Smallest of the scales: of a route, the room all along."""
+        """Smallest scale; for a route, the room along all of it."""
         return float(self.scale.min())
 
 

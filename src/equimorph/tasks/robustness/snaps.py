@@ -36,9 +36,9 @@ class LeastSnap:
     Parameters
     ----------
     status
-        "found"; "infimum" where changes that lead to a snap come as near to a length as one likes
-        but do not attain it, with the reason in `why`: `change` is one of them; or "refused", also
-        with the reason: no change is known in the box.
+        "found"; "infimum" where changes that lead to a snap come arbitrarily close to a length but
+        do not attain it, with the reason in `why`: `change` is one of them; or "refused", also with
+        the reason: no change is known in the box.
     distance
         As of `stability_distance`: where stability is lost, which need not snap, as at cusps.
     change
@@ -84,10 +84,10 @@ def least_snap(eset: EquilibriumSet, state: State) -> LeastSnap:
     """Find the least straight change of the free parameters that makes a stable state snap.
 
     With a load among the free parameters of the set this is the least change of actuators and load.
-    The nearest loss of stability may snap nowhere, like the tip of a cusp, or be none that a
-    straight change leads to. Then straight changes to all vertices of the stability boundary are
-    tried; the shortest one that snaps is followed along the boundary to where it is least, or
-    bisected towards the nearest place that does not snap.
+    The nearest loss of stability may cause no snap, as at the tip of a cusp, or no straight change
+    may lead to it. Then straight changes to all vertices of the stability boundary are tried; the
+    shortest one that snaps is followed along the boundary to where it is least, or bisected towards
+    the nearest place that does not snap.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def least_snap(eset: EquilibriumSet, state: State) -> LeastSnap:
 
     Returns
     -------
-    The change, and where the snap lands; or that no change is known in the box that snaps.
+    The change and the landing of the snap; or a refusal if no change in the box is known to snap.
 
     Raises
     ------
     InputError
-        If the state is unstable, or no state of the set.
+        If the state is unstable or does not belong to the set.
     """
     distance = stability_distance(eset, state)
     moves = _Moves(eset, state)

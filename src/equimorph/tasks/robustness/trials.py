@@ -31,7 +31,7 @@ class Trials:
         How each trial ended: "arrived", or what it met (see `Event`); "start" if the imperfection
         alone was too much.
     at
-        Where: number of the step + share of it.
+        Number of the step plus the fraction of it at which the trial ended.
     states
         Last states.
     """
@@ -93,11 +93,11 @@ def random_trials(  # all but three by keyword
     within: Sequence[Constraint] = (),
     seed: int = 0,
 ) -> Trials:
-    """Execute a schedule with parameters that are off by normally distributed amounts.
+    """Execute a schedule with normally distributed errors of parameters.
 
-    Actuators with an offset keep it all along. Imperfect loads and shapes are parameters, too: a
-    rod with a further `LineLoad` or `Curvature` pattern of amplitude 0 becomes imperfect by an
-    amplitude that is not. All trials are lifted side by side.
+    The error of an actuator stays constant during a trial. Imperfect loads and shapes are
+    parameters, too: a rod with a further `LineLoad` or `Curvature` pattern of amplitude 0 becomes
+    imperfect by an amplitude that is not. All trials are lifted side by side.
 
     Parameters
     ----------

@@ -51,13 +51,14 @@ class Shapes:
         "solved"; "fitted": there are more descriptors than free parameters and no state meets them
         all; or "refused" with the reason in `why`.
     states
-        All solutions, best first: stable ones before unstable ones, then by rank. Of fits, the
-        local minima of the misfit, the least first. Of families (fewer descriptors than free
+        All solutions, best first: stable ones before unstable ones, then by rank. For fits, the
+        local minima of the misfit, the smallest first. For families (fewer descriptors than free
         parameters), the members nearest to the vertices that come nearest; see `solution_family`.
     index
         Negative eigenvalues of each; 0 is stable.
     misfit
-        Misfit of each: root of the sum of squares of its misses, in ranges over the set.
+        Misfit of each: root of the sum of squared deviations from the targets, in ranges over the
+        set.
     routes
         Route to each solution from the start, or the reason of a refusal; empty without a start.
     closest, miss
@@ -124,7 +125,7 @@ class Shapes:
     def family(self) -> Level | None:
         """All states that meet fewer targets than there are free parameters: curves or surfaces.
 
-        None for as many targets as free parameters, or more.
+        None if there are at least as many targets as free parameters.
         """
         known = self._known
         if len(self.wanted) >= len(known.eset.names):

@@ -20,7 +20,7 @@ ENTRIES_AT_ONCE = 400_000
 
 
 class ProofStatus(StrEnum):
-    """How well it is known that one stable curve joins the states; each member equals its text."""
+    """Evidence that one stable curve joins the states; each member equals its text."""
 
     PROVED = "proved"
     """The bounds hold on all segments, and with them those of the second derivatives over whole

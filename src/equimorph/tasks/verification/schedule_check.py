@@ -157,13 +157,13 @@ class Verification:
     states
         Equilibria along the schedule, as far as it can be followed.
     at
-        Number of the step + share of it, per state.
+        Number of the step plus the fraction of it, per state.
     margin
         Smallest stability margin on the way.
     schedule
         The schedule with the margins and descriptors found; only if it was verified.
     violation
-        What ended the way, and where.
+        The event that ended the schedule, and where.
     proof
         In proof mode: what is proved, or supported by samples, between the states.
     """
@@ -186,7 +186,7 @@ class Verification:
 
     @property
     def verified(self) -> bool:
-        """Whether nothing stands in the way."""
+        """Whether the schedule was verified."""
         return self.status == "verified"
 
     @property
@@ -215,7 +215,7 @@ def verify(
     proof: bool = False,
     options: TraceOptions | None = None,
 ) -> Verification:
-    """Check a schedule, from wherever it comes: every step is lifted finely, margins are recorded.
+    """Check a schedule from any source: every step is lifted with fine steps, margins are recorded.
 
     Between its steps parameters change at constant rates. A way-point {name: value} keeps the
     parameters that it does not name.
@@ -225,8 +225,8 @@ def verify(
     schedule
         A `Schedule`, of a route or read from files; or way-points, which need a `start`.
     start
-        State in which the structure is. None: that of the schedule, corrected if it was written
-        with few digits.
+        State in which the structure starts. By default the start of the schedule, corrected if it
+        was written with few digits.
     structure
         Needed only if neither a start nor the schedule carries one.
     within
@@ -238,7 +238,7 @@ def verify(
     proof
         Bound the curve between the states, too: that it exists, is the only one nearby and keeps
         its index. This is proved or, where the bounds are sampled, supported; see `ProofStatus`. A
-        schedule that is safe, but cannot be proved so, stays verified.
+        schedule that is safe but not proved remains verified.
     options
         Step control of the lifts; by default that of the final check of routes.
 
