@@ -109,6 +109,8 @@ from .structures import (
     Round as Round,
     SectionProperties as SectionProperties,
     SpaceStability as SpaceStability,
+    SpatialEnd as SpatialEnd,
+    SpatialRod as SpatialRod,
     Spring as Spring,
     State as State,
     States as States,

@@ -17,7 +17,7 @@ from equimorph.structures import (
     Truss,
     Unknown,
 )
-from oracles import rods
+from oracles import rods, spatial_rods
 from oracles.frames import Twin
 
 
@@ -245,6 +245,10 @@ SPECIMENS = (
     _general("stretchable arch", rods.stretchable_arch),
     _general("inflated rod", rods.inflated_rod),
     _general("pulled rod", rods.pulled_rod),
+    _general("arch in space", spatial_rods.arch),
+    _general("everything on a rod in space", spatial_rods.everything),
+    _general("sheared cantilever in space", spatial_rods.cantilever),
+    _general("guided rod in space", spatial_rods.guided),
     Specimen("spring", Spring(1.3), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     Specimen("spring by its energy", written_spring(), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     _truss("truss", arch_truss("engineering")),

@@ -43,12 +43,13 @@ from equimorph.structures.rod import (
     Tendon,
     Tube,
 )
+from equimorph.structures.spatial import SpatialEnd, SpatialRod
 from equimorph.structures.spring import Spring
 from equimorph.structures.states import SpaceStability, State, States, natural_state
 from equimorph.structures.truss import Bar, Truss
 
 KINDS: dict[str, Callable[..., Structure]] = {
-    each.kind: each for each in (Rod, Spring, EnergyStructure, Truss, Frame)
+    each.kind: each for each in (Rod, SpatialRod, Spring, EnergyStructure, Truss, Frame)
 }
 """Classes of structures by their words in files."""
 
@@ -77,6 +78,8 @@ __all__ = [
     "Round",
     "SectionProperties",
     "SpaceStability",
+    "SpatialEnd",
+    "SpatialRod",
     "Spring",
     "State",
     "States",

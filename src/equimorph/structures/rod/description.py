@@ -84,7 +84,7 @@ class Description:
         return out
 
     def _profile(self, name: str, unit: float = 1.0) -> LoadShape:
-        return _rescale(profile(getattr(self, name), name, self.kinks), unit)
+        return rescale(profile(getattr(self, name), name, self.kinks), unit)
 
     def build(self, elements: int, degree: int) -> Build:
         """The rod in non-dimensional form."""
@@ -104,8 +104,8 @@ class Description:
             )
         self._check_pressure()
         mesh = mesh_with_kinks(kinks, elements, degree)
-        _check_positive(rigid, "stiffness", mesh.nodes)
-        _check_positive(axial, "axial", mesh.nodes)
+        check_profile_positive(rigid, "stiffness", mesh.nodes)
+        check_profile_positive(axial, "axial", mesh.nodes)
         couple, spring = self.units.value("couple"), self.units.value("spring")
         first, last = (support.scaled(couple, spring) for support in self.supports)
         length = self.units.value("length")
@@ -282,7 +282,7 @@ class Description:
         return data | self.units.data()
 
 
-def _rescale(shape: LoadShape, unit: float) -> LoadShape:
+def rescale(shape: LoadShape, unit: float) -> LoadShape:
     """The profile divided by a unit."""
     if unit == 1.0:
         return shape
@@ -293,7 +293,10 @@ def _rescale(shape: LoadShape, unit: float) -> LoadShape:
     return LoadShape(None, density, shape.kinks)
 
 
-def _check_positive(shape: LoadShape | None, name: str, s: Float[np.ndarray, " nodes"]) -> None:
+def check_profile_positive(
+    shape: LoadShape | None, name: str, s: Float[np.ndarray, " nodes"]
+) -> None:
+    """Refuse a profile that is not positive everywhere."""
     if shape is None:
         return
     points = np.unique(np.concatenate([s, np.linspace(0.0, 1.0, 201)]))

@@ -26,7 +26,8 @@ SAMPLES = np.linspace(0.0, 1.0, 25)
 _SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
 
 
-def _arclength(s: float) -> float:
+def check_arclength(s: float) -> float:
+    """Refuse what is no arclength."""
     try:
         value = float(s)
     except (TypeError, ValueError):
@@ -36,14 +37,15 @@ def _arclength(s: float) -> float:
     return value
 
 
-def _written(name: str, s: float) -> str:
+def name_at(name: str, s: float) -> str:
     """Name at an arclength, from which the arclength is read back exactly: ``height(1/3)``."""
     nice = (f"{s:.6g}", *(f"{round(s * below)}/{below}" for below in (3, 6, 7, 9, 11, 12)))
-    exact = (text for text in nice if _fraction(text) == s)
+    exact = (text for text in nice if read_fraction(text) == s)
     return f"{name}({next(exact, repr(s))})"
 
 
-def _symbol(letter: str, s: float) -> str:
+def symbol_at(letter: str, s: float) -> str:
+    """Symbol at an arclength: ``y(½)``."""
     return f"{letter}({_SYMBOLS.get(s, f'{s:g}')})"
 
 
@@ -59,25 +61,25 @@ def _field(rod: Measured, s: float, which: int) -> Callable[[Lanes, Parameters],
 
 def coordinate(rod: Measured, s: float, axis: int) -> Descriptor:
     """x(s) (axis 0) or y(s) (axis 1)."""
-    at = _arclength(s)
-    name, symbol = _written("height" if axis else "x", at), _symbol("y" if axis else "x", at)
+    at = check_arclength(s)
+    name, symbol = name_at("height" if axis else "x", at), symbol_at("y" if axis else "x", at)
     unit = rod.units.label("length")
     return Descriptor(name, unit, _field(rod, at, 2 + axis), symbol, rod.signature)
 
 
 def angle(rod: Measured, s: float) -> Descriptor:
     """θ(s)."""
-    at = _arclength(s)
-    name, value = _written("angle", at), _field(rod, at, 0)
-    return Descriptor(name, "rad", value, _symbol("θ", at), rod.signature)
+    at = check_arclength(s)
+    name, value = name_at("angle", at), _field(rod, at, 0)
+    return Descriptor(name, "rad", value, symbol_at("θ", at), rod.signature)
 
 
 def curvature(rod: Measured, s: float) -> Descriptor:
     """κ(s)."""
-    at = _arclength(s)
-    name, value = _written("curvature", at), _field(rod, at, 1)
+    at = check_arclength(s)
+    name, value = name_at("curvature", at), _field(rod, at, 1)
     unit = rod.units.label("curvature")
-    return Descriptor(name, unit, value, _symbol("κ", at), rod.signature)
+    return Descriptor(name, unit, value, symbol_at("κ", at), rod.signature)
 
 
 def max_curvature(rod: Measured) -> Descriptor:
@@ -137,11 +139,11 @@ def descriptor_from_text(rod: Measured, text: str) -> Descriptor:
     if argument is not None and name == "support_force":
         return support_force(rod, argument)
     if argument is not None and name == "clearance":
-        return clearance(rod, _fraction(argument))
+        return clearance(rod, read_fraction(argument))
     if argument in {"0", "1"} and name == "end_moment":
         return end_moment(rod, int(argument))
     if argument is not None and name in {"height", "x", "angle", "curvature"}:
-        s = _fraction(argument)
+        s = read_fraction(argument)
         if name in {"height", "x"}:
             return coordinate(rod, s, int(name == "height"))
         return angle(rod, s) if name == "angle" else curvature(rod, s)
@@ -161,7 +163,8 @@ def total_energy(rod: Measured) -> Descriptor:
     return Descriptor("energy", rod.units.energy_label, value, "E", rod.signature)
 
 
-def _fraction(text: str) -> float:
+def read_fraction(text: str) -> float:
+    """Number written like ``0.5`` or ``1/3``."""
     try:
         above, _, below = text.partition("/")
         return float(above) / float(below or 1.0)

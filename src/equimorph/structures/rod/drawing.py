@@ -46,7 +46,7 @@ def rod_drawing(
     points = [(term, size) for term, size in amplitudes if isinstance(term, PointForce)]
     if points:
         places = rod.shape(z, p, np.array([float(term.s) for term, _ in points]))
-        pushes = [size[:, None] * np.array(term.direction) for term, size in points]
+        pushes = [size[:, None] * np.array(term.direction)[:2] for term, size in points]
         forces.append(Forces(places, np.stack(pushes, axis=1)))
     turns = [(term, size) for term, size in amplitudes if isinstance(term, Couple)]
     if turns:
@@ -86,7 +86,7 @@ def _per_length(
 ) -> Float[np.ndarray, "lanes points 2"]:
     """Force per arclength at the `STATIONS`."""
     if isinstance(term, LineLoad):
-        normals = term.density().density(STATIONS)[:, None] * np.array(term.direction)
+        normals = term.density().density(STATIONS)[:, None] * np.array(term.direction)[:2]
     return np.asarray(size[:, None, None] * normals)
 
 

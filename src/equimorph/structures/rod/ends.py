@@ -116,7 +116,7 @@ class Axis:
     """
 
     name: str
-    unit: tuple[float, float]
+    unit: tuple[float, ...]
     first: Holding
     last: Holding
 

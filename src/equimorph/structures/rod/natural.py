@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.polynomial import legendre
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.structures.contract import Advance
 from equimorph.structures.rod.discretisation import reference_element
 from equimorph.structures.rod.general import GeneralMechanics
 from equimorph.structures.rod.mechanics import Mechanics
@@ -58,8 +60,24 @@ class Point:
         self.t[lanes], self.x[lanes], self.slope[lanes] = other.t, other.x, other.slope
 
 
+class Continued(Protocol):
+    """Mechanics that can be continued."""
+
+    @property
+    def size(self) -> int:
+        """Length of z."""
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step along the curve with parameter velocity `dp`."""
+
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether the discretisation represents states."""
+
+
 def follow(
-    rod: Mechanics, part: Part, x: Float[np.ndarray, "lanes extended"]
+    rod: Continued, part: Part, x: Float[np.ndarray, "lanes extended"]
 ) -> tuple[Values, Float[np.ndarray, "lanes extended"]]:
     """Move x = (z, span) along a part: the share of it that was reached, 1 if all, and x there."""
     here = newton(rod, part, np.arange(len(x)), np.zeros(len(x)), x)[0]
@@ -96,7 +114,7 @@ def _predict(before: Point, here: Point, t: Values) -> Float[np.ndarray, "lanes 
 
 
 def newton(
-    rod: Mechanics,
+    rod: Continued,
     part: Part,
     lanes: Int[np.ndarray, " lanes"],
     t: Values,

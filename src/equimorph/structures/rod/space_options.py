@@ -63,9 +63,9 @@ class SpaceOptions:
             return LateralStiffness(properties.torsion, properties.lateral)
         if self.torsion is None:
             return None
-        return LateralStiffness(self._ratio("torsion", units), self._ratio("lateral", units), kinks)
+        return LateralStiffness(self.ratio("torsion", units), self.ratio("lateral", units), kinks)
 
-    def _ratio(self, name: str, units: Units) -> Any:
+    def ratio(self, name: str, units: Units) -> Any:
         """A stiffness with a unit, relative to EI; anything else is relative already."""
         given = getattr(self, name)
         if not isinstance(given, str):

@@ -16,6 +16,8 @@ from equimorph.structures.rod.profiles import LoadShape, at_nodes, inside, load_
 ElementNodes = Float[np.ndarray, "elements order"]
 DOWN = (0.0, -1.0)
 """Direction of gravity."""
+SPATIAL = ("about", "binormal")
+"""Fields of terms that differ from their defaults on rods in space only."""
 
 
 def _arclength(value: Any, name: str) -> float:
@@ -37,13 +39,29 @@ def _stretch(start: Any, stop: Any) -> tuple[float, float]:
     return first, last
 
 
-def _direction(value: Any) -> tuple[float, float]:
+def _direction(value: Any) -> tuple[float, float, float]:
+    """Direction (x, y, z) of two or three numbers."""
     try:
-        x, y = (float(component) for component in value)
+        parts = [float(component) for component in value]
     except (TypeError, ValueError):
-        x, y = np.nan, np.nan
-    if not (np.isfinite(x) and np.isfinite(y) and (x, y) != (0.0, 0.0)):
-        raise InputError(f"`direction` must be two numbers (x, y), not both 0; got {value!r}.")
+        parts = []
+    if len(parts) not in (2, 3) or not np.isfinite(parts).all() or not any(parts):
+        raise InputError(
+            "`direction` must be two numbers (x, y), not both 0, or for a rod in space three "
+            f"(x, y, z); got {value!r}."
+        )
+    x, y, *z = parts
+    return x, y, z[0] if z else 0.0
+
+
+def _in_plane(value: Any) -> tuple[float, float]:
+    """Direction (x, y) of a load on a planar rod."""
+    x, y, z = _direction(value)
+    if z != 0.0:
+        raise InputError(
+            f"`direction` must lie in the plane of the rod, z = 0; got {value!r}. Loads across "
+            "the plane need a `SpatialRod`."
+        )
     return x, y
 
 
@@ -94,7 +112,9 @@ class Term(ABC):
                     f"`{field.name}` of a {self.word} must be a number or a table to be written "
                     "to a file; got a callable."
                 )
-            if field.name != "kinks":  # of a callable only, and that is refused
+            # kinks are those of a callable, and that is refused; some fields belong to space only
+            silent = field.name in SPATIAL and value == field.default
+            if field.name != "kinks" and not silent:
                 out[field.name] = _plain(value)
         return out
 
@@ -124,7 +144,7 @@ class LineLoad(Term):
     shape
         "uniform", "left-half", a table [[s, Q], ...] or a callable Q(s); s runs from 0 to 1.
     direction
-        Its horizontal and vertical part.
+        Its horizontal and vertical part, and on a rod in space also the part along z.
     kinks
         Arclengths where a callable is not smooth.
     """
@@ -151,7 +171,7 @@ class LineLoad(Term):
 
     def effects(self, mesh: Mesh) -> Effects:
         """Load cumulated from end A."""
-        x, y = _direction(self.direction)
+        x, y = _in_plane(self.direction)
         rho = self.density().cumulate(mesh)
         total = float(rho[-1, -1])
         return Effects(along=x * rho, across=y * rho, force=(x * total, y * total))
@@ -167,7 +187,8 @@ class PointForce(Term):
     s
         Where it acts, from 0 to 1.
     direction
-        Its horizontal and vertical part; downward by default.
+        Its horizontal and vertical part, and on a rod in space also the part along z; downward by
+        default.
     """
 
     s: float
@@ -187,7 +208,7 @@ class PointForce(Term):
 
     def effects(self, mesh: Mesh) -> Effects:
         """Load cumulated from end A: a step."""
-        x, y = _direction(self.direction)
+        x, y = _in_plane(self.direction)
         step = np.ones((1, mesh.degree + 1)) * inside(self.s, 2.0, mesh)[:, None]
         return Effects(along=x * step, across=y * step, force=(x, y))
 
@@ -228,32 +249,44 @@ class Curvature(Term):
         A number, a table [[s, f], ...] or a callable.
     start, stop
         Where it begins and ends.
+    about
+        Axis of the cross-section about which it turns: "b", the binormal, as in the plane; on a rod
+        in space also "n", out of the plane, or "t", as an intrinsic twist.
     """
 
     pattern: Any = 1.0
     start: float = 0.0
     stop: float = 1.0
     kinks: Sequence[float] = ()
+    about: str = "b"
     word: ClassVar[str] = "curvature"
     measure: ClassVar[str] = "curvature"
 
     def __post_init__(self) -> None:
-        """Check pattern and stretch."""
+        """Check pattern, stretch and axis."""
         _stretch(self.start, self.stop)
-        self._profile()
+        self.profile()
+        if self.about not in ("t", "n", "b"):
+            raise InputError(f"`about` must be 't', 'n' or 'b'; got {self.about!r}.")
 
-    def _profile(self) -> LoadShape:
+    def profile(self) -> LoadShape:
+        """Its pattern."""
         return profile(self.pattern, "pattern", self.kinks)
 
     @property
     def breaks(self) -> tuple[float, ...]:
         """Its ends, and the pattern's kinks."""
-        return _interior([self.start, self.stop, *self._profile().kinks.tolist()])
+        return _interior([self.start, self.stop, *self.profile().kinks.tolist()])
 
     def effects(self, mesh: Mesh) -> Effects:
         """Intrinsic curvature."""
+        if self.about != "b":
+            raise InputError(
+                f"`about` must be 'b' on a planar rod; got {self.about!r}. Twist and curvature out "
+                "of the plane need a `SpatialRod`."
+            )
         there = inside(self.start, self.stop, mesh)[:, None]
-        return Effects(natural=there * at_nodes(self._profile(), mesh))
+        return Effects(natural=there * at_nodes(self.profile(), mesh))
 
 
 @check_arguments
@@ -272,32 +305,43 @@ class Tendon(Term):
         d(s), in the user's unit of length: a number, a table [[s, d], ...] or a callable.
     start, stop
         Where the cable is anchored.
+    binormal
+        Offset along the binormal, of a cable on a rod in space.
     """
 
     offset: Any
     start: float = 0.0
     stop: float = 1.0
     kinks: Sequence[float] = ()
+    binormal: Any = 0.0
     word: ClassVar[str] = "tendon"
     measure: ClassVar[str] = "tension"
 
     def __post_init__(self) -> None:
-        """Check offset and stretch."""
+        """Check offsets and stretch."""
         _stretch(self.start, self.stop)
-        self._profile()
+        self.profiles()
 
-    def _profile(self) -> LoadShape:
-        return profile(self.offset, "offset", self.kinks)
+    def profiles(self) -> tuple[LoadShape, LoadShape]:
+        """Offsets to the left of the axis and along the binormal."""
+        aside = profile(self.binormal, "binormal", self.kinks)
+        return profile(self.offset, "offset", self.kinks), aside
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Its ends, and the offset's kinks."""
-        return _interior([self.start, self.stop, *self._profile().kinks.tolist()])
+        """Its ends, and the offsets' kinks."""
+        kinks = [s for each in self.profiles() for s in each.kinks.tolist()]
+        return _interior([self.start, self.stop, *kinks])
 
     def effects(self, mesh: Mesh) -> Effects:
         """A moment T d, a thrust T, and a torsional stiffness T d²."""
+        if self.binormal != 0.0:
+            raise InputError(
+                f"`binormal` must be 0 on a planar rod; got {self.binormal!r}. A cable beside the "
+                "plane needs a `SpatialRod`."
+            )
         there = inside(self.start, self.stop, mesh)[:, None]
-        along, offset = there * np.ones(mesh.degree + 1), at_nodes(self._profile(), mesh)
+        along, offset = there * np.ones(mesh.degree + 1), at_nodes(self.profiles()[0], mesh)
         return Effects(bending=there * offset, tension=along, torsion=there * offset**2)
 
 

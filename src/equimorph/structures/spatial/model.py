@@ -1,0 +1,249 @@
+"""The Lagrangian of a rod in space as constant arrays."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.ends import FREE, Axis, compliance
+from equimorph.structures.rod.profiles import LoadShape, at_nodes
+from equimorph.structures.rod.terms import Term
+from equimorph.structures.rod.units import FOUR_PI_SQUARED
+from equimorph.structures.spatial.effects import SpatialEffects, effects
+from equimorph.structures.spatial.ends import Ends, support_axes
+
+ANGLES = ("theta", "tilt", "twist")
+"""Angles a, b, τ of a clamp R = exp(e₃ a) exp(e₂ b) exp(e₁ τ); with _A or _B, its parameters."""
+Rows = Float[np.ndarray, "scalars elements order 3"]
+Row = Float[np.ndarray, "scalars elements order"]
+
+
+@dataclass(frozen=True, eq=False)
+class Build:
+    """What a rod in space is made of, in non-dimensional form.
+
+    Attributes
+    ----------
+    stiffness
+        In the plane; `ratios` are those against twist and out of the plane to it.
+    natural
+        Intrinsic strains: twist, curvatures about n and b.
+    axial, shear
+        Stiffnesses against extension and, along n and b, against shear; None: rigid.
+    terms
+        What each amplitude scales, by name, in the order of the parameters.
+    length
+        That of the rod in the user's unit, in which the offsets of tendons are given.
+    """
+
+    mesh: Mesh
+    ends: Ends
+    stiffness: LoadShape
+    ratios: tuple[LoadShape, LoadShape]
+    natural: tuple[LoadShape, LoadShape, LoadShape]
+    axial: LoadShape | None
+    shear: tuple[LoadShape, LoadShape] | None
+    terms: Mapping[str, Sequence[Term]]
+    length: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialModel:
+    """The Lagrangian of a rod in its rotations q and *scalars* y = (multipliers, parameters, 1).
+
+    ``L = Σ m (½ u·(K + τ e₁e₁ᵀ) u − u·b + a₁ − ½ γ₁ (a₁ + T)² − ½ γ₂ a₂² − ½ γ₃ a₃²) + ½ yᵀ Q y``
+    over the nodes of every element with quadrature weights m. u: twist and curvatures about n and b
+    from the rotations; a: the force ``f = Σ y force`` on the cross-section, on its axes t, n, b;
+    ``b = Σ y moment``, ``T = Σ y tension``, ``τ = Σ y torsion``; γ: compliances against extension
+    and shear, whose strains are eliminated at the nodes.
+
+    Attributes
+    ----------
+    names
+        Parameters.
+    multipliers
+        Number of supports that act against each other along x, y, z.
+    stiffness
+        K: diagonal, against twist and bending about n and b.
+    softness
+        γ.
+    turned
+        Angles (a, b, τ) of clamps A and B as combinations of the scalars.
+    held
+        Whether the rotations of the ends are prescribed.
+    reaction
+        Force of the support at A.
+    origin
+        Coordinates of end A (`from_start`) or B. Like all rows, they combine the scalars.
+    """
+
+    mesh: Mesh
+    names: tuple[str, ...]
+    multipliers: int
+    held: tuple[bool, bool]
+    stiffness: Float[np.ndarray, "elements order 3"]
+    softness: Float[np.ndarray, "elements order 3"]
+    force: Rows
+    moment: Rows
+    tension: Row
+    torsion: Row
+    quadratic: Float[np.ndarray, "scalars scalars"]
+    turned: Float[np.ndarray, "2 3 scalars"]
+    reaction: Float[np.ndarray, "3 scalars"]
+    origin: Float[np.ndarray, "3 scalars"]
+    from_start: tuple[bool, bool, bool]
+
+    @property
+    def scalars(self) -> int:
+        """Number of multipliers and parameters, and 1 for the constant."""
+        return self.multipliers + len(self.names) + 1
+
+    @cached_property
+    def soft(self) -> bool:
+        """Whether the rod stretches or shears."""
+        return bool(self.softness.any())
+
+    @property
+    def unknown_nodes(self) -> slice:
+        """Nodes whose rotations are unknown."""
+        count = len(self.mesh.nodes)
+        return slice(int(self.held[0]), count - int(self.held[1]))
+
+    def map_scalars(
+        self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
+    ) -> "SpatialModel":
+        """The same rod in new parameters ``y``, of which its scalars are ``matrix @ y``."""
+
+        def mapped(rows: np.ndarray) -> np.ndarray:
+            return np.asarray(np.einsum("jk,j...->k...", matrix, rows))
+
+        return replace(
+            self,
+            names=tuple(names),
+            force=mapped(self.force),
+            moment=mapped(self.moment),
+            tension=mapped(self.tension),
+            torsion=mapped(self.torsion),
+            quadratic=matrix.T @ self.quadratic @ matrix,
+            turned=self.turned @ matrix,
+            reaction=self.reaction @ matrix,
+            origin=self.origin @ matrix,
+        )
+
+
+def raw_names(ends: Ends, terms: Mapping[str, Sequence[Term]]) -> tuple[str, ...]:
+    """Parameters of a rod before coordinates are chosen: angles, amplitudes, places."""
+    angles = [
+        f"{angle}_{side}"
+        for side, end in zip("AB", ends, strict=True)
+        if not end.turns
+        for angle in ANGLES
+    ]
+    places = [axis.name for axis in support_axes(ends) if axis.opposed]
+    return (*angles, *terms, *places)
+
+
+def raw_model(build: Build) -> SpatialModel:
+    """Arrays of a rod in the parameters of `raw_names`."""
+    mesh, ends = build.mesh, build.ends
+    names, axes = raw_names(ends, build.terms), support_axes(ends)
+    opposed = [axis for axis in axes if axis.opposed]
+    m = len(opposed)
+    place = {name: m + i for i, name in enumerate(names)}
+    count = m + len(names) + 1
+    stiffness, softness = _stiffnesses(build)
+    total = {name: _sum_effects(terms, mesh) for name, terms in build.terms.items()}
+    rows = np.zeros((2, count, mesh.elements, mesh.degree + 1, 3))
+    (force, moment), (tension, torsion) = rows, np.zeros((2, *rows.shape[1:-1]))
+    natural = np.zeros_like(moment)
+    natural[-1] = np.stack([at_nodes(each, mesh) for each in build.natural], axis=-1)
+    for c, axis in enumerate(opposed):
+        force[c] = axis.unit
+    for name, each in total.items():
+        row = place[name]
+        # a free end B takes no load: what lies beyond a cross-section hangs on end A
+        hung = [axis.last == FREE for axis in axes] * each.total
+        force[row], natural[row] = each.force - hung, each.natural
+        moment[row] = each.moment
+        # amplitudes of tendons are tensions times the unit of their offsets
+        tension[row] = 0.0 if build.axial is None else each.tension * build.length
+        torsion[row] = each.torsion / build.length
+    moment += stiffness * natural
+    weights = mesh.element_weights[..., None] * stiffness
+    quadratic = np.einsum("jeik,eik,leik->jl", natural, weights, natural)
+    reaction, origin, from_start = _supports(axes, total, place, quadratic)
+    turned = np.zeros((2, 3, count))
+    for side, end in enumerate(ends):
+        if not end.turns:
+            for k, angle in enumerate(ANGLES):
+                turned[side, k, place[f"{angle}_{'AB'[side]}"]] = 1.0
+    return SpatialModel(
+        mesh, names, m, (not ends[0].turns, not ends[1].turns), stiffness, softness,
+        force, moment, tension, torsion, quadratic, turned, reaction, origin, from_start,
+    )  # fmt: skip
+
+
+def _stiffnesses(
+    build: Build,
+) -> tuple[Float[np.ndarray, "elements order 3"], Float[np.ndarray, "elements order 3"]]:
+    """K and γ at the nodes of every element."""
+    mesh = build.mesh
+    plane = at_nodes(build.stiffness, mesh) / FOUR_PI_SQUARED
+    twist, aside = (plane * at_nodes(each, mesh) for each in build.ratios)
+    softness = np.zeros((*plane.shape, 3))
+    if build.axial is not None:
+        softness[..., 0] = 1.0 / at_nodes(build.axial, mesh)
+    if build.shear is not None:
+        for k, each in enumerate(build.shear):
+            softness[..., 1 + k] = 1.0 / at_nodes(each, mesh)
+    return np.stack([twist, aside, plane], axis=-1), softness
+
+
+def _sum_effects(terms: Sequence[Term], mesh: Mesh) -> SpatialEffects:
+    """Effects of several terms with one amplitude."""
+    out = SpatialEffects.none(mesh)
+    for term in terms:
+        for name, part in vars(effects(term, mesh)).items():
+            getattr(out, name)[:] += part
+    return out
+
+
+def _supports(
+    axes: Sequence[Axis],
+    total: Mapping[str, SpatialEffects],
+    place: Mapping[str, int],
+    quadratic: Float[np.ndarray, "scalars scalars"],
+) -> tuple[Float[np.ndarray, "3 scalars"], Float[np.ndarray, "3 scalars"], tuple[bool, bool, bool]]:
+    """Add the energy of the supports; A's reaction; where the rod begins, or ends if A is free.
+
+    Along each axis as in the plane, see `structures.rod.model`: with λ the force of the support at
+    A, F that of all loads, x the place of B's support, and compliances c:
+    ``−(λ + F) x − ½ c_A λ² − ½ c_B (λ + F)²``, end A at ``−c_A λ``, end B at ``x + c_B (λ + F)``.
+    """
+    count, multiplier = len(quadratic), 0
+    reactions, origin, from_start = np.zeros((3, count)), np.zeros((3, count)), [True] * 3
+    for i, axis in enumerate(axes):
+        loads, reaction, site = np.zeros((3, count))
+        for name, each in total.items():
+            loads[place[name]] = each.total[i]
+        if axis.opposed:
+            reaction[multiplier] = 1.0
+            site[place[axis.name]] = 1.0
+            multiplier += 1
+        elif axis.last == FREE:
+            reaction = -loads
+        rest = reaction + loads
+        reactions[i] = reaction
+        quadratic -= np.outer(rest, site) + np.outer(site, rest)
+        if axis.first != FREE:
+            quadratic -= compliance(axis.first) * np.outer(reaction, reaction)
+            origin[i] -= compliance(axis.first) * reaction
+        if axis.last != FREE:
+            quadratic -= compliance(axis.last) * np.outer(rest, rest)
+        if axis.first == FREE:
+            origin[i] += compliance(axis.last) * rest
+            from_start[i] = False
+    return reactions, origin, (from_start[0], from_start[1], from_start[2])

@@ -1,0 +1,115 @@
+"""Unit quaternions, scalar part first, as rotations of cross-sections; and jets of their functions.
+
+A cross-section has the rotation R with the columns t, n, b. Products act on the last axis.
+
+A *jet* carries derivatives along: its first axis has one part (a value), two (value and derivative
+along v), or four (value, along v, along w, and the mixed second derivative).
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+Quaternions = Float[np.ndarray, "*some 4"]
+Jet = Float[np.ndarray, "parts *some"]
+
+PAIRS: dict[int, tuple[tuple[tuple[int, int], ...], ...]] = {
+    1: (((0, 0),),),
+    2: (((0, 0),), ((0, 1), (1, 0))),
+    4: (((0, 0),), ((0, 1), (1, 0)), ((0, 2), (2, 0)), ((0, 3), (1, 2), (2, 1), (3, 0))),
+}
+"""Parts of two factors whose products add up to each part of the product."""
+
+
+def product(a: Quaternions, b: Quaternions) -> Quaternions:
+    """Product a b of quaternions."""
+    a0, a1, a2, a3 = np.moveaxis(a, -1, 0)
+    b0, b1, b2, b3 = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
+            a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
+            a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
+            a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
+        ],
+        axis=-1,
+    )
+
+
+UNITS = np.eye(4)[1:]
+"""e₁, e₂, e₃."""
+RIGHT = np.stack([product(np.eye(4), unit).T for unit in UNITS])
+"""q e_k is ``RIGHT[k] @ q``; each matrix is skew."""
+LEFT = np.stack([product(unit, np.eye(4)).T for unit in UNITS])
+"""e_k q is ``LEFT[k] @ q``."""
+FRAME = np.zeros((3, 3, 4, 4))
+"""Component c of column k of R is ``q · FRAME[k, c] @ q`` where |q| = 1."""
+for _k in range(3):
+    for _c in range(3):  # q e_k q* = (e_c q) · (q e_k)
+        _matrix = LEFT[_c].T @ RIGHT[_k]
+        FRAME[_k, _c] = 0.5 * (_matrix + _matrix.T)
+
+
+def exponential(vectors: Float[np.ndarray, "*some 3"]) -> Quaternions:
+    """Rotations by rotation vectors."""
+    half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vectors], axis=-1)
+
+
+def rotation_vectors(q: Quaternions) -> Float[np.ndarray, "*some 3"]:
+    """Rotation vectors of rotations, from −π to π: the shorter way round."""
+    near = np.where(q[..., :1] < 0.0, -q, q)
+    sine = np.linalg.norm(near[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, near[..., :1])
+    rate = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 2.0)
+    return np.asarray(rate * near[..., 1:])
+
+
+def conjugate(q: Quaternions) -> Quaternions:
+    """Inverse rotations."""
+    return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
+
+
+def matrices(q: Quaternions) -> Float[np.ndarray, "*some 3 3"]:
+    """Rotation matrices, with the columns t, n, b."""
+    return np.asarray(np.einsum("...a,kcab,...b->...ck", q, FRAME, q, optimize=True))
+
+
+# --- jets -----------------------------------------------------------------------------------------
+
+
+def bilinear(multiply: Callable[[np.ndarray, np.ndarray], np.ndarray], a: Jet, b: Jet) -> Jet:
+    """Jet of a product that is linear in both factors."""
+    return np.stack([sum(multiply(a[i], b[j]) for i, j in pairs) for pairs in PAIRS[len(a)]])
+
+
+def compose(value: np.ndarray, first: np.ndarray, second: np.ndarray, inner: Jet) -> Jet:
+    """Jet of f(x) for the jet of x, from f, f' and f'' at its value."""
+    parts = [value, *(first * part for part in inner[1:])]
+    if len(inner) == 4:
+        parts[3] = parts[3] + second * inner[1] * inner[2]
+    return np.stack(parts)
+
+
+def half_turn(angle: Jet, axis: int) -> Jet:
+    """Rotations exp(e_k angle/2) about axis k = 0, 1, 2 as a jet of quaternions."""
+    c, s = np.cos(0.5 * angle[0]), np.sin(0.5 * angle[0])
+    out = np.zeros((*angle.shape, 4))
+    out[..., 0] = compose(c, -0.5 * s, -0.25 * c, angle)
+    out[..., 1 + axis] = compose(s, 0.5 * c, -0.25 * s, angle)
+    return out
+
+
+def clamp_rotation(angles: Float[np.ndarray, "parts lanes 3"]) -> Jet:
+    """Rotation exp(e₃ a/2) exp(e₂ b/2) exp(e₁ τ/2) of a clamp from its angles (a, b, τ)."""
+    turns = [half_turn(angles[..., k], axis) for k, axis in enumerate((2, 1, 0))]
+    return bilinear(product, bilinear(product, turns[0], turns[1]), turns[2])
+
+
+def normalised(q: Jet) -> tuple[Jet, Jet, Jet]:
+    """q/|q|, 1/|q| and |q|² of quaternions as jets."""
+    square = bilinear(lambda a, b: (a * b).sum(axis=-1), q, q)
+    rho = square[0]
+    inverse = compose(rho**-0.5, -0.5 * rho**-1.5, 0.75 * rho**-2.5, square)
+    return bilinear(lambda a, b: a[..., None] * b, inverse, q), inverse, square

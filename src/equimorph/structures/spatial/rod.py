@@ -1,0 +1,488 @@
+"""Elastic rods in space."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.argument_checks import check_arguments
+from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.errors import InputError
+from equimorph.linalg import Border, BorderedSolution
+from equimorph.model import Descriptor, Drawing
+from equimorph.structures.contract import (
+    Advance,
+    Direction,
+    LinearSystem,
+    Structure,
+    Symmetry,
+)
+from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.profiles import LoadSpec, load_shape
+from equimorph.structures.rod.sections import SectionProperties, cross_section
+from equimorph.structures.rod.space_options import SpaceOptions
+from equimorph.structures.rod.terms import LineLoad, Term
+from equimorph.structures.rod.units import rod_units
+from equimorph.structures.spatial import descriptors
+from equimorph.structures.spatial.description import SpatialDescription
+from equimorph.structures.spatial.drawing import RodDrawing
+from equimorph.structures.spatial.ends import Ends
+from equimorph.structures.spatial.errors import discretisation_error
+from equimorph.structures.spatial.fields import Fields, SpatialFields
+from equimorph.structures.spatial.mechanics import SpatialMechanics
+from equimorph.structures.spatial.model import raw_model
+from equimorph.structures.spatial.natural import natural_states
+from equimorph.structures.spatial.symmetry import symmetries
+from equimorph.structures.states import State, States
+from equimorph.structures.unit_system import Quantity, unit_system
+
+DEFAULT_SPAN = float(np.sin(1.0))
+CLAMPED = ("clamped", "clamped")
+ARCS = 128
+"""Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""
+PROFILES: Mapping[str, Any] = {
+    **{"stiffness": 1.0, "curvature": 0.0, "side_curvature": 0.0, "natural_twist": 0.0},
+    **{"axial": None, "shear": None},
+}
+"""Profiles along the rod with their defaults."""
+
+
+class SpatialRod(Structure):
+    """Elastic rod in space: it bends about two axes and twists, and may stretch and shear.
+
+    Energy ``E = ∫ ½ (u − u₀)·K (u − u₀) ds`` plus the potential of dead loads, with the strains u:
+    the twist and the curvatures about the axes n and b of the cross-section; constraints
+    ``∫ t ds = place of end B``. Unit quaternions at Gauss–Lobatto nodes with quadrature at the
+    nodes, so that energy, residual and Hessian agree exactly; critical loads converge with twice
+    the degree. Planar states lie in z = 0: t is the tangent, n the normal on its left, b along z.
+
+    Scales as of `Rod`: lengths by L, forces by 4π²B/L², energies and couples by 4π²B/L, curvatures
+    by 1/L; with `EI` or a section, and `length`, all numbers are in the user's units. Arclengths s
+    are shares of the length, from 0 at end A to 1 at end B.
+
+    Parameters are, in this order: the coordinates; of each end whose rotation is held the angles
+    ``theta_A``, ``tilt_A``, ``twist_A`` of R = exp(e₃ θ) exp(e₂ tilt) exp(e₁ twist); actuators;
+    loads; and where both ends are supported the place ``nu``, ``rise``, ``sideways`` of end B along
+    x, y and z. Between clamps, Theta and Delta stand for θ_A = Δ + Θ, θ_B = Δ − Θ. A clamp turned
+    by a twist of 4π is the same again, one turned by 2π holds the rod with another link.
+
+    Parameters
+    ----------
+    load
+        "uniform", "left-half", a table [[s, Q], ...] or a callable Q(s): a line load q, positive
+        downward. The default is uniform, unless there are `loads`.
+    span
+        Default of the parameter nu.
+    torsion, lateral
+        GJ and EI out of the plane, for bending about n: relative to the bending stiffness in the
+        plane, about b (numbers, tables or callables), or texts with units.
+    section
+        A `Strip`, `Round`, `Tube` or `OwnSection` in place of EI, torsion and lateral.
+    ends
+        Ends A and B: "clamped", "pinned" (a ball joint), "free", "guided" (rotation, y and z are
+        held), or a `SpatialEnd`. One of them has to hold the rotation.
+    stiffness
+        Bending stiffness about b relative to B (to `EI`): a number, a table or a callable.
+    curvature, side_curvature, natural_twist
+        Intrinsic curvature about b, about n, and intrinsic twist: numbers, tables or callables.
+    axial, shear
+        Axial stiffness EA(s), and stiffness against shear along n and b, in units of force. None:
+        rigid.
+    loads
+        More parameters of the role "load" by name, 0 by default: a `LineLoad` or `PointForce` with
+        directions (x, y, z), or several of a kind that share the amplitude. All are dead loads.
+    actuators
+        The same for the role "actuator"; `Curvature` patterns about any axis and `Tendon`s, above
+        all. A small curvature about n, or a load along z, is an imperfection that breaks the
+        symmetry of planar states.
+    coordinates
+        Named linear coordinates in place of parameters; see `Rod`. ``{}`` leaves theta_A, theta_B.
+    rise, sideways
+        Defaults of the place of end B along y and z.
+    kinks
+        Arclengths at which a callable is not smooth.
+    elements, degree
+        Resolution: the default, six elements of degree 6, gives critical loads of the arch to 3e-9.
+    EI, length, units
+        As of `Rod`.
+
+    Raises
+    ------
+    InputError
+        For stiffnesses that are missing or not positive, an end B that is out of reach, supports
+        that let the rod drift or spin, couples and pressure (they have no potential in space), and
+        as for `Rod`.
+
+    References
+    ----------
+    [Antman2005]_, chapter VIII: the theory of Kirchhoff and Cosserat rods.
+
+    Examples
+    --------
+    A cantilever strip bends in its plane under its tip load:
+
+    >>> from equimorph import PointForce, SpatialRod, lift
+    >>> ends, tip = ("clamped", "free"), {"P": PointForce(1.0)}
+    >>> rod = SpatialRod(torsion=0.8, lateral=50.0, ends=ends, loads=tip, EI=1.0, length=1.0)
+    >>> bent = lift(rod.natural_state(), to={"P": 2.0}).end.state
+    >>> round(-rod.height(1.0)(bent), 5)
+    0.49346
+    """
+
+    kind: ClassVar[str] = "spatial rod"
+    endless_in: ClassVar[str] = "max_curvature"
+
+    def __init__(  # noqa: PLR0913  # what a rod can have
+        self,
+        load: LoadSpec | None = None,
+        span: Quantity | None = None,
+        *,
+        torsion: Any = None,
+        lateral: Any = None,
+        section: Any = None,
+        ends: Sequence[Any] = CLAMPED,
+        stiffness: Any = 1.0,
+        curvature: Any = 0.0,
+        side_curvature: Any = 0.0,
+        natural_twist: Any = 0.0,
+        axial: Any = None,
+        shear: Any = None,
+        loads: Mapping[str, Any] | None = None,
+        actuators: Mapping[str, Any] | None = None,
+        coordinates: Mapping[str, Mapping[str, float]] | None = None,
+        rise: Quantity = 0.0,
+        sideways: Quantity = 0.0,
+        kinks: Sequence[float] = (),
+        elements: int = 6,
+        degree: int = 6,
+        EI: Quantity | None = None,
+        length: Quantity | None = None,
+        units: Mapping[str, Any] | None = None,
+    ) -> None:
+        if not (isinstance(elements, int) and elements >= 2):
+            raise InputError(f"`elements` must be a whole number >= 2; got {elements!r}.")
+        if not (isinstance(degree, int) and 3 <= degree <= 16):
+            raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
+        system = unit_system(units)
+        made = None if section is None else cross_section(section)
+        self._space = SpaceOptions(torsion, lateral, made).check(EI, length)
+        self.units = rod_units(self._space.bending_stiffness(EI, system), length, system)
+        system.check_all_have_units(
+            {"EI": EI, "length": length, "span": span, "rise": rise, "sideways": sideways}
+        )
+        number = self.units.number
+        shape = "uniform" if load is None and loads is None else load
+        own = {} if shape is None else {"q": LineLoad(shape, kinks=kinks)}
+        if shape is not None:
+            load_shape(shape, kinks)
+        reach = DEFAULT_SPAN * self.units.value("length")
+        self._resolution = (elements, degree)
+        self._given = {
+            "stiffness": stiffness,
+            "curvature": number(curvature, "1/length", "curvature"),
+            "side_curvature": number(side_curvature, "1/length", "side_curvature"),
+            "natural_twist": number(natural_twist, "1/length", "natural_twist"),
+            "axial": number(axial, "force", "axial"),
+            "shear": number(shear, "force", "shear"),
+        }
+        self.description = SpatialDescription(
+            ends,
+            {**self._given, **self._ratios()},
+            {**own, **(loads or {})},
+            actuators or {},
+            coordinates,
+            {
+                "nu": reach if span is None else float(number(span, "length", "span")),
+                "rise": float(number(rise, "length", "rise")),
+                "sideways": float(number(sideways, "length", "sideways")),
+            },
+            kinks,
+            self.units,
+        )
+        self.description.check_places()
+        self.parameters = self.description.parameters
+        self.mechanics = SpatialMechanics(self.description.model(elements, degree))
+        self.unknowns, self.constraints = self.mechanics.unknowns, self.mechanics.constraints
+        self.mass, self.length_unit = self.mechanics.mass, self.units.label("length")
+        self.energy_scale = self.units.value("couple")
+
+    def _ratios(self) -> dict[str, Any]:
+        """Stiffnesses against twist and out of the plane, relative to that in the plane."""
+        made = self._space.properties(self.units)
+        if made is not None:
+            return {"torsion": made.torsion, "lateral": made.lateral}
+        if self._space.torsion is None:
+            raise InputError(
+                "`torsion`, `lateral` must be given for a rod in space; got neither. Give these, "
+                "like torsion=0.77, lateral=1.0 for a round one, or a section."
+            )
+        names = ("torsion", "lateral")
+        return {name: self._space.ratio(name, self.units) for name in names}
+
+    def identity(self) -> dict[str, Any]:
+        """Kind, resolution, and everything that differs from the default."""
+        elements, degree = self._resolution
+        data: dict[str, Any] = {"kind": self.kind, **self.description.data()}
+        for name, default in PROFILES.items():
+            value = self._given[name]
+            if callable(value):
+                raise InputError(
+                    f"`{name}` must be a number or a table to be written to a file; got a "
+                    "callable. Sample it into a table [[s, f], ...]."
+                )
+            if not (isinstance(value, int | float | None) and value == default):
+                data[name] = value.tolist() if isinstance(value, np.ndarray) else value
+        data |= self.units.data() | self._space.data()
+        if self._space.section is not None:  # which gives it
+            data.pop("EI")
+        return {**data, "elements": elements, "degree": degree}
+
+    # --- the contract ---------------------------------------------------------------------------
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """Potential energy E, in units of 4π²B/L."""
+        return self.mechanics.energy(z, p)
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+        return self.mechanics.residual(z, p)
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return self.mechanics.parameter_derivative(z, p, dp)
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        return self.mechanics.second_derivative(z, p, v, w)
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p: couples and forces of actuators, displacements of loads."""
+        return self.mechanics.effort(z, p)
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with F_z − shift·mass, bordered."""
+        return self.mechanics.solve(z, p, rhs, border, shift)
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z; computed together."""
+        return self.mechanics.linear_system(z, p, directions)
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step, with tangent and inertia."""
+        return self.mechanics.advance(z, p, dp, row, corner, defect)
+
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Random guesses."""
+        return self.mechanics.sample(p, generator)
+
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether the highest Legendre coefficients of the rotations are small in every element."""
+        return self.mechanics.resolved(z, p)
+
+    def error_estimate(self, z: Lanes, p: Parameters) -> Values:
+        """Bound of the errors of curvature and place, by solving again with a higher degree.
+
+        Twice the largest change of max |κ|, and of strains and places at 25 arclengths. Infinite
+        where the finer rod has no equilibrium near the state, as may happen at a fold.
+        """
+        return discretisation_error(self.mechanics, self._refined, z, p)
+
+    @cached_property
+    def _refined(self) -> SpatialMechanics:
+        elements, degree = self._resolution
+        return SpatialMechanics(self.description.model(elements, min(degree + 4, 16)))
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Mirror images and half turns of equilibria that are equilibria."""
+        return self._symmetries
+
+    @cached_property
+    def _symmetries(self) -> tuple[Symmetry, ...]:
+        return symmetries(self.mechanics.model, self.unknowns)
+
+    # --- natural states -------------------------------------------------------------------------
+
+    @cached_property
+    def _raw(self) -> SpatialMechanics:
+        """Mechanics in the parameters of `model.raw_names`."""
+        return SpatialMechanics(raw_model(self.description.build(*self._resolution)))
+
+    def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
+        """Unloaded rod, continued from its stress-free shape."""
+        raw, m = self._raw, self.constraints
+        matrix = self.description.matrix(raw.model)[m:-1, m:]
+        given = np.concatenate([p, np.ones((len(p), 1))], axis=1)
+        return natural_states(raw, given @ matrix.T)
+
+    def unloaded(self) -> Mapping[str, float]:
+        """All loads zero."""
+        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
+
+    @check_arguments
+    def natural_state(self, **values: float) -> State:
+        """Natural state at given actuators: unloaded, continued from the stress-free rod.
+
+        Raises
+        ------
+        InputError
+            For unknown or meaningless parameters, a load that is not 0, or where the continuation
+            from the stress-free shape meets a fold.
+        """
+        p = self.natural_parameters(values)
+        z, found = self.natural(p[None])
+        if found[0]:
+            return State(self, z[0], p)
+        given = ", ".join(
+            f"{each.name}={value:g}" for each, value in zip(self.parameters, p, strict=True)
+        )
+        raise InputError(
+            f"`natural_state` must be reached from the stress-free rod; got {given}, and the "
+            "continuation ends before. A straight rod buckles any way: turn an end, give it "
+            "curvature, or choose ends nearer to the stress-free ones."
+        )
+
+    def natural_states(self, p: Parameters) -> tuple[States, Flags]:
+        """Natural states of many settings, and which of them were found."""
+        z, found = self.natural(p)
+        return States(self, z, p), found
+
+    # --- shapes ---------------------------------------------------------------------------------
+
+    @property
+    def mesh(self) -> Mesh:
+        """Elements along the rod."""
+        return self.mechanics.mesh
+
+    @cached_property
+    def recovery(self) -> SpatialFields:
+        """Fields along the rod, non-dimensional."""
+        return SpatialFields(self.mechanics)
+
+    def fields(self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]) -> Fields:
+        """Rotations, places and strains at arclengths, in the user's units."""
+        found = self.recovery.at(z, p, s)
+        length, bend = self.units.value("length"), self.units.value("curvature")
+        return Fields(found.rotations, length * found.places, bend * found.strains)
+
+    def shape(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "lanes points 3"]:
+        """Positions (x, y, z) at arclengths `s` (default: 101 equidistant ones)."""
+        at = np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
+        return self.fields(z, p, at).places
+
+    def frames(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes points 3 3"]:
+        """Axes of the cross-sections at arclengths: the columns of each matrix are t, n, b."""
+        return self.recovery.at(z, p, s).frames
+
+    def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 3"]:
+        """Shape as cubic arcs with the rod's positions and tangents at their ends."""
+        fields = self.fields(z, p, np.linspace(0.0, 1.0, ARCS + 1))
+        rate = fields.frames[..., 0] * (self.units.value("length") / ARCS)
+        places = fields.places
+        return np.stack([places[:, :-1], places[:, 1:], rate[:, :-1], rate[:, 1:]], axis=2)
+
+    def drawing(self, z: Lanes, p: Parameters) -> Drawing:
+        """Supports of the ends, loads, tendons and segments that bend."""
+        draw = RodDrawing(self.recovery, self.ends, self.units.value("length"))
+        return draw(self.description.amplitudes(p), z, p)
+
+    @property
+    def ends(self) -> Ends:
+        """How ends A and B are supported."""
+        return self.description.supports
+
+    @property
+    def terms(self) -> dict[str, tuple[Term, ...]]:
+        """Loads and actuators that act on the rod, by the name of their amplitude."""
+        return self.description.terms
+
+    @property
+    def section(self) -> SectionProperties | None:
+        """Stiffnesses and weight of the section in the rod's units; None if none was given."""
+        return self._space.properties(self.units)
+
+    # --- descriptors ----------------------------------------------------------------------------
+
+    @check_arguments
+    def height(self, s: float) -> Descriptor:
+        """y(s), in units of L."""
+        return descriptors.coordinate(self, "height", s)
+
+    @check_arguments
+    def position(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
+        """(x(s), y(s), z(s)), in units of L."""
+        x, y, z = (descriptors.coordinate(self, name, s) for name in ("x", "height", "z"))
+        return x, y, z
+
+    @check_arguments
+    def angles(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
+        """Angles turn, tilt, roll of R = exp(e₃ turn) exp(e₂ tilt) exp(e₁ roll) at s.
+
+        Turn and roll lie between −π and π; all three jump where the tangent is along ±z.
+        """
+        turn, tilt, roll = (descriptors.angle(self, name, s) for name in descriptors.ANGLES)
+        return turn, tilt, roll
+
+    @check_arguments
+    def strains(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
+        """Twist, and curvatures about n and b, at s, in units of 1/L."""
+        twist, aside, bend = (descriptors.strain(self, name, s) for name in descriptors.STRAINS)
+        return twist, aside, bend
+
+    @check_arguments
+    def bending(self, s: float) -> Descriptor:
+        """Bending curvature √(κ_n² + κ_b²) at s, in units of 1/L."""
+        return descriptors.bending(self, s)
+
+    @cached_property
+    def max_curvature(self) -> Descriptor:
+        """Largest bending curvature along the rod, in units of 1/L."""
+        return descriptors.max_curvature(self)
+
+    @cached_property
+    def total_energy(self) -> Descriptor:
+        """Potential energy E, in units of 4π²B/L."""
+        return descriptors.total_energy(self)
+
+    @check_arguments
+    def support_force(self, component: str) -> Descriptor:
+        """Force of the support at A on the rod along "x", "y" or "z"."""
+        return descriptors.support_force(self, component)
+
+    @check_arguments
+    def end_couple(self, end: int, component: str) -> Descriptor:
+        """Couple of the support at end 0 or 1 on the rod, about an axis "x", "y" or "z"."""
+        return descriptors.end_couple(self, end, component)
+
+    @check_arguments
+    def clearance(self, apart: float = 0.1) -> Descriptor:
+        """Smallest distance between points whose arclengths differ by `apart` at least.
+
+        Contact is not modelled: a rod of thickness h touches itself where this is below h.
+        """
+        return descriptors.clearance(self, apart)
+
+    @property
+    def elevation(self) -> Descriptor:
+        """y(½)."""
+        return self.height(0.5)
+
+    def descriptor(self, text: str) -> Descriptor:
+        """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
+        return descriptors.descriptor_from_text(self, text)
