@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -60,6 +60,7 @@ class Point:
         self.t[lanes], self.x[lanes], self.slope[lanes] = other.t, other.x, other.slope
 
 
+@runtime_checkable
 class Continued(Protocol):
     """Mechanics that can be continued."""
 

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -10,10 +9,9 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
 from equimorph.structures.rod.descriptors import check_arclength, name_at, read_fraction, symbol_at
-from equimorph.structures.rod.units import Units
 from equimorph.structures.spatial.clearance import closest_approach, stations
-from equimorph.structures.spatial.fields import Fields, SpatialFields
-from equimorph.structures.spatial.mechanics import SpatialMechanics
+from equimorph.structures.spatial.fields import Fields
+from equimorph.structures.spatial.measured import MeasuredInSpace
 
 COORDINATES = {"x": 0, "height": 1, "z": 2}
 STRAINS = {"twist": 0, "side_curvature": 1, "curvature": 2}
@@ -31,28 +29,8 @@ WRITTEN = (
 )
 
 
-class InSpace(Protocol):
-    """What the descriptors need of a rod in space."""
-
-    @property
-    def units(self) -> Units:
-        """Its units."""
-
-    @property
-    def signature(self) -> Any:
-        """Its identity."""
-
-    @property
-    def mechanics(self) -> SpatialMechanics:
-        """Its mechanics."""
-
-    @property
-    def recovery(self) -> SpatialFields:
-        """Its fields."""
-
-
 def _pointwise(
-    rod: InSpace, name: str, s: float, quantity: str, of: Callable[[Fields], np.ndarray]
+    rod: MeasuredInSpace, name: str, s: float, quantity: str, of: Callable[[Fields], np.ndarray]
 ) -> Descriptor:
     """A field at one arclength."""
     at, unit = np.array([check_arclength(s)]), rod.units.value(quantity)
@@ -64,19 +42,19 @@ def _pointwise(
     return Descriptor(written, rod.units.label(quantity), value, symbol, rod.signature)
 
 
-def coordinate(rod: InSpace, name: str, s: float) -> Descriptor:
+def coordinate(rod: MeasuredInSpace, name: str, s: float) -> Descriptor:
     """x(s), y(s) or z(s)."""
     axis = COORDINATES[name]
     return _pointwise(rod, name, s, "length", lambda fields: fields.places[:, 0, axis])
 
 
-def strain(rod: InSpace, name: str, s: float) -> Descriptor:
+def strain(rod: MeasuredInSpace, name: str, s: float) -> Descriptor:
     """Twist, or curvature about n or b, at an arclength."""
     axis = STRAINS[name]
     return _pointwise(rod, name, s, "curvature", lambda fields: fields.strains[:, 0, axis])
 
 
-def bending(rod: InSpace, s: float) -> Descriptor:
+def bending(rod: MeasuredInSpace, s: float) -> Descriptor:
     """Bending curvature √(κ_n² + κ_b²) at an arclength."""
 
     def size(fields: Fields) -> np.ndarray:
@@ -85,7 +63,7 @@ def bending(rod: InSpace, s: float) -> Descriptor:
     return _pointwise(rod, "bending", s, "curvature", size)
 
 
-def angle(rod: InSpace, name: str, s: float) -> Descriptor:
+def angle(rod: MeasuredInSpace, name: str, s: float) -> Descriptor:
     """Angle a, b or τ of the cross-section R = exp(e₃ a) exp(e₂ b) exp(e₁ τ) at an arclength.
 
     The tangent is (cos a cos b, sin a cos b, −sin b); a and τ lie between −π and π.
@@ -102,7 +80,7 @@ def angle(rod: InSpace, name: str, s: float) -> Descriptor:
     return _pointwise(rod, name, s, "angle", found)
 
 
-def max_curvature(rod: InSpace) -> Descriptor:
+def max_curvature(rod: MeasuredInSpace) -> Descriptor:
     """Largest bending curvature along the rod."""
     unit = rod.units.value("curvature")
 
@@ -116,7 +94,7 @@ def max_curvature(rod: InSpace) -> Descriptor:
     return Descriptor("max_curvature", label, value, "max |κ|", rod.signature, place)
 
 
-def total_energy(rod: InSpace) -> Descriptor:
+def total_energy(rod: MeasuredInSpace) -> Descriptor:
     """Potential energy E."""
     unit = rod.units.value("couple")
 
@@ -126,7 +104,7 @@ def total_energy(rod: InSpace) -> Descriptor:
     return Descriptor("energy", rod.units.energy_label, value, "E", rod.signature)
 
 
-def support_force(rod: InSpace, component: str) -> Descriptor:
+def support_force(rod: MeasuredInSpace, component: str) -> Descriptor:
     """Component of the force of the support at A on the rod."""
     if component not in FORCES:
         raise InputError(f"`component` must be 'x', 'y' or 'z'; got {component!r}.")
@@ -139,7 +117,7 @@ def support_force(rod: InSpace, component: str) -> Descriptor:
     return Descriptor(name, rod.units.label("force"), value, "λμν"[axis], rod.signature)
 
 
-def end_couple(rod: InSpace, end: int, component: str) -> Descriptor:
+def end_couple(rod: MeasuredInSpace, end: int, component: str) -> Descriptor:
     """Component of the couple of the support at an end on the rod, about an axis in space."""
     if end not in {0, 1}:
         raise InputError(f"`end` must be 0 or 1; got {end!r}.")
@@ -154,7 +132,7 @@ def end_couple(rod: InSpace, end: int, component: str) -> Descriptor:
     return Descriptor(name, label, value, f"M_{component}({end})", rod.signature)
 
 
-def clearance(rod: InSpace, apart: float) -> Descriptor:
+def clearance(rod: MeasuredInSpace, apart: float) -> Descriptor:
     """Smallest distance between points that lie `apart` or further along the rod."""
     number = float(apart) if isinstance(apart, int | float) else np.nan
     if not 0.0 < number < 1.0:
@@ -176,7 +154,7 @@ def clearance(rod: InSpace, apart: float) -> Descriptor:
     return Descriptor(name, label, value, "clearance", rod.signature, place)
 
 
-def descriptor_from_text(rod: InSpace, text: str) -> Descriptor:
+def descriptor_from_text(rod: MeasuredInSpace, text: str) -> Descriptor:
     """Descriptor written as text."""
     match = re.fullmatch(r"\s*(\w+)\s*(?:\(\s*([^()]*?)\s*\))?\s*", text)
     name, argument = (match.group(1), match.group(2)) if match else ("", None)
@@ -192,7 +170,7 @@ def descriptor_from_text(rod: InSpace, text: str) -> Descriptor:
     )
 
 
-def _of_argument(rod: InSpace, name: str, argument: str) -> Descriptor | None:
+def _of_argument(rod: MeasuredInSpace, name: str, argument: str) -> Descriptor | None:
     """Descriptor of a name with something in parentheses; None for another name."""
     if name == "support_force":
         return support_force(rod, argument)
@@ -204,7 +182,7 @@ def _of_argument(rod: InSpace, name: str, argument: str) -> Descriptor | None:
     return _of_arclength(rod, name, read_fraction(argument)) if name in SYMBOLS else None
 
 
-def _of_arclength(rod: InSpace, name: str, s: float) -> Descriptor:
+def _of_arclength(rod: MeasuredInSpace, name: str, s: float) -> Descriptor:
     """Field at an arclength by its name."""
     if name in COORDINATES:
         return coordinate(rod, name, s)

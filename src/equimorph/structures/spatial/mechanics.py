@@ -159,7 +159,7 @@ class SpatialMechanics:
         local = local + np.einsum("eij,pleia->pleja", self.slopes, spread)
         return self._assemble(local)
 
-    def _assemble(self, local: Float[np.ndarray, "*some elements order 4"]) -> np.ndarray:
+    def _assemble(self, local: Float[np.ndarray, "... elements order 4"]) -> np.ndarray:
         """Sum what belongs to the same node."""
         out = np.zeros((*local.shape[:-3], len(self.mesh.nodes), 4), local.dtype)
         for e, nodes in enumerate(self.mesh.element_nodes):

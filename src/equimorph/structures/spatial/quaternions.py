@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-Quaternions = Float[np.ndarray, "*some 4"]
-Jet = Float[np.ndarray, "parts *some"]
+Quaternions = Float[np.ndarray, "... 4"]
+Jet = Float[np.ndarray, "parts ..."]
 
 PAIRS: dict[int, tuple[tuple[tuple[int, int], ...], ...]] = {
     1: (((0, 0),),),
@@ -51,13 +51,13 @@ for _k in range(3):
         FRAME[_k, _c] = 0.5 * (_matrix + _matrix.T)
 
 
-def exponential(vectors: Float[np.ndarray, "*some 3"]) -> Quaternions:
+def exponential(vectors: Float[np.ndarray, "... 3"]) -> Quaternions:
     """Rotations by rotation vectors."""
     half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vectors], axis=-1)
 
 
-def rotation_vectors(q: Quaternions) -> Float[np.ndarray, "*some 3"]:
+def rotation_vectors(q: Quaternions) -> Float[np.ndarray, "... 3"]:
     """Rotation vectors of rotations, from −π to π: the shorter way round."""
     near = np.where(q[..., :1] < 0.0, -q, q)
     sine = np.linalg.norm(near[..., 1:], axis=-1, keepdims=True)
@@ -71,7 +71,7 @@ def conjugate(q: Quaternions) -> Quaternions:
     return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
-def matrices(q: Quaternions) -> Float[np.ndarray, "*some 3 3"]:
+def matrices(q: Quaternions) -> Float[np.ndarray, "... 3 3"]:
     """Rotation matrices, with the columns t, n, b."""
     return np.asarray(np.einsum("...a,kcab,...b->...ck", q, FRAME, q, optimize=True))
 
@@ -101,7 +101,7 @@ def half_turn(angle: Jet, axis: int) -> Jet:
     return out
 
 
-def clamp_rotation(angles: Float[np.ndarray, "parts lanes 3"]) -> Jet:
+def clamp_rotation(angles: Float[np.ndarray, "parts ... 3"]) -> Jet:
     """Rotation exp(e₃ a/2) exp(e₂ b/2) exp(e₁ τ/2) of a clamp from its angles (a, b, τ)."""
     turns = [half_turn(angles[..., k], axis) for k, axis in enumerate((2, 1, 0))]
     return bilinear(product, bilinear(product, turns[0], turns[1]), turns[2])

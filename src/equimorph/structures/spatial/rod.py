@@ -5,43 +5,29 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.linalg import Border, BorderedSolution
-from equimorph.model import Descriptor, Drawing
-from equimorph.structures.contract import (
-    Advance,
-    Direction,
-    LinearSystem,
-    Structure,
-    Symmetry,
-)
-from equimorph.structures.rod.discretisation import Mesh
+from equimorph.model import Drawing
 from equimorph.structures.rod.profiles import LoadSpec, load_shape
 from equimorph.structures.rod.sections import SectionProperties, cross_section
 from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.rod.terms import LineLoad, Term
 from equimorph.structures.rod.units import rod_units
-from equimorph.structures.spatial import descriptors
+from equimorph.structures.spatial.described import DescribedInSpace
 from equimorph.structures.spatial.description import SpatialDescription
 from equimorph.structures.spatial.drawing import RodDrawing
 from equimorph.structures.spatial.ends import Ends
 from equimorph.structures.spatial.errors import discretisation_error
-from equimorph.structures.spatial.fields import Fields, SpatialFields
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import raw_model
 from equimorph.structures.spatial.natural import natural_states
-from equimorph.structures.spatial.symmetry import symmetries
 from equimorph.structures.states import State, States
 from equimorph.structures.unit_system import Quantity, unit_system
 
 DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")
-ARCS = 128
-"""Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""
 PROFILES: Mapping[str, Any] = {
     **{"stiffness": 1.0, "curvature": 0.0, "side_curvature": 0.0, "natural_twist": 0.0},
     **{"axial": None, "shear": None},
@@ -49,7 +35,7 @@ PROFILES: Mapping[str, Any] = {
 """Profiles along the rod with their defaults."""
 
 
-class SpatialRod(Structure):
+class SpatialRod(DescribedInSpace):
     """Elastic rod in space: it bends about two axes and twists, and may stretch and shear.
 
     Energy ``E = ∫ ½ (u − u₀)·K (u − u₀) ds`` plus the potential of dead loads, with the strains u:
@@ -239,80 +225,6 @@ class SpatialRod(Structure):
             data.pop("EI")
         return {**data, "elements": elements, "degree": degree}
 
-    # --- the contract ---------------------------------------------------------------------------
-
-    def energy(self, z: Lanes, p: Parameters) -> Values:
-        """Potential energy E, in units of 4π²B/L."""
-        return self.mechanics.energy(z, p)
-
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z; p)."""
-        return self.mechanics.residual(z, p)
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-        return self.mechanics.parameter_derivative(z, p, dp)
-
-    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
-        """D²F[v, w]."""
-        return self.mechanics.second_derivative(z, p, v, w)
-
-    def effort(self, z: Lanes, p: Parameters) -> Parameters:
-        """∂L/∂p: couples and forces of actuators, displacements of loads."""
-        return self.mechanics.effort(z, p)
-
-    def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
-    ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered."""
-        return self.mechanics.solve(z, p, rhs, border, shift)
-
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z; computed together."""
-        return self.mechanics.linear_system(z, p, directions)
-
-    def advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        """One Newton step, with tangent and inertia."""
-        return self.mechanics.advance(z, p, dp, row, corner, defect)
-
-    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Random guesses."""
-        return self.mechanics.sample(p, generator)
-
-    def resolved(self, z: Lanes, p: Parameters) -> Flags:
-        """Whether the highest Legendre coefficients of the rotations are small in every element."""
-        return self.mechanics.resolved(z, p)
-
-    def error_estimate(self, z: Lanes, p: Parameters) -> Values:
-        """Bound of the errors of curvature and place, by solving again with a higher degree.
-
-        Twice the largest change of max |κ|, and of strains and places at 25 arclengths. Infinite
-        where the finer rod has no equilibrium near the state, as may happen at a fold.
-        """
-        return discretisation_error(self.mechanics, self._refined, z, p)
-
-    @cached_property
-    def _refined(self) -> SpatialMechanics:
-        elements, degree = self._resolution
-        return SpatialMechanics(self.description.model(elements, min(degree + 4, 16)))
-
-    def symmetries(self) -> tuple[Symmetry, ...]:
-        """Mirror images and half turns of equilibria that are equilibria."""
-        return self._symmetries
-
-    @cached_property
-    def _symmetries(self) -> tuple[Symmetry, ...]:
-        return symmetries(self.mechanics.model, self.unknowns)
-
     # --- natural states -------------------------------------------------------------------------
 
     @cached_property
@@ -359,43 +271,18 @@ class SpatialRod(Structure):
         z, found = self.natural(p)
         return States(self, z, p), found
 
-    # --- shapes ---------------------------------------------------------------------------------
+    def error_estimate(self, z: Lanes, p: Parameters) -> Values:
+        """Bound of the errors of curvature and place, by solving again with a higher degree.
 
-    @property
-    def mesh(self) -> Mesh:
-        """Elements along the rod."""
-        return self.mechanics.mesh
+        Twice the largest change of max |κ|, and of strains and places at 25 arclengths. Infinite
+        where the finer rod has no equilibrium near the state, as may happen at a fold.
+        """
+        return discretisation_error(self.mechanics, self._refined, z, p)
 
     @cached_property
-    def recovery(self) -> SpatialFields:
-        """Fields along the rod, non-dimensional."""
-        return SpatialFields(self.mechanics)
-
-    def fields(self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]) -> Fields:
-        """Rotations, places and strains at arclengths, in the user's units."""
-        found = self.recovery.at(z, p, s)
-        length, bend = self.units.value("length"), self.units.value("curvature")
-        return Fields(found.rotations, length * found.places, bend * found.strains)
-
-    def shape(
-        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
-    ) -> Float[np.ndarray, "lanes points 3"]:
-        """Positions (x, y, z) at arclengths `s` (default: 101 equidistant ones)."""
-        at = np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
-        return self.fields(z, p, at).places
-
-    def frames(
-        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
-    ) -> Float[np.ndarray, "lanes points 3 3"]:
-        """Axes of the cross-sections at arclengths: the columns of each matrix are t, n, b."""
-        return self.recovery.at(z, p, s).frames
-
-    def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 3"]:
-        """Shape as cubic arcs with the rod's positions and tangents at their ends."""
-        fields = self.fields(z, p, np.linspace(0.0, 1.0, ARCS + 1))
-        rate = fields.frames[..., 0] * (self.units.value("length") / ARCS)
-        places = fields.places
-        return np.stack([places[:, :-1], places[:, 1:], rate[:, :-1], rate[:, 1:]], axis=2)
+    def _refined(self) -> SpatialMechanics:
+        elements, degree = self._resolution
+        return SpatialMechanics(self.description.model(elements, min(degree + 4, 16)))
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the ends, loads, tendons and segments that bend."""
@@ -416,73 +303,3 @@ class SpatialRod(Structure):
     def section(self) -> SectionProperties | None:
         """Stiffnesses and weight of the section in the rod's units; None if none was given."""
         return self._space.properties(self.units)
-
-    # --- descriptors ----------------------------------------------------------------------------
-
-    @check_arguments
-    def height(self, s: float) -> Descriptor:
-        """y(s), in units of L."""
-        return descriptors.coordinate(self, "height", s)
-
-    @check_arguments
-    def position(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
-        """(x(s), y(s), z(s)), in units of L."""
-        x, y, z = (descriptors.coordinate(self, name, s) for name in ("x", "height", "z"))
-        return x, y, z
-
-    @check_arguments
-    def angles(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
-        """Angles turn, tilt, roll of R = exp(e₃ turn) exp(e₂ tilt) exp(e₁ roll) at s.
-
-        Turn and roll lie between −π and π; all three jump where the tangent is along ±z.
-        """
-        turn, tilt, roll = (descriptors.angle(self, name, s) for name in descriptors.ANGLES)
-        return turn, tilt, roll
-
-    @check_arguments
-    def strains(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
-        """Twist, and curvatures about n and b, at s, in units of 1/L."""
-        twist, aside, bend = (descriptors.strain(self, name, s) for name in descriptors.STRAINS)
-        return twist, aside, bend
-
-    @check_arguments
-    def bending(self, s: float) -> Descriptor:
-        """Bending curvature √(κ_n² + κ_b²) at s, in units of 1/L."""
-        return descriptors.bending(self, s)
-
-    @cached_property
-    def max_curvature(self) -> Descriptor:
-        """Largest bending curvature along the rod, in units of 1/L."""
-        return descriptors.max_curvature(self)
-
-    @cached_property
-    def total_energy(self) -> Descriptor:
-        """Potential energy E, in units of 4π²B/L."""
-        return descriptors.total_energy(self)
-
-    @check_arguments
-    def support_force(self, component: str) -> Descriptor:
-        """Force of the support at A on the rod along "x", "y" or "z"."""
-        return descriptors.support_force(self, component)
-
-    @check_arguments
-    def end_couple(self, end: int, component: str) -> Descriptor:
-        """Couple of the support at end 0 or 1 on the rod, about an axis "x", "y" or "z"."""
-        return descriptors.end_couple(self, end, component)
-
-    @check_arguments
-    def clearance(self, apart: float = 0.1) -> Descriptor:
-        """Smallest distance between points whose arclengths differ by `apart` at least.
-
-        Contact is not modelled: a rod of thickness h touches itself where this is below h.
-        """
-        return descriptors.clearance(self, apart)
-
-    @property
-    def elevation(self) -> Descriptor:
-        """y(½)."""
-        return self.height(0.5)
-
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
-        return descriptors.descriptor_from_text(self, text)
