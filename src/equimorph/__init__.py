@@ -1,7 +1,7 @@
 """Quasi-static shape control of soft, morphing structures.
 
 Names are loaded when they are first used, so that importing the package costs nothing. The stub
-`__init__.pyi` beside this file is the one list of them, read here and by type checkers.
+`__init__.pyi` in this folder is the one list of them, read here and by type checkers.
 """
 
 import lazy_loader

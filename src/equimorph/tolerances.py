@@ -1,6 +1,6 @@
 """Tolerances that several modules share, in groups; each says the scale that it is measured in.
 
-A tolerance that only one algorithm uses stands beside that algorithm.
+A tolerance that only one algorithm uses is defined with that algorithm.
 """
 
 # Identity: two things nearer than this are the same.

@@ -259,7 +259,7 @@ class Projection(Chart):
     Raises
     ------
     InputError
-        For an empty set.
+        If the set is empty.
     """
 
     def __post_init__(self) -> None:
@@ -290,7 +290,7 @@ class DescriptorChart(Chart):
     Raises
     ------
     InputError
-        For an empty set, or coordinates that are unknown, too few or many, or depend on each other.
+        If the set is empty, or coordinates are unknown, too few, too many, or depend on each other.
     """
 
     chosen: Sequence[Descriptor | str]

@@ -180,8 +180,8 @@ def coordinates_of(eset: EquilibriumSet, chosen: Sequence[Descriptor | str]) -> 
     Raises
     ------
     InputError
-        For another number than that of the free parameters, equal ones, parameters that are not
-        free, or unknown names.
+        If there are not as many as free parameters, two are equal, or one is a fixed parameter or
+        an unknown name.
     """
     d = len(eset.names)
     if isinstance(chosen, str) or len(chosen) != d:

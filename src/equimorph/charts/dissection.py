@@ -55,7 +55,7 @@ def dissect(eset: EquilibriumSet) -> Atlas:
     Raises
     ------
     InputError
-        For an empty set.
+        If the set is empty.
     """
     check_cells(eset)
     eset = cut_along_crossings(eset)

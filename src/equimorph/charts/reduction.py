@@ -147,8 +147,8 @@ def reduce(
     Raises
     ------
     InputError
-        For an empty set, one without stable states, a rule that does not fit the set, or one that
-        prefers no state at all.
+        If the set is empty or has no stable states, or the rule does not fit the set or prefers no
+        state at all.
     """
     check_cells(eset)
     eset = with_cusp_vertices(cut_along_crossings(eset))

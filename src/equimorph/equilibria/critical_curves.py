@@ -210,7 +210,7 @@ def fold_curve(
     Raises
     ------
     InputError
-        If `state` is no such state or lies outside, or for unknown or too few parameters.
+        If `state` is not such a state or lies outside, or parameters are unknown or too few.
     """
     structure = state.structure
     free = places(structure, parameters, 2 + len(on))
@@ -248,7 +248,7 @@ def branch_curve(
     Raises
     ------
     InputError
-        If `state` is no such branch point or lies outside, or for unknown parameters.
+        If `state` is not such a branch point or lies outside, or a parameter is unknown.
     """
     structure = state.structure
     unfolded = len(parameters) == 2
@@ -287,7 +287,7 @@ def cusp_curve(
     Raises
     ------
     InputError
-        If `state` is no cusp or lies outside, or for unknown parameters.
+        If `state` is not a cusp or lies outside, or a parameter is unknown.
     """
     structure = state.structure
     free = places(structure, parameters, 3)
@@ -326,7 +326,7 @@ def constraint_curve(
     Raises
     ------
     InputError
-        If `state` is not on the bounds or lies outside, or for unknown or too few parameters.
+        If `state` is not on the bounds or lies outside, or parameters are unknown or too few.
     """
     structure = state.structure
     free = places(structure, parameters, 1 + len(on))
@@ -365,7 +365,7 @@ def grazing_curve(
     Raises
     ------
     InputError
-        If `state` is no such state or lies outside, or for unknown parameters.
+        If `state` is not such a state or lies outside, or a parameter is unknown.
     """
     structure = state.structure
     free = places(structure, parameters, 3)

@@ -59,7 +59,7 @@ def way_points(
     Raises
     ------
     InputError
-        For an unknown parameter, a value without meaning, or no way-point that moves.
+        If a parameter is unknown, a value has no meaning, or no way-point moves.
     """
     corners = [start]
     for step in [to] if isinstance(to, Mapping) else list(to):

@@ -52,7 +52,7 @@ AT_GOAL, FROM_GOAL = 1e-9, 1e-6
 """Distance from an end of t, and of the states in the metric, from which Newton's method takes
 lanes there whose steps became too small."""
 PATIENCE = 40
-"""One in so many lanes may be finished before their gaps in the block are closed."""
+"""Reciprocal share of finished lanes at which the gaps that they leave in the block are closed."""
 WHY = {
     kernels.SHORT: "the step became too small",
     kernels.LONG: "no end in {most} steps",

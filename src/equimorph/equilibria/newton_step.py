@@ -121,7 +121,7 @@ class Problem:
 
     @property
     def width(self) -> int:
-        """Unknowns besides z: steps along the directions, and β."""
+        """Unknowns in addition to z: steps along the directions, and β."""
         return int(self.directions.shape[1]) + self.unfolded
 
     @property

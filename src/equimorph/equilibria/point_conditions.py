@@ -1,4 +1,4 @@
-"""Conditions on equilibria: what a point must satisfy besides F(z; p) = 0.
+"""Conditions on equilibria: what a point must satisfy in addition to F(z; p) = 0.
 
 Newton's method only needs a condition and its slopes along the equilibrium set, so that a condition
 is asked for its value after a step onto the set and for its derivatives along directions of the
@@ -50,7 +50,7 @@ class Linear:
 
 @runtime_checkable
 class Condition(Protocol):
-    """Scalars that vanish at the wanted points, linear at a point of each lane."""
+    """Scalars that vanish at the target points, linearised at a point of each lane."""
 
     @property
     def critical(self) -> bool:

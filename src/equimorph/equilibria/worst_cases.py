@@ -47,7 +47,7 @@ def worst_over(
     Raises
     ------
     InputError
-        For unknown names, none, or sizes that are not positive.
+        If a name is unknown, there is none, or a size is not positive.
     """
     box = _Corners(structure, descriptor, _corners(structure, offsets))
     sizes = ", ".join(f"{name} ± {float(size)!r}" for name, size in offsets.items())
@@ -239,7 +239,7 @@ def held_over(
     Raises
     ------
     InputError
-        For an unknown name, or ends that are not finite and in order.
+        If the name is unknown, or the ends are not finite and in order.
     """
     at = position(structure.parameters, name)
     low, high = float(ends[0]), float(ends[1])

@@ -53,8 +53,7 @@ RECOVERED = 50
 HIDDEN = 12
 """Rounds of bisection around missing states that bring no new equilibria over grid vertices."""
 LIMIT = 20_000, 30
-"""Most equilibria of a set where no limit is given: this many, or so many for each point of the
-grid."""
+"""Default limit of the number of equilibria: this constant, or this many per grid point."""
 MOST_POINTS = 1_000_000
 """Points of a grid above which a set is refused, if no limit allows more: they take 6 GB."""
 HOPELESS = 50
@@ -126,10 +125,10 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     Raises
     ------
     InputError
-        For a box in more than three parameters, a grid of more points than `limit` (than a million
-        without one), unknown names, parameters both free and fixed,
-        values without meaning, an accuracy that is not positive, no constraints in `within`, or a
-        journal of something else.
+        If the box has more than three parameters, the grid has more points than `limit` (one
+        million by default), a name is unknown, a parameter is both free and fixed, a value has no
+        meaning, the accuracy is not positive, `within` holds anything but constraints, or the
+        journal is that of another computation.
     """
     progress = progress or Silent()
     intervals = _intervals(box, intervals)

@@ -76,7 +76,7 @@ def parameter_vector(
     Raises
     ------
     InputError
-        For an unknown name, a value without meaning, or a parameter with neither value nor default.
+        If a name is unknown, a value has no meaning, or a parameter has neither value nor default.
     """
     for name in values:
         position(parameters, name)

@@ -11,7 +11,7 @@ SETTINGS = ((0.96, 0.0), (0.64, 1.16), (0.64, -1.16), (0.64, 0.58), (0.64, -0.58
 """Of the article's table; its Δ has another sign or scale, so that both signs and halves are tried.
 """
 BESIDE = 1e-3
-"""Width of the grid cell at a setting of which the curvature is computed, in rad."""
+"""Width in rad of the grid cell at a setting for which the curvature is computed."""
 
 
 def main(folder: Path, grid: em.Grid | None = None) -> dict[str, float]:

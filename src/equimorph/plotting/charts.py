@@ -68,7 +68,7 @@ def chart_domain(chart: Chart, ax: Axes | None = None) -> Axes:
     Raises
     ------
     InputError
-        For a chart of other than two coordinates.
+        If a chart does not have two coordinates.
     """
     if len(chart.names) != 2:
         raise InputError(f"`chart` must have two coordinates; got {len(chart.names)}.")

@@ -64,7 +64,7 @@ def route_panels(
     Raises
     ------
     InputError
-        For a route that did not arrive.
+        If the route did not arrive.
     """
     if route.path is None or route.schedule is None:
         raise InputError(f"`route` must have arrived; got one that was refused: {route.why}")

@@ -188,7 +188,7 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
     Raises
     ------
     InputError
-        Without states, or for another number of labels.
+        If there are no states, or not as many labels as states.
     """
     names = list(labels) or [str(k) for k in range(1, len(states) + 1)]
     if not len(states) or len(names) != len(states):

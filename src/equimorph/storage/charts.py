@@ -81,7 +81,7 @@ def write_chart(group: h5py.Group, chart: Chart | Atlas) -> None:
     Raises
     ------
     InputError
-        For a chart of an atlas, or a reduction by a function or nearest to a state.
+        If the chart belongs to an atlas, or is a reduction by a function or nearest to a state.
     """
     eset = chart.eset
     about: dict[str, Any] = {"kind": type(chart).__name__}

@@ -129,7 +129,7 @@ def extend(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None
     Raises
     ------
     InputError
-        As `open_file`.
+        As for `open_file`.
     """
     memory = io.BytesIO()
     with open_file(path, kind, version):

@@ -61,6 +61,7 @@ CHANGES: Mapping[str, Change] = {
     "Audit": Change(version=4),
     "LeastSnap": Change(version=2),
     "Proof": Change(version=2, removed=("status",)),  # it follows from `why` and `bounds`
+    "Shapes": Change(version=2, renamed={"wanted": "targets"}),
 }
 """Changes by class; a class that is not listed is as it was in version 1."""
 

@@ -72,7 +72,7 @@ def write_surface(path: str | Path, eset: EquilibriumSet, height: Descriptor | N
     Raises
     ------
     InputError
-        For another ending, or if `path` cannot be written.
+        If `path` has another ending or cannot be written.
     """
     path = Path(path)
     writers = {".ply": _ply, ".vtp": _vtp}

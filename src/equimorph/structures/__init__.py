@@ -109,7 +109,7 @@ def from_identity(identity: Mapping[str, Any]) -> Structure:
     Raises
     ------
     InputError
-        For an unknown kind or data that the kind does not take.
+        If the kind is unknown, or does not take the data.
     """
     data = dict(identity)
     kind = data.pop("kind", None)

@@ -26,7 +26,7 @@ def value_of(structure: Structure, name: str) -> Descriptor:
     Raises
     ------
     InputError
-        For an unknown name.
+        If the name is unknown.
     """
     at = position(structure.parameters, name)
 
@@ -43,7 +43,7 @@ def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
     Raises
     ------
     InputError
-        For another axis than x, y or z, or `s` outside 0 to 1.
+        If the axis is not x, y or z, or `s` lies outside 0 to 1.
     """
     if axis not in ("x", "y", "z") or not 0.0 <= s <= 1.0:
         raise InputError(f"`shape` must be x, y or z at s from 0 to 1; got {axis} at {s:g}.")
@@ -65,7 +65,7 @@ def effort_of(structure: Structure, name: str) -> Descriptor:
     Raises
     ------
     InputError
-        For an unknown name.
+        If the name is unknown.
     """
     at, unit = position(structure.parameters, name), structure.energy_scale
 
@@ -130,7 +130,7 @@ def outside(structure: Structure, box: Box) -> Descriptor:
     Raises
     ------
     InputError
-        For names that the structure does not have.
+        If the structure does not have a parameter of the box.
     """
     at = np.array([position(structure.parameters, name) for name in box.names])
     scales = structure.scales[at]

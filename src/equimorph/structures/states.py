@@ -247,7 +247,7 @@ def natural_state(structure: Structure, /, **values: float) -> State:
     Raises
     ------
     InputError
-        For unknown or meaningless parameters, a load, or where no natural state is found.
+        If a parameter is unknown, has no meaning or is a load, or if no natural state is found.
 
     Examples
     --------

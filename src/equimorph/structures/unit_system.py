@@ -183,7 +183,7 @@ class UnitSystem:
         return float(found.group(1)) * value / unit
 
     def check_all_have_units(self, given: Mapping[str, Any]) -> None:
-        """Refuse plain numbers beside texts with units where no units are named for them.
+        """Refuse plain numbers together with texts with units where no units are named for them.
 
         Parameters
         ----------

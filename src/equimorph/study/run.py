@@ -53,8 +53,8 @@ def run_study(
     Raises
     ------
     InputError
-        For a wrong study file, one that needs more memory than there is, a start or goal that is no
-        stable equilibrium, or a folder that cannot be written, is in use, or holds something else.
+        If the study file is wrong or needs more memory than there is, a start or goal is not a
+        stable equilibrium, or the folder cannot be written, is in use, or holds something else.
     """
     sink = MemoryWatch(progress or Silent())
     text, study, problem = read_problem(path)
@@ -83,7 +83,7 @@ def read_problem(path: Path) -> tuple[str, Study, Problem]:
     Raises
     ------
     InputError
-        For a wrong study file, or one that needs more memory than there is.
+        If the study file is wrong or needs more memory than there is.
     """
     text = read_study_text(path)
     study = parse_study(text, path.name, path.parent)

@@ -284,4 +284,4 @@ ANY_STRUCTURE: Any = Annotated[
     Union[tuple(StructureSection.__subclasses__())],  # noqa: UP007  # of the classes above
     Field(discriminator="kind"),
 ]
-"""Sections of all structures, told apart by their kinds."""
+"""Sections of all structures, distinguished by their kinds."""

@@ -149,8 +149,8 @@ def estimate_state(
     Raises
     ------
     InputError
-        For too few values, values or errors that are no numbers, missing errors, a confidence not
-        between 0 and 1, or a set without cells.
+        If there are too few values, a value or error is not a number, an error is missing, the
+        confidence is not between 0 and 1, or the set has no cells.
 
     Examples
     --------

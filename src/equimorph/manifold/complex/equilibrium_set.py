@@ -142,7 +142,8 @@ class EquilibriumSet:
         Raises
         ------
         InputError
-            For names that are not free, missing ones, or a point outside the box.
+            If a name is not that of a free parameter or is missing, or the point lies outside the
+            box.
         """
         return self._parameters(at)
 
@@ -177,8 +178,8 @@ class EquilibriumSet:
         Raises
         ------
         InputError
-            For names that are not free, missing ones, different numbers of values, or points
-            outside the box.
+            If a name is not that of a free parameter or is missing, numbers of values differ, or a
+            point lies outside the box.
         """
         p = self._parameters_over(at)
         states, point, cell = self._sheets.over(p)

@@ -56,7 +56,7 @@ CURVES = FacetMark.FOLD | FacetMark.CAP | FacetMark.CROSSING
 TRIANGLES, TETRAHEDRA = 2, 3
 """Dimension of their cells."""
 AT_ONCE = 4096
-"""Cells or edges that one thread looks at in one go."""
+"""Number of cells or edges in one task of a thread."""
 ON_BOX = 1e-9
 """Distance from a side of the box, relative to the width of the box, of points that lie on it."""
 

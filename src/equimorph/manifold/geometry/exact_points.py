@@ -257,13 +257,13 @@ def pin(
     Parameters
     ----------
     groups
-        Numbers of the points around the wanted one.
+        Numbers of the points around the requested one.
     kind
         `FOLD` (det F_z = 0), `CAP` (a constraint is active), `CORNER` (both), others: neither.
     span
         The k orthonormal directions, in scaled free parameters, in which the parameters may move.
         As many conditions as are left put the point into the normal space of the group through
-        its middle, so that it lies amid the group.
+        its middle, so that it lies between the points of the group.
     member, share
         A member of the groups, and the share of the way towards it at which the middle is taken.
     """
@@ -301,7 +301,7 @@ def _led(
     around: Values,
     low: Numbers,
 ) -> Pinned:
-    """Pin folds in small steps from known ones to the middle, where one step goes astray."""
+    """Compute folds in small steps from known ones to the middle, where a single step diverges."""
     z, p = z.copy(), p.copy()
     found = np.ones(len(z), bool)
     start = embed(aim.setting, z, p)
@@ -320,10 +320,10 @@ def _led(
 def pin_crossings(
     setting: Setting, points: Points, groups: Sequence[Sequence[int]], span: Span, cap: bool = False
 ) -> Pinned:
-    """Crossing points amid groups of points, with parameters in a span; see `pin`.
+    """Crossing points between groups of points, with parameters in a span; see `pin`.
 
-    With k directions, k − 1 conditions put the point amid its group; `cap`: a constraint is active
-    in place of one of them.
+    With k directions, k − 1 conditions place the point between those of its group; `cap`: a
+    constraint is active in place of one of them.
     """
     z, p, deviations = middles(setting, points, groups)
     rows = principal_directions(deviations, span.shape[1] - 1 - cap)

@@ -50,7 +50,7 @@ def pin_in_cells(
     span: Span,
     frames: Frames,
 ) -> Pinned:
-    """Exact points amid groups, inside grid cells.
+    """Exact points between groups of points, inside grid cells.
 
     Where the one in the normal space through the middle is not, those through points between the
     middle and one of the group are tried: near its own points a constraint with kinks is smooth,
@@ -90,7 +90,7 @@ def depths(frames: Frames, points: Float[np.ndarray, "lanes d"]) -> Values:
 
 
 SHEETS = 2
-"""To each of which a crossing belongs."""
+"""Whether a crossing belongs to each."""
 DIVIDED = 1 / 100
 """Share of the largest grid tetrahedron below which none is divided, although a fold may overturn
 cells there."""

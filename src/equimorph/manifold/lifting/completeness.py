@@ -25,9 +25,9 @@ APART = 1e-5
 STARTS = 200
 """Random starts of Newton's method in each independent search."""
 SCATTERED = 2000
-"""Random points, with one random guess each, from which Newton starts beside the searches."""
-FREED = 4
-"""Of these guesses one in so many is corrected with the parameters free as well."""
+"""Random points with one random guess each, from which Newton starts in addition to searches."""
+PER_FREE = 4
+"""Number of these guesses per guess that is corrected with the parameters free as well."""
 ITERATIONS = 40
 """Of Newton's method from there, at most."""
 
@@ -105,7 +105,7 @@ def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator)
     p[:, free] = generator.uniform(eset.box.lower, eset.box.upper, (count, len(free)))
     guess, guards = structure.sample(p, generator), Guards(iterations=ITERATIONS)
     fixed = settle(structure, guess, p, guards=guards)
-    some = slice(0, count // FREED)
+    some = slice(0, count // PER_FREE)
     directions = free_directions(structure, free, len(p[some]))
     freed = settle(structure, guess[some], p[some], directions, guards=guards, frames=False)
     z, p = np.concatenate([fixed.z, freed.z]), np.concatenate([fixed.p, freed.p])

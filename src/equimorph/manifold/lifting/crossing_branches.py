@@ -150,7 +150,7 @@ def _enter_arcs(
     """Enter curves both of whose halves leave through a constraint before they reach a vertex.
 
     So do the side branches of pitchforks near where these leave through the constraint, at every
-    scale. `halves` are the numbers of half-branches, and `outcome` is what became of them.
+    scale. `halves` are the numbers of half-branches, and `outcome` tells how each of them ended.
     """
     if pairing.mesh.dimension != TRIANGLES:
         return

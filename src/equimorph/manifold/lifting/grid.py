@@ -78,8 +78,8 @@ def coarse_grid(
 ) -> tuple[BaseMesh, Int[np.ndarray, " vertices"]]:
     """Mesh on selected lines of a grid, and on a few beyond it, within limits.
 
-    It has at most so many intervals along each parameter of the grid. Returned with it are the
-    grid's numbers of its vertices, −1 for those beyond the grid.
+    The number of its intervals along each parameter is limited. Returned with it are the grid's
+    numbers of its vertices, −1 for those beyond the grid.
     """
     counts = [len(line) - 1 for line in lines]
     chosen, wide = [], []
@@ -179,7 +179,7 @@ def _split(
     mirrored: tuple[bool, ...],
     around: tuple[list[int], list[int]],
 ) -> None:
-    """Split an edge and the triangles and tetrahedra around it, none of which was split before."""
+    """Split an edge and the triangles and tetrahedra around it, all of them unsplit so far."""
     a, b = mesh.edges[edge].tolist()
     middle = len(mesh.vertices) + len(growth.vertices)
     growth.vertices.append(_between(mesh.vertices[a], mesh.vertices[b], mirrored))

@@ -138,7 +138,7 @@ class Pairing:
         return self.ray(self.curves.start[curve], self.curves.edge[curve]) == curve
 
     def rays_with(self, mark: RayMark) -> Rays:
-        """Rays with a certain mark: of each edge from one end, lest curves be traced twice."""
+        """Rays with a certain mark: each edge from one end, so that no curve is traced twice."""
         count = self.points.count
         vertex = self.points.vertex[:count]
         chosen = (self.rays[:count] == mark) & (vertex >= 0)[:, None]
@@ -240,7 +240,7 @@ def _incidence(mesh: BaseMesh) -> tuple[Int[np.ndarray, "V slots"], Int[np.ndarr
 
 
 def start_pairing(setting: Setting, mesh: BaseMesh, limit: int) -> Pairing:
-    """Empty pairing on a mesh, for at most so many points."""
+    """Empty pairing on a mesh, for at most `limit` points."""
     incident, slots = _incidence(mesh)
     pairing = Pairing(
         setting,

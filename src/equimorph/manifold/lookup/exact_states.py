@@ -17,7 +17,7 @@ ITERATIONS = 40
 ROUND_OFF = 1e-14
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
 SETTLED = 2
-"""Corrections after which a lane whose index is not the wanted one is given up."""
+"""Corrections after which a lane with another index than the requested one is abandoned."""
 
 Points = Float[np.ndarray, "points P"]
 

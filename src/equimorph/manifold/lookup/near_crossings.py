@@ -6,9 +6,9 @@ With a border b the equations ``F = r b``, ``b·(z − z₀) = s`` stay regular,
 crossing point z₀ are the roots of r(s) [Govaerts2000]_.
 
 At a distance δ from a pitchfork these are √δ apart, and r between them is of the size of δ^(3/2):
-10⁻⁹ beside that of an arch it is 5·10⁻¹⁶, and round-off in F, 10⁻¹⁶, would move roots by a tenth
-of their distance. So r is integrated from the crossing point, where it vanishes. The round-off in
-its derivatives counts only times the way.
+10⁻⁹ from that of an arch it is 5·10⁻¹⁶, and round-off in F, 10⁻¹⁶, would move roots by a tenth of
+their distance. So r is integrated from the crossing point, where it vanishes. The round-off in its
+derivatives counts only times the way.
 """
 
 from dataclasses import dataclass

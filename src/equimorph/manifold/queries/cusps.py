@@ -48,7 +48,7 @@ def cusps(eset: EquilibriumSet) -> Cusps:
     Raises
     ------
     InputError
-        For a set over another number of parameters.
+        If the set has another number of free parameters.
     """
     if len(eset.names) != 2:
         raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")

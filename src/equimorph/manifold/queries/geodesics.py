@@ -45,8 +45,9 @@ class _Move:
 class Chains:
     """Chains of points on the set from a state to folds, each pulled straight: discrete geodesics.
 
-    The sum of squared links is least where every point lies amid its neighbours as seen along its
-    tangent space, and the last link is orthogonal to the fold. All chains move side by side.
+    The sum of squared links is least where every point lies in the middle of its neighbours as seen
+    along its tangent space, and the last link is orthogonal to the fold. All chains move side by
+    side.
     """
 
     def __init__(self, eset: EquilibriumSet, ways: Sequence[Spot]) -> None:
@@ -54,7 +55,7 @@ class Chains:
         self.on_set, self.on_fold = Ground(self.setting, eset), Ground(self.setting, eset, True)
 
     def straighten(self, links: int) -> list[float]:
-        """Lengths of the chains with so many links each, after they have been straightened."""
+        """Lengths of the chains with `links` links each, after they have been straightened."""
         self._divide(links)
         moving = list(range(len(self.chains)))
         for _ in range(SWEEPS):

@@ -68,7 +68,7 @@ def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Lev
     Raises
     ------
     InputError
-        For another number of descriptors, or anything but descriptors.
+        If there is another number of descriptors, or anything but descriptors.
     """
     _check_count(eset, descriptors)
     return _level(eset, lambda v: jacobian(eset.setting, v, descriptors))
@@ -103,7 +103,7 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
     Raises
     ------
     InputError
-        For another number of descriptors than of free parameters.
+        If there are not as many descriptors as free parameters.
     """
     _check_count(eset, descriptors)
     fabric = fabric_of(eset)

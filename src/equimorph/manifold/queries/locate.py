@@ -110,9 +110,9 @@ def locate(
     Raises
     ------
     InputError
-        For fewer values than free parameters, values that are no numbers, fixed parameters,
-        descriptors of other structures, shapes with other numbers of points than the structure
-        draws, or an empty set.
+        If there are fewer values than free parameters, a value is not a number, a parameter is
+        fixed, a descriptor belongs to another structure, a shape has another number of points than
+        the structure draws, or the set is empty.
     """
     if len(eset.cells) == 0:
         raise InputError("`eset` must have states to compare with; got an empty set.")

@@ -25,7 +25,7 @@ HOPELESS = 60
 MOST = 4_000_000
 """Cells beyond which refinement ends."""
 LOCAL = 40
-"""If at most one in so many edges deviates, only their surroundings are refined."""
+"""Reciprocal share of deviating edges up to which only their surroundings are refined."""
 RINGS = 4
 """Rings of cells around edges that deviate, which longer ones to be cut first may lie in."""
 

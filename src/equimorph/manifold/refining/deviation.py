@@ -34,7 +34,7 @@ UNEVEN = 4.0
 SIX = 6
 """Edges of a tetrahedron."""
 FEW = 50
-"""If fewer than one in so many edges are to be bisected, all are at once."""
+"""Reciprocal share of edges to bisect below which all of them are bisected at once."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,9 @@ class Edges:
     def deviating(self, tolerance: float) -> Bool[np.ndarray, " E"]:
         """Edges that should be bisected now, and can be.
 
-        Folds and constraints come first: they bulge out between their vertices, and edges beside
-        them would cross them. Of tetrahedra the curves in which these surfaces and the sides of the
-        box meet come before all else, and then surfaces that bulge far out.
+        Folds and constraints come first: they bulge out between their vertices, and adjacent edges
+        would cross them. Of tetrahedra the curves in which these surfaces and the sides of the box
+        meet come before all else, and then surfaces that bulge far out.
         """
         first = (self.error > tolerance) & ((self.marks & CURVES) > 0)
         if self.of_cells.shape[1] == SIX:
@@ -252,7 +252,7 @@ def _close(
 ) -> tuple[Bool[np.ndarray, " E"], Float[np.ndarray, " E"]]:
     """Wanted edges and what follows; and by how much cells prefer to be cut at each edge.
 
-    In every cell with a wanted edge the longest one is wanted, too, if that is longer by more than
+    In every cell with a chosen edge the longest edge is chosen, too, if it is longer by more than
     `PREFERENCE`.
     """
     wanted = wanted & ~edges.stuck

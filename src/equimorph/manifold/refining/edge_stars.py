@@ -150,8 +150,8 @@ class Rings:
     """Edges with the cells around them.
 
     cells: around each edge, −1 where there are fewer; first, second: polygons around it that turn
-    to the right about it, of so many corners, −1 beyond; second is empty but for edges on surfaces
-    inside. mark: of the edges; index: of the cells at first and second.
+    to the right about it, with their number of corners, −1 beyond; second is empty but for edges on
+    surfaces inside. mark: of the edges; index: of the cells at first and second.
     """
 
     ends: Edges

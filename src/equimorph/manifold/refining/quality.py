@@ -32,7 +32,7 @@ SHARP = np.radians(10.0)
 POOR = {2: np.radians(20.0), 3: np.radians(18.0)}
 """Cells with a smaller angle are made better if possible, by the dimension of the cells."""
 OVERTURNED = {2: 0.0, 3: 0.1}
-"""Factor on the angle of cells that project against their index; tetrahedra beside folds may."""
+"""Factor on the angle of cells that project against their index; tetrahedra at folds may do so."""
 AT_ONCE = 512
 """Cells that are seen from their corners in one array operation."""
 

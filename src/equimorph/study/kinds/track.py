@@ -34,7 +34,7 @@ class TrackKind(Kind[Tracking]):
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Tracking
     ) -> Sequence[Figure]:
-        """As of a route."""
+        """As for a route."""
         return figures_of_way(eset, question.files, _as_route(answer))
 
     def report(self, question: Question, answer: Tracking, folder: Path) -> list[str]:

@@ -43,7 +43,7 @@ class VerifyKind(Kind[Verification]):
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Verification
     ) -> Sequence[Figure]:
-        """As of a route."""
+        """As for a route."""
         return figures_of_way(eset, question.files, _as_route(answer))
 
     def report(self, question: Question, answer: Verification, folder: Path) -> list[str]:

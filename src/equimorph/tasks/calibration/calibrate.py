@@ -180,7 +180,7 @@ def _join_tables(
 
 
 def _judge(free: Unknowns, branch: Branch, *, known: bool) -> Calibration:
-    """Tell what became of a fit, with its covariance."""
+    """Status of a fit, with its covariance."""
     assert branch.accepted is not None
     values, residuals, jacobian = branch.accepted
     k = len(free.names)

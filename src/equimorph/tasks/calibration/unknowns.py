@@ -97,9 +97,9 @@ def unknowns(start: States, wanted: Wanted, family: Family | None = None) -> Unk
     Raises
     ------
     InputError
-        For nothing, an unknown name or kind, a parameter in two unknowns, a value that differs
-        between the states, a gain of zeros, data without a family or that it does not have, or a
-        family whose nominal member is another structure.
+        If there is no unknown, a name or kind is not known, a parameter occurs in two unknowns, a
+        value differs between the states, a gain multiplies zeros, data have no family or do not
+        belong to it, or the nominal member of the family is another structure.
     """
     if not wanted:
         raise InputError("`unknown` must name at least one parameter; got nothing.")

@@ -82,8 +82,7 @@ class ActuatorMap(ABC):
         Raises
         ------
         InputError
-            For names that are not those of the grid, a setting outside, or one without a natural
-            state.
+            If names are not those of the grid, or the setting lies outside or has no natural state.
         """
         point = _point(self.grid, setting)[None]
         z, found = self.sheet.states(point)
@@ -159,8 +158,8 @@ def unloaded_base(
     Raises
     ------
     InputError
-        For a grid that does not have two parameters, a load that is one of them or fixed, or
-        unknown names.
+        If the grid does not have two parameters, the load is one of them or fixed, or a name is
+        unknown.
     """
     if len(grid.names) != 2:
         raise InputError(f"`grid` must have two parameters; got {', '.join(grid.names)}.")
@@ -190,7 +189,7 @@ def natural_states_over(
     Raises
     ------
     InputError
-        As `unloaded_base`.
+        As for `unloaded_base`.
     """
     return natural_sheet(structure, grid, unloaded_base(structure, grid, load, fixed or {}))
 

@@ -238,8 +238,8 @@ class FirstStablePaths(Paths):
 def _forks(pairs: Brackets, back: int) -> list[tuple[Samples, Bool[np.ndarray, " pairs"]]]:
     """Critical states of each side behind which its path may be another than that of the other.
 
-    The first one that differs in its indices, or so many before. Where a side has none, its flag is
-    not set.
+    The first fold that differs in its indices, or the given number before it. Where a side has
+    none, its flag is not set.
     """
     found = []
     for one, other in ((pairs.a, pairs.b), (pairs.b, pairs.a)):

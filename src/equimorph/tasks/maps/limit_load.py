@@ -73,8 +73,7 @@ class LimitLoadMap(ActuatorMap):
         Raises
         ------
         InputError
-            For names that are not those of the grid, a setting outside, or one without a natural
-            state.
+            If names are not those of the grid, or the setting lies outside or has no natural state.
         """
         return limit_load(self.rest(setting), self.load, within=self.within, bound=self.bound)
 

@@ -124,7 +124,7 @@ def actuator_bounds(
     Raises
     ------
     InputError
-        For limits that are not in order.
+        If limits are not in order.
     """
     bounds: list[Constraint] = []
     for name, (low, high) in limits.items():

@@ -162,8 +162,8 @@ def track(  # the knobs of the public face, all by keyword
     Raises
     ------
     InputError
-        If `start` is no stable equilibrium, not known, or violates a bound, or for targets and
-        actuators without meaning.
+        If `start` is not a stable equilibrium, is not known or violates a bound, or if targets or
+        actuators have no meaning.
 
     Examples
     --------

@@ -133,7 +133,7 @@ def landscape(  # the knobs of the public face, most by keyword
     Raises
     ------
     InputError
-        For a grid over other parameters than the two of the set, or an unknown sense.
+        If the grid has other parameters than the two of the set, or the sense is unknown.
     """
     if tuple(grid.names) != tuple(eset.names) or len(grid.names) != 2:
         raise InputError(

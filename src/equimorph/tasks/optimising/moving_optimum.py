@@ -103,8 +103,8 @@ def follow_optimum(
     Raises
     ------
     InputError
-        If `start` is not stable or not known, for an unknown sense, a negative margin, or legs and
-        actuators without meaning.
+        If `start` is not stable or not known, the sense is unknown, the margin negative, or legs or
+        actuators have no meaning.
 
     Examples
     --------

@@ -180,8 +180,8 @@ def optimise(  # the knobs of the public face, all by keyword
     Raises
     ------
     InputError
-        For an unknown sense, a negative margin, an empty set, or a start that is no stable state of
-        the set.
+        If the sense is unknown, the margin negative, the set empty, or the start not a stable state
+        of the set.
 
     Examples
     --------

@@ -127,8 +127,8 @@ def reachable(
     Raises
     ------
     InputError
-        If `state` is no stable state of the set or violates a constraint, or for another number of
-        descriptors.
+        If `state` is not a stable state of the set or violates a constraint, or there is another
+        number of descriptors.
 
     Examples
     --------

@@ -120,8 +120,9 @@ def limit_sensitivity(
     Raises
     ------
     InputError
-        At branch points, where imperfections count with a fractional power (`imperfection_law`),
-        for limits that have no derivative, unknown names, or a constraint that is not given.
+        If the limit is a branch point, where imperfections act with a fractional power
+        (`imperfection_law`), or has no derivative, a name is unknown, or its constraint is not
+        given.
     """
     structure, state = limit.state.structure, limit.state
     places = {name: position(structure.parameters, name) for name in (*names, load)}

@@ -210,7 +210,7 @@ class _Trials:
         return float(RESOLVED * max(abs(self.perfect.value), scale))
 
     def falls(self, loads: Falls) -> Falls:
-        """Changes of the limit load; not a number where none is found, or told from round-off."""
+        """Changes of the limit load; NaN where there is none, or none above round-off."""
         falls = loads - self.perfect.value
         return np.where(np.abs(falls) > self.noise, falls, np.nan)
 

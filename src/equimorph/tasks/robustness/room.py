@@ -117,7 +117,7 @@ def stable_room(  # all but two by keyword
     Raises
     ------
     InputError
-        If a state is no stable equilibrium, for unknown names, or tolerances that are not positive.
+        If a state is not a stable equilibrium, a name is unknown, or a tolerance is not positive.
     """
     batch = states.batch if isinstance(states, State) else states
     structure = batch.structure

@@ -22,7 +22,7 @@ BEYOND = 1e-3
 HALVINGS = 12
 """Bisections between a fold that snaps and a place that does not."""
 BESIDE = 4
-"""Vertices of the boundary towards which folds beside a place that does not snap are tried."""
+"""Number of boundary vertices towards which folds are tried near a place that does not snap."""
 NEAR = 1e-3
 """Excess of a change over the infimum, relative to it, that will do: nearer, snaps are tiny."""
 MOST_MOVES = 400
@@ -177,7 +177,7 @@ class _Moves:
     def shortest_to_the_boundary(self, held: State | None) -> _Snap | None:
         """Shortest change that snaps, of those to places of the stability boundary.
 
-        These are its vertices, and ever nearer ones to a place `held` where nothing snaps: beside
+        These are its vertices, and folds ever closer to a place `held` where nothing snaps: near
         the tip of a cusp the part of the folds that snaps may be shorter than an edge.
         """
         stratum, _ = pieces_of(self.eset, self.state)

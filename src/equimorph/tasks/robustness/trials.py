@@ -121,7 +121,7 @@ def random_trials(  # all but three by keyword
     Raises
     ------
     InputError
-        For unknown names, spreads that are not positive, or no trials.
+        If a name is unknown, a spread is not positive, or there are no trials.
     """
     structure = start.structure
     names = tuple(spreads)

@@ -26,7 +26,7 @@ NEAR = 1.0
 
 def best_fits(
     known: Predictor,
-    wanted: Float[np.ndarray, " k"],
+    targets: Float[np.ndarray, " k"],
     within: tuple[Constraint, ...],
     allowed: Bool[np.ndarray, " V"] | None = None,
 ) -> tuple[States, Float[np.ndarray, " fits"]]:
@@ -46,11 +46,11 @@ def best_fits(
         "misfit",
         lambda *each: sum(
             ((value - target) / unit) ** 2
-            for value, target, unit in zip(each, wanted, spread, strict=True)
+            for value, target, unit in zip(each, targets, spread, strict=True)
         ),
         *known.descriptors,
     )
-    edges, value = known.edges, known.misfits(wanted)
+    edges, value = known.edges, known.misfits(targets)
     if allowed is not None:
         edges = edges[allowed[edges].all(axis=1)]
     starts = local_minima(edges, value)[:STARTS]
@@ -68,24 +68,24 @@ def best_fits(
     return States(structure, z, p), misfit
 
 
-def solution_family(known: Predictor, wanted: Float[np.ndarray, " k"]) -> Level:
+def solution_family(known: Predictor, targets: Float[np.ndarray, " k"]) -> Level:
     """Level set of one descriptor, or of two over three parameters: curves.
 
     Of two, curves run on the surface on which the first has its value, through the edges at whose
     ends the second lies on both sides of its own. `lost` counts edges without such a state, and
     triangles that curves do not just pass.
     """
-    level = level_set(known.eset, known.descriptors[0], float(wanted[0]))
-    if len(wanted) == 1 or not level.pieces:
+    level = level_set(known.eset, known.descriptors[0], float(targets[0]))
+    if len(targets) == 1 or not level.pieces:
         return level
     triangles = np.sort(np.concatenate(level.pieces), axis=1)
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[:, [1, 2]]])
     edges, number = np.unique(sides, axis=0, return_inverse=True)
-    rest = known.descriptors[1](level.states) - wanted[1]
+    rest = known.descriptors[1](level.states) - targets[1]
     crossed = np.flatnonzero(rest[edges[:, 0]] * rest[edges[:, 1]] < 0.0)
     if len(crossed) == 0:
         return Level(level.states[:0], (), level.lost)
-    states, found = _exact(known, level.states, edges[crossed], rest, wanted)
+    states, found = _exact(known, level.states, edges[crossed], rest, targets)
     place = np.full(len(edges), -1)
     place[crossed[found]] = np.flatnonzero(found)
     ends = place[number.reshape(3, -1).T]
@@ -100,7 +100,7 @@ def _exact(
     surface: States,
     edges: Edges,
     rest: Float[np.ndarray, " states"],
-    wanted: Float[np.ndarray, " k"],
+    targets: Float[np.ndarray, " k"],
 ) -> tuple[States, Bool[np.ndarray, " edges"]]:
     """Exact states near linear predictions on edges, and which of them were found."""
     structure, setting = known.eset.structure, known.setting
@@ -112,7 +112,7 @@ def _exact(
     vertex = cKDTree(embed(setting, points.z, points.p)).query(embed(setting, z, p))[1]
     used, own = np.unique(vertex, return_inverse=True)
     rows = points_at_vertices(known.eset, used).rows[own]
-    many = np.tile(wanted, (len(edges), 1))
+    many = np.tile(targets, (len(edges), 1))
     exact = states_with_values(setting, SetPoints(z, p, rows), known.descriptors, many)
     z_end, p_end, found = exact.z, exact.p, exact.found
     gaps = (

@@ -74,12 +74,12 @@ class Predictor:
         return low - reach, high + reach
 
     def cells(
-        self, wanted: Float[np.ndarray, " k"]
+        self, targets: Float[np.ndarray, " k"]
     ) -> tuple[Float[np.ndarray, "some corners"], Int[np.ndarray, " some"]]:
         """Barycentric coordinates at which cells take values, in or near them; which cells."""
         low, high = self._ranges
         near = np.ones(len(low), bool)
-        for k, value in enumerate(wanted):
+        for k, value in enumerate(targets):
             near &= (low[:, k] <= value) & (value <= high[:, k])
         cells = np.flatnonzero(near)
         corners = self.values[self.eset.cells[cells]]
@@ -87,7 +87,7 @@ class Predictor:
         size = np.maximum(np.abs(sides).max(axis=(1, 2), initial=0.0), 1e-300)
         regular = np.abs(np.linalg.det(sides)) > 1e-12 * size ** sides.shape[1]
         cells, corners, sides = cells[regular], corners[regular], sides[regular]
-        gap = wanted - corners[:, 0]
+        gap = targets - corners[:, 0]
         inner = np.linalg.solve(np.swapaxes(sides, 1, 2), gap[:, :, None])[:, :, 0]
         share = np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)
         inside = np.flatnonzero(share.min(axis=1) >= -OVERHANG)
@@ -151,16 +151,16 @@ class Predictor:
         sides /= np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-300)
         return np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(sides, 1, 2))[0], 1, 2))
 
-    def misfits(self, wanted: Float[np.ndarray, " k"]) -> Float[np.ndarray, " V"]:
+    def misfits(self, targets: Float[np.ndarray, " k"]) -> Float[np.ndarray, " V"]:
         """Root of the sum of squares of what vertices miss, in ranges over the set."""
-        return np.asarray(np.sqrt((((self.values - wanted) / self.spread) ** 2).sum(axis=1)))
+        return np.asarray(np.sqrt((((self.values - targets) / self.spread) ** 2).sum(axis=1)))
 
 
 def states_with_values(
     setting: Setting,
     at: SetPoints,
     descriptors: tuple[Descriptor, ...],
-    wanted: Float[np.ndarray, "lanes k"],
+    targets: Float[np.ndarray, "lanes k"],
 ) -> Settled:
     """Solve F(z; p) = 0 and S(z, p) = S* from guesses near a set.
 
@@ -173,12 +173,12 @@ def states_with_values(
         Structure and free parameters.
     at
         Guesses, with bases of spaces near the tangent spaces.
-    wanted
+    targets
         S* for each lane; at most d descriptors.
     """
     structure, free = setting.structure, setting.free
     directions = free_directions(structure, free, len(at))
-    values = Values(tuple(each.function for each in descriptors), wanted)
+    values = Values(tuple(each.function for each in descriptors), targets)
     frame = embedded_planes(structure, free, at.rows)
     return settle(structure, at.z, at.p, directions, [values], GUARDS, frame)
 
@@ -186,7 +186,7 @@ def states_with_values(
 def twin_guesses(
     known: Predictor, exact: Settled, rows: Rows, some: Some
 ) -> tuple[SetPoints, Int[np.ndarray, " twins"]]:
-    """Guesses of the second solution beside some solutions near det J_S = 0.
+    """Guesses of second solutions close to given ones near det J_S = 0.
 
     Along the direction v in which the descriptors change least, their component u follows
     ``σ t + c t²/2``, which vanishes again at ``t = −2σ/c``. The curvature c comes from states of

@@ -74,7 +74,7 @@ class Shapes:
     routes: tuple[Route, ...]
     closest: State
     miss: Mapping[str, float]
-    wanted: Float[np.ndarray, " k"]
+    targets: Float[np.ndarray, " k"]
     within: tuple[Constraint, ...]
     known: Predictor | None = field(default=None, metadata=NOT_KEPT)
 
@@ -118,7 +118,7 @@ class Shapes:
         if not allowed.any():
             allowed = stable_vertices(eset)
         within = (*self.within, stability(eset.structure, 0.0))
-        found, _ = best_fits(known, self.wanted, within, allowed)
+        found, _ = best_fits(known, self.targets, within, allowed)
         return found[0] if len(found) else None
 
     @cached_property
@@ -128,9 +128,9 @@ class Shapes:
         None if there are at least as many targets as free parameters.
         """
         known = self._known
-        if len(self.wanted) >= len(known.eset.names):
+        if len(self.targets) >= len(known.eset.names):
             return None
-        return solution_family(known, self.wanted)
+        return solution_family(known, self.targets)
 
     @property
     def _known(self) -> Predictor:
@@ -179,8 +179,8 @@ def solve_shape(
     Raises
     ------
     InputError
-        Without targets, for values that are not finite, an empty set, or a rank by routes without
-        a start.
+        If there are no targets, a value is not finite, the set is empty, or routes rank solutions
+        without a start.
     """
     columns = {each: np.array([value], dtype=float) for each, value in targets.items()}
     return solve_shapes(eset, columns, within=within, start=start, rank=rank)[0]
@@ -219,9 +219,9 @@ def solve_shapes(
     Raises
     ------
     InputError
-        As for `solve_shape`, and for different numbers of values.
+        As for `solve_shape`, or if numbers of values differ.
     """
-    wanted = _numbers(eset, targets)
+    numbers = _numbers(eset, targets)
     rank = rank or ("energy" if start is None else "route")
     if rank == "route" and start is None:
         raise InputError(
@@ -229,12 +229,12 @@ def solve_shapes(
         )
     known = predictor(eset, tuple(targets))
     constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
-    if wanted.shape[1] > len(eset.names):
-        groups = [_fit(known, each, constraints) for each in wanted]
+    if numbers.shape[1] > len(eset.names):
+        groups = [_fit(known, each, constraints) for each in numbers]
     else:
-        groups = _solve(known, wanted, constraints)
+        groups = _solve(known, numbers, constraints)
     answers = []
-    for values, (states, misfit) in zip(wanted, groups, strict=True):
+    for values, (states, misfit) in zip(numbers, groups, strict=True):
         routes = [] if start is None else [plan(eset, start, s, within=within) for s in states]
         answers.append(_answer(known, values, constraints, states, misfit, rank, routes))
     return tuple(answers)
@@ -257,7 +257,7 @@ def _numbers(
 
 def _answer(
     known: Predictor,
-    wanted: Float[np.ndarray, " k"],
+    targets: Float[np.ndarray, " k"],
     within: tuple[Constraint, ...],
     states: States,
     misfit: Values,
@@ -273,28 +273,28 @@ def _answer(
         own = states.energy if rank == "energy" else -states.margin
     fits = misfit > EXACT
     order = np.lexsort((own, index, np.where(fits, misfit, 0.0)))
-    closest, miss = _closest(known, wanted)
+    closest, miss = _closest(known, targets)
     status: Literal["solved", "fitted", "refused"] = "solved"
     if len(order) == 0 or fits.all():
         status = "fitted" if len(order) else "refused"
-    why = "" if status == "solved" else _why(known.descriptors, wanted, miss)
+    why = "" if status == "solved" else _why(known.descriptors, targets, miss)
     return Shapes(
         status, why, states[order], index[order], misfit[order],
-        tuple(routes[k] for k in order) if routes else (), closest, miss, wanted, within, known,
+        tuple(routes[k] for k in order) if routes else (), closest, miss, targets, within, known,
     )  # fmt: skip
 
 
 def _solve(
-    known: Predictor, wanted: Float[np.ndarray, "many k"], within: tuple[Constraint, ...]
+    known: Predictor, targets: Float[np.ndarray, "many k"], within: tuple[Constraint, ...]
 ) -> list[tuple[States, Values]]:
     """Exact solutions of each question in the box and within constraints, each once."""
     structure, eset = known.eset.structure, known.eset
-    guesses, owner = _guesses(known, wanted)
-    exact = states_with_values(known.setting, guesses, known.descriptors, wanted[owner])
+    guesses, owner = _guesses(known, targets)
+    exact = states_with_values(known.setting, guesses, known.descriptors, targets[owner])
     z, p, found = exact.z, exact.p, exact.found
-    if wanted.shape[1] == len(eset.names):
+    if targets.shape[1] == len(eset.names):
         starts, of = twin_guesses(known, exact, guesses.rows, np.flatnonzero(found))
-        twins = states_with_values(known.setting, starts, known.descriptors, wanted[owner[of]])
+        twins = states_with_values(known.setting, starts, known.descriptors, targets[owner[of]])
         owner = np.concatenate([owner, owner[of]])
         order = np.argsort(owner, kind="stable")
         z, p = np.concatenate([z, twins.z])[order], np.concatenate([p, twins.p])[order]
@@ -306,66 +306,66 @@ def _solve(
         found[found] &= constraint.excess(z[found], p[found]) <= room
     states = States(structure, z[found], p[found])
     owner = owner[found]
-    bounds = np.searchsorted(owner, np.arange(len(wanted) + 1))
+    bounds = np.searchsorted(owner, np.arange(len(targets) + 1))
     groups = []
     for first, last in pairwise(bounds):
         own = states[first:last]
         own = own[distinct(own, SAME_STATE)]
         groups.append((own, np.zeros(len(own))))
-    if wanted.shape[1] < len(eset.names):
+    if targets.shape[1] < len(eset.names):
         # the shortest way to a family may leave the box
         groups = [
             group if len(group[0]) else _members(known, values, within)
-            for group, values in zip(groups, wanted, strict=True)
+            for group, values in zip(groups, targets, strict=True)
         ]
     return groups
 
 
 def _members(
-    known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
+    known: Predictor, targets: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
 ) -> tuple[States, Values]:
     """Members of a family within the box and constraints."""
-    states, misfit = _fit(known, wanted, within)
+    states, misfit = _fit(known, targets, within)
     return states[misfit <= EXACT], misfit[misfit <= EXACT]
 
 
 def _guesses(
-    known: Predictor, wanted: Float[np.ndarray, "many k"]
+    known: Predictor, targets: Float[np.ndarray, "many k"]
 ) -> tuple[SetPoints, Int[np.ndarray, " lanes"]]:
     """Starts of Newton's method, and the questions that they belong to."""
-    if wanted.shape[1] < len(known.eset.names):
-        starts = [local_minima(known.edges, known.misfits(each))[:STARTS] for each in wanted]
+    if targets.shape[1] < len(known.eset.names):
+        starts = [local_minima(known.edges, known.misfits(each))[:STARTS] for each in targets]
         vertices = np.concatenate(starts)
-        owner = np.repeat(np.arange(len(wanted)), [len(each) for each in starts])
+        owner = np.repeat(np.arange(len(targets)), [len(each) for each in starts])
         used, place = np.unique(vertices, return_inverse=True)
         return points_at_vertices(known.eset, used).take(place), owner
-    parts = [known.cells(each) for each in wanted]
-    owner = np.repeat(np.arange(len(wanted)), [len(cells) for _, cells in parts])
+    parts = [known.cells(each) for each in targets]
+    owner = np.repeat(np.arange(len(targets)), [len(cells) for _, cells in parts])
     shares, cells = (np.concatenate(column) for column in zip(*parts, strict=True))
     return known.guesses(shares, cells), owner
 
 
 def _fit(
-    known: Predictor, wanted: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
+    known: Predictor, targets: Float[np.ndarray, " k"], within: tuple[Constraint, ...]
 ) -> tuple[States, Values]:
     """Different fits of least squares."""
-    states, misfit = best_fits(known, wanted, within)
+    states, misfit = best_fits(known, targets, within)
     kept = distinct(states, SAME_STATE)
     return states[kept], misfit[kept]
 
 
-def _closest(known: Predictor, wanted: Float[np.ndarray, " k"]) -> tuple[State, dict[str, float]]:
-    best = int(known.misfits(wanted).argmin())
-    gaps = (known.values[best] - wanted).tolist()
+def _closest(known: Predictor, targets: Float[np.ndarray, " k"]) -> tuple[State, dict[str, float]]:
+    best = int(known.misfits(targets).argmin())
+    gaps = (known.values[best] - targets).tolist()
     names = [each.name for each in known.descriptors]
     return known.eset.points[best], dict(zip(names, gaps, strict=True))
 
 
 def _why(
     descriptors: tuple[Descriptor, ...],
-    wanted: Float[np.ndarray, " k"],
+    targets: Float[np.ndarray, " k"],
     miss: Mapping[str, float],
 ) -> str:
-    asked = ", ".join(f"{d.name} = {v:g}" for d, v in zip(descriptors, wanted, strict=True))
+    asked = ", ".join(f"{d.name} = {v:g}" for d, v in zip(descriptors, targets, strict=True))
     gaps = ", ".join(f"{name} by {gap:.3g}" for name, gap in miss.items())
     return f"no state of the set has {asked}; the nearest vertex misses {gaps}"

@@ -84,8 +84,8 @@ class Bounds:
         )
 
 
-def segment_bounds(first: States, last: States, wanted: float = 0.0) -> Bounds:
-    """Bounds on the segments between pairs of equilibria; a `wanted` margin is tried as well."""
+def segment_bounds(first: States, last: States, target: float = 0.0) -> Bounds:
+    """Bounds on the segments between pairs of equilibria; the `target` margin is tried as well."""
     structure = first.structure
     middle = States(structure, 0.5 * (first.z + last.z), 0.5 * (first.p + last.p))
     half = 0.5 * np.abs(last.z - first.z), 0.5 * np.abs(last.p - first.p)
@@ -111,7 +111,7 @@ def segment_bounds(first: States, last: States, wanted: float = 0.0) -> Bounds:
     at_ends = 2.0 * ends / np.maximum(1.0 - turn, 1e-300)[:, None]
     tube = half[0] + np.where(proved, error, 0.0)[:, None] * weights, half[1]
     least = np.minimum(first.margin, last.margin)
-    margin = _margins(middle, matrix, bound, tube, least, wanted)
+    margin = _margins(middle, matrix, bound, tube, least, target)
     return Bounds(proved, error, unique, at_ends, index, weights, np.where(proved, margin, 0.0))
 
 
@@ -194,7 +194,7 @@ def _margins(
     bound: Majorant,
     tube: Direction,
     least: Values,
-    wanted: float,
+    target: float,
 ) -> Values:
     """Largest tried σ for which F_z − σ·mass keeps index 0 in the tubes.
 
@@ -208,10 +208,10 @@ def _margins(
         kept = np.where(good, shift, kept)
         if (kept > 0.0).all():
             break
-    near = (kept < wanted) & (least > wanted)
+    near = (kept < target) & (least > target)
     if near.any():
-        good = _keeps(middle, matrix, bound, tube, np.where(near, wanted, 0.0)) & near
-        kept = np.where(good, wanted, kept)
+        good = _keeps(middle, matrix, bound, tube, np.where(near, target, 0.0)) & near
+        kept = np.where(good, target, kept)
     return kept
 
 
