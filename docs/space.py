@@ -4,7 +4,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from equimorph import Grid, Rod, limit_load_map, plotting
+from equimorph import Grid, Rod, limit_load_map, plotting, strongest
 
 FOLDER = Path(__file__).parent
 GRID = Grid(Theta=(0.3, 1.6, 40), Delta=(-1.2, 1.2, 40))
@@ -21,7 +21,7 @@ def main(file: Path = FOLDER / "space.png", grid: Grid = GRID) -> Path:
         figure, axes = plt.subplots(1, 2, figsize=(7.6, 3.2))
         figure.subplots_adjust(left=0.07, right=0.93, bottom=0.27, top=0.92, wspace=0.5)
         for ax, found in zip(axes, (planar, spatial), strict=True):
-            plotting.load_map(found, ax)
+            plotting.load_map(found, ax, highest=strongest(planar).best.value)
         axes[0].set_title("strip: in its plane")
         axes[1].set_title("round rod: in space")
     figure.savefig(file, dpi=DOTS)

@@ -136,6 +136,51 @@ def test_introduction(numbers_of):
     np.testing.assert_allclose(found["height at 2/3 adapted"], 0.10, rtol=1e-9)
 
 
+def test_space_route(numbers_of):
+    """Round −0.342, A = 2 +0.173, strips .355, .467 to the digits; between 65 stations less.
+
+    At the stations .572 and .604 for the wider strips: `tests/validation/test_rods_in_space.py`.
+    """
+    found = numbers_of("space_route")
+    names = ("round", "A = 2, C = 0.9", "2 : 1", "3.16 : 1")
+    own = [found[f"{name}: smallest on the way"] for name in names]
+    np.testing.assert_allclose(own, [-0.342, 0.173, 0.355, 0.467], atol=6e-4)
+    wide = [found[f"{name}: smallest on the way"] for name in ("10 : 1", "40 : 1")]
+    assert 0.567 < wide[0] < 0.572
+    assert 0.597 < wide[1] < 0.604
+    assert found["round: stable in space all along"] is False
+
+
+def test_space_stiffness(numbers_of):
+    """Smallest A of the way for three C, and at (0.9, 0) up to two loads; last digit."""
+    found = numbers_of("space_stiffness", settings=(2, 2))
+    for torsion, exact in ((0.77, 1.4745), (1.0, 1.4715), (1.4, 1.4687)):
+        key = f"least A for the way inside out, C = {torsion:g}"
+        np.testing.assert_allclose(found[key], exact, atol=1e-4)
+    loads = {"q = 2.5": 1.5708, "the planar limit load": 2.7901}
+    for load, exact in loads.items():
+        np.testing.assert_allclose(found[f"least A at (0.9, 0) up to {load}"], exact, atol=1e-4)
+
+
+def test_space_loads(numbers_of):
+    """The first lateral loads of the round rod; maps on few settings."""
+    found = numbers_of("space_loads", grid=em.Grid(Theta=(0.5, 1.3, 3), Delta=(-0.6, 0.6, 4)))
+    expected = {
+        ("uniform", 0.6, 0.0): 1.125177, ("uniform", 0.9, 0.0): 1.601472,
+        ("uniform", 0.9, 0.02): 1.601348, ("uniform", 1.2, 0.0): 2.086648,
+        ("uniform", 1.5, 0.0): 2.693904, ("uniform", 0.94, 0.6): 1.637928,
+        ("left-half", 0.9, 0.0): 1.534254, ("left-half", 0.94, 0.6): 1.596116,
+    }  # fmt: skip
+    for (load, theta, delta), value in expected.items():
+        key = f"round, {load}: leaves its plane at ({theta:g}, {delta:g})"
+        np.testing.assert_allclose(found[key], value, atol=1e-6)
+    assert found["round: snaps out of its plane at (0.9, 0)"] is False
+    sideways = "share of settings that leave the plane first"
+    assert found[f"planar: {sideways}"] == 0.0
+    assert found[f"round: {sideways}"] == 1.0
+    assert found[f"strip 3: {sideways}"] == 0.0
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda each: each.name)
 def test_examples_are_short_and_use_the_public_face(example):
     """At most 80 lines; nothing imported from within."""

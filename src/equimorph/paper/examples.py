@@ -11,6 +11,9 @@ from equimorph.paper import (
     limit_loads,
     models,
     parameterisations,
+    space_loads,
+    space_route,
+    space_stiffness,
     spring,
     tracking,
 )
@@ -145,6 +148,46 @@ EXAMPLES = (
             "thick: stability boundary and other folds; dashed: max |κ| = 6, paler beyond. (b) "
             "The end angles, darker where the arch has two stable states; hatched: beyond max |κ| "
             "= 20, at which the set is cut. (c) Shapes at the way-points.",
+        },
+    ),
+    Example(
+        "space_loads",
+        "In space: limit loads",
+        space_loads.main,
+        {
+            f"space-loads-{name}": f"Limit loads of the arch under the uniform load, {text}, in "
+            "colours common to all five maps. Striped: the arch leaves its plane first; dotted: "
+            "max |κ| = 10 is reached first; hatched: max |κ| exceeds 10 without load."
+            for name, text in (
+                ("planar", "held in its plane"),
+                ("round", "made of a round rod (ν = 0.3)"),
+                *(
+                    (f"strip-{ratio:g}", f"made of a strip {ratio:g} times as wide as thick")
+                    for ratio in space_loads.RATIOS
+                ),
+            )
+        },
+    ),
+    Example(
+        "space_route",
+        "In space: the way inside out",
+        space_route.main,
+        {
+            "space-route": "The article's way inside out at q = 2.5 in space: "
+            "the lowest eigenvalue of the second variation out of the plane, left along "
+            "the way for a round rod (ν = 0.3) and for rectangular sections by width to thickness, "
+            "right the smallest one on the way. Below zero the arch leaves its plane.",
+        },
+    ),
+    Example(
+        "space_stiffness",
+        "In space: how stiff is stiff enough",
+        space_stiffness.main,
+        {
+            "space-stiffness": "Smallest stiffness A out of the plane, relative to EI in it, with "
+            "which the arch under the uniform load (C = GJ/EI = 0.77) stays in its plane from rest "
+            "up to q = 2.5, or up to its planar limit load where that is lower (left of the "
+            "ridge). The figure is symmetric in Δ.",
         },
     ),
 )

@@ -101,6 +101,8 @@ class Panel:
         What is hatched.
     from_zero
         Whether colours begin at zero.
+    highest
+        Value of the last colour; that of the map if there is none.
     """
 
     looks: Mapping[str, CurveLook]
@@ -108,6 +110,7 @@ class Panel:
     marks: tuple[Mark, ...]
     ground_label: str
     from_zero: bool
+    highest: float | None = None
 
 
 def new_map_axes(wider: float = 0.0) -> Axes:
@@ -172,7 +175,8 @@ def value_colours() -> Colormap:
 def _fill(ax: Axes, amap: ActuatorMap, panel: Panel, found: Faces) -> None:
     """Fill the faces, and draw contours over the smooth ones."""
     known = amap.value[np.isfinite(amap.value)]
-    low, high = 0.0 if panel.from_zero else float(known.min()), float(known.max())
+    low = 0.0 if panel.from_zero else float(known.min())
+    high = float(known.max()) if panel.highest is None else panel.highest
     norm = Normalize(low, high)
     look: dict[str, Any] = {
         "cmap": value_colours(),
@@ -259,7 +263,7 @@ _LOOKS = {
 
 
 @check_arguments
-def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
+def load_map(lmap: LimitLoadMap, ax: Axes | None = None, *, highest: float | None = None) -> Axes:
     """Limit loads over two actuators, with the curves on which they jump or bend.
 
     Cells that a jump crosses are cut along it; nothing is interpolated across. Contours are drawn
@@ -273,6 +277,9 @@ def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
         The map.
     ax
         Where to draw; None makes a figure one column wide.
+    highest
+        Limit load of the last colour, so that several maps share their colours; None takes the
+        largest of the map.
 
     Returns
     -------
@@ -288,6 +295,7 @@ def load_map(lmap: LimitLoadMap, ax: Axes | None = None) -> Axes:
         ),
         ground_label="undefined",
         from_zero=True,
+        highest=highest,
     )
     return draw_map(lmap, panel, ax)
 
