@@ -22,6 +22,8 @@ from typecheck import unchecked
         (1.0, "`a` must be (lower, upper); got 1.0."),
         (("0", "1"), "`a` must be numbers (lower, upper); got ('0', '1')."),
         ((True, 2.0), "`a` must be numbers (lower, upper); got (True, 2.0)."),
+        (np.array(3.0), "`a` must be (lower, upper); got array(3.)."),
+        ({0: 1, 1: 2}, "`a` must be (lower, upper); got {0: 1, 1: 2}."),
     ],
 )
 def test_bounds_that_span_nothing_are_refused(bounds, said):
@@ -41,11 +43,24 @@ def test_a_box_has_at_least_one_side():
         ((0.0, 1.0, 2.5), "`a` must have a whole number of intervals >= 1; got 2.5."),
         ((1.0, 1.0, 3), "`a` must have finite lower < upper; got (1.0, 1.0, 3)."),
         ((0.0, 1.0), "`a` must be (lower, upper, intervals); got (0.0, 1.0)."),
+        ((True, 2, 3), "`a` must be numbers (lower, upper, intervals); got (True, 2, 3)."),
+        ((0, 2, True), "`a` must be numbers (lower, upper, intervals); got (0, 2, True)."),
+        (np.array(3.0), "`a` must be (lower, upper, intervals); got array(3.)."),
     ],
 )
 def test_grids_without_whole_intervals_are_refused(sides, said):
     with unchecked(), pytest.raises(InputError, match=f"^{re.escape(said)}$"):
         Grid(a=sides)
+
+
+def test_a_grid_has_at_least_one_parameter():
+    with pytest.raises(InputError, match=r"^`Grid` must name at least one parameter; got none\.$"):
+        Grid()
+
+
+def test_single_precision_bounds_are_numbers():
+    """Their magnitude is compared as a number of double precision, without an overflow warning."""
+    assert repr(Box(a=np.array([0.0, 3.0], dtype=np.float32))) == "Box(a=(0, 3))"
 
 
 def test_a_box_contains_its_sides_and_what_slack_adds():
@@ -59,6 +74,7 @@ def test_a_box_contains_its_sides_and_what_slack_adds():
 
 def test_boxes_and_grids_say_what_they_are():
     grid = Grid(b=(-2, 2, 4), a=(0, 0.5, 1))
+    assert repr(grid) == "Grid(b=(-2, 2, 4), a=(0, 0.5, 1))"
     assert repr(grid.box) == "Box(b=(-2, 2), a=(0, 0.5))"
     assert (grid.names, grid.intervals) == (("b", "a"), (4, 1))
     b, a = grid.axes()

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
-from equimorph.argument_kinds import is_number
-from equimorph.argument_vocabulary import LARGEST
+from equimorph.argument_kinds import is_listed, is_number, short
+from equimorph.argument_vocabulary import FINITE
 from equimorph.errors import InputError, suggestion
 
 Role = Literal["actuator", "load", "fixed"]
@@ -35,7 +35,7 @@ class Parameter:
 
     def check(self, value: float) -> float:
         """Return `value` as a float, or raise `InputError` if it has no meaning."""
-        number = float(value) if is_number(value) and abs(value) <= LARGEST else np.nan
+        number = float(value) if is_number(value) and FINITE.holds(value) else np.nan
         if not (np.isfinite(number) and self.lower < number < self.upper):
             raise InputError(
                 f"`{self.name}` must be a finite number{self._limits()}; got {value!r}."
@@ -89,15 +89,15 @@ def parameter_vector(
     return vector
 
 
-def _bounds(name: str, value: object, count: int) -> tuple[float, ...]:
+def _bounds(name: str, value: Any, count: int) -> tuple[float, ...]:
     meaning = "(lower, upper)" if count == 2 else "(lower, upper, intervals)"
-    if not isinstance(value, Sequence | np.ndarray) or len(value) != count:
-        raise InputError(f"`{name}` must be {meaning}; got {value!r}.")
+    if not is_listed(value) or len(value) != count:
+        raise InputError(f"`{name}` must be {meaning}; got {short(value)}.")
     if not all(map(is_number, value)):
-        raise InputError(f"`{name}` must be numbers {meaning}; got {value!r}.")
-    numbers = tuple(float(entry) if abs(entry) <= LARGEST else np.nan for entry in value)
+        raise InputError(f"`{name}` must be numbers {meaning}; got {short(value)}.")
+    numbers = tuple(float(entry) if FINITE.holds(entry) else np.nan for entry in value)
     if not (np.isfinite(numbers).all() and numbers[0] < numbers[1]):
-        raise InputError(f"`{name}` must have finite lower < upper; got {value!r}.")
+        raise InputError(f"`{name}` must have finite lower < upper; got {short(value)}.")
     return numbers
 
 
@@ -137,6 +137,8 @@ class Grid:
     """A regular grid of settings: ``Grid(Theta=(0.2, 2.5, 93), ...)`` has 93 intervals in Theta."""
 
     def __init__(self, **ranges: Sequence[float]) -> None:
+        if not ranges:
+            raise InputError("`Grid` must name at least one parameter; got none.")
         triples = {name: _bounds(name, value, 3) for name, value in ranges.items()}
         for name, triple in triples.items():
             if triple[2] < 1 or triple[2] != int(triple[2]):
@@ -146,6 +148,11 @@ class Grid:
         self.box = Box(**{name: triple[:2] for name, triple in triples.items()})
         self.names = self.box.names
         self.intervals: tuple[int, ...] = tuple(int(triple[2]) for triple in triples.values())
+
+    def __repr__(self) -> str:
+        """Return the call that makes this grid."""
+        sides = zip(self.names, self.box.lower, self.box.upper, self.intervals, strict=True)
+        return f"Grid({', '.join(f'{name}=({a:g}, {b:g}, {n})' for name, a, b, n in sides)})"
 
     def axes(self) -> tuple[Float[np.ndarray, " points"], ...]:
         """Grid lines per parameter, ends included."""
