@@ -9,6 +9,7 @@ import base64
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -113,25 +114,35 @@ def _ply(surface: _Surface) -> bytes:
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(surface.points)}"]
     lines += [f"property {PLY_TYPES[v.dtype.kind]} {_word(name)}" for name, v in vertices.items()]
     lines.append(f"element {simplex} {len(surface.cells)}")
-    fields = [(name, "<i4", column) for name, column in corners.items()]
+    fields = [_Column(name, "<i4", column) for name, column in corners.items()]
     if simplex == "face":
         lines.append("property list uchar int vertex_indices")
-        fields.insert(0, ("count", "u1", np.full(len(surface.cells), 3)))
+        fields.insert(0, _Column("count", "u1", np.full(len(surface.cells), 3)))
     else:
         lines += [f"property int {name}" for name in corners]
     lines += [f"property int {_word(name)}" for name in surface.on_cells]
-    fields += [(f"cell {name}", "<i4", values) for name, values in surface.on_cells.items()]
+    fields += [_Column(f"cell {name}", "<i4", values) for name, values in surface.on_cells.items()]
     header = "\n".join([*lines, "end_header\n"]).encode("ascii")
-    columns = [(name, f"<{v.dtype.kind}{8 if v.dtype.kind == 'f' else 4}", v)
-               for name, v in vertices.items()]  # fmt: skip
+    columns = [
+        _Column(name, f"<{v.dtype.kind}{8 if v.dtype.kind == 'f' else 4}", v)
+        for name, v in vertices.items()
+    ]
     return header + _rows(columns) + _rows(fields)
 
 
-def _rows(columns: list[tuple[str, str, Shaped[np.ndarray, " n"]]]) -> bytes:
-    rows = np.zeros(len(columns[0][2]), [(f"{k} {name}", kind) for k, (name, kind, _) in
-                                         enumerate(columns)])  # fmt: skip
-    for field, (_, _, values) in zip(rows.dtype.names or (), columns, strict=True):
-        rows[field] = values
+class _Column(NamedTuple):
+    """One number of each row of a binary table, in numpy's notation of its type."""
+
+    name: str
+    kind: str
+    values: Shaped[np.ndarray, " n"]
+
+
+def _rows(columns: list[_Column]) -> bytes:
+    layout = [(f"{k} {each.name}", each.kind) for k, each in enumerate(columns)]
+    rows = np.zeros(len(columns[0].values), layout)
+    for field, each in zip(rows.dtype.names or (), columns, strict=True):
+        rows[field] = each.values
     return rows.tobytes()
 
 

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -134,10 +134,21 @@ def places_of_joints(
     return tuple(table), np.array(places)
 
 
-def ends_of_edges(
-    edges: Iterable[tuple[str, Sequence[str]]], joints: Sequence[str], edge: str
-) -> Ends:
-    """Numbers of the joints that edges, given by name and ends, join.
+@runtime_checkable
+class Edge(Protocol):
+    """A member or bar between two joints."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def ends(self) -> Sequence[str]:
+        """Names of its joints."""
+
+
+def ends_of_edges(edges: Iterable[Edge], joints: Sequence[str], edge: str) -> Ends:
+    """Numbers of the joints that edges join.
 
     Raises
     ------
@@ -145,13 +156,13 @@ def ends_of_edges(
         For an unknown joint.
     """
     found = []
-    for name, ends in edges:
-        for end in ends:
+    for each in edges:
+        for end in each.ends:
             if end not in joints:
                 raise InputError(
-                    f"`ends` of {edge} {name} must be joints ({', '.join(joints)}); got {end}."
+                    f"`ends` of {edge} {each.name} must be joints ({', '.join(joints)}); got {end}."
                 )
-        found.append([joints.index(end) for end in ends])
+        found.append([joints.index(end) for end in each.ends])
     return np.array(found, dtype=int).reshape(-1, 2)
 
 

@@ -90,7 +90,7 @@ def depths(frames: Frames, points: Float[np.ndarray, "lanes d"]) -> Values:
 
 
 SHEETS = 2
-"""Whether a crossing belongs to each."""
+"""Number of sheets that meet at a crossing."""
 DIVIDED = 1 / 100
 """Share of the largest grid tetrahedron below which none is divided, although a fold may overturn
 cells there."""

@@ -6,6 +6,7 @@ all meet in a hub: an exact crossing point at which a test function of the fold 
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -29,13 +30,20 @@ Ways = list[list[Chord]]
 COMBINATIONS = 256
 """Ways to cut all polygons over a triangle beyond which it is undecided at once."""
 SHEETS = 2
-"""To each of which a crossing belongs."""
+"""Number of sheets that meet at a crossing."""
 HUB = 1e-13
 """Precision of the place of a hub, relative to its chord."""
 NEAR, FAR = 1e-6, 1e-3
 """The same where a second eigenvalue vanishes: target, and largest value that is accepted."""
 SKEW = 1e-4
 """Quadratic over cubic coefficient, a length in the metric, below which it counts as zero."""
+
+
+class Group(NamedTuple):
+    """Points over a grid triangle between which an exact point is computed."""
+
+    triangle: int
+    points: tuple[int, ...]
 
 
 def join_crossings(plans: list[Plan], ways: list[Ways]) -> list[Ways]:
@@ -107,27 +115,25 @@ def _singular(plan: Plan) -> int:
     return len(plan.those(TURN)) + len(plan.those(MEETING))
 
 
-def split_crossings(
-    pairing: Pairing, plans: list[Plan], wanted: set[tuple[int, Chord]]
-) -> list[int]:
+def split_crossings(pairing: Pairing, plans: list[Plan], chords: set[Group]) -> list[int]:
     """Put exact points on chords of crossings, for both sheets; return triangles without one."""
-    known = {(plan.polygon.triangle, chord) for plan in plans for chord in plan.middle}
-    todo = sorted(wanted - known)
+    known = {Group(plan.polygon.triangle, chord) for plan in plans for chord in plan.middle}
+    todo = sorted(chords - known)
     points = _pin(pairing, todo, cap=False)
     at = dict(zip(todo, points, strict=True))
     for plan in plans:
         for chord in plan.chords:
-            point = at.get((plan.polygon.triangle, chord))
+            point = at.get(Group(plan.polygon.triangle, chord))
             if point is not None:
                 plan.middle[chord] = point
-    return [triangle for (triangle, _), point in at.items() if point is None]
+    return [group.triangle for group, point in at.items() if point is None]
 
 
 def pin_ends(pairing: Pairing, plans: list[Plan]) -> list[int | None]:
     """Where crossings leave through a constraint, the same point for both sheets."""
-    keys = [(plan.polygon.triangle, tuple(sorted(plan.those(MEETING)))) for plan in plans]
+    keys = [Group(plan.polygon.triangle, tuple(sorted(plan.those(MEETING)))) for plan in plans]
     groups = {
-        (key[0], (plan.points[0], plan.points[-1], *key[1])): key
+        Group(key.triangle, (plan.points[0], plan.points[-1], *key.points)): key
         for key, plan in zip(keys, plans, strict=True)
         if keys.count(key) == SHEETS
     }
@@ -137,20 +143,18 @@ def pin_ends(pairing: Pairing, plans: list[Plan]) -> list[int | None]:
     return [at.get(key) for key in keys]
 
 
-def _pin(
-    pairing: Pairing, wanted: Sequence[tuple[int, tuple[int, ...]]], *, cap: bool
-) -> list[int | None]:
+def _pin(pairing: Pairing, groups: Sequence[Group], *, cap: bool) -> list[int | None]:
     """Numbers of new crossing points near points over triangles; None where none was found."""
-    if not wanted:
+    if not groups:
         return []
     setting, store = pairing.setting, pairing.points
-    span = planes(pairing, [triangle for triangle, _ in wanted])
-    pinned = pin_crossings(setting, store, [group for _, group in wanted], span, cap)
+    span = planes(pairing, [group.triangle for group in groups])
+    pinned = pin_crossings(setting, store, [group.points for group in groups], span, cap)
     good = pinned.found & pairing.mesh.covers(pinned.p[:, setting.free])
     low = lower_index(setting, pinned.z, pinned.p)
     return [
         store.add(pinned.z[k], pinned.p[k], int(low[k]), VertexKind.CROSSING) if good[k] else None
-        for k in range(len(wanted))
+        for k in range(len(groups))
     ]
 
 

@@ -12,6 +12,8 @@ from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import flags_of
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.crossing_discs import (
+    Group,
+    Ways,
     join_crossings,
     pin_ends,
     put_hubs,
@@ -146,18 +148,19 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
         found.caps.add(chord_of(*side))
         if _same_side(plan, side):
             found.undecided.add(plan.polygon.triangle)
-    wanted = [(plan, _through(plan)) for plan in plans if plan.polygon.open]
+    through = {k: _through(plan) for k, plan in enumerate(plans) if plan.polygon.open}
     found.caps.update(
-        chord_of(plan.points[0], plan.points[-1]) for plan, kind in wanted if not kind
+        chord_of(plans[k].points[0], plans[k].points[-1]) for k, kind in through.items() if not kind
     )
-    wanted = [(plan, kind) for plan, kind in wanted if kind]
-    pairs = [(plan, (plan.points[0], plan.points[-1]), kind) for plan, kind in wanted]
-    extra = _pin(pairing, pairs)
-    crossing = [k for k, (_, kind) in enumerate(wanted) if kind == VertexKind.CROSSING]
-    ends = pin_ends(pairing, [wanted[k][0] for k in crossing])
-    for k, point in zip(crossing, ends, strict=True):
+    open_plans = [plans[k] for k, kind in through.items() if kind]
+    kinds = [kind for kind in through.values() if kind]
+    ends = [(plan.points[0], plan.points[-1]) for plan in open_plans]
+    extra = _pin(pairing, _groups(open_plans, ends), kinds)
+    crossing = [k for k, kind in enumerate(kinds) if kind == VertexKind.CROSSING]
+    met = pin_ends(pairing, [open_plans[k] for k in crossing])
+    for k, point in zip(crossing, met, strict=True):
         extra[k] = point
-    for (plan, _), point in zip(wanted, extra, strict=True):
+    for plan, point in zip(open_plans, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
             continue
@@ -184,7 +187,7 @@ def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan
         match_folds(plan.points, plan.singular, lambda point: int(index[point])) for plan in plans
     ]
     several = [k for k, each in enumerate(ways) if len(each) > 1]
-    continuous = _continuous(pairing, [(plans[k], ways[k]) for k in several])
+    continuous = _continuous(pairing, [plans[k] for k in several], [ways[k] for k in several])
     for k, each in zip(several, continuous, strict=True):
         ways[k] = each
     ways = join_crossings(plans, ways)
@@ -207,9 +210,7 @@ def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan
     return [plan for plan in decided if plan.polygon.triangle not in lost]
 
 
-def _continuous(
-    pairing: Pairing, choices: list[tuple[Plan, list[list[Chord]]]]
-) -> list[list[list[Chord]]]:
+def _continuous(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> list[Ways]:
     """Ways in which every chord joins folds whose sheets lie on the same side.
 
     In the narrow wedge behind a cusp two fold curves run side by side at every scale: there only
@@ -217,14 +218,14 @@ def _continuous(
     """
     at = [
         (number, fold)
-        for number, (plan, ways) in enumerate(choices)
+        for number, (plan, ways) in enumerate(zip(plans, choices, strict=True))
         for fold in sorted({fold for way in ways for chord in way for fold in chord})
         if plan.singular(fold) == TURN
     ]
     if not at:
-        return [ways for _, ways in choices]
+        return choices
     normals = existence_normals(pairing.setting, pairing.points, np.array([fold for _, fold in at]))
-    flat = _along_sides(pairing, [choices[number][0].polygon.triangle for number, _ in at], normals)
+    flat = _along_sides(pairing, [plans[number].polygon.triangle for number, _ in at], normals)
     flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
     normal = dict(zip(at, flat, strict=True))
     return [
@@ -237,7 +238,7 @@ def _continuous(
                 if plan.singular(a) == TURN
             )
         ]
-        for number, (plan, ways) in enumerate(choices)
+        for number, (plan, ways) in enumerate(zip(plans, choices, strict=True))
     ]
 
 
@@ -257,22 +258,23 @@ def _along_sides(
 
 def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     """Put an exact point on chords that would lie on a grid edge, or block triangulation."""
-    wanted = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
-    folds = [(plan, chord) for plan, chord in wanted if plan.singular(chord[0]) == TURN]
-    extra = _pin(pairing, [(plan, chord, VertexKind.FOLD) for plan, chord in folds])
+    blocked = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
+    folds = [(plan, chord) for plan, chord in blocked if plan.singular(chord[0]) == TURN]
+    groups = _groups([plan for plan, _ in folds], [chord for _, chord in folds])
+    extra = _pin(pairing, groups, [VertexKind.FOLD] * len(folds))
     for (plan, chord), point in zip(folds, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
         else:
             plan.middle[chord] = point
     met = {
-        (plan.polygon.triangle, chord)
-        for plan, chord in wanted
+        Group(plan.polygon.triangle, chord)
+        for plan, chord in blocked
         if plan.singular(chord[0]) == MEETING
     }
     # near a constraint the crossing might leave between the ends of its chord
     met |= {
-        (plan.polygon.triangle, chord)
+        Group(plan.polygon.triangle, chord)
         for plan in plans
         for chord in plan.chords
         if plan.polygon.open and plan.singular(chord[0]) == MEETING and chord not in plan.middle
@@ -289,26 +291,39 @@ def _chords_to_split(plan: Plan) -> list[Chord]:
     return [chords[chord] for chord in chosen]
 
 
-def _pin(pairing: Pairing, wanted: list[tuple[Plan, Chord, int]]) -> list[int | None]:
-    """Numbers of new exact points of some kind between pairs; None where none was found."""
-    out: list[int | None] = [None] * len(wanted)
+def _groups(plans: list[Plan], pairs: list[Chord]) -> list[Group]:
+    return [Group(plan.polygon.triangle, pair) for plan, pair in zip(plans, pairs, strict=True)]
+
+
+def _pin(pairing: Pairing, pairs: list[Group], kinds: list[int]) -> list[int | None]:
+    """Numbers of new exact points of given kinds between pairs; None where none was found."""
+    out: list[int | None] = [None] * len(pairs)
     for kind in (VertexKind.FOLD, VertexKind.CAP, VertexKind.CORNER):
-        own = [k for k, each in enumerate(wanted) if each[2] == kind]
+        own = [k for k, each in enumerate(kinds) if each == kind]
         if not own:
             continue
-        pairs = [wanted[k][1] for k in own]
-        span = planes(pairing, [wanted[k][0].polygon.triangle for k in own])
-        pinned = pin(pairing.setting, pairing.points, pairs, kind, span)
+        ends = [pairs[k].points for k in own]
+        span = planes(pairing, [pairs[k].triangle for k in own])
+        pinned = pin(pairing.setting, pairing.points, ends, kind, span)
         good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
-        lows = pairing.points.index[np.array(pairs)].min(axis=1)
+        lows = pairing.points.index[np.array(ends)].min(axis=1)
         for lane, low in zip(np.flatnonzero(good).tolist(), lows[good].tolist(), strict=True):
             out[own[lane]] = pairing.points.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out
 
 
+@dataclass(frozen=True)
+class _PlanPiece:
+    """A piece of a polygon that is cut, by its corners, with the index of its sheet."""
+
+    plan: Plan
+    corners: Piece
+    index: int
+
+
 def _fill(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     """Cut polygons and triangulate their pieces, all pieces with equally many corners together."""
-    by_size: dict[int, list[tuple[Plan, Piece, int]]] = {}
+    by_size: dict[int, list[_PlanPiece]] = {}
     for number, plan in enumerate(plans):
         plan.sheet = number
         for chord in plan.chords:
@@ -322,7 +337,7 @@ def _fill(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
             if index is None or len(piece) < 3:
                 found.undecided.add(plan.polygon.triangle)
             else:
-                by_size.setdefault(len(piece), []).append((plan, piece, index))
+                by_size.setdefault(len(piece), []).append(_PlanPiece(plan, piece, index))
     for pieces in by_size.values():
         _triangulate(pairing, pieces, found)
 
@@ -334,24 +349,24 @@ def _index(pairing: Pairing, piece: Piece) -> int | None:
     return index.pop() if len(index) == 1 else None
 
 
-def _triangulate(pairing: Pairing, pieces: list[tuple[Plan, Piece, int]], found: _Found) -> None:
+def _triangulate(pairing: Pairing, pieces: list[_PlanPiece], found: _Found) -> None:
     """Enter the triangles of pieces with equally many corners."""
     store = pairing.points
-    corners = np.array([piece for _, piece, _ in pieces])
+    corners = np.array([each.corners for each in pieces])
     places = embed(pairing.setting, store.z[corners.ravel()], store.p[corners.ravel()])
-    sides = np.array([plan.on(piece) for plan, piece, _ in pieces])
+    sides = np.array([each.plan.on(each.corners) for each in pieces])
     triangles, possible = triangulate(places.reshape(*corners.shape, -1), sides)
     rows = np.arange(len(corners))[:, None, None]
-    for (plan, _, index), own, good in zip(
+    for piece, own, good in zip(
         pieces, corners[rows, triangles].tolist(), possible.tolist(), strict=True
     ):
         if not good:
-            found.undecided.add(plan.polygon.triangle)
+            found.undecided.add(piece.plan.polygon.triangle)
             continue
         found.corners.extend(own)
-        found.index.extend([index] * len(own))
-        found.owner.extend([plan.polygon.triangle] * len(own))
-        found.sheet.extend([plan.sheet] * len(own))
+        found.index.extend([piece.index] * len(own))
+        found.owner.extend([piece.plan.polygon.triangle] * len(own))
+        found.sheet.extend([piece.plan.sheet] * len(own))
 
 
 def existence_normals(

@@ -94,7 +94,7 @@ def frame_network(
     """
     names, places = places_of_joints(joints, system, (2,), reserved=(WEIGHT,))
     made = tuple(member_of(each).measured(system) for each in members)
-    ends = ends_of_edges(((member.name, member.ends) for member in made), names, "member")
+    ends = ends_of_edges(made, names, "member")
     held = np.zeros((len(names), 3))
     for at, joint, given in supported_joints(supports, names):
         held[at] = stiffnesses(joint, given, system)

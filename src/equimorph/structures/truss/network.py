@@ -111,7 +111,7 @@ def truss_network(
     """
     names, places = places_of_joints(joints, system, (2, 3))
     made = tuple(bar_of(each).measured(system) for each in bars)
-    ends = ends_of_edges(((bar.name, bar.ends) for bar in made), names, "bar")
+    ends = ends_of_edges(made, names, "bar")
     held = np.zeros(places.shape, bool)
     for at, joint, axes in supported_joints(supports, names):
         held[at, _held_axes(joint, axes, places.shape[1])] = True

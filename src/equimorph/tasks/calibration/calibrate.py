@@ -14,7 +14,7 @@ from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.structures import States
 from equimorph.tasks.calibration.branch import Branch, BranchEnds, Jacobian, Residuals
-from equimorph.tasks.calibration.measurements import Columns, Measurement
+from equimorph.tasks.calibration.measurements import Measurement, Readings
 from equimorph.tasks.calibration.unknowns import Family, Unknowns, Vector, Wanted, unknowns
 
 CONVERGED = 1e-13
@@ -149,8 +149,7 @@ def calibrate(
     for state in start:
         check_start(state)
     free = unknowns(start, unknown, family)
-    tables = [each.table(start) for each in measured]
-    values, sigma = _join_tables(tables)
+    values, sigma = _join_tables([each.table(start) for each in measured])
     count = int(np.isfinite(values).sum())
     if count < len(free.names):
         raise InputError(
@@ -167,16 +166,14 @@ def calibrate(
     return _judge(free, branch, known=sigma is not None)
 
 
-def _join_tables(
-    tables: Sequence[tuple[Columns, Columns | None]],
-) -> tuple[Columns, Columns | None]:
+def _join_tables(tables: Sequence[Readings]) -> Readings:
     if not tables:
         raise InputError("`measured` must hold at least one measurement; got none.")
-    values = np.concatenate([each for each, _ in tables], axis=1)
-    deviations = [sigma for _, sigma in tables if sigma is not None]
+    values = np.concatenate([each.values for each in tables], axis=1)
+    deviations = [each.sigma for each in tables if each.sigma is not None]
     if deviations and len(deviations) < len(tables):
         raise InputError("`sigma` must be given for all measurements or for none; got some.")
-    return values, np.concatenate(deviations, axis=1) if deviations else None
+    return Readings(values, np.concatenate(deviations, axis=1) if deviations else None)
 
 
 def _judge(free: Unknowns, branch: Branch, *, known: bool) -> Calibration:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Protocol, runtime_checkable
+from typing import Annotated, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -24,11 +24,18 @@ WEIGHTS = ((1.0, 8.0 / 12.0), (-1.0, -8.0 / 12.0), (2.0, -1.0 / 12.0), (-2.0, 1.
 """Steps and weights of the central difference of fourth order."""
 
 
+class Readings(NamedTuple):
+    """Measured numbers, one row per state, and their standard deviations, if known."""
+
+    values: Columns
+    sigma: Columns | None
+
+
 @runtime_checkable
 class Measurement(Protocol):
     """Measured numbers, some for each state, and how to compute them."""
 
-    def table(self, start: States) -> tuple[Columns, Columns | None]:
+    def table(self, start: States) -> Readings:
         """Measured numbers and standard deviations; `InputError` if they do not fit the states."""
 
     def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
@@ -55,11 +62,11 @@ class MeasuredValues:
     values: Numbers
     sigma: Numbers | None = None
 
-    def table(self, start: States) -> tuple[Columns, Columns | None]:
+    def table(self, start: States) -> Readings:
         """Measured numbers and standard deviations."""
         name, shape = f"values of {self.descriptor.name}", (len(start), 1)
         values = _fitting(name, np.atleast_1d(self.values), (len(start),)).reshape(shape)
-        return values, _deviations(self.sigma, shape, 1)
+        return Readings(values, _deviations(self.sigma, shape, 1))
 
     def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
         """Return the values of the descriptor, or of its namesake on another structure."""
@@ -90,11 +97,11 @@ class MeasuredShape:
     s: Sequence[float] | None = None
     sigma: Numbers | None = None
 
-    def table(self, start: States) -> tuple[Columns, Columns | None]:
+    def table(self, start: States) -> Readings:
         """Measured numbers and standard deviations."""
         drawn = start.shape(self._places).shape
         points = _fitting("points of the shape", np.asarray(self.points), drawn)
-        return points.reshape(len(start), -1), _deviations(self.sigma, drawn, 3)
+        return Readings(points.reshape(len(start), -1), _deviations(self.sigma, drawn, 3))
 
     def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
         """Return the coordinates of the points."""
