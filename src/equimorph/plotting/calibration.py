@@ -12,6 +12,7 @@ from equimorph.errors import InputError
 from equimorph.plotting import style
 from equimorph.plotting.labels import with_unit
 from equimorph.plotting.shapes import prepare_axes
+from equimorph.plotting.viewpoint import flat_shapes
 from equimorph.tasks import Calibration, MeasuredShape
 
 _ROOM = 0.06
@@ -23,6 +24,7 @@ _GAP = 0.42
 _LOOKS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("$x$", "o", {}),
     ("$y$", "s", {"mfc": "white"}),
+    ("$z$", "^", {"mfc": "white"}),
 )
 
 
@@ -59,9 +61,9 @@ def calibration(found: Calibration, measured: MeasuredShape, ax: Axes | None = N
     left[there] = found.residuals
     colours = style.progress_map()(np.linspace(0.0, 0.85, len(points)))
     with style.house_style():
-        ax = prepare_axes(found.states, ax, room=_ROOM, below=_BELOW)
-        for shape, dots, colour in zip(found.states.shape(), points, colours, strict=True):
-            ax.plot(*shape.T, color=colour, linewidth=1.0, zorder=2)
+        ax, around = prepare_axes(found.states, ax, room=_ROOM, below=_BELOW)
+        around.draw_shapes(ax, colours, 2, linewidths=1.0)
+        for dots, colour in zip(flat_shapes(found.states.structure, points), colours, strict=True):
             ax.plot(
                 *dots.T, "o", ms=3, mfc="white", mec=colour, mew=0.8, linestyle="none", zorder=3
             )
@@ -78,17 +80,17 @@ def calibration(found: Calibration, measured: MeasuredShape, ax: Axes | None = N
 def _draw_residuals(
     ax: Axes,
     places: Float[np.ndarray, " points"],
-    left: Float[np.ndarray, "states points 2"],
+    left: Float[np.ndarray, "states points space"],
     colours: Float[np.ndarray, "states 4"],
 ) -> None:
     """Residuals, fitted minus measured coordinates, over the arclengths of the points."""
     ax.axhline(0.0, color=style.FAINT, linewidth=style.HAIRLINE, zorder=1)
     for own, colour in zip(left, colours, strict=True):
-        for axis, (_, marker, look) in enumerate(_LOOKS):
+        for values, (_, marker, look) in zip(own.T, _LOOKS, strict=False):
             ax.plot(
-                places, own[:, axis], marker, ms=2.8, color=colour, mew=0.7, zorder=3, **look
+                places, values, marker, ms=2.8, color=colour, mew=0.7, zorder=3, **look
             )  # fmt: skip
-    for name, marker, look in _LOOKS:
+    for name, marker, look in _LOOKS[: left.shape[2]]:
         ax.plot([], [], marker, ms=2.8, color=style.INK, mew=0.7, label=name, **look)
     largest = np.nanmax(np.abs(left), initial=1e-300)
     ax.set_ylim(-1.2 * largest, 1.2 * largest)

@@ -25,6 +25,7 @@ from equimorph.plotting.curves import path_of, states_along, track
 from equimorph.plotting.labels import symbol
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
+from equimorph.plotting.viewpoint import draw_triad
 from equimorph.structures import States
 from equimorph.tasks import Route
 
@@ -32,6 +33,7 @@ _WIDTH, _HEIGHT, _DOTS = 6.4, 3.1, 120
 """Inches of a frame, and pixels per inch."""
 _LARGER = {"font.size": 9, "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8}
 _CURVATURE = "max_curvature"
+_START_AND_GOAL = "#cfcfcf"
 _READING_PLACES = ((0.13, 0.085), (0.13, 0.025), (0.46, 0.085), (0.46, 0.025))
 """Right ends of the numbers, as shares of the frame: the free parameters above each other, margin
 and curvature to the right of them."""
@@ -97,7 +99,7 @@ class _Stage:
 
     canvas: Any  # matplotlib's canvas has no types
     background: Any
-    shape: Line2D
+    shape: Moving
     parts: tuple[Moving, ...]
     travelled: Line2D
     point: Line2D
@@ -113,7 +115,7 @@ class _Stage:
         return Image.fromarray(np.asarray(self.canvas.buffer_rgba())).convert("RGB")
 
     def _moving(self) -> tuple[Artist, ...]:
-        parts = (self.shape, *(part.artist for part in self.parts))
+        parts = (self.shape.artist, *(part.artist for part in self.parts))
         in_depth = sorted(parts, key=lambda each: each.get_zorder())
         return (*in_depth, self.travelled, self.point, *self.texts)
 
@@ -128,15 +130,16 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
     frame_shapes(left, around, room=0.1)
     left.axis("off")
     around.draw_grounds(left)
-    for outline in around.outlines[[0, -1]]:
-        left.plot(*outline.T, color="#cfcfcf", linewidth=2.0, zorder=1)
+    if around.viewpoint is not None:
+        draw_triad(left, around.viewpoint, states.structure.length_unit)
+    Surroundings(states[[0, -1]]).draw_shapes(left, [_START_AND_GOAL] * 2, 1, linewidths=2.0)
     frame_plane(right, eset)
     regions = count_regions(eset.coordinates, eset.cells)
     shade_regions(right, eset, regions)
     hatch_cut(right, eset, regions, stable_only=False)
     draw_folds(right, eset)
     draw_track(right, eset, route, path_of(route)).set_linewidth(0.8)
-    (shape,) = left.plot([], [], color=style.INDEX_COLOURS[0], linewidth=3.0, zorder=4)
+    shape = around.moving_shape(left, style.INDEX_COLOURS[0], 4, 3.0)
     (travelled,) = right.plot([], [], color=style.ROUTE_COLOUR, linewidth=2.4, zorder=8)
     (point,) = right.plot([], [], "o", color=style.INK, markeredgecolor="white", ms=7, zorder=9)
     parts = around.moving_parts(left)
@@ -151,11 +154,11 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
 
 def _pictures(stage: _Stage, states: States, eset: EquilibriumSet, path: Path) -> list[Image.Image]:
     """One picture per state."""
-    outlines, places = states.shape(), track(eset, states)
+    places = track(eset, states)
     ways = _ways(path, places, eset)
     pictures = []
     for k in range(len(states)):
-        stage.shape.set_data(*outlines[k].T)
+        stage.shape.place(k)
         for part in stage.parts:
             part.place(k)
         stage.travelled.set_data(*ways[k].T)

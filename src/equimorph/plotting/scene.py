@@ -19,7 +19,7 @@ from scipy import ndimage
 from equimorph.plotting.depth import DepthBuffer, View, depth_buffer, view_of
 from equimorph.plotting.shading import Paint, paint
 
-_SAMPLES = 3
+SAMPLES = 3
 """Pixels of the depth buffer per pixel of the picture, in each direction."""
 _VOTES = 9
 """Neighbouring points along a curve, one a pixel, whose median decides whether it is visible:
@@ -118,10 +118,10 @@ def _take(
     reach = view.place(corners)[..., :2].reshape(-1, 2)
     low, high = np.floor(reach.min(axis=0)) - 1, np.ceil(reach.max(axis=0)) + 1
     columns, rows = (high - low).astype(int)
-    fine = view.translate(low, _SAMPLES)
+    fine = view.translate(low, SAMPLES)
     placed = fine.place(corners)
-    buffer = depth_buffer(placed, int(rows * _SAMPLES), int(columns * _SAMPLES))
-    picture = _downsample(paint(buffer, fine, corners, surface))
+    buffer = depth_buffer(placed, int(rows * SAMPLES), int(columns * SAMPLES))
+    picture = downsample(paint(buffer, fine, corners, surface))
     range_of_depth = float(np.ptp(placed[..., 2]))
     lines: list[tuple[Mapping[str, Any], list[Float[np.ndarray, "_ 2"]]]] = []
     cut = [_cut(fine.place(c.points), buffer, c.slack * range_of_depth) for c in curves]
@@ -129,7 +129,7 @@ def _take(
         if curve.hidden is not None:
             lines.append((curve.hidden, hidden))
     lines += [(curve.seen, seen) for curve, (seen, _) in zip(curves, cut, strict=True)]
-    return _Shot(picture, low, lines=[(k, [v / _SAMPLES + low for v in vs]) for k, vs in lines])
+    return _Shot(picture, low, lines=[(k, [v / SAMPLES + low for v in vs]) for k, vs in lines])
 
 
 def _cut(
@@ -138,7 +138,7 @@ def _cut(
     """Pieces of a polyline that are seen, and those that are hidden; neighbours share an end."""
     steps = np.hypot(*np.diff(places[:, :2], axis=0).T)
     length = np.concatenate([[0.0], np.cumsum(steps)])
-    at = np.linspace(0.0, length[-1], max(2, int(length[-1] / _SAMPLES)))
+    at = np.linspace(0.0, length[-1], max(2, int(length[-1] / SAMPLES)))
     at = np.unique(np.concatenate([at, length]))  # corners stay sharp
     points = np.column_stack([np.interp(at, length, places[:, k]) for k in range(3)])
     seen = ndimage.median_filter(buffer.shows(points, slack), _VOTES, mode="nearest")
@@ -154,10 +154,10 @@ def _runs(
     return [points[a : b + 1] for a, b in zip(starts, ends, strict=True)]
 
 
-def _downsample(picture: Float[np.ndarray, "rows columns 4"]) -> UInt8[np.ndarray, "_ _ 4"]:
+def downsample(picture: Float[np.ndarray, "rows columns 4"]) -> UInt8[np.ndarray, "_ _ 4"]:
     """Mean colour and share of cover of blocks of pixels; colours are weighted by their cover."""
     rows, columns, _ = picture.shape
-    blocks = picture.reshape(rows // _SAMPLES, _SAMPLES, columns // _SAMPLES, _SAMPLES, 4)
+    blocks = picture.reshape(rows // SAMPLES, SAMPLES, columns // SAMPLES, SAMPLES, 4)
     mean = blocks.mean(axis=(1, 3))
     mean[..., :3] /= np.maximum(mean[..., 3:], 1e-6)
     return np.asarray(np.round(255 * np.clip(mean, 0.0, 1.0)).astype(np.uint8))

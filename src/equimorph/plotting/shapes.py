@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 from mpl_toolkits.mplot3d import proj3d
@@ -18,7 +17,7 @@ from equimorph.errors import InputError
 from equimorph.model import Obstacle
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along
-from equimorph.plotting.labels import BOX, with_unit
+from equimorph.plotting.labels import BOX
 from equimorph.plotting.surroundings import Surroundings, frame_shapes, limits
 from equimorph.structures import States
 from equimorph.tasks import Route
@@ -36,7 +35,7 @@ def prepare_axes(
     room: float,
     below: float = 0.0,
     obstacles: Sequence[Obstacle] = (),
-) -> Axes:
+) -> tuple[Axes, Surroundings]:
     """Axes with the surroundings of states and limits around all their outlines.
 
     Parameters
@@ -57,13 +56,9 @@ def prepare_axes(
         height = _height(around, room) + below
         ax = style.new_axes(style.SINGLE_COLUMN, height, _MARGINS)
     frame_shapes(ax, around, room)
-    unit = states.structure.length_unit
-    ax.set_xlabel(with_unit("$x$", unit))
-    ax.set_ylabel(with_unit("$y$", unit))
-    ax.xaxis.set_major_locator(style.few_ticks())
-    ax.yaxis.set_major_locator(style.few_ticks())
+    around.label_axes(ax)
     around.draw_still(ax)
-    return ax
+    return ax, around
 
 
 def _height(around: Surroundings, room: float) -> float:
@@ -122,16 +117,14 @@ def shapes(
     if count < 2:
         raise InputError(f"`count` must be at least 2; got {count!r}.")
     states = states_along(path_of(path_or_route), count)
-    outlines = states.shape()
     with style.house_style():
-        ax = prepare_axes(states, ax, room=_ROOM, below=_BAR, obstacles=obstacles)
+        ax, around = prepare_axes(states, ax, room=_ROOM, below=_BAR, obstacles=obstacles)
+        outlines = around.outlines
         progress = np.linspace(0.0, 1.0, count)
         colours = style.progress_map()(progress)
         widths = np.full(count, 0.9)
         widths[[0, -1]] = 2.2
-        ax.add_collection(
-            LineCollection(list(outlines), colors=colours, linewidths=widths, zorder=2)
-        )
+        around.draw_shapes(ax, colours, 2, linewidths=widths)
         _name_ends(ax, outlines[0], outlines[-1])
         below = make_axes_locatable(ax).append_axes("bottom", size=0.08, pad=_BAR - 0.08)
         scale = ScalarMappable(Normalize(0, 1), style.progress_map())
@@ -196,13 +189,16 @@ def portraits(states: States, labels: Sequence[str] = (), ax: Axes | None = None
             f"`labels` must be one for each of one or more states; got {len(names)} for "
             f"{len(states)}."
         )
-    outlines = states.shape()
     with style.house_style():
-        ax = prepare_axes(states, ax, room=_PORTRAIT_ROOM)
+        ax, around = prepare_axes(states, ax, room=_PORTRAIT_ROOM)
+        outlines = around.outlines
         colours = style.progress_map()(np.linspace(0.0, 0.8, len(states)))
+        if around.viewpoint is not None:
+            around.draw_shapes(ax, colours, 3)
         for k, (outline, at) in enumerate(zip(outlines, farthest_apart(outlines), strict=True)):
-            look = {"color": colours[k], "linestyle": _DASHES[k % len(_DASHES)]}
-            ax.plot(*outline.T, linewidth=1.6, zorder=3, **look)
+            if around.viewpoint is None:
+                look = {"color": colours[k], "linestyle": _DASHES[k % len(_DASHES)]}
+                ax.plot(*outline.T, linewidth=1.6, zorder=3, **look)
             above = outline[at, 1] >= np.median(outlines[:, at, 1])
             ax.annotate(
                 names[k], tuple(outline[at].tolist()), (0, 3 if above else -3), ha="center",
@@ -233,8 +229,8 @@ def numbered_shapes(ax: Axes, states: States) -> None:
     ]
     colours = style.progress_map()(np.linspace(0.0, 1.0, len(states)))
     shown = outlines[different]
+    Surroundings(states[different]).draw_shapes(ax, colours[different], 2, linewidths=1.3)
     for k, outline, at in zip(different, shown, farthest_apart(shown), strict=True):
-        ax.plot(*outline.T, color=colours[k], linewidth=1.3, zorder=2)
         up = bool(outline[at, 1] >= np.median(shown[:, at, 1]))
         text = ax.annotate(
             str(k + 1), tuple(outline[at].tolist()), (0, 2.5 if up else -2.5),
@@ -242,9 +238,7 @@ def numbered_shapes(ax: Axes, states: States) -> None:
             color=colours[k], weight="bold", zorder=4,
         )  # fmt: skip
         text.set_path_effects(style.RIM)
-    unit = states.structure.length_unit
-    ax.set_xlabel(with_unit("$x$", unit))
-    ax.set_ylabel(with_unit("$y$", unit))
+    around.label_axes(ax)
 
 
 def number_in_space(ax: Any, places: Float[np.ndarray, "_ 3"]) -> None:

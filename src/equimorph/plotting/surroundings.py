@@ -1,4 +1,7 @@
-"""Supports, loads and actuators around shapes: what a structure says of itself, drawn."""
+"""Shapes with their supports, loads and actuators: what a structure says of itself, drawn.
+
+Structures in space are seen by a parallel projection; see `viewpoint` and `tubes`.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import AbstractPathEffect
@@ -16,7 +20,10 @@ from matplotlib.patheffects import Stroke as Casing
 
 from equimorph.model import ActuatorKind, Constraint, Drawing, Obstacle, Support, SupportKind
 from equimorph.plotting import style
+from equimorph.plotting.labels import with_unit
 from equimorph.plotting.support_symbols import AWAY, HUB, SYMBOLS, UPRIGHT, Stroke
+from equimorph.plotting.tubes import Picture, draw_solids, moving_solid
+from equimorph.plotting.viewpoint import Viewpoint, draw_triad, viewpoint_of
 from equimorph.structures import States
 
 _RADIUS = 0.022
@@ -62,7 +69,7 @@ class Moving:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What stands around the shapes of states, in the coordinates of the axes.
+    """Shapes of states and what stands around them, in the coordinates of the axes.
 
     Parameters
     ----------
@@ -76,14 +83,24 @@ class Surroundings:
     obstacles: tuple[Obstacle, ...] = ()
 
     @cached_property
-    def outlines(self) -> Lines:
-        """Shapes."""
+    def _shapes(self) -> Float[np.ndarray, "states points space"]:
         return self.states.shape()
 
     @cached_property
+    def viewpoint(self) -> Viewpoint | None:
+        """From where a structure in space is seen; None for a planar one."""
+        return None if self._shapes.shape[2] == 2 else viewpoint_of(self.states.structure)
+
+    @cached_property
+    def outlines(self) -> Lines:
+        """Shapes, as they are seen."""
+        return self._shapes if self.viewpoint is None else self.viewpoint.flat(self._shapes)
+
+    @cached_property
     def drawing(self) -> Drawing:
-        """What the structure says of itself."""
-        return self.states.drawing()
+        """What the structure says of itself, as it is seen."""
+        drawing = self.states.drawing()
+        return drawing if self.viewpoint is None else self.viewpoint.drawing(drawing)
 
     @cached_property
     def size(self) -> float:
@@ -162,6 +179,33 @@ class Surroundings:
         return np.concatenate([part.reshape(-1, 2) for part in parts])
 
     # --- artists --------------------------------------------------------------------------------
+
+    def draw_shapes(self, ax: Axes, colours: Any, zorder: float, **look: Any) -> None:
+        """Draw all shapes: lines with a look, or solids in one picture; limits must be final."""
+        if self.viewpoint is not None:
+            picture = Picture(self.viewpoint, ax)
+            draw_solids(picture, self.states, self.size, colours, zorder)
+            return
+        lines = LineCollection(list(self.outlines), colors=colours, zorder=zorder, **look)
+        ax.add_collection(lines)
+
+    def moving_shape(self, ax: Axes, colour: Any, zorder: float, width: float) -> Moving:
+        """The shape, to be placed state by state; limits must be final."""
+        if self.viewpoint is None:
+            return _line(ax, self.outlines, color=colour, linewidth=width, zorder=zorder)
+        picture = Picture(self.viewpoint, ax, ax.figure.dpi)
+        return Moving(*moving_solid(picture, self.states, self.size, colour, zorder))
+
+    def label_axes(self, ax: Axes) -> None:
+        """Axes of the plane with their unit; of space the directions x, y, z and a scale."""
+        unit = self.states.structure.length_unit
+        if self.viewpoint is not None:
+            draw_triad(ax, self.viewpoint, unit)
+            return
+        ax.set_xlabel(with_unit("$x$", unit))
+        ax.set_ylabel(with_unit("$y$", unit))
+        ax.xaxis.set_major_locator(style.few_ticks())
+        ax.yaxis.set_major_locator(style.few_ticks())
 
     def draw_still(self, ax: Axes) -> None:
         """Draw everything for a figure: moving supports at both ends of the way, loads once."""

@@ -162,6 +162,8 @@ class Structure(ABC):
     """Unit of the coordinates to draw."""
     endless_in: ClassVar[str] = ""
     """Descriptor to bound, as infinitely many equilibria exist where it grows; empty if none."""
+    upward: ClassVar[str] = "y"
+    """Axis, y or z, that is upward in pictures of a structure in space."""
     energy_scale: float = 1.0
     """Value of one unit of `energy` in the units of the parameters, in joules for example."""
 
@@ -274,7 +276,22 @@ class Structure(ABC):
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points space"]:
-        """Coordinates to draw."""
+        """Coordinates to draw, in the plane or in space."""
+
+    def frames(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "lanes points 3 3"] | None:
+        """Cross-sections at the points of `shape`, where a structure in space has them.
+
+        The columns are the unit tangent, normal and binormal.
+        """
+        del z, p, s
+        return None
+
+    @property
+    def flatness(self) -> float:
+        """Width along the binormal over thickness along the normal, of cross-sections to draw."""
+        return 1.0
 
     def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 space"]:
         """Shape as cubic arcs: both ends, and the derivatives there; straight lines by default."""

@@ -139,6 +139,16 @@ class States:
         """Coordinates to draw, in the structure's unit of length."""
         return self.structure.shape(self.z, self.p, s)
 
+    @check_arguments
+    def frames(
+        self, s: Float[np.ndarray, " points"] | None = None
+    ) -> Float[np.ndarray, "lanes points 3 3"] | None:
+        """Cross-sections at the points of `shape`: columns tangent, normal, binormal.
+
+        None if the structure has no cross-sections in space.
+        """
+        return self.structure.frames(self.z, self.p, s)
+
     def drawing(self) -> Drawing:
         """Supports, loads and actuators to draw around the shapes."""
         return self.structure.drawing(self.z, self.p)

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Values
 from equimorph.model import Box, Constraint, Descriptor
+from equimorph.plotting.viewpoint import flat_shapes
 from equimorph.structures import States
 
 ROOM = 0.03
@@ -186,7 +187,7 @@ def table_of_states(
     numbered
         Whether rows are numbered from 1, as on the accompanying figure.
     """
-    shapes = states.shape()
+    shapes = flat_shapes(states.structure, states.shape())
     box = np.stack([shapes.min(axis=(0, 1)) - ROOM, shapes.max(axis=(0, 1)) + ROOM])
     columns = {"": ["stable" if index == 0 else f"index {index}" for index in states.index]}
     for each in descriptors:

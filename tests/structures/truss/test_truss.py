@@ -150,7 +150,7 @@ def test_shapes_walk_along_every_bar():
     for truss in (tripod(), arch_truss("green")):
         steps = {frozenset(pair) for pair in pairwise(truss.network.walk.tolist())}
         assert steps == {frozenset(pair) for pair in truss.network.ends.tolist()}
-    assert tripod().natural_state().shape().shape == (len(tripod().network.walk), 2)
+    assert tripod().natural_state().shape().shape == (len(tripod().network.walk), 3)
 
 
 def test_the_set_and_a_route_around_the_snap_of_an_actuated_truss():

@@ -115,14 +115,20 @@ class MeasuredInSpace(Structure):
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points 3"]:
         """Positions (x, y, z) at arclengths `s` (default: 101 equidistant ones)."""
-        at = np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
-        return self.fields(z, p, at).places
+        return self.fields(z, p, _arclengths(s)).places
 
     def frames(
-        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points 3 3"]:
-        """Axes of the cross-sections at arclengths: the columns of each matrix are t, n, b."""
-        return self.recovery.at(z, p, s).frames
+        """Axes of the cross-sections at arclengths `s`: the columns of each matrix are t, n, b."""
+        return self.recovery.at(z, p, _arclengths(s)).frames
+
+    @property
+    def flatness(self) -> float:
+        """Width over thickness of a rectangle with the rod's mean ratio of bending stiffnesses."""
+        model = self.mechanics.model
+        _, aside, bend = model.stiffness.reshape(-1, 3).mean(axis=0)
+        return float(np.sqrt(aside / bend))
 
     def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 3"]:
         """Shape as cubic arcs with the rod's positions and tangents at their ends."""
@@ -130,3 +136,7 @@ class MeasuredInSpace(Structure):
         rate = fields.frames[..., 0] * (self.units.value("length") / ARCS)
         places = fields.places
         return np.stack([places[:, :-1], places[:, 1:], rate[:, :-1], rate[:, 1:]], axis=2)
+
+
+def _arclengths(s: Float[np.ndarray, " points"] | None) -> Float[np.ndarray, " points"]:
+    return np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)

@@ -46,6 +46,7 @@ class TrussMechanics(DiscreteStructure):
     """
 
     kind: ClassVar[str] = "truss"
+    upward: ClassVar[str] = "z"
     constraints = 0
 
     def __init__(
@@ -197,20 +198,19 @@ class TrussMechanics(DiscreteStructure):
 
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
-    ) -> Float[np.ndarray, "lanes points 2"]:
+    ) -> Float[np.ndarray, "lanes points space"]:
         """Joints along a walk over all bars, some of which it passes twice.
 
-        `s` runs from 0 to 1 along it; all bars get equal lengths. A truss in space is seen
-        obliquely: half of y recedes.
+        `s` runs from 0 to 1 along it; all bars get equal lengths.
         """
         corners = self.joint_places(z)[:, self.network.walk]
         return corners if s is None else along_corners(corners, s)
 
-    def joint_places(self, z: Lanes) -> Float[np.ndarray, "lanes joints 2"]:
-        """Joints as they are drawn."""
+    def joint_places(self, z: Lanes) -> Float[np.ndarray, "lanes joints space"]:
+        """Places of the joints."""
         full = np.repeat(self.network.places[None], len(z), axis=0)
         full[:, ~self.network.held] += z
-        return self._seen(full)
+        return full
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the joints, forces on them, and bars that change their length."""
@@ -220,7 +220,8 @@ class TrussMechanics(DiscreteStructure):
             here = places[:, joint]
             if made.space == 3 and held.any():
                 kind = SupportKind.PIN if held.all() else SupportKind.ROLLER
-                supports.append(Support(kind, here, np.tile([1.0, 0.0], (len(z), 1))))
+                free = np.eye(3)[int(np.argmin(held))]
+                supports.append(Support(kind, here, np.tile(free, (len(z), 1))))
             elif held.any():
                 stiffness = np.where([*held, False], np.inf, 0.0)
                 supports += supports_of_point(stiffness, here, np.tile([1.0, 0.0], (len(z), 1)))
@@ -232,19 +233,11 @@ class TrussMechanics(DiscreteStructure):
         at = np.flatnonzero(loaded.any(axis=1))
         return Drawing(
             tuple(supports),
-            (Forces(places[:, at], self._seen(forces)[:, at]),) if len(at) else (),
+            (Forces(places[:, at], forces[:, at]),) if len(at) else (),
             actuators=tuple(
                 Actuator(ActuatorKind.LENGTH, places[:, ends]) for ends in made.ends[moved]
             ),
         )
-
-    def _seen(
-        self, vectors: Float[np.ndarray, "lanes joints space"]
-    ) -> Float[np.ndarray, "lanes joints 2"]:
-        if self.network.space == 2:
-            return vectors
-        recede = 0.5 * np.sqrt(0.5) * vectors[..., 1]
-        return np.stack([vectors[..., 0] + recede, vectors[..., 2] + recede], axis=-1)
 
 
 def symmetries(truss: TrussMechanics) -> tuple[Symmetry, ...]:
