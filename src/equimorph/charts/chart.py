@@ -22,6 +22,7 @@ from equimorph.charts.domain import (
 )
 from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.preparation import cut_along_crossings, flip_inverted_triangles
+from equimorph.charts.singular_pairs import SingularPairs
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.geometry.setting import embed
@@ -278,7 +279,9 @@ class DescriptorChart(Chart):
     """Descriptors and free parameters as coordinates.
 
     They are regular at folds of the set. They fail where the coordinates themselves fold (their
-    Jacobian along the set vanishes) and where different sheets have the same coordinates.
+    Jacobian along the set vanishes) and where different sheets have the same coordinates. Beside
+    the curve on which they fold, pairs of states are searched from this curve, too: cells are flat,
+    and may hold one state of a pair alone.
 
     Parameters
     ----------
@@ -329,6 +332,17 @@ class DescriptorChart(Chart):
     def singular(self) -> Level:
         """Exact states at which the coordinates fold: their Jacobian along the set vanishes."""
         return singular_set(self.eset, self.coordinates.scalars)
+
+    @cached_property
+    def _pairs(self) -> SingularPairs | None:
+        """Pairs beside the states at which the coordinates fold, if they do."""
+        states = self.singular.states
+        return SingularPairs(self.cells, states) if len(states) else None
+
+    def _found(self, points: Points) -> Found:
+        """All states of the chart's cells over points, and of pairs that lie beside these cells."""
+        found = super()._found(points)
+        return found if self._pairs is None else self._pairs.add_to(found, points)
 
     @cached_property
     def single_valued(self) -> bool:

@@ -170,7 +170,7 @@ class Cells:
         again = self._doubtful(hits, good, len(points))
         z, p, good = self._again(hits, z, p, good, again, points)
         kept = np.flatnonzero(good)
-        kept = kept[self._one_of_each(z[kept], p[kept], hits.take(kept))]
+        kept = kept[self.one_of_each(z[kept], p[kept], hits.take(kept))]
         hits = hits.take(kept)
         return z[kept], p[kept], first + hits.point, self.numbers[hits.cell], hits.inside
 
@@ -194,7 +194,7 @@ class Cells:
         """Exact states near guesses, where there are any that the cells may have."""
         folded = self._at_fold[hits.cell]
         z, p, good, index = self.coordinates.solved(
-            guess_z, guess_p, wanted, lambda lanes: self._planes(hits.cell[lanes]), folded
+            guess_z, guess_p, wanted, lambda lanes: self.planes(hits.cell[lanes]), folded
         )
         setting = self.coordinates.setting
         some = np.flatnonzero(good)
@@ -202,8 +202,14 @@ class Cells:
             embed(setting, z[some], p[some]) - embed(setting, guess_z[some], guess_p[some]),
             axis=1,
         )
-        good[some] = moved <= 2.0 * self._sizes[hits.cell[some]] + SAME_STATE
+        good[some] = moved <= 2.0 * self.sizes[hits.cell[some]] + SAME_STATE
         return z, p, self._in_cells(z, p, good, index, hits.cell)
+
+    def hold(
+        self, states: States, index: Int[np.ndarray, " n"], cell: Int[np.ndarray, " n"]
+    ) -> Flags:
+        """Whether states of some indices may lie on cells, given by their places among these."""
+        return self._in_cells(states.z, states.p, np.ones(len(states), bool), index, cell)
 
     def _in_cells(
         self,
@@ -230,10 +236,11 @@ class Cells:
         return np.asarray(place[self.corners[:, 1:]] - place[self.corners[:, :1]])
 
     @cached_property
-    def _sizes(self) -> Float[np.ndarray, " own"]:
+    def sizes(self) -> Float[np.ndarray, " own"]:
+        """Longest sides from the first corners of the cells, in the metric."""
         return np.asarray(np.linalg.norm(self._frames, axis=2).max(axis=1))
 
-    def _planes(self, cell: Int[np.ndarray, " hits"]) -> Float[np.ndarray, "hits d coordinates"]:
+    def planes(self, cell: Int[np.ndarray, " hits"]) -> Float[np.ndarray, "hits d coordinates"]:
         """Orthonormal bases of the planes of cells."""
         some, back = np.unique(cell, return_inverse=True)
         basis = np.linalg.qr(np.swapaxes(self._frames[some], 1, 2))[0]
@@ -293,7 +300,7 @@ class Cells:
         index = np.where(arrived, ended.index, -1)
         return ended.z, p, self._in_cells(ended.z, p, arrived, index, hits.cell)
 
-    def _one_of_each(self, z: Lanes, p: Parameters, hits: Hits) -> Int[np.ndarray, " kept"]:
+    def one_of_each(self, z: Lanes, p: Parameters, hits: Hits) -> Int[np.ndarray, " kept"]:
         """One of the equal states over each point, rather from a cell that contains the point.
 
         Equal states have equal products with any vector, so that they are neighbours in its order.
