@@ -497,3 +497,33 @@ def double_zero(test: Callable[[float], float], low: float, high: float) -> floa
         width = max(0.02 * (high - low), 1e-7 * abs(here))
         low, high = here - width, here + width
     return here
+
+
+def clamped_buckling_moment(tension: float) -> float:
+    """Least M of w'''' − i M w''' − T w'' = 0, w = y + i z, with w = w' = 0 at both ends.
+
+    Solutions are 1, s and e^{iks} with k² − M k + T = 0. The determinant of the four conditions,
+    divided by e^{iM/2}, is real or imaginary.
+    """
+
+    def conditions(moment):
+        omega = np.sqrt(moment**2 / 4.0 - tension)
+        k = moment / 2.0 + np.array([omega, -omega])
+        ends = np.exp(1j * k)
+        if tension == 0.0:  # 1, s, s², e^{iMs}
+            end = np.exp(1j * moment)
+            rows = [
+                [1, 0, 0, 1],
+                [0, 1, 0, 1j * moment],
+                [1, 1, 1, end],
+                [0, 1, 2, 1j * moment * end],
+            ]
+        else:
+            rows = [[1, 0, 1, 1], [0, 1, *(1j * k)], [1, 1, *ends], [0, 1, *(1j * k * ends)]]
+        value = np.linalg.det(np.array(rows)) * np.exp(-0.5j * moment)
+        return value.real if abs(value.real) > abs(value.imag) else value.imag
+
+    trials = 2.0 * np.sqrt(tension) + np.linspace(1.0, 12.0, 120)
+    values = np.array([conditions(each) for each in trials])
+    first = int(np.flatnonzero(values[1:] * values[:-1] < 0.0)[0])
+    return brentq(conditions, trials[first], trials[first + 1], xtol=1e-13)

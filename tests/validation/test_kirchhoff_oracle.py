@@ -12,6 +12,7 @@ from oracles.kirchhoff import (
     Rod,
     about,
     clamp,
+    clamped_buckling_moment,
     composed,
     double_zero,
     free,
@@ -28,36 +29,6 @@ def twisted(moment: float, tension: float = 0.0) -> Rod:
     twist = moment / STIFFNESS[0]
     end = End((None, 0.0, 0.0), tuple(about((1, 0, 0), twist)), force=(tension, 0.0, 0.0))
     return straight(6, clamp(), end, STIFFNESS, (tension, 0, 0), twist, steps=5)
-
-
-def clamped_buckling_moment(tension: float) -> float:
-    """Least M of w'''' − i M w''' − T w'' = 0, w = y + i z, with w = w' = 0 at both ends.
-
-    Solutions are 1, s and e^{iks} with k² − M k + T = 0. The determinant of the four conditions,
-    divided by e^{iM/2}, is real or imaginary.
-    """
-
-    def conditions(moment):
-        omega = np.sqrt(moment**2 / 4.0 - tension)
-        k = moment / 2.0 + np.array([omega, -omega])
-        ends = np.exp(1j * k)
-        if tension == 0.0:  # 1, s, s², e^{iMs}
-            end = np.exp(1j * moment)
-            rows = [
-                [1, 0, 0, 1],
-                [0, 1, 0, 1j * moment],
-                [1, 1, 1, end],
-                [0, 1, 2, 1j * moment * end],
-            ]
-        else:
-            rows = [[1, 0, 1, 1], [0, 1, *(1j * k)], [1, 1, *ends], [0, 1, *(1j * k * ends)]]
-        value = np.linalg.det(np.array(rows)) * np.exp(-0.5j * moment)
-        return value.real if abs(value.real) > abs(value.imag) else value.imag
-
-    trials = 2.0 * np.sqrt(tension) + np.linspace(1.0, 12.0, 120)
-    values = np.array([conditions(each) for each in trials])
-    first = int(np.flatnonzero(values[1:] * values[:-1] < 0.0)[0])
-    return brentq(conditions, trials[first], trials[first + 1], xtol=1e-13)
 
 
 @pytest.mark.parametrize("tension", TENSIONS)
