@@ -9,7 +9,8 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Drawing
+from equimorph.model import Drawing, parameter_vector
+from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.rod.profiles import LoadSpec, load_shape
 from equimorph.structures.rod.sections import SectionProperties, cross_section
 from equimorph.structures.rod.space_options import SpaceOptions
@@ -23,11 +24,14 @@ from equimorph.structures.spatial.errors import discretisation_error
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import raw_model
 from equimorph.structures.spatial.natural import natural_states
+from equimorph.structures.spatial.planar import planar_guess
 from equimorph.structures.states import State, States
 from equimorph.structures.unit_system import Quantity, unit_system
 
 DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")
+NEAR = 1e-6
+"""By how much quaternions may be longer than 1 at a corrected state."""
 PROFILES: Mapping[str, Any] = {
     **{"stiffness": 1.0, "curvature": 0.0, "side_curvature": 0.0, "natural_twist": 0.0},
     **{"axial": None, "shear": None},
@@ -270,6 +274,37 @@ class SpatialRod(DescribedInSpace):
         """Natural states of many settings, and which of them were found."""
         z, found = self.natural(p)
         return States(self, z, p), found
+
+    @check_arguments
+    def planar_state(self, state: State, **values: float) -> State:
+        """State of a planar rod as a state of this one, in the plane z = 0.
+
+        Rotations are taken from the planar rod's angles, and corrected by Newton's method.
+
+        Parameters
+        ----------
+        state
+            Of a `Rod` with the same supports and loads.
+        **values
+            Parameters that the planar rod lacks or names otherwise; the others are taken from
+            `state` by their names, or have their defaults.
+
+        Raises
+        ------
+        InputError
+            Where the correction does not converge: the rods differ.
+        """
+        names = [each.name for each in self.parameters]
+        known = {name: value for name, value in state.parameters.items() if name in names}
+        p = parameter_vector(self.parameters, {**known, **values})[None]
+        z = planar_guess(self.mechanics, state)
+        z, found = correct_at_parameters(self, z, p)
+        if not found[0] or np.abs(z[:, : self.unknowns]).max() > 1.0 + NEAR:
+            raise InputError(
+                "`state` must be one of a planar rod with the same supports, loads and stiffness; "
+                f"got {state!r}, near which this rod has no equilibrium."
+            )
+        return State(self, z[0], p[0])
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Values:
         """Bound of the errors of curvature and place, by solving again with a higher degree.

@@ -1,0 +1,298 @@
+"""The Lagrangian of a rod in space and its derivatives, by jets, in batches.
+
+z = (q₁, q₂, …; λ): four entries a node whose rotation is unknown, then the multipliers. The
+rotation of a node is q/|q|, so that z + dz is a state for every dz; the energy ½ k m (|q|² − 1)²
+keeps lengths at 1, and is zero at equilibria. See docs/decisions.md, "Rotations in space".
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.arrays import Flags, Lanes, Parameters, Scalars, Values
+from equimorph.errors import InputError
+from equimorph.structures.contract import Direction
+from equimorph.structures.spatial.model import SpatialModel
+from equimorph.structures.spatial.quaternions import (
+    FRAME,
+    RIGHT,
+    Jet,
+    bilinear,
+    clamp_rotation,
+    exponential,
+    normalised,
+    product,
+)
+
+LENGTH_STIFFNESS = 100.0
+"""k: lengths of quaternions are the stiffer in the metric, the nearer Newton's steps are to those
+on the rotations; margins of states are known below it."""
+LARGEST_TAIL = 5e-4
+"""Highest Legendre coefficients of q, half of radians, of an element that represents its part."""
+FORCES = 8.0
+"""Spread of the support forces of random guesses."""
+
+Nodes = Float[np.ndarray, "lanes nodes 4"]
+
+
+class SpatialLagrangian:
+    """The Lagrangian of a `SpatialModel`; methods as in `structures.contract`."""
+
+    def __init__(self, model: SpatialModel) -> None:
+        self.model, self.mesh = model, model.mesh
+        self.parameters, self.constraints = len(model.names), model.multipliers
+        inner = model.unknown_nodes
+        self.slopes = self.mesh.reference.derivative / self.mesh.lengths[:, None, None]
+        self.weights = self.mesh.element_weights
+        self.stiff_lengths = LENGTH_STIFFNESS * 4.0 * self.mesh.weights[inner]
+        self.mass = np.repeat(4.0 * self.mesh.weights[inner], 4)
+        self.unknowns = len(self.mass)
+
+    @property
+    def size(self) -> int:
+        """Length of z."""
+        return self.unknowns + self.constraints
+
+    def check(self, *pairs: Direction) -> None:
+        """Refuse states and directions of other widths."""
+        for pair in pairs:
+            for name, given, width in zip("zp", pair, (self.size, self.parameters), strict=True):
+                if given.shape[1] != width:
+                    raise InputError(
+                        f"`{name}` must have {width} columns; got shape {given.shape}. States "
+                        "belong to the rod, and the resolution, that made them."
+                    )
+
+    # --- scalars and rotations ------------------------------------------------------------------
+
+    def scalars(self, z: Lanes, p: Parameters) -> Scalars:
+        """Multipliers, parameters and 1."""
+        self.check((z, p))
+        return np.concatenate([z[:, self.unknowns :], p, np.ones((len(z), 1))], axis=1)
+
+    def jets(
+        self, z: Lanes, p: Parameters, *directions: Direction
+    ) -> tuple[Float[np.ndarray, "parts lanes nodes 4"], Float[np.ndarray, "parts lanes scalars"]]:
+        """Quaternions at all nodes and scalars, with their derivatives along directions."""
+        parts = 2 ** len(directions)
+        y = np.zeros((parts, *self.scalars(z, p).shape), np.result_type(z, p))
+        y[0] = self.scalars(z, p)
+        q = np.zeros((parts, len(z), len(self.mesh.nodes), 4), y.dtype)
+        inner = self.model.unknown_nodes
+        q[0][:, inner] = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
+        for k, (dz, dp) in enumerate(directions):
+            y[1 + k, :, :-1] = np.concatenate([dz[:, self.unknowns :], dp], axis=1)
+            q[1 + k][:, inner] = dz[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
+        for side, node in enumerate((0, -1)):
+            if self.model.held[side]:
+                angles = np.einsum("ks,...ls->...lk", self.model.turned[side], y)
+                q[:, :, node] = clamp_rotation(angles)
+        return q, y
+
+    def rotations(self, z: Lanes, p: Parameters) -> Nodes:
+        """Unit quaternions at all nodes, those of the ends included."""
+        q = self.jets(z, p)[0][0]
+        return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True))
+
+    # --- the Lagrangian in unit quaternions -----------------------------------------------------
+
+    def element_strains(self, q: Jet) -> tuple[Jet, Jet, Jet]:
+        """q e_k and q' at the nodes of every element, and u."""
+        local = q[:, :, self.mesh.element_nodes]
+        turned = np.einsum("kab,...b->...ka", RIGHT, local)
+        moved = np.einsum("eij,pleja->pleia", self.slopes, local)
+        strain = 2.0 * bilinear(lambda a, b: np.einsum("...ka,...a->...k", a, b), turned, moved)
+        return turned, moved, strain
+
+    def section_forces(self, q: Jet, y: Jet) -> tuple[Jet, Jet]:
+        """∂a_k/∂q and a_k: of the force on the cross-section, on its axes."""
+        local = q[:, :, self.mesh.element_nodes]
+        force = np.einsum("pls,seic->pleic", y, self.model.force)
+
+        def pull(f: np.ndarray, at: np.ndarray) -> np.ndarray:
+            return np.asarray(np.einsum("...c,kcab,...b->...ka", f, FRAME, at, optimize=True))
+
+        slope = 2.0 * bilinear(pull, force, local)
+        axial = 0.5 * bilinear(lambda a, b: np.einsum("...ka,...a->...k", a, b), slope, local)
+        return slope, axial
+
+    def stretches(self, axial: Jet, y: Jet) -> Jet:
+        """∂L/∂a_k over the weights: 1 + extension, and shears."""
+        pull = np.zeros_like(axial)
+        pull[..., 0] = np.einsum("pls,sei->plei", y, self.model.tension)
+        out = -self.model.softness * (axial + pull)
+        out[0, ..., 0] += 1.0
+        return np.asarray(out)
+
+    def section_moments(self, strain: Jet, y: Jet) -> Jet:
+        """Moments on the axes of the cross-section."""
+        out = self.model.stiffness * strain
+        out = out - np.einsum("pls,seik->pleik", y, self.model.moment)
+        torsion = np.einsum("pls,sei->plei", y, self.model.torsion)
+        out[..., 0] += bilinear(np.multiply, torsion, strain[..., 0])
+        return np.asarray(out)
+
+    def slope(self, q: Jet, y: Jet) -> Jet:
+        """Gradient of L by unit quaternions at all nodes."""
+        turned, moved, strain = self.element_strains(q)
+        weights = self.weights[..., None]
+        moment = 2.0 * weights * self.section_moments(strain, y)
+        pull, axial = self.section_forces(q, y)
+        stretch = weights * self.stretches(axial, y)
+
+        def combine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+            return np.asarray(np.einsum("...k,...ka->...a", a, b))
+
+        own = -np.einsum("kab,...b->...ka", RIGHT, moved)
+        local = bilinear(combine, moment, own) + bilinear(combine, stretch, pull)
+        spread = bilinear(combine, moment, turned)
+        local = local + np.einsum("eij,pleia->pleja", self.slopes, spread)
+        return self.assemble(local)
+
+    def assemble(self, local: Float[np.ndarray, "... elements order 4"]) -> np.ndarray:
+        """Sum what belongs to the same node."""
+        out = np.zeros((*local.shape[:-3], len(self.mesh.nodes), 4), local.dtype)
+        for e, nodes in enumerate(self.mesh.element_nodes):
+            out[..., nodes, :] += local[..., e, :, :]
+        return out
+
+    def by_scalars(self, q: Jet, y: Jet) -> Jet:
+        """∂L/∂y at fixed rotations."""
+        _, _, strain = self.element_strains(q)
+        _, axial = self.section_forces(q, y)
+        weights = self.weights[..., None]
+        stretch = weights * self.stretches(axial, y)
+        local, model = q[:, :, self.mesh.element_nodes], self.model
+
+        def turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+            return np.asarray(np.einsum("...a,kcab,...b->...kc", a, FRAME, b, optimize=True))
+
+        frames = bilinear(turn, local, local)
+        pointing = bilinear(lambda a, b: np.einsum("...k,...kc->...c", a, b), stretch, frames)
+        out = np.einsum("pleic,seic->pls", pointing, model.force)
+        out = out - np.einsum("pleik,seik->pls", weights * strain, model.moment)
+        twisting = 0.5 * self.weights * bilinear(np.multiply, strain[..., 0], strain[..., 0])
+        out = out + np.einsum("plei,sei->pls", twisting, model.torsion)
+        shortening = stretch[..., 0].copy()
+        shortening[0] -= self.weights
+        out = out + np.einsum("plei,sei->pls", shortening, model.tension)
+        return np.asarray(out + np.einsum("pls,st->plt", y, model.quadratic))
+
+    # --- contract -------------------------------------------------------------------------------
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """L without the multipliers' part."""
+        given, y = self.jets(z, p)
+        m = self.constraints
+        q, _, square = normalised(given)
+        _, _, strain = self.element_strains(q)
+        _, axial = self.section_forces(q, y)
+        bending = np.einsum("pls,seik->pleik", y, self.model.moment)
+        moment = self.section_moments(strain, y)
+        density = 0.5 * ((moment - bending) * strain).sum(axis=-1)
+        density = density + axial[..., 0]
+        pull = axial.copy()
+        pull[..., 0] += np.einsum("pls,sei->plei", y, self.model.tension)
+        density = density - 0.5 * (self.model.softness * pull**2).sum(axis=-1)
+        total = np.einsum("ei,lei->l", self.weights, density[0])
+        total = total + 0.5 * np.einsum("ls,st,lt->l", y[0], self.model.quadratic, y[0])
+        total = total - (y[0][:, :m] * self.by_scalars(q, y)[0][:, :m]).sum(axis=1)
+        excess = square[0][:, self.model.unknown_nodes] - 1.0
+        return np.asarray(total + 0.125 * (excess**2 @ self.stiff_lengths))
+
+    def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
+        """F with its derivatives along directions."""
+        given, y = self.jets(z, p, *directions)
+        unit, inverse, square = normalised(given)
+        slope = self.slope(unit, y)
+        along = bilinear(lambda a, b: (a * b).sum(axis=-1), unit, slope)
+        across = slope - bilinear(lambda a, b: a[..., None] * b, along, unit)
+        out = bilinear(lambda a, b: a[..., None] * b, inverse, across)
+        excess = square.copy()
+        excess[0] -= 1.0
+        inner = self.model.unknown_nodes
+        length = bilinear(lambda a, b: a[..., None] * b, excess, given)[:, :, inner]
+        out = out[:, :, inner] + 0.5 * self.stiff_lengths[:, None] * length
+        closing = self.by_scalars(unit, y)[..., : self.constraints]
+        return np.concatenate([out.reshape(*out.shape[:2], self.unknowns), closing], axis=-1)
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+        return np.asarray(self.equations(z, p)[0])
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return np.asarray(self.equations(z, p, (np.zeros_like(z), dp))[1])
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        return np.asarray(self.equations(z, p, v, w)[3])
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p."""
+        given, y = self.jets(z, p)
+        q = normalised(given)[0]
+        out = self.by_scalars(q, y)[0]
+        slope = self.slope(q, y)[0]
+        for side, node in enumerate((0, -1)):
+            if self.model.held[side]:
+                rows = self.model.turned[side]
+                angles = np.einsum("ks,ls->lk", rows, y[0])
+                for k in range(3):
+                    change = np.stack([angles, np.zeros_like(angles)])
+                    change[1, :, k] = 1.0
+                    work = (clamp_rotation(change)[1] * slope[:, node]).sum(axis=1)
+                    out = out + work[:, None] * rows[k]
+        return np.ascontiguousarray(out[:, self.constraints : -1])
+
+    def end_couples(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2 3"]:
+        """Couples (x, y, z) of the supports on both ends; 0 at free rotations."""
+        given, y = self.jets(z, p)
+        q = normalised(given)[0]
+        slope = self.slope(q, y)[0]
+        out = [
+            np.stack([0.5 * (product(unit, q[0][:, k]) * slope[:, k]).sum(axis=1)
+                      for unit in np.eye(4)[1:]], axis=-1)
+            for k in (0, -1)
+        ]  # fmt: skip
+        return np.stack(out, axis=1)
+
+    def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 3"]:
+        """Force of the support at A: multipliers, or what balances the loads."""
+        return np.asarray(np.einsum("cs,ls->lc", self.model.reaction, self.scalars(z, p)))
+
+    # --- guesses --------------------------------------------------------------------------------
+
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Rotations between those of the ends, turned by random waves, with random multipliers."""
+        lanes, s, modes = len(p), self.mesh.nodes, np.arange(1, 7)
+        amplitude = generator.normal(size=(lanes, len(modes), 3)) * (3.0 / modes)[:, None]
+        amplitude *= generator.uniform(size=(lanes, 1, 1))
+        start, stop = self.model.held
+        if start and stop:
+            waves = np.sin(np.pi * np.outer(s, modes))
+        else:
+            waves = np.sin(np.pi * np.outer(s if start else 1.0 - s, modes - 0.5))
+        turns = exponential(np.einsum("nm,lmk->lnk", waves, amplitude))
+        q = product(self.between(p), turns)[:, self.model.unknown_nodes]
+        forces = generator.normal(size=(lanes, self.constraints)) * FORCES
+        return np.concatenate([q.reshape(lanes, self.unknowns), forces], axis=1)
+
+    def between(self, p: Parameters) -> Nodes:
+        """Rotations with the angles of clamps, linear in s between two of them."""
+        y = np.concatenate([np.zeros((len(p), self.constraints)), p, np.ones((len(p), 1))], axis=1)
+        ends = np.einsum("eks,ls->lek", self.model.turned, y)
+        start, stop = self.model.held
+        if not (start and stop):
+            ends = np.repeat(ends.sum(axis=1, keepdims=True), 2, axis=1)
+        s = self.mesh.nodes[:, None]
+        angles = ends[:, :1] * (1.0 - s) + ends[:, 1:] * s
+        return np.asarray(clamp_rotation(angles[None])[0])
+
+    def tail(self, z: Lanes, p: Parameters) -> Values:
+        """Largest of the two highest Legendre coefficients of q in all elements."""
+        coefficients = np.einsum("cn,lna->lca", self.mesh.highest, self.rotations(z, p))
+        return np.asarray(np.abs(coefficients).max(axis=(1, 2)))
+
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether the rotations are smooth in every element."""
+        return np.asarray(self.tail(z, p) < LARGEST_TAIL)
