@@ -6,6 +6,8 @@ from equimorph.argument_checks import check_arguments
 from equimorph.model import Descriptor
 from equimorph.structures.spatial import descriptors
 from equimorph.structures.spatial.measured import MeasuredInSpace
+from equimorph.structures.spatial.orbits import on_orbit
+from equimorph.structures.states import State
 
 
 class DescribedInSpace(MeasuredInSpace):
@@ -69,6 +71,25 @@ class DescribedInSpace(MeasuredInSpace):
         Contact is not modelled: a rod of thickness h touches itself where this is below h.
         """
         return descriptors.clearance(self, apart)
+
+    @check_arguments
+    def warnings(self, state: State, thickness: float = 0.0) -> tuple[str, ...]:
+        """Why what is computed of a state may not hold, one line each.
+
+        Contact with itself, for a rod of some `thickness` in the user's unit of length; and orbits:
+        equal bending stiffnesses between coaxial clamps let a state turn about their axis for
+        nothing, so that F_z is singular and no event found there is a fold.
+        """
+        found = []
+        distance = self.clearance()(state)
+        if distance <= max(thickness, 1e-9 * self.units.value("length")):
+            found.append(f"the rod touches itself: points come as near as {distance:.3g}")
+        if on_orbit(self.mechanics, state.z[None], state.p[None])[0]:
+            found.append(
+                "the state may be turned about the axis of the clamps for nothing: give the rod a "
+                "load across this axis, another clamp, or unequal bending stiffnesses"
+            )
+        return tuple(found)
 
     @property
     def elevation(self) -> Descriptor:

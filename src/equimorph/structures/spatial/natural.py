@@ -59,7 +59,9 @@ def natural_states(rod: SpatialMechanics, p: Parameters) -> tuple[Lanes, Flags]:
         here = np.flatnonzero(share >= 1.0)
         x, start = x[here], p[here]
         start[:, span] = x[:, -1]
-    sharpening = rod.resolved(x[:, :-1], start)
+    # a rod that is pulled straighter bends within ever shorter ends
+    sharpening = _apart(rod, p[here]) > _apart(rod, start)
+    sharpening &= rod.resolved(x[:, :-1], start)
     last = Part(start, p[here], free=False, sharpening=sharpening, span=span or 0)
     share, x = follow(rod, last, x)
     there = np.flatnonzero(share >= 1.0)
@@ -67,6 +69,12 @@ def natural_states(rod: SpatialMechanics, p: Parameters) -> tuple[Lanes, Flags]:
     out[here[there]] = newton(rod, last, there, np.ones(len(there)), x[there])[0].x[:, :-1]
     found[here[there]] = True
     return out, found
+
+
+def _apart(rod: SpatialMechanics, p: Parameters) -> Values:
+    """Distance of the ends, as far as it is prescribed."""
+    at = [rod.model.names.index(name) for name in PLACES if name in rod.model.names]
+    return np.asarray(np.linalg.norm(p[:, at], axis=1))
 
 
 def _forces(rod: SpatialMechanics) -> Bool[np.ndarray, " parameters"]:

@@ -1,5 +1,7 @@
 """States of planar rods as guesses for rods in space."""
 
+from typing import Any
+
 import numpy as np
 
 from equimorph.arrays import Lanes
@@ -10,17 +12,17 @@ from equimorph.structures.spatial.quaternions import half_turn
 from equimorph.structures.states import State
 
 
-def planar_guess(mechanics: SpatialMechanics, state: State) -> Lanes:
+def planar_guess(mechanics: SpatialMechanics, state: Any) -> Lanes:
     """Unknowns with the angles and the support forces of a planar rod's state.
 
     Raises
     ------
     InputError
-        For the state of another structure.
+        For anything but the state of a planar rod.
     """
+    if not (isinstance(state, State) and isinstance(state.structure, Measured)):
+        raise InputError(f"`state` must be a state of a planar rod; got {state!r}.")
     rod = state.structure
-    if not isinstance(rod, Measured):
-        raise InputError(f"`state` must be one of a planar rod; got {state!r}.")
     z, p = state.z[None], state.p[None]
     nodes = mechanics.mesh.nodes[mechanics.model.unknown_nodes]
     angles = rod.fields(z, p, nodes)[:, :, 0]

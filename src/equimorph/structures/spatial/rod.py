@@ -276,7 +276,7 @@ class SpatialRod(DescribedInSpace):
         return States(self, z, p), found
 
     @check_arguments
-    def planar_state(self, state: State, **values: float) -> State:
+    def planar_state(self, state: Any, **values: float) -> State:
         """State of a planar rod as a state of this one, in the plane z = 0.
 
         Rotations are taken from the planar rod's angles, and corrected by Newton's method.
@@ -284,7 +284,7 @@ class SpatialRod(DescribedInSpace):
         Parameters
         ----------
         state
-            Of a `Rod` with the same supports and loads.
+            A `State` of a `Rod` with the same supports and loads.
         **values
             Parameters that the planar rod lacks or names otherwise; the others are taken from
             `state` by their names, or have their defaults.
@@ -292,12 +292,12 @@ class SpatialRod(DescribedInSpace):
         Raises
         ------
         InputError
-            Where the correction does not converge: the rods differ.
+            For anything else, or where the correction does not converge: the rods differ.
         """
+        z = planar_guess(self.mechanics, state)
         names = [each.name for each in self.parameters]
         known = {name: value for name, value in state.parameters.items() if name in names}
         p = parameter_vector(self.parameters, {**known, **values})[None]
-        z = planar_guess(self.mechanics, state)
         z, found = correct_at_parameters(self, z, p)
         if not found[0] or np.abs(z[:, : self.unknowns]).max() > 1.0 + NEAR:
             raise InputError(
