@@ -272,7 +272,7 @@ def test_whole_scene_may_be_turned():
     turn = exponential(np.array([0.4, -0.7, 0.3]))
     down, clamp = np.array([0.2, -1.0, 0.5]), (0.3, -0.2, 0.4)
     turned = matrices(turn) @ down
-    q = product(turn, clamp_rotation(np.array(clamp)[None])[0])
+    q = product(turn, clamp_rotation(np.array(clamp)[None, None])[0, 0])
     r = matrices(q)
     angles = np.arctan2(r[1, 0], r[0, 0]), -np.arcsin(r[2, 0]), np.arctan2(r[2, 1], r[2, 2])
     shapes = []

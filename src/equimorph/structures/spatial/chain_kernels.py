@@ -1,0 +1,196 @@
+"""Compiled kernels of the chain of vertices of a rod in space, and of its closures.
+
+Coordinates along which there is no closure have one of their own with a multiplier −1.
+"""
+
+import numpy as np
+
+from equimorph.linalg.compiled import njit
+from equimorph.linalg.kernels import INNER
+from equimorph.linalg.simd import absolute, load, spread, store, where_less
+from equimorph.structures.spatial.element_kernels import BORDER, COLUMN, FORCE, ROW
+from equimorph.structures.spatial.node_kernels import (
+    COUNT,
+    EXCESS,
+    INVERSE,
+    LARGE,
+    PRODUCT,
+    RADIAL,
+    RADII,
+    SMALL,
+    SOFT,
+    TOTAL,
+    stretch_of,
+)
+
+SHARES = 9
+"""Rows of one row of a vertex: three of its own block, then the border."""
+SYSTEM = np.int64(6)
+"""Width of the system of three closures and the load with its two right-hand sides."""
+
+
+@njit(**INNER)
+def to_vertices(e, inner, size, width, matrix, base, vertices, ties):
+    """Add what remains of an element to the rows of its vertices."""
+    for side in range(2):
+        for r in range(3):
+            row, to = base + (inner + 3 * side + r) * width, (3 * (e + side) + r) * SHARES
+            for c in range(r, 3):
+                own = load(matrix, row + inner + 3 * side + c)
+                store(vertices, to + c, load(vertices, to + c) + own)
+            for c in range(BORDER):
+                value = load(matrix, row + size + c)
+                store(vertices, to + 3 + c, load(vertices, to + 3 + c) + value)
+    for r in range(3):
+        for c in range(3):
+            tie = load(matrix, base + (inner + r) * width + inner + 3 + c)
+            store(ties, 9 * e + 3 * r + c, tie)
+
+
+@njit(**INNER)
+def complete_vertex(v, node, radii, row, slopes, vertices):
+    """Take the length of a vertex out of its rows; write its part of the closing row."""
+    inverse, soft = load(radii, RADII * node + INVERSE), load(radii, RADII * node + SOFT)
+    growth = load(radii, RADII * node + EXCESS) * soft
+    share = load(radii, RADII * node + RADIAL) * inverse * soft
+    square, stretch = inverse * inverse * soft, stretch_of(radii, node)
+    for k in range(3):
+        slope, to = load(slopes, 3 * node + k), (3 * v + k) * SHARES
+        for j in range(k, 3):
+            own = load(vertices, to + j) - square * slope * load(slopes, 3 * node + j)
+            store(vertices, to + j, own + stretch if j == k else own)
+        store(vertices, to + 3 + FORCE, load(vertices, to + 3 + FORCE) - growth * slope)
+        own = load(vertices, to + 3 + ROW) + share * slope
+        store(vertices, to + 3 + ROW, own + load(row, 4 * node + k))
+
+
+@njit(**INNER)
+def eliminate_vertex(v, last, vertices, ties, products, extremes):
+    """Eliminate the rotation of a vertex from the next one and from the border."""
+    one = spread(1.0)
+    for k in range(3):
+        row = (3 * v + k) * SHARES
+        inverse = one / load(vertices, row + k)
+        store(vertices, row + k, inverse)
+        note_pivot(inverse, extremes)
+        for i in range(k + 1, 3):
+            factor, to = load(vertices, row + i) * inverse, (3 * v + i) * SHARES
+            for j in range(i, SHARES):
+                store(vertices, to + j, load(vertices, to + j) - factor * load(vertices, row + j))
+            if v < last:
+                tie, here = 9 * v + 3 * i, 9 * v + 3 * k
+                for j in range(3):
+                    store(ties, tie + j, load(ties, tie + j) - factor * load(ties, here + j))
+        if v < last:
+            for i in range(3):
+                factor = load(ties, 9 * v + 3 * k + i) * inverse
+                to = (3 * v + 3 + i) * SHARES
+                for j in range(i, 3):
+                    own = load(vertices, to + j) - factor * load(ties, 9 * v + 3 * k + j)
+                    store(vertices, to + j, own)
+                for j in range(3, SHARES):
+                    own = load(vertices, to + j) - factor * load(vertices, row + j)
+                    store(vertices, to + j, own)
+        for a in range(BORDER):
+            factor = load(vertices, row + 3 + a) * inverse
+            for c in range(a, BORDER):
+                at = BORDER * a + c
+                store(products, at, load(products, at) + factor * load(vertices, row + 3 + c))
+
+
+@njit(**INNER)
+def note_pivot(inverse, extremes):
+    """Count a negative pivot; note extremes, sum and product of the reciprocals."""
+    zero, one, size = spread(0.0), spread(1.0), absolute(inverse)
+    count, small, large = load(extremes, COUNT), load(extremes, SMALL), load(extremes, LARGE)
+    store(extremes, COUNT, count + where_less(inverse, zero, one, zero))
+    store(extremes, SMALL, where_less(size, small, size, small))
+    store(extremes, LARGE, where_less(large, size, size, large))
+    store(extremes, TOTAL, load(extremes, TOTAL) + inverse)
+    store(extremes, PRODUCT, load(extremes, PRODUCT) * inverse)
+
+
+@njit(**INNER)
+def small_system(axes, compliance, products, closing, rates, row, given, small):
+    """Schur system of the closures and the load, in rows of `SYSTEM`; given: corner and defect."""
+    zero = spread(0.0)
+    for a in range(3):
+        at = a * SYSTEM
+        if axes[a] < 0:
+            for c in range(SYSTEM):
+                store(small, at + c, spread(compliance[a, c] if c < 3 else 0.0))
+            store(small, 3 * SYSTEM + a, zero)
+            continue
+        for c in range(3):
+            low, high = min(a, c), max(a, c)
+            value = spread(compliance[a, c]) - load(products, BORDER * low + high)
+            store(small, at + c, value if axes[c] >= 0 else zero)
+        store(small, at + 3, load(rates, a) - load(products, BORDER * a + COLUMN))
+        store(small, at + 4, zero - load(closing, a) - load(products, BORDER * a + FORCE))
+        store(small, at + 5, zero)
+        store(small, 3 * SYSTEM + a, load(row, a) - load(products, BORDER * a + ROW))
+    at = 3 * SYSTEM
+    store(small, at + 3, load(given, 0) - load(products, BORDER * COLUMN + ROW))
+    store(small, at + 4, zero - load(given, 1) - load(products, BORDER * FORCE + ROW))
+    store(small, at + 5, spread(1.0))
+
+
+@njit(**INNER)
+def note_closures(small, extremes):
+    """Count negative eigenvalues of the closures' block, by the signs of its invariants; det."""
+    a, b, c = load(small, 0), load(small, 1), load(small, 2)
+    d, e, f = load(small, SYSTEM + 1), load(small, SYSTEM + 2), load(small, 2 * SYSTEM + 2)
+    zero, one = spread(0.0), spread(1.0)
+    first, second = a + d + f, a * d - b * b + a * f - c * c + d * f - e * e
+    third = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
+    # changes of sign in x³ − first x² + second x − third, at −x
+    count, sign = zero, one
+    for value in (first, second, third):
+        count = count + where_less(sign * value, zero, one, zero)
+        sign = where_less(value, zero, zero - one, one)
+    store(extremes, COUNT, load(extremes, COUNT) + count)
+    store(extremes, PRODUCT, third / load(extremes, PRODUCT))
+
+
+@njit(**INNER)
+def restore_vertex(v, last, node, after, vertices, ties, small, turns):
+    """Back-substitute step and tangent at a vertex; turns: six rows a node."""
+    for k in range(2, -1, -1):
+        row = (3 * v + k) * SHARES
+        step, turn = reduced(vertices, row + 3, small)
+        for j in range(k + 1, 3):
+            factor, at = load(vertices, row + j), 6 * node + 2 * j
+            step, turn = step - factor * load(turns, at), turn - factor * load(turns, at + 1)
+        if v < last:
+            for j in range(3):
+                factor, at = load(ties, 9 * v + 3 * k + j), 6 * after + 2 * j
+                step, turn = step - factor * load(turns, at), turn - factor * load(turns, at + 1)
+        inverse = load(vertices, row + k)
+        store(turns, 6 * node + 2 * k, step * inverse)
+        store(turns, 6 * node + 2 * k + 1, turn * inverse)
+
+
+@njit(**INNER)
+def reduced(rows, at, small):
+    """Right-hand sides of step and tangent from reduced border columns."""
+    step, turn = load(rows, at + FORCE), spread(0.0)
+    for c in range(4):
+        column = load(rows, at + (c if c < 3 else COLUMN))
+        step = step - column * load(small, c * SYSTEM + 4)
+        turn = turn - column * load(small, c * SYSTEM + 5)
+    return step, turn
+
+
+@njit(**INNER)
+def restore_inner(inner, size, first, places, width, matrix, base, pivots, at, small, turns):
+    """Back-substitute step and tangent at the inner nodes of an element."""
+    for k in range(inner - 1, -1, -1):
+        row = base + k * width
+        step, turn = reduced(matrix, row + size, small)
+        for j in range(k + 1, size):
+            to = 6 * (first + places[j // 3]) + 2 * (j % 3)
+            factor = load(matrix, row + j)
+            step, turn = step - factor * load(turns, to), turn - factor * load(turns, to + 1)
+        to, inverse = 6 * (first + places[k // 3]) + 2 * (k % 3), load(pivots, at + k)
+        store(turns, to, step * inverse)
+        store(turns, to + 1, turn * inverse)
