@@ -9,8 +9,18 @@ SAME_STATE = 1e-6
 SAME_SOLUTION = 1e-5
 """Distance, in the metric and scaled parameters, of two states that separate iterations found, such
 as descents, gradient flows and queries, which end less sharply than Newton's method."""
+SAME_VERTEX = 1e-7
+"""Distance, in the metric, of two exact vertices of a complex."""
+SAME_PLACE = 1e-7
+"""Distance of two settings, in units of the parameters' scales."""
 SAME_NUMBER = 1e-9
 """Difference of two numbers, relative to the largest of those that are compared."""
+
+SAME_TO_ROUNDING = 1e-12
+"""Difference of two numbers, relative to one and to their size, that round-off explains."""
+IN_BOX = 1e-12
+"""Distance beyond a side of a box up to which points lie in it: relative to the width of the box,
+or in units of the parameters."""
 
 SINGULAR = 1e-10
 """Eigenvalue of a stiffness matrix, relative to the largest one, that counts as zero."""

@@ -24,6 +24,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
+from equimorph.tolerances import IN_BOX
 
 ON_BARRIER = 1e-9
 """Distance from a barrier, in ranges of the parameters, within which points lie on it."""
@@ -95,7 +96,7 @@ class Reduction(Chart):
         found = self.preference.over(points)
         code = np.full(len(points), PointStatus.GAP)
         code[found.point] = PointStatus.INSIDE
-        beyond = ~self.eset.box.holds(points, slack=1e-12)
+        beyond = ~self.eset.box.holds(points, slack=IN_BOX)
         code[beyond] = PointStatus.BEYOND_THE_BOX
         code[self._on_barrier(points) & ~beyond] = PointStatus.BARRIER
         return self._answers(found.take(code[found.point] == PointStatus.INSIDE), code)

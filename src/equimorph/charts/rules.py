@@ -16,6 +16,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
+from equimorph.tolerances import SAME_TO_ROUNDING
 
 Scores = Float[np.ndarray, " found"]
 Chooser = Callable[[Found, Points], Bool[np.ndarray, " found"]]
@@ -23,8 +24,6 @@ Chooser = Callable[[Found, Points], Bool[np.ndarray, " found"]]
 Scoring = Callable[[Found], Scores]
 
 
-EQUAL = 1e-12
-"""Difference, relative to one and to their size, up to which scores are equal."""
 Identity = Mapping[str, str | int | float]
 
 
@@ -85,7 +84,7 @@ def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np
         least = np.full(int(found.point.max(initial=-1)) + 1, np.inf)
         np.minimum.at(least, found.point[chosen], value[chosen])
         own = least[found.point]
-        chosen[chosen] = (value <= own + EQUAL * (1.0 + np.abs(own)))[chosen]
+        chosen[chosen] = (value <= own + SAME_TO_ROUNDING * (1.0 + np.abs(own)))[chosen]
     kept = np.flatnonzero(chosen)
     order = kept[np.argsort(found.point[kept], kind="stable")]
     out = np.zeros(len(chosen), bool)

@@ -22,6 +22,7 @@ from equimorph.equilibria.locus_events import (
 )
 from equimorph.equilibria.steps import least_inside
 from equimorph.equilibria.trace_options import EventKind, TraceOptions
+from equimorph.tolerances import SAME_STATE
 
 CLOSE = 0.05
 """Least value inside a step, as a share of those at its ends, that asks for shorter steps."""
@@ -31,8 +32,6 @@ BACK = 0.4
 """Factor of a step's length after a refusal."""
 FOLLOWING = 1e-12
 """Estimate of a correction that is not taken any more."""
-CLOSED = 1e-6
-"""Distance in the metric at which a curve has returned to its start, or its sides have met."""
 
 
 @dataclass
@@ -220,7 +219,7 @@ def _passes(locus: Locus, walk: Walks, stop: float, target: Spots) -> tuple[floa
         return None
     length = np.array([ahead])
     spot, found = advance(locus, walk.spots, length, predict(locus, walk, length))
-    if not found[0] or locus.lengths(spot.x - target.x)[0] > CLOSED:
+    if not found[0] or locus.lengths(spot.x - target.x)[0] > SAME_STATE:
         return None
     return travelled + ahead, spot
 

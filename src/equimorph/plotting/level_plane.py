@@ -13,12 +13,12 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 
 from equimorph.argument_checks import check_arguments
-from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.curves import fold_pieces, path_of, states_along
 from equimorph.plotting.labels import descriptor_label, roomiest
+from equimorph.plotting.plane import check_two_parameters
 from equimorph.structures import State, States
 from equimorph.tasks import Route
 
@@ -91,8 +91,7 @@ def level_plane(
     InputError
         If the set has not two free parameters.
     """
-    if len(eset.names) != 2:
-        raise InputError(f"`eset` must have two free parameters; got {', '.join(eset.names)}.")
+    check_two_parameters(eset)
     view = _Plane(*plane)
     with style.house_style():
         own = ax is None

@@ -155,6 +155,12 @@ def legend_below(ax: Axes, lines: Sequence[Artist], *, room: bool) -> None:
     )  # fmt: skip
 
 
+def check_two_parameters(eset: EquilibriumSet) -> None:
+    """Refuse sets over one or three parameters."""
+    if len(eset.names) != 2:
+        raise InputError(f"`eset` must have two free parameters; got {', '.join(eset.names)}.")
+
+
 def frame_plane(ax: Axes, eset: EquilibriumSet) -> None:
     """Limits and labels of the plane of the free parameters."""
     ax.set_xlim(eset.box.lower[0], eset.box.upper[0])
@@ -294,8 +300,7 @@ def solutions(eset: EquilibriumSet, states: States, ax: Axes | None = None) -> A
     InputError
         If the set has not two free parameters.
     """
-    if len(eset.names) != 2:
-        raise InputError(f"`eset` must have two free parameters; got {', '.join(eset.names)}.")
+    check_two_parameters(eset)
     ax = parameter_plane(eset, ax=ax)
     if not len(states):
         return ax

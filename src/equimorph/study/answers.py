@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
+from typing import Literal
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
@@ -14,7 +15,7 @@ from equimorph.structures import States
 from equimorph.study import html
 from equimorph.study.names import route_figures
 from equimorph.study.question import Figure, Question, still
-from equimorph.tasks import Route
+from equimorph.tasks import Route, Tracking, Verification
 
 
 def heading(question: Question) -> str:
@@ -56,6 +57,12 @@ def free_columns(
         for name in names
         if name not in known
     }
+
+
+def as_route(answer: Tracking | Verification, status: Literal["arrived", "refused"]) -> Route:
+    """The way of a motion or a schedule as a route, for figures."""
+    way, length = answer.path, float(answer.path.length[-1])
+    return Route(status, answer.why, [], way, answer.margin, length, answer.schedule)
 
 
 def figures_of_way(eset: EquilibriumSet | None, name: str, route: Route) -> Sequence[Figure]:

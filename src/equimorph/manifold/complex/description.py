@@ -1,7 +1,7 @@
 """From a complex to an equilibrium set: pieces, folds, boundaries and the audit."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -124,6 +124,24 @@ def describe(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         grid_vertex=given.grid_vertex,
         crossings=tuple(pieces(whole.facets[crossed])),
     )
+
+
+def describe_again(eset: EquilibriumSet, given: Complex, setting: Setting) -> EquilibriumSet:
+    """Describe a set whose cells have changed; what was counted as it was lifted is kept."""
+    audit = eset.audit
+    lifting = Lifting(**{each.name: getattr(audit, each.name) for each in fields(Lifting)})
+    frame = Frame(setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
+    out = describe(frame, given, lifting)
+    kept = replace(
+        out.audit,
+        checked=audit.checked,
+        missing=audit.missing,
+        recovered=audit.recovered,
+        accuracy=audit.accuracy,
+        deviation=audit.deviation,
+        unrefined=audit.unrefined,
+    )
+    return replace(out, audit=kept)
 
 
 def _boundaries(

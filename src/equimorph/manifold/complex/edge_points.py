@@ -21,6 +21,7 @@ from equimorph.manifold.geometry.exact_points import (
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import Cubics, Ends, split_step
+from equimorph.tolerances import IN_BOX, SAME_VERTEX
 
 CHUNK = 512
 """Edges that are worked on together: their work arrays stay small, and threads share the chunks."""
@@ -29,8 +30,6 @@ REACH = 0.3
 EXCESS = 0.35
 """How much longer the parts of an edge may be than they would be on a straight one, relative to
 it."""
-SAME = 1e-7
-"""Distance in the metric below which two vertices are one."""
 MET = (0, -2, -1)
 """Columns of a vertex's place by which candidates for the same vertex are sorted."""
 WEIGHTS = np.array([0.36, 0.48, 0.8])
@@ -94,11 +93,11 @@ def unmet(fabric: Fabric, tried: Sequence[Tried]) -> list[Tried]:
     out = []
     for found, vertices in tried:
         own = vertices.place[:, MET] @ WEIGHTS
-        first, last = (np.searchsorted(key, own + gap) for gap in (-SAME, SAME))
+        first, last = (np.searchsorted(key, own + gap) for gap in (-SAME_VERTEX, SAME_VERTEX))
         new = np.ones(len(own), bool)
         for lane in np.flatnonzero(last > first).tolist():
             there = place[known[first[lane] : last[lane]]]
-            new[lane] = np.linalg.norm(there - vertices.place[lane], axis=1).min() > SAME
+            new[lane] = np.linalg.norm(there - vertices.place[lane], axis=1).min() > SAME_VERTEX
         kept = found.copy()
         kept[found] = new
         out.append((found, vertices) if new.all() else (kept, vertices.take(np.flatnonzero(new))))
@@ -175,25 +174,37 @@ def _beside_sides(
 
 def _accept(
     fabric: Fabric,
-    wanted: Places,
+    target: Places,
     at: Pinned,
     place: Float[np.ndarray, "n coordinates"],
     plane: Float[np.ndarray, "n d coordinates"],
 ) -> Tried:
     """Those vertices on edges that are close to where they were looked for, and of the index."""
-    first, second = (fabric.vertices.place[wanted.ends[:, side]] for side in range(2))
-    length = np.linalg.norm(second - first, axis=1)
-    here = _embed(fabric, at.z, at.p)
-    found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
-    for end, part in ((first, wanted.t), (second, 1.0 - wanted.t)):
-        found &= np.linalg.norm(here - end, axis=1) <= (part + EXCESS) * length
-    free = at.p[:, fabric.setting.free]
-    found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
-    found &= _of_index(fabric, wanted.mark, at, found, wanted.lowest)
-    vertices = _vertices_at(fabric, wanted.mark, at, found, wanted.lowest, plane)
-    good = _along(replace(fabric, vertices=vertices), wanted.mark, (second - first)[found])
+    found = _is_close(fabric, target, at, place)
+    found &= _of_index(fabric, target.mark, at, found, target.lowest)
+    vertices = _vertices_at(fabric, target.mark, at, found, target.lowest, plane)
+    way = np.subtract(*(fabric.vertices.place[target.ends[:, side]] for side in (1, 0)))
+    good = _along(replace(fabric, vertices=vertices), target.mark, way[found])
     found[found] = good
     return found, vertices.take(np.flatnonzero(good))
+
+
+def _is_close(
+    fabric: Fabric,
+    target: Places,
+    at: Corrected | Pinned,
+    place: Float[np.ndarray, "n coordinates"],
+) -> Bool[np.ndarray, " n"]:
+    """Which points lie close to their places, between the ends of their edges and in the box."""
+    first, second = (fabric.vertices.place[target.ends[:, side]] for side in range(2))
+    length = np.linalg.norm(second - first, axis=1)
+    here = _embed(fabric, at.z, at.p)
+    close = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
+    for end, part in ((first, target.t), (second, 1.0 - target.t)):
+        close &= np.linalg.norm(here - end, axis=1) <= (part + EXCESS) * length
+    free = at.p[:, fabric.setting.free]
+    inside = (free >= fabric.box[0] - IN_BOX) & (free <= fabric.box[1] + IN_BOX)
+    return np.asarray(close & inside.all(axis=1))
 
 
 def _orthogonally(
@@ -218,12 +229,7 @@ def _orthogonally(
         at: Corrected | Pinned = corrected_amid(setting, z, p, place, plane, length)
     else:
         at = _on_curves(fabric, mark, z, p, place, plane, length, first)
-    here = _embed(fabric, at.z, at.p)
-    found = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
-    for end, part in ((first, t), (second, 1.0 - t)):
-        found &= np.linalg.norm(here - end.place, axis=1) <= (part + EXCESS) * length
-    free = at.p[:, setting.free]
-    found &= ((free >= fabric.box[0] - 1e-12) & (free <= fabric.box[1] + 1e-12)).all(axis=1)
+    found = _is_close(fabric, Places(ends, mark, lowest, t), at, place)
     if isinstance(at, Corrected):
         found &= at.index == lowest
         vertices = free_vertices(setting, at if found.all() else at.take(found))

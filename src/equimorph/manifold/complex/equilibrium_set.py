@@ -18,6 +18,7 @@ from equimorph.manifold.lookup.over import Sheets
 from equimorph.manifold.lookup.states_over import StatesOver
 from equimorph.model import Box, Constraint, parameter_vector, position
 from equimorph.structures import States, Structure
+from equimorph.tolerances import IN_BOX
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ class EquilibriumSet:
         """The same for numbers that were checked."""
         _check_names(self.names, at)
         point = np.array([float(at[name]) for name in self.names])
-        if not self.box.holds(point, slack=1e-12):
+        if not self.box.holds(point, slack=IN_BOX):
             raise InputError(f"`at` must lie in {self.box}; got {dict(at)}.")
         return np.asarray(self.setting.parameters(point[None])[0])
 
@@ -205,7 +206,7 @@ class EquilibriumSet:
                 f"got shapes {shapes}."
             )
         points = np.stack(columns, axis=1)
-        outside = np.flatnonzero(~self.box.holds(points, slack=1e-12))
+        outside = np.flatnonzero(~self.box.holds(points, slack=IN_BOX))
         if len(outside):
             worst = dict(zip(self.names, points[outside[0]].tolist(), strict=True))
             raise InputError(f"`at` must lie in {self.box}; got {worst} (point {outside[0]}).")

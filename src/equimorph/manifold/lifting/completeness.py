@@ -19,9 +19,8 @@ from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.model import Progress, position
 from equimorph.structures import States
+from equimorph.tolerances import SAME_SOLUTION
 
-APART = 1e-5
-"""Distance in the metric above which two equilibria are two."""
 STARTS = 200
 """Random starts of Newton's method in each independent search."""
 SCATTERED = 2000
@@ -124,7 +123,7 @@ def _lacking(found: States, eset: EquilibriumSet) -> States:
     gap = np.sqrt((known.states.z - found.z[known.point])[:, :n] ** 2 @ mass)
     closest = np.full(len(found), np.inf)
     np.minimum.at(closest, known.point, gap)
-    return found[np.flatnonzero(closest > APART)]
+    return found[np.flatnonzero(closest > SAME_SOLUTION)]
 
 
 def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:

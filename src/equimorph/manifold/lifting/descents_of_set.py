@@ -16,6 +16,7 @@ from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.structures import States
+from equimorph.tolerances import SAME_SOLUTION
 
 VERTICES = 8
 """Vertices of each stratum of index one from which the energy is followed downwards."""
@@ -23,8 +24,6 @@ MOST = 50
 """Strata, the largest ones, and folds from which descents begin: a set may be in shreds."""
 BISECTIONS = 2
 """Rounds in which vertices between neighbours are added whose descents land on other strata."""
-APART = 1e-5
-"""Distance in the metric above which a landing is no state of the set."""
 NOWHERE = -1
 """Instead of a stratum: the descent does not land on the set."""
 FOLD = -1
@@ -156,7 +155,7 @@ def _strata(eset: EquilibriumSet, states: States) -> Some:
     known = eset.over(**{name: states[name] for name in eset.names})
     n, mass = eset.structure.unknowns, eset.structure.mass
     gap = np.sqrt((known.states.z - states.z[known.point])[:, :n] ** 2 @ mass)
-    near = np.flatnonzero(gap <= APART)
+    near = np.flatnonzero(gap <= SAME_SOLUTION)
     out = np.full(len(states), NOWHERE)
     out[known.point[near]] = known.stratum[near]
     return out

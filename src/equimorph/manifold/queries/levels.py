@@ -17,7 +17,7 @@ from equimorph.manifold.complex.cuts import (
     cut_between,
     roots,
 )
-from equimorph.manifold.complex.description import Frame, Lifting, describe
+from equimorph.manifold.complex.description import describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
@@ -232,20 +232,5 @@ def part_of(
         facets=facets[(marks & FacetMark.HOLE) == 0],
         marks=marks[(marks & FacetMark.HOLE) == 0],
     )
-    audit = eset.audit
-    lifting = Lifting(
-        audit.unpaired, audit.conflicts, audit.retraced,
-        audit.parity_violations, audit.undecided, audit.bisected,
-    )  # fmt: skip
-    frame = Frame(fabric.setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
-    out = describe(frame, fabric.complex(), lifting)
-    kept = replace(
-        out.audit,
-        checked=audit.checked,
-        missing=audit.missing,
-        recovered=audit.recovered,
-        accuracy=audit.accuracy,
-        deviation=audit.deviation,
-        unrefined=audit.unrefined + lost,
-    )
-    return replace(out, audit=kept)
+    out = describe_again(eset, fabric.complex(), fabric.setting)
+    return replace(out, audit=replace(out.audit, unrefined=out.audit.unrefined + lost))

@@ -15,6 +15,7 @@ from equimorph.manifold.geometry.exact_points import Aim, corrected, lower_index
 from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import split_step
+from equimorph.tolerances import IN_BOX
 
 FIRST, LEAST = 0.25, 1e-3
 """First and least step along a curve, relative to its edge."""
@@ -108,7 +109,7 @@ def _step(
     pinned = corrected(aim, z, p, around)
     moved = np.linalg.norm(embed(setting, pinned.z, pinned.p) - middle)
     free = pinned.p[0, setting.free]
-    inside = (free >= fabric.box[0] - 1e-12).all() and (free <= fabric.box[1] + 1e-12).all()
+    inside = (free >= fabric.box[0] - IN_BOX).all() and (free <= fabric.box[1] + IN_BOX).all()
     if not (pinned.found[0] and inside and moved <= OFF * size):
         return None
     count = lower_index if mark == FacetMark.FOLD else _index

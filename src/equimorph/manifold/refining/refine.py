@@ -15,7 +15,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.manifold.complex.audit import Audit
-from equimorph.manifold.complex.description import Frame, Lifting, describe
+from equimorph.manifold.complex.description import describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import question_of_refinement, recall_set
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
@@ -86,24 +86,15 @@ def refine_cells(eset: EquilibriumSet, accuracy: float, progress: Progress) -> E
     fabric = _settle_and_repair(fabric, SHARE[len(eset.names)] * accuracy, memory, progress)
     fabric = part_sheets(fabric, memory)
     edges = known(fabric, memory)
-    audit = eset.audit
-    lifting = Lifting(
-        audit.unpaired, audit.conflicts, audit.retraced,
-        audit.parity_violations, audit.undecided, audit.bisected,
-    )  # fmt: skip
-    frame = Frame(eset.setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
-    out = describe(frame, fabric.complex(), lifting)
+    out = describe_again(eset, fabric.complex(), fabric.setting)
     quality = replace(
         out.audit,
-        checked=audit.checked,
-        missing=audit.missing,
-        recovered=audit.recovered,
         accuracy=accuracy,
         deviation=float(edges.error.max(initial=0.0) / SHARE[len(eset.names)]),
         unrefined=int((edges.error > SHARE[len(eset.names)] * accuracy).sum()),
         smallest_angle=smallest_angle(fabric),
         smallest_dihedral=smallest_dihedral(fabric),
-        changed=_topology_change(audit, out.audit),
+        changed=_topology_change(eset.audit, out.audit),
         smallest_free_angle=smallest_free_angle(fabric),
     )
     return replace(out, audit=quality)

@@ -10,10 +10,10 @@ from rich.markup import escape as plain
 from equimorph.manifold import EquilibriumSet
 from equimorph.storage import write_schedule
 from equimorph.study import html
-from equimorph.study.answers import figures_of_way, heading, pictures_of_way
+from equimorph.study.answers import as_route, figures_of_way, heading, pictures_of_way
 from equimorph.study.names import schedule_table
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks import Route, Tracking, track
+from equimorph.tasks import Tracking, track
 
 MOST_ROWS = 8
 """Compromises that a page shows."""
@@ -35,7 +35,7 @@ class TrackKind(Kind[Tracking]):
         self, question: Question, eset: EquilibriumSet | None, answer: Tracking
     ) -> Sequence[Figure]:
         """As for a route."""
-        return figures_of_way(eset, question.files, _as_route(answer))
+        return figures_of_way(eset, question.files, as_route(answer, answer.status))
 
     def report(self, question: Question, answer: Tracking, folder: Path) -> list[str]:
         """Verdict, schedule and figures."""
@@ -83,10 +83,3 @@ def _compromise(answer: Tracking) -> list[str]:
     ]
     head = ["leg", "miss", *map(escape, names)]
     return [f"<p>{words}</p>", html.table(head, rows)]
-
-
-def _as_route(answer: Tracking) -> Route:
-    """The motion as a route, for figures."""
-    way, status = answer.path, answer.status
-    length = float(way.length[-1])
-    return Route(status, answer.why, [], way, answer.margin, length, answer.schedule)

@@ -11,10 +11,10 @@ from rich.markup import escape as plain
 from equimorph.manifold import EquilibriumSet
 from equimorph.storage import write_schedule
 from equimorph.study import html
-from equimorph.study.answers import figures_of_way, heading, pictures_of_way
+from equimorph.study.answers import as_route, figures_of_way, heading, pictures_of_way
 from equimorph.study.names import schedule_table
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks import Proof, ProofStatus, Route, Verification, verify
+from equimorph.tasks import Proof, ProofStatus, Verification, verify
 
 STANDINGS: Mapping[ProofStatus, tuple[str, str]] = {
     ProofStatus.PROVED: ("Proved", ""),
@@ -44,7 +44,8 @@ class VerifyKind(Kind[Verification]):
         self, question: Question, eset: EquilibriumSet | None, answer: Verification
     ) -> Sequence[Figure]:
         """As for a route."""
-        return figures_of_way(eset, question.files, _as_route(answer))
+        status: Literal["arrived", "refused"] = "arrived" if answer.verified else "refused"
+        return figures_of_way(eset, question.files, as_route(answer, status))
 
     def report(self, question: Question, answer: Verification, folder: Path) -> list[str]:
         """Verdict, proof, schedule and figures."""
@@ -68,13 +69,6 @@ class VerifyKind(Kind[Verification]):
             return f"{head}: [bold red]refused[/]. {plain(_sentence(answer.why))}"
         proof = "" if answer.proof is None else f", {answer.proof.status}"
         return f"{head}: [bold green]verified[/], smallest margin {answer.margin:.3f}{proof}."
-
-
-def _as_route(answer: Verification) -> Route:
-    """The way as a route, for figures."""
-    status: Literal["arrived", "refused"] = "arrived" if answer.verified else "refused"
-    length = float(answer.path.length[-1])
-    return Route(status, answer.why, [], answer.path, answer.margin, length, answer.schedule)
 
 
 def _sentence(why: str) -> str:

@@ -20,6 +20,7 @@ from equimorph.tasks.maps.curves import (
     edge_of_definition,
     places_on,
 )
+from equimorph.tolerances import IN_BOX
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,6 +207,6 @@ def _point(grid: Grid, setting: Mapping[str, float]) -> Float[np.ndarray, " 2"]:
         names = ", ".join(setting) or "nothing"
         raise InputError(f"`setting` must give {' and '.join(grid.names)}; got {names}.")
     point = np.array([float(setting[name]) for name in grid.names])
-    if not grid.box.holds(point, slack=1e-12):
+    if not grid.box.holds(point, slack=IN_BOX):
         raise InputError(f"`setting` must lie in {grid.box}; got {dict(setting)}.")
     return point

@@ -22,6 +22,7 @@ from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import Structure
 from equimorph.tasks.maps.brackets import PARTS, SHRINKING, Brackets, Samples, sample_distance
+from equimorph.tolerances import SAME_PLACE
 
 ELSEWHERE = 0.02
 """Arclength between two extrema from which on they are different ones."""
@@ -36,8 +37,6 @@ place needs another cause: near a slightly unfolded pitchfork a cusp and a branc
 the path lie 1e-7 to 1e-5 apart, and only one of them makes the map jump."""
 SLACK = 1e-3
 """How far outside its bracket, in lengths of it, an exact place may lie."""
-ONE_PLACE = 1e-7
-"""Places closer than this, in units of the parameters' scales, are one."""
 NEARBY = Guards(iterations=10, longest=np.inf, too_long=0.5, converged=1e-9)
 """The guesses are close: longer corrections, in the metric, lead elsewhere."""
 TEST_DIFFERENCE = 1e-6
@@ -216,7 +215,7 @@ def candidates(paths: Paths, pairs: Brackets) -> Candidates:
         others = _first(paths, pairs, causes, first)
         open_ = open_[others.found[open_]]
         tried[open_] = others.cause[open_]
-        apart = np.abs(others.p[open_] - best.p[open_])[:, places].max(axis=1) > ONE_PLACE
+        apart = np.abs(others.p[open_] - best.p[open_])[:, places].max(axis=1) > SAME_PLACE
         better = apart & ~_looks_smooth(paths, pairs.take(open_), others.p[open_])
         best.put(open_[better], others.take(open_[better]))
         open_ = open_[~better]

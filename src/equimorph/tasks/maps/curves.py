@@ -23,7 +23,8 @@ from equimorph.tasks.maps.brackets import (
     sample_distance,
     suspicious_edges,
 )
-from equimorph.tasks.maps.causes import BESIDE, ONE_PLACE, Paths, Start, candidates, is_sharp
+from equimorph.tasks.maps.causes import BESIDE, Paths, Start, candidates, is_sharp
+from equimorph.tolerances import SAME_PLACE
 
 ROUNDS = 3
 """How often causes are looked for, in parts of parts of a pair."""
@@ -215,7 +216,7 @@ def curves_through(
         for kind in dict.fromkeys(places.kind.tolist()):
             some = places.take(np.flatnonzero(places.kind == kind))
             # a vertex on a curve belongs to two edges, and was found from both
-            rounded = np.round(some.setting / (ONE_PLACE * scales))
+            rounded = np.round(some.setting / (SAME_PLACE * scales))
             some = some.take(np.sort(np.unique(rounded, axis=0, return_index=True)[1]))
             ends = np.stack([some.brackets.a.value, some.brackets.b.value], axis=1)
             for line in polylines(some.setting / scales, some.brackets.edge, shape):
