@@ -18,7 +18,7 @@ import numpy as np
 from equimorph.argument_kinds import (
     ANYTHING,
     Kind,
-    converted,
+    convert_value,
     is_listed,
     is_mapping,
     kind_of,
@@ -73,12 +73,12 @@ def check_arguments(thing: Thing) -> Thing:
     """
     if inspect.isclass(thing):
         made: Any = thing
-        made.__init__ = _checked(made.__init__)
+        made.__init__ = _wrap_with_checks(made.__init__)
         return thing
-    return _checked(thing)  # type: ignore[return-value]
+    return _wrap_with_checks(thing)  # type: ignore[return-value]
 
 
-def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
+def _wrap_with_checks(function: Callable[..., Any]) -> Callable[..., Any]:
     entry = Entry(function)
 
     @wraps(function)
@@ -175,7 +175,7 @@ class Entry:
 
     def _convert(self, kind: Kind, name: str, value: Any, args: tuple[Any, ...]) -> Any:
         try:
-            return converted(kind, value)
+            return convert_value(kind, value)
         except (TypeError, ValueError, OverflowError):
             pass
         named = [{name: value}] if name not in self._kinds else _mappings(value) * kind.by_name

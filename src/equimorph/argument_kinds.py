@@ -282,7 +282,7 @@ def _either(kinds: Sequence[Kind]) -> Kind:
     def convert(value: Any) -> Any:
         for kind in said:
             try:
-                made = converted(kind, value)
+                made = convert_value(kind, value)
             except (TypeError, ValueError, OverflowError):
                 continue
             return made
@@ -297,7 +297,7 @@ def _either(kinds: Sequence[Kind]) -> Kind:
     return Kind(" or ".join(words), " or ".join(several), fits, convert, culprit, holds, by_name)
 
 
-def converted(kind: Kind, value: Any) -> Any:
+def convert_value(kind: Kind, value: Any) -> Any:
     """Value in a form that fits; TypeError or ValueError if there is none."""
     made = kind.convert(value) if kind.convert is not None else value
     if not kind.fits(made):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria.prescribed_curves import approximated
+from equimorph.equilibria.prescribed_curves import approximate
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from oracles.polynomial import Polynomial, fold_form, pitchfork_form
@@ -95,7 +95,7 @@ def test_arch_on_a_closed_curve_is_where_it_was():
 
 def test_polynomials_agree_with_a_function_and_its_derivatives():
     """exp(sin 9t): tolerances by 81 and 81² times the error of values, 1e-12."""
-    f = approximated(lambda t: np.array([[np.exp(np.sin(9 * t))]]), 1, np.ones(1))
+    f = approximate(lambda t: np.array([[np.exp(np.sin(9 * t))]]), 1, np.ones(1))
     t = np.linspace(0.0, 1.0, 101)
     f = f.take(np.zeros(101, int))
     value, s, c = np.exp(np.sin(9 * t)), np.sin(9 * t), np.cos(9 * t)
@@ -105,7 +105,7 @@ def test_polynomials_agree_with_a_function_and_its_derivatives():
 
 
 def test_curves_go_on_straight_beyond_their_ends():
-    f = approximated(lambda t: np.array([[t**2]]), 1, np.ones(1)).take(np.zeros(2, int))
+    f = approximate(lambda t: np.array([[t**2]]), 1, np.ones(1)).take(np.zeros(2, int))
     assert f.value(np.array([-0.5, 1.5]))[:, 0] == pytest.approx([0.0, 2.0], abs=1e-12)
     assert f.bend(np.array([-0.5, 1.5])).ravel().tolist() == [0.0, 0.0]
 

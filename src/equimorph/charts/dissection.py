@@ -221,11 +221,11 @@ def _snap_to_cusps(
     if path[0] == path[-1]:
         return out
     for _ in range(2):
-        out = _begun(clear, free, cells, out, cusps)[::-1]
+        out = _start_at_cusp(clear, free, cells, out, cusps)[::-1]
     return out
 
 
-def _begun(
+def _start_at_cusp(
     clear: Walker, free: Walker, cells: Cells, path: list[int], cusps: tuple[int, ...]
 ) -> list[int]:
     """The path from the cusp next to its beginning on, if it sees one of its first vertices."""

@@ -13,8 +13,8 @@ from equimorph.equilibria.prescribed_curves import (
     Pieces,
     SmoothCurve,
     TrackedCurve,
-    approximated,
-    interpolated,
+    approximate,
+    interpolate,
 )
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Spline, position
@@ -189,8 +189,8 @@ def _pieces(
             f"got {got:.9g} at t=0."
         )
     if isinstance(leg, Spline):
-        return interpolated(leg.t, at, len(here), 3)
-    return approximated(at, len(here), scales)
+        return interpolate(leg.t, at, len(here), 3)
+    return approximate(at, len(here), scales)
 
 
 def _track_descriptors(states: States, leg: Leg, first: Waypoint) -> Prepared:
@@ -221,7 +221,7 @@ def _track_descriptors(states: States, leg: Leg, first: Waypoint) -> Prepared:
     else:
         stop = at(1.0)
         line = lambda t: start + t * (stop - start)  # noqa: E731
-        pieces = interpolated(np.array([0.0, 1.0]), line, len(here), 1)
+        pieces = interpolate(np.array([0.0, 1.0]), line, len(here), 1)
     curve = TrackedCurve(structure, pieces, free, descriptors, pieces.lengths(scales))
     return Prepared(curve, curve.begin(states.z, here))
 

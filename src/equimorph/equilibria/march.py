@@ -136,7 +136,7 @@ class Block:
             self._last.pop(int(lane), None)
         stuck = stepping.seat(lanes, levels, self._knobs, z, start, *state)
         self.active += count
-        lost = self._given_up() if stuck else []
+        lost = self._lost_lanes() if stuck else []
         self._close()
         return lost
 
@@ -170,7 +170,7 @@ class Block:
             if self.options.record:
                 self.points.add(trial, *record[1:])
         finished, given_up = stepping.proceed(move.tangent_z, mass, self._places, *state, smallest)
-        lost = self._given_up() if given_up else []
+        lost = self._lost_lanes() if given_up else []
         if given_up or finished > active // PATIENCE:
             self._close()
         return lost
@@ -328,7 +328,7 @@ class Block:
             counts[kernels.WHAT],
         )
 
-    def _given_up(self) -> list[Loss]:
+    def _lost_lanes(self) -> list[Loss]:
         """Lanes that cannot go on; those that are at their goal but for round-off arrive."""
         (numbers, counts), lost = self._scalars, list[Loss]()
         stage = counts[kernels.STAGE, : self.active]

@@ -121,7 +121,7 @@ def lift_one(
         here = pieces[-1].events[-1].state
     if not pieces:
         raise InputError("`to` must change at least one parameter; got the start itself.")
-    return _joined(state, pieces)
+    return _join(state, pieces)
 
 
 def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOptions) -> Path | None:
@@ -143,7 +143,7 @@ def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOpti
     if not ((outcome.code == EventCode.ARRIVED) & (gap < JOINED)).all():
         return None
     lanes = range(len(begin))
-    return _joined(states[0], [_segment(curve, outcome, lane, within, lane) for lane in lanes])
+    return _join(states[0], [_segment(curve, outcome, lane, within, lane) for lane in lanes])
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def _segment(
     """
     if len(outcome.code) > 1:
         curve, outcome = curve.take(np.array([lane])), _lane(outcome, lane)
-    passed = [*zip(outcome.passed.travelled, _passed(curve, outcome, number), strict=True)]
+    passed = [*zip(outcome.passed.travelled, _events_passed(curve, outcome, number), strict=True)]
     passed += [(length, replace(one, at=number + one.at)) for length, one in aside]
     passed.sort(key=lambda each: each[0])
     events = (*(event for _, event in passed), _end(curve, outcome, number, within))
@@ -204,7 +204,7 @@ def _states(
     return curve.take(np.zeros(len(t), int)).states(z, t)
 
 
-def _passed(curve: Curve, outcome: Traces, number: int) -> list[Event]:
+def _events_passed(curve: Curve, outcome: Traces, number: int) -> list[Event]:
     passed = outcome.passed
     z, p = _states(curve, passed.z, passed.t)
     return [
@@ -254,7 +254,7 @@ def _end(curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, .
     return Event(kind, state, number + float(t[0]), critical, detail)
 
 
-def _joined(start: State, pieces: list[_Segment]) -> Path:
+def _join(start: State, pieces: list[_Segment]) -> Path:
     z = np.concatenate([start.z[None], *(piece.z for piece in pieces)])
     p = np.concatenate([start.p[None], *(piece.p for piece in pieces)])
     at = np.concatenate([[0.0], *(piece.at for piece in pieces)])

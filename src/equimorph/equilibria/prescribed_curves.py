@@ -94,7 +94,7 @@ class Pieces:
         return total
 
 
-def interpolated(
+def interpolate(
     breaks: Float[np.ndarray, " ends"], function: Function, lanes: int, degree: int
 ) -> Pieces:
     """Polynomials through the values of a function at the Chebyshev points of each piece.
@@ -113,7 +113,7 @@ def interpolated(
     return Pieces(breaks, (series, slopes, bends), which)
 
 
-def approximated(function: Function, lanes: int, scales: Float[np.ndarray, " columns"]) -> Pieces:
+def approximate(function: Function, lanes: int, scales: Float[np.ndarray, " columns"]) -> Pieces:
     """Polynomials that agree with a smooth function to round-off, in as few pieces as it takes.
 
     Raises
@@ -125,7 +125,7 @@ def approximated(function: Function, lanes: int, scales: Float[np.ndarray, " col
     count = 1
     while True:
         breaks = np.linspace(0.0, 1.0, count + 1)
-        found = interpolated(breaks, function, lanes, DEGREE)
+        found = interpolate(breaks, function, lanes, DEGREE)
         missed, place = 0.0, 0.0
         for low, high in pairwise(breaks):
             for t in 0.5 * (low + high) + 0.5 * (high - low) * between:
@@ -244,9 +244,9 @@ class TrackedCurve:
 
     def begin(self, z: Lanes, p: Parameters) -> Extended:
         """(u, a, λ) of states."""
-        return self._joined(z, p[:, self.free])
+        return self._join(z, p[:, self.free])
 
-    def _joined(self, z: Lanes, a: Float[np.ndarray, "lanes k"]) -> Extended:
+    def _join(self, z: Lanes, a: Float[np.ndarray, "lanes k"]) -> Extended:
         n = self.structure.unknowns
         return np.concatenate([z[:, :n], a, z[:, n:]], axis=1)
 
@@ -293,9 +293,9 @@ class TrackedCurve:
         step += onto
         missed = self._values(x, p) - self._targets(t)
         return Advance(
-            self._joined(step[:, :size], step[:, size:-1]),
+            self._join(step[:, :size], step[:, size:-1]),
             step[:, -1].copy(),
-            self._joined(tangent[:, :size], tangent[:, size:-1]),
+            self._join(tangent[:, :size], tangent[:, size:-1]),
             tangent[:, -1].copy(),
             np.abs(np.concatenate([residual, missed], axis=1)).max(axis=1),
             solved.negative - structure.constraints,

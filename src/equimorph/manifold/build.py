@@ -184,7 +184,7 @@ def _of_grid(
     finder = CellFinder()
     for number in range(SEARCHES):
         pairing.fit()
-        cells, bisected = _lifted(pairing, finder, progress)
+        cells, bisected = _lift_grid(pairing, finder, progress)
         frame = Frame(setting, pairing.mesh, box, fixed, intervals)
         eset = account(pairing, cells, frame, bisected)
         found = check(eset, generator, _checks(effort.checks, setting), progress)
@@ -271,7 +271,7 @@ def _off_zero(setting: Setting) -> tuple[bool, ...]:
     return (True,) * len(setting.free)
 
 
-def _lifted(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[Cells, int]:
+def _lift_grid(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[Cells, int]:
     """Flood, close, assemble; bisect what is not certain and go on."""
     bisected = first = 0
     rounds = BISECTIONS[pairing.mesh.dimension]

@@ -80,7 +80,7 @@ def chart_domain(chart: Chart, ax: Axes | None = None) -> Axes:
             _fill(ax, overlap.domain, _TWICE)
         if isinstance(chart, Reduction):
             _fill(ax, chart.gaps, _GAP)
-        for edge in _drawn(chart):
+        for edge in _edges_to_draw(chart):
             if edge.kind in _EDGES:
                 ax.plot(*edge.points.T, zorder=4, **_EDGES[edge.kind])
         for barrier in chart.barriers if isinstance(chart, Reduction) else ():
@@ -171,7 +171,7 @@ def _fill(ax: Axes, domain: Domain, look: dict[str, Any]) -> None:
         ax.add_patch(PathPatch(outline, linewidth=0.0, zorder=1, **look))
 
 
-def _drawn(chart: Chart) -> list[Edge]:
+def _edges_to_draw(chart: Chart) -> list[Edge]:
     """Edges of the domain; chords of folds that parameters cross are not worth a line."""
     skipped = "singular" if chart.coordinates.projecting else ""
     return [edge for edge in chart.domain.edges if edge.kind != skipped]
@@ -202,7 +202,7 @@ def _frame(ax: Axes, chart: Chart) -> None:
 
 def _legend(charts: Sequence[Chart]) -> list[Patch | Line2D]:
     """Entries for what occurs."""
-    kinds = {edge.kind for chart in charts for edge in _drawn(chart)}
+    kinds = {edge.kind for chart in charts for edge in _edges_to_draw(chart)}
     reduced = [chart for chart in charts if isinstance(chart, Reduction)]
     entries: list[Patch | Line2D] = [Patch(facecolor=_FILL, label=_LABELS["inside"])]
     if any(chart.overlaps for chart in charts if not isinstance(chart, Reduction)):

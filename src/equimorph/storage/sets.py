@@ -108,9 +108,9 @@ def read_set(group: h5py.Group, owner: Owner) -> EquilibriumSet:
         stratum=get(group, "stratum"),
         folds=tuple(_chains(group, "fold", d)),
         boundaries=tuple(Boundary(vertices, BoundaryKind(kind)) for vertices, kind in chains),
-        components=tuple(_built("Component", each, about) for each in about["components"]),
-        strata=tuple(_built("Stratum", each, about) for each in about["strata"]),
-        audit=_built("Audit", about["audit"], about),
+        components=tuple(_build("Component", each, about) for each in about["components"]),
+        strata=tuple(_build("Stratum", each, about) for each in about["strata"]),
+        audit=_build("Audit", about["audit"], about),
         # sets over two parameters were once stored without tetrahedra
         mesh=BaseMesh(
             **{name: get(group, f"grid_{name}") for name in GRID if f"grid_{name}" in group}
@@ -177,7 +177,7 @@ def _about(eset: EquilibriumSet) -> dict[str, object]:
     }
 
 
-def _built(name: str, values: dict[str, Any], about: dict[str, Any]) -> Any:
+def _build(name: str, values: dict[str, Any], about: dict[str, Any]) -> Any:
     """Record inside a set; older files give no versions."""
     version = about.get("versions", {}).get(name, 1)
     return find_schema(name).build(version, _tuples(values))

@@ -74,9 +74,9 @@ class Argument:
     def look_up(self, ground: Ground, section: Any, place: str) -> Any:
         """Return what the task takes, or a `Later`; `InputError` names the key of what is wrong."""
         value = getattr(section, self.key)
-        return None if value is None else self.found(ground, value, f"{place}.{self.key}")
+        return None if value is None else self.interpret(ground, value, f"{place}.{self.key}")
 
-    def found(self, ground: Ground, value: Any, key: str) -> Any:
+    def interpret(self, ground: Ground, value: Any, key: str) -> Any:
         """Return what a value stands for."""
         del ground, key
         return tuple(value) if isinstance(value, list) else value
@@ -107,7 +107,7 @@ class StateArgument(Argument):
         """It is chosen there, if it is given."""
         return getattr(section, self.key) is not None
 
-    def found(self, ground: Ground, value: StateSection, key: str) -> Any:
+    def interpret(self, ground: Ground, value: StateSection, key: str) -> Any:
         """Look up what it is chosen by."""
         check_state(ground, value, key)
         return ChosenState(value, key)
@@ -116,7 +116,7 @@ class StateArgument(Argument):
 class NaturalArgument(Argument):
     """A state without a set."""
 
-    def found(self, ground: Ground, value: NaturalSection, key: str) -> Any:
+    def interpret(self, ground: Ground, value: NaturalSection, key: str) -> Any:
         """Look up where it comes from."""
         check_natural(ground, value, key)
         return NaturalState(value, key)
@@ -125,7 +125,7 @@ class NaturalArgument(Argument):
 class DescriptorArgument(Argument):
     """A descriptor by its name."""
 
-    def found(self, ground: Ground, value: str, key: str) -> Any:
+    def interpret(self, ground: Ground, value: str, key: str) -> Any:
         """Look it up."""
         return descriptor_at(ground.structure, value, key)
 
@@ -133,7 +133,7 @@ class DescriptorArgument(Argument):
 class DescriptorsArgument(Argument):
     """Descriptors by their names."""
 
-    def found(self, ground: Ground, value: Sequence[str], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
         """Look them up."""
         texts = enumerate(value)
         return tuple(descriptor_at(ground.structure, text, f"{key}[{i}]") for i, text in texts)
@@ -142,7 +142,7 @@ class DescriptorsArgument(Argument):
 class CoordinatesArgument(Argument):
     """Descriptors or parameters by their names."""
 
-    def found(self, ground: Ground, value: Sequence[str], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
         """Look the descriptors up."""
         names = names_of(ground.structure.parameters)
         return tuple(
@@ -154,7 +154,7 @@ class CoordinatesArgument(Argument):
 class ValuesArgument(Argument):
     """Values of descriptors."""
 
-    def found(self, ground: Ground, value: Mapping[str, float], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Mapping[str, float], key: str) -> Any:
         """Look the descriptors up."""
         return descriptors_of(ground.structure, value, key)
 
@@ -162,7 +162,7 @@ class ValuesArgument(Argument):
 class WithinArgument(Argument):
     """Constraints as texts."""
 
-    def found(self, ground: Ground, value: Sequence[str], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
         """Look their descriptors up."""
         return constraints_of(ground.structure, value, key)
 
@@ -170,7 +170,7 @@ class WithinArgument(Argument):
 class ParametersArgument(Argument):
     """Names of parameters, or values by such names."""
 
-    def found(self, ground: Ground, value: Any, key: str) -> Any:
+    def interpret(self, ground: Ground, value: Any, key: str) -> Any:
         """Check the names."""
         check_parameters(ground.structure, [value] if isinstance(value, str) else value, key)
         return value
@@ -179,7 +179,7 @@ class ParametersArgument(Argument):
 class BoxArgument(Argument):
     """A box of parameters."""
 
-    def found(self, ground: Ground, value: Mapping[str, list[float]], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Mapping[str, list[float]], key: str) -> Any:
         """Check the names."""
         check_parameters(ground.structure, value, key)
         with at_key(key):
@@ -189,7 +189,7 @@ class BoxArgument(Argument):
 class PointsArgument(Argument):
     """Parameters that change step by step."""
 
-    def found(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
         """Check names and values."""
         for i, step in enumerate(value):
             check_values(ground.structure, step, f"{key}[{i}]")
@@ -199,7 +199,7 @@ class PointsArgument(Argument):
 class WayPointsArgument(Argument):
     """Points of the set through which a way leads."""
 
-    def found(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
         """Refuse points outside the box."""
         for i, corner in enumerate(value):
             check_point(ground.box, corner, f"{key}[{i}]", whole=False)
@@ -209,7 +209,7 @@ class WayPointsArgument(Argument):
 class LegsArgument(Argument):
     """Targets and loads that move leg by leg: what is no parameter is a descriptor."""
 
-    def found(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
         """Look the descriptors up."""
         names = names_of(ground.structure.parameters)
         return [
@@ -229,7 +229,7 @@ class ActuatorsArgument(Argument):
         del section
         return True
 
-    def found(self, ground: Ground, value: Sequence[str], key: str) -> Any:
+    def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
         """Refuse parameters that the set does not free."""
         box = ground.box
         sides = zip(box.names, box.lower.tolist(), box.upper.tolist(), strict=True)
@@ -246,6 +246,6 @@ class ActuatorsArgument(Argument):
 class RuleArgument(Argument):
     """A rule that prefers one of the states over a point."""
 
-    def found(self, ground: Ground, value: RuleSection, key: str) -> Any:
+    def interpret(self, ground: Ground, value: RuleSection, key: str) -> Any:
         """Look up its descriptor or parameter."""
         return rule_of(ground, value, key)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.linalg.lanes import results_of
-from equimorph.manifold.complex.marked_complex import TETRAHEDRA, Fabric, FacetMark, held
+from equimorph.manifold.complex.marked_complex import TETRAHEDRA, Fabric, FacetMark, held_parameters
 from equimorph.manifold.complex.vertices import Vertices, free_vertices, vertices_of
 from equimorph.manifold.geometry.exact_points import (
     Aim,
@@ -256,7 +256,7 @@ def _predict(
     bend = Cubics(first, second).step(frames, chord, t)
     dz, dp = split_step(setting, t[:, None] * chord + bend)
     z, p = z[:, 0] + dz, p[:, 0] + dp
-    for k in held(mark, fabric.dimension):
+    for k in held_parameters(mark, fabric.dimension):
         p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
     return z, p
 
@@ -275,7 +275,7 @@ def _on_curves(
     setting, d = fabric.setting, fabric.dimension
     inside = replace(end, rows=plane).allowed
     rows = np.swapaxes(inside, 1, 2) @ plane
-    span = np.delete(np.eye(d), held(mark, d), axis=0)
+    span = np.delete(np.eye(d), held_parameters(mark, d), axis=0)
     aim = Aim(
         setting,
         bool(mark & FacetMark.FOLD),

@@ -118,7 +118,7 @@ class Fabric:
             slopes.append(store.cap_slope[at])
         if mark & FacetMark.CROSSING:
             slopes.append(store.crossing_slope[at])
-        slopes.extend(rows[:, :, rows.shape[2] - d + k] for k in held(mark, d))
+        slopes.extend(rows[:, :, rows.shape[2] - d + k] for k in held_parameters(mark, d))
         stacked = np.stack(slopes, axis=1) if slopes else np.zeros((len(at), 0, d))
         return Ends(store.place[at], rows, stacked)
 
@@ -239,7 +239,7 @@ def shares(count: int) -> list[tuple[int, int]]:
     return [(at, min(at + AT_ONCE, count)) for at in range(0, count, AT_ONCE)]
 
 
-def held(mark: int, dimension: int) -> list[int]:
+def held_parameters(mark: int, dimension: int) -> list[int]:
     """Free parameters that sides of the box hold."""
     return [k for k in range(dimension) if mark & (3 * FacetMark.SIDE << 2 * k)]
 

@@ -173,7 +173,7 @@ def corrected(
     index
         Index of the sheet, if it is known: far from the guess, that of another may be met.
     """
-    found = _settled(aim, z, p, around, lower, index)
+    found = _settle_guarded(aim, z, p, around, lower, index)
     good = found.found
     if aim.crossing:
         good[good] = _crosses(aim.take(np.flatnonzero(good)), found.z[good], found.p[good])
@@ -194,13 +194,13 @@ def corrected_amid(
     """
     span = np.tile(np.eye(len(setting.free)), (len(middle), 1, 1))
     aim = Aim(setting, False, False, span, middle, rows)
-    found = _settled(aim, z, p, around, None, None)
+    found = _settle_guarded(aim, z, p, around, None, None)
     frames, good = np.zeros_like(found.frames), found.found
     frames[good] = found.frames[good]
     return Corrected(found.z, found.p, frames, found.index, good)
 
 
-def _settled(
+def _settle_guarded(
     aim: Aim,
     z: Lanes,
     p: Parameters,
@@ -288,12 +288,12 @@ def pin(
             break
         start = np.array([groups[lane][end] for lane in lanes.tolist()], int)
         z, p = points.z[start], points.p[start]
-        led = _led(aim.take(lanes), steps, z, p, around[lanes], low[lanes])
+        led = _lead(aim.take(lanes), steps, z, p, around[lanes], low[lanes])
         pinned.z[lanes], pinned.p[lanes], pinned.found[lanes] = led.z, led.p, led.found
     return pinned
 
 
-def _led(
+def _lead(
     aim: Aim,
     steps: int,
     z: Lanes,

@@ -193,9 +193,9 @@ def account(
         store.vertex[used].copy(),
         number[cells.corners],
         cells.index,
-        _kept(number[cells.folds]),
-        _kept(number[cells.caps]),
-        _kept(number[cells.crossings]),
+        _facets_in_use(number[cells.folds]),
+        _facets_in_use(number[cells.caps]),
+        _facets_in_use(number[cells.crossings]),
     )
     lost = abandoned_rays(pairing)
     lifting = Lifting(
@@ -209,7 +209,7 @@ def account(
     return describe(frame, whole, lifting)
 
 
-def _kept(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:
+def _facets_in_use(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:
     """Facets whose points are all in use."""
     return facets[(facets >= 0).all(axis=1)]
 

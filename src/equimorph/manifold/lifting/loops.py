@@ -98,7 +98,7 @@ def _with_arcs(
         partners = [each for each in others if following[0] in _crossings(pairing, each)]
         if len(partners) != 1:
             return [None], []
-        joined.append(_joined(pairing, arc, partners[0]))
+        joined.append(_join_chains(pairing, arc, partners[0]))
         arcs, polygons = ([e for e in own if e != partners[0]] for own in (arcs, polygons))
     return list(polygons), joined
 
@@ -109,7 +109,7 @@ def _crossings(pairing: Pairing, polygon: Polygon) -> set[int]:
     return {point for point in polygon.points if kinds[point] == VertexKind.CROSSING}
 
 
-def _joined(pairing: Pairing, first: Polygon, second: Polygon) -> Polygon:
+def _join_chains(pairing: Pairing, first: Polygon, second: Polygon) -> Polygon:
     """Polygon of two open chains whose nearer ends are joined along the constraint."""
     chain = first.points, second.points
     ends = np.array([own[k] for own in chain for k in (0, -1)])

@@ -81,13 +81,13 @@ def closed_surfaces(
         np.concatenate([surfaces.index[own], index[capped], index[first]]),
         number[np.concatenate([surfaces.surface[own], at[capped], at[first]])],
         np.arange(own.sum() + len(lids)) >= own.sum(),
-        np.concatenate([surfaces.met[own], _met(lids, crossing)]),
+        np.concatenate([surfaces.met[own], _sides_on_crossings(lids, crossing)]),
         surfaces.owner[wanted],
         caps[wanted],
     )
 
 
-def _met(
+def _sides_on_crossings(
     corners: Int[np.ndarray, "n 3"], crossing: Bool[np.ndarray, " points"]
 ) -> Bool[np.ndarray, "n 3"]:
     """Which sides ab, bc, ca of lids join two crossings."""

@@ -185,7 +185,7 @@ class NearCrossings:
 
         And the crossing points for which that is so: near others a second eigenvalue vanishes.
         """
-        centres, series = self._reduced(centres, p)
+        centres, series = self._reduce(centres, p)
         owner, start = [], []
         for lane, fit in enumerate(series.T):
             roots = chebyshev.chebroots(fit)
@@ -197,7 +197,7 @@ class NearCrossings:
         found = self._roots(centres.take(own), p, series[:, own], np.array(start, float))
         return _distinct(*found), centres
 
-    def _reduced(self, centres: Centres, p: Parameters) -> tuple[Centres, Series]:
+    def _reduce(self, centres: Centres, p: Parameters) -> tuple[Centres, Series]:
         """Chebyshev series of r(s), with amplitudes relative to `WIDE`, where it could be found."""
         nodes = chebyshev.chebpts1(DEGREE + 1)
         shape, many = (-1, len(nodes)), np.repeat(np.arange(len(centres.z)), len(nodes))
@@ -225,7 +225,7 @@ class NearCrossings:
         self, own: Centres, p: Parameters, series: Series, x: Values
     ) -> tuple[Branches, Values]:
         """States at roots of series of r near x, with their amplitudes in the metric."""
-        x = _improved(series, x)
+        x = _improve(series, x)
         z, r, slope, good = self._along(own, p[own.point], x * WIDE / own.size)
         good &= (np.abs(r) <= RESIDUAL) & (np.abs(x) <= 1.0)
         # the slope has the sign of the eigenvalue that nearly vanishes
@@ -279,7 +279,7 @@ def of_set(setting: Setting, points: States, cells: Cells, crossings: Facets) ->
     return NearCrossings(setting, points, facets, cells, number[whole.cell_facets])
 
 
-def _improved(series: Series, x: Values) -> Values:
+def _improve(series: Series, x: Values) -> Values:
     """Roots of series by Newton's method, without steps that only follow round-off."""
     slopes, r = chebyshev.chebder(series), chebyshev.chebval(x, series, tensor=False)
     for _ in range(CORRECTIONS):

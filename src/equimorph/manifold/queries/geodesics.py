@@ -106,7 +106,7 @@ class Chains:
         for share in 0.5 ** np.arange(HALVINGS):
             if not todo:
                 break
-            tried = self._moved([moves[i] for i in todo], float(share))
+            tried = self._move([moves[i] for i in todo], float(share))
             for i, chain in zip(todo.copy(), tried, strict=True):
                 whole = None if chain is None else joined([self.chains[i].take(FIRST), chain])
                 if whole is not None and self._energy(whole) < energy[i]:
@@ -128,7 +128,7 @@ class Chains:
             tip = last.take(np.array([i]))
             yield _Move(inner.take(own), frames[own], step[0], tip, edge, step[1], step[2])
 
-    def _moved(self, moves: Sequence[_Move], share: float) -> list[Spot | None]:
+    def _move(self, moves: Sequence[_Move], share: float) -> list[Spot | None]:
         """Chains without their first points after a share of each step; None: not on the set."""
         frames, step = np.concatenate([m.frames for m in moves]), [m.step for m in moves]
         edge, end = np.concatenate([m.edge for m in moves]), [m.end for m in moves]

@@ -121,7 +121,7 @@ class _Descent:
             return
         step = share[:, None] * move.step
         value = self.value[lanes]
-        new, norm, better = _shortened(face, move, step, self.residuals, value)
+        new, norm, better = _shorten(face, move, step, self.residuals, value)
         self.spot, self.value[lanes] = self.spot.replaced(lanes, new), norm
         self._release(lanes[~better], (move.fall < STALLED * value**2)[~better])
 
@@ -251,7 +251,7 @@ def _newton_step(ground: Ground, spot: Spot, residuals: Residuals) -> _Move:
         return _Move(spot, frames, np.zeros((lanes, 0)), np.zeros(lanes))
     gradient, slope = _gradient(ground, spot, frames, residuals)
     hessian = np.einsum("lmi,lmj->lij", slope, slope)
-    curved, measured = _curved(ground, spot, frames, residuals)
+    curved, measured = _second_derivatives(ground, spot, frames, residuals)
     # at a side of the box, where there is no beyond, Gauss–Newton has to do
     hessian[measured] = 0.5 * (curved + np.swapaxes(curved, 1, 2))[measured]
     values, vectors = np.linalg.eigh(hessian)
@@ -263,7 +263,7 @@ def _newton_step(ground: Ground, spot: Spot, residuals: Residuals) -> _Move:
     return _Move(spot, frames, step, -np.einsum("lk,lk->l", gradient, step))
 
 
-def _curved(
+def _second_derivatives(
     ground: Ground, spot: Spot, frames: Frames, residuals: Residuals
 ) -> tuple[Float[np.ndarray, "lanes k k"], Flags]:
     """Second derivatives along the set, from gradients on both sides; and where there are."""
@@ -274,21 +274,21 @@ def _curved(
     many, own = spot.take(each), frames[each]
     there, good = ground.moved(many, own, step)
     there = many.replaced(np.flatnonzero(good), there.take(good))
-    turned = _aligned(ground.setting, ground.frames(there)[0], own)
+    turned = _align(ground.setting, ground.frames(there)[0], own)
     gradient = _gradient(ground, there, turned, residuals)[0].reshape(2, k, lanes, k)
     curved = np.moveaxis(gradient[0] - gradient[1], 0, 1) / (2.0 * CURVING)
     measured = good.reshape(2 * k, lanes).all(axis=0)
     return curved, measured & np.isfinite(curved).all(axis=(1, 2))
 
 
-def _aligned(setting: Setting, frames: Frames, others: Frames) -> Frames:
+def _align(setting: Setting, frames: Frames, others: Frames) -> Frames:
     """Frames turned in their spaces until they agree with others as well as they can."""
     ours, theirs = (placed_frames(setting, each) for each in (frames, others))
     left, _, right = np.linalg.svd(ours @ np.swapaxes(theirs, 1, 2))
     return np.asarray(np.swapaxes(left @ right, 1, 2) @ frames)
 
 
-def _shortened(
+def _shorten(
     ground: Ground, move: _Move, step: Steps, residuals: Residuals, value: Values
 ) -> tuple[Spot, Values, Flags]:
     """Points after steps, halved until the norm falls; the norms, and where it does."""

@@ -89,7 +89,7 @@ class SnapGraph:
         lines = [f"SnapGraph over {self.eset.box}: {len(self.strata)} stable strata"]
         for stratum in self.strata:
             lines.append(f"  stratum {stratum} ({self.eset.strata[stratum].cells} cells)")
-            lines.extend(f"    {_told(self.eset, snap)}" for snap in self.leaving(stratum))
+            lines.extend(f"    {_in_words(self.eset, snap)}" for snap in self.leaving(stratum))
         return "\n".join(lines)
 
 
@@ -218,7 +218,7 @@ class _Edge:
         return int(found[0]) if len(found) else NOWHERE
 
 
-def _told(eset: EquilibriumSet, snap: Snap) -> str:
+def _in_words(eset: EquilibriumSet, snap: Snap) -> str:
     """A snap in one line."""
     points = eset.coordinates[snap.vertices]
     low, high = points.min(axis=0), points.max(axis=0)

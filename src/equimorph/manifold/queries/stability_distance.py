@@ -123,7 +123,7 @@ def _in_parameters(
     for lane in np.argsort(length, kind="stable"):
         if length[lane] >= best:
             break
-        share = _reached(eset, state, found.p[lane])
+        share = _reach(eset, state, found.p[lane])
         if share is not None and share * length[lane] < best:
             best = float(share * length[lane])
             nearest = State(eset.structure, found.z[lane], found.p[lane])
@@ -141,7 +141,7 @@ def _nearest_of_each_part(
     return np.asarray(minima[:CANDIDATES])
 
 
-def _reached(eset: EquilibriumSet, state: State, p: Float[np.ndarray, " P"]) -> float | None:
+def _reach(eset: EquilibriumSet, state: State, p: Float[np.ndarray, " P"]) -> float | None:
     """Share of a straight change after which stability is lost; None if it is not."""
     goal = state.p + (1.0 - SHORT_OF) * (p - state.p)
     to = {name: float(goal[k]) for name, k in zip(eset.names, eset.setting.free, strict=True)}

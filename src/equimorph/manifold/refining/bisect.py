@@ -8,7 +8,7 @@ from equimorph.manifold.complex.marked_complex import CURVES, Fabric
 from equimorph.manifold.complex.shared_edges import copies, duplicates, first_copies, with_copies
 from equimorph.manifold.complex.vertices import Vertices, gather
 from equimorph.manifold.geometry.topology import keys_of
-from equimorph.manifold.refining.deviation import Edges, Memory, chosen, known
+from equimorph.manifold.refining.deviation import Edges, Memory, choose_edges, update_edges
 from equimorph.manifold.refining.follow_edge import follow_edge, on_plain_curves
 from equimorph.manifold.refining.patches import patch_around
 from equimorph.manifold.refining.refill import flip, refill
@@ -43,7 +43,7 @@ def settle(
     """
     cells = len(fabric.cells)
     for _ in range(ROUNDS):
-        edges = known(fabric, memory)
+        edges = update_edges(fabric, memory)
         hopeless = memory.failures > max(HOPELESS, len(edges.ends) // 50)
         todo = ((edges.error > tolerance) | edges.pressing | edges.uneven) & ~edges.stuck
         if hopeless or len(fabric.cells) > most or not todo.any():
@@ -55,7 +55,7 @@ def settle(
             "refining", int((edges.error <= tolerance).sum()), len(edges.error)
         )
         before = len(fabric.vertices)
-        fabric = bisect(fabric, edges, chosen(edges, tolerance), memory)
+        fabric = bisect(fabric, edges, choose_edges(edges, tolerance), memory)
         if fabric.dimension == 2:
             fabric = flip(fabric, memory.cut, since=before)
         elif fabric.dimension == 3 and len(fabric.cells) > GROWN * cells:
@@ -87,7 +87,7 @@ def part_sheets(fabric: Fabric, memory: Memory) -> Fabric:
     ends = duplicates(fabric)
     if len(ends) == 0:
         return fabric
-    edges, base = known(fabric, memory), len(fabric.vertices)
+    edges, base = update_edges(fabric, memory), len(fabric.vertices)
     those = np.flatnonzero(np.isin(keys_of(edges.ends, base), keys_of(ends, base)))
     return bisect(fabric, edges, those, memory)
 

@@ -126,7 +126,7 @@ class Memory:
         self.lost |= inner.lost
 
 
-def known(fabric: Fabric, memory: Memory) -> Edges:
+def update_edges(fabric: Fabric, memory: Memory) -> Edges:
     """Edges with their deviations; only those that are new are measured."""
     base = len(fabric.vertices)
     ends, of_cells = edges_of(fabric.cells, base)
@@ -229,7 +229,7 @@ def deviations(
     return out
 
 
-def chosen(edges: Edges, tolerance: float) -> Int[np.ndarray, " n"]:
+def choose_edges(edges: Edges, tolerance: float) -> Int[np.ndarray, " n"]:
     """Edges to be bisected now, those first that cells with several are to be cut at first.
 
     Those that deviate so much that their halves may, too; of the others, those that all cells

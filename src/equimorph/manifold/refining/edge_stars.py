@@ -47,7 +47,7 @@ def reconnections(
     beside = np.zeros(base, bool)
     beside[fabric.cells[poor]] = True
     around = np.flatnonzero(count_corners(beside, fabric.cells) > 1)
-    barred, facets = _known(fabric, fabric.cells[around], but)
+    barred, facets = _keys_of_cells(fabric, fabric.cells[around], but)
     sides = [fabric.cells[poor][:, list(k)] for k in combinations(range(4), 2)]
     edges = rows_of(distinct(np.concatenate([keys_of(side, base) for side in sides])), base, 2)
     # rings whose edge has an end that is not near are what they were
@@ -68,7 +68,7 @@ def _open_again(rings: "Rings", near: Bool[np.ndarray, " V"]) -> Bool[np.ndarray
     return np.asarray(near[rings.ends].all(axis=1) | (corners > 1))
 
 
-def _known(fabric: Fabric, around: Cells, but: Edges) -> tuple[Keys, Keys]:
+def _keys_of_cells(fabric: Fabric, around: Cells, but: Edges) -> tuple[Keys, Keys]:
     """Keys of all edges and of all facets between corners of some cells; `but` count as edges."""
     base = len(fabric.vertices)
     near = np.zeros(base, bool)

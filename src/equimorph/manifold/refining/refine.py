@@ -20,7 +20,7 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import question_of_refinement, recall_set
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
 from equimorph.manifold.refining.bisect import part_sheets, settle
-from equimorph.manifold.refining.deviation import Memory, known
+from equimorph.manifold.refining.deviation import Memory, update_edges
 from equimorph.manifold.refining.quality import (
     SHARP,
     qualities,
@@ -85,7 +85,7 @@ def refine_cells(eset: EquilibriumSet, accuracy: float, progress: Progress) -> E
     fabric = refill(fabric_of(eset), memory)
     fabric = _settle_and_repair(fabric, SHARE[len(eset.names)] * accuracy, memory, progress)
     fabric = part_sheets(fabric, memory)
-    edges = known(fabric, memory)
+    edges = update_edges(fabric, memory)
     out = describe_again(eset, fabric.complex(), fabric.setting)
     quality = replace(
         out.audit,
@@ -130,7 +130,7 @@ def _better_tetrahedra(fabric: Fabric, tolerance: float, memory: Memory) -> Fabr
         # edges that come to lie on a fold may deviate from it
         fabric = settle(fabric, tolerance, memory)
         faults = (
-            int((known(fabric, memory).error > tolerance).sum()),
+            int((update_edges(fabric, memory).error > tolerance).sum()),
             int((qualities(fabric.vertices, fabric.cells, fabric.cell_index) < SHARP).sum()),
         )
         if fewest is not None and faults >= fewest:

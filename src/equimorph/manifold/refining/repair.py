@@ -8,7 +8,7 @@ from jaxtyping import Bool
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
 from equimorph.manifold.queries.cusps import with_cusps_beside
 from equimorph.manifold.refining.bisect import bisect, settle
-from equimorph.manifold.refining.deviation import Edges, Memory, known, near_lost
+from equimorph.manifold.refining.deviation import Edges, Memory, near_lost, update_edges
 from equimorph.manifold.refining.patches import Patch, patch_around
 from equimorph.manifold.refining.quality import (
     SHARP,
@@ -98,7 +98,7 @@ def _sharp(fabric: Fabric) -> Bool[np.ndarray, " C"]:
 
 def _faults(fabric: Fabric, tolerance: float, memory: Memory) -> tuple[int, int, int, int]:
     """Numbers of edges that deviate, and of cells overturned, looking backwards, and sharp."""
-    deviating = int((known(fabric, memory).error > tolerance).sum())
+    deviating = int((update_edges(fabric, memory).error > tolerance).sum())
     over = int(project_against_index(fabric.vertices, fabric.cells, fabric.cell_index).sum())
     return (
         deviating,
@@ -116,14 +116,14 @@ def _as_it_is(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
 def _curves_cut(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     """Chords of folds and constraints that pass a vertex turn cells over."""
     del tolerance
-    edges = known(fabric, memory)
+    edges = update_edges(fabric, memory)
     return _cut(fabric, edges, _bad(fabric), (edges.marks & CURVES) > 0, memory)
 
 
 def _all_cut(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     """All edges of bad cells and of those that touch them."""
     del tolerance
-    edges, near = known(fabric, memory), np.zeros(len(fabric.vertices), bool)
+    edges, near = update_edges(fabric, memory), np.zeros(len(fabric.vertices), bool)
     near[fabric.cells[_bad(fabric)]] = True
     everything = np.ones(len(edges.ends), bool)
     return _cut(fabric, edges, near[fabric.cells].any(axis=1), everything, memory)

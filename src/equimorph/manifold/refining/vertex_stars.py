@@ -18,7 +18,7 @@ from equimorph.manifold.complex.marked_complex import (
     Fabric,
     FacetMark,
     edges_of,
-    held,
+    held_parameters,
     squared_sides,
 )
 from equimorph.manifold.complex.shared_edges import copies
@@ -78,7 +78,7 @@ def collapses(fabric: Fabric, quality: Quality, near: Near, short: float = 0.0) 
     ends = rows_of(distinct(keys_of(np.concatenate([ends, others]), base)), base, 2)
     moves = np.concatenate([ends, ends[:, ::-1]])
     moves, row = in_all_sheets(fabric, moves[_goes_on(fabric, moves)])
-    refills = drawn(fabric, moves, row)
+    refills = collapse_into(fabric, moves, row)
     refills = replace(refills, kind=Kind.COLLAPSE, short=_short(refills, moves, row, short))
     # links cost more to look at than angles
     good = hopeful(refills, with_exact(refills, quality))
@@ -176,7 +176,7 @@ def in_all_sheets(
     return moves[whole], np.unique(row[whole], return_inverse=True)[1]
 
 
-def drawn(fabric: Fabric, moves: Edges, row: Rows) -> Refills:
+def collapse_into(fabric: Fabric, moves: Edges, row: Rows) -> Refills:
     """Refills that collapse vertices into others, without the cells that vanish."""
     base = len(fabric.vertices)
     columns = []
@@ -210,10 +210,10 @@ def moves(fabric: Fabric, quality: Quality, near: Near, sharp: float = SHARP) ->
         parts.append(vertices)
     gone = np.concatenate(old)
     if len(gone) == 0:
-        return drawn(fabric, np.zeros((0, 2), int), gone)
+        return collapse_into(fabric, np.zeros((0, 2), int), gone)
     more = replace(fabric, vertices=fabric.vertices.join(*parts))
     number = np.arange(len(gone))
-    return drawn(more, np.stack([gone, base + number], axis=1), number)
+    return collapse_into(more, np.stack([gone, base + number], axis=1), number)
 
 
 def _at_better_places(
@@ -236,12 +236,12 @@ def _at_better_places(
     along = np.einsum("nk,nkd->nd", step, directions)
     dz, dp = split_step(setting, np.einsum("nd,ndf->nf", along, store.frame[chosen]))
     z, p = store.z[chosen] + dz, store.p[chosen] + dp
-    for k in held(mark, d):
+    for k in held_parameters(mark, d):
         p[:, setting.free[k]] = store.p[chosen, setting.free[k]]
-    span = np.tile(np.delete(np.eye(d), held(mark, d), axis=0), (len(chosen), 1, 1))
+    span = np.tile(np.delete(np.eye(d), held_parameters(mark, d), axis=0), (len(chosen), 1, 1))
     fold, cap = bool(mark & FacetMark.FOLD), bool(mark & FacetMark.CAP)
     aim = Aim(setting, fold, cap, span, embed(setting, z, p), directions @ store.rows[chosen])
-    if not held(mark, d):
+    if not held_parameters(mark, d):
         aim = replace(aim, tangents=store.rows[chosen])
     pinned = corrected(aim, z, p, np.linalg.norm(step, axis=1))
     free, found = pinned.p[:, setting.free], pinned.found

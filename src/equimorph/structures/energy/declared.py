@@ -9,7 +9,7 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.model import Parameter
-from equimorph.structures.energy.expressions import CONSTANTS, FUNCTIONS, expression, written
+from equimorph.structures.energy.expressions import CONSTANTS, FUNCTIONS, expression, write_formulas
 from equimorph.structures.energy.tape import casadi, rough_operations
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -122,7 +122,7 @@ def unknowns_of(given: Any) -> tuple[Unknown, ...]:
         if isinstance(each, Unknown):
             unknowns.append(each)
         elif isinstance(each, Mapping):
-            unknowns.append(_built(Unknown, each, "unknowns"))
+            unknowns.append(_build(Unknown, each, "unknowns"))
         else:
             unknowns += [Unknown(name) for name in _symbol_names(each)]
     if not unknowns:
@@ -135,7 +135,7 @@ def parameters_of(given: Iterable[Any]) -> tuple[Parameter, ...]:
     made = []
     for each in given:
         one: Parameter = (
-            each if isinstance(each, Parameter) else _built(Parameter, each, "parameters")
+            each if isinstance(each, Parameter) else _build(Parameter, each, "parameters")
         )
         if one.role not in ("actuator", "load", "fixed"):
             raise InputError(
@@ -157,7 +157,7 @@ def data_of(one: Parameter | Unknown) -> dict[str, Any]:
     }
 
 
-def _built(kind: Any, data: Any, what: str) -> Any:
+def _build(kind: Any, data: Any, what: str) -> Any:
     defaults = {"unit": "1", "scale": 1.0, "role": "actuator"} if kind is Parameter else {}
     try:
         return kind(**{**defaults, **data})
@@ -251,7 +251,7 @@ class Symbols:
 
     def texts(self) -> tuple[dict[str, str], Formulas]:
         """Definitions and formulas as texts."""
-        definitions, flat = written(self.formulas.flat(), self.all)
+        definitions, flat = write_formulas(self.formulas.flat(), self.all)
         return definitions, self.formulas.fill(flat)
 
 

@@ -162,7 +162,9 @@ _FORMS = {
 }  # fmt: skip
 
 
-def written(expressions: Sequence[Any], symbols: Sequence[Any]) -> tuple[dict[str, str], list[str]]:
+def write_formulas(
+    expressions: Sequence[Any], symbols: Sequence[Any]
+) -> tuple[dict[str, str], list[str]]:
     """Definitions of named parts in their order, and expressions in terms of them.
 
     The inverse of `expression`: reading the definitions one after the other and then the

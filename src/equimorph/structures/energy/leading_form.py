@@ -30,7 +30,7 @@ def grows(tape: Tape, unknowns: int, p: Float[np.ndarray, " parameters"]) -> boo
 
     None if it is no polynomial, or not a short one.
     """
-    energy = _expanded(tape, unknowns, p)
+    energy = _expand(tape, unknowns, p)
     if energy is None:
         return None
     largest = max((abs(value) for value in energy.values()), default=0.0)
@@ -40,7 +40,7 @@ def grows(tape: Tape, unknowns: int, p: Float[np.ndarray, " parameters"]) -> boo
     return degree > 0 and degree % 2 == 0 and positive_definite(form, unknowns)
 
 
-def _expanded(tape: Tape, unknowns: int, p: Float[np.ndarray, " parameters"]) -> Polynomial | None:
+def _expand(tape: Tape, unknowns: int, p: Float[np.ndarray, " parameters"]) -> Polynomial | None:
     """The first output as a polynomial in the unknowns at given parameters."""
     unit = tuple(0 for _ in range(unknowns))
     work: dict[int, Polynomial | None] = {}

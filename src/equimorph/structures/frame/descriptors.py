@@ -30,7 +30,7 @@ CONJUGATE = {
 _CALL = re.compile(r"(\w+)(?:\(([\w-]+)(?:,([\w-]+))?\))?")
 
 
-def _made(
+def _make(
     frame: FrameFields, name: str, unit: str, value: Callable[[Lanes, Parameters], Values]
 ) -> Descriptor:
     return Descriptor(name, frame.model.system.label(unit), value, name, frame.signature)
@@ -71,7 +71,7 @@ def rotation(frame: FrameFields, where: str, joint: str | None = None) -> Descri
     def value(z: Lanes, p: Parameters) -> Values:
         return frame.turns(z, frame.scalars(z, p))[:, node].copy()
 
-    return _made(frame, name, "rad", value)
+    return _make(frame, name, "rad", value)
 
 
 def end_force(frame: FrameFields, kind: str, member: str, joint: str) -> Descriptor:
@@ -95,7 +95,7 @@ def end_force(frame: FrameFields, kind: str, member: str, joint: str) -> Descrip
         )
 
     name = frame.model.network.members[at].name
-    return _made(frame, f"{kind}({name},{joint})", "force", value)
+    return _make(frame, f"{kind}({name},{joint})", "force", value)
 
 
 def moment(frame: FrameFields, member: str, joint: str) -> Descriptor:
@@ -107,7 +107,7 @@ def moment(frame: FrameFields, member: str, joint: str) -> Descriptor:
         return np.asarray(unit * frame.end_moments(z, p)[:, at, side])
 
     name = frame.model.network.members[at].name
-    return _made(frame, f"moment({name},{joint})", "force·length", value)
+    return _make(frame, f"moment({name},{joint})", "force·length", value)
 
 
 def max_curvature(frame: FrameFields, member: str | None = None) -> Descriptor:
@@ -139,7 +139,7 @@ def reaction(frame: FrameFields, joint: str, axis: str) -> Descriptor:
         return np.asarray(force * frame.reactions(z, p)[:, at, along])
 
     unit = "force·length" if along == 2 else "force"
-    return _made(frame, f"reaction({joint},{axis})", unit, value)
+    return _make(frame, f"reaction({joint},{axis})", unit, value)
 
 
 def effort(frame: FrameFields, parameter: str, sign: float = 1.0) -> Descriptor:
@@ -152,7 +152,7 @@ def effort(frame: FrameFields, parameter: str, sign: float = 1.0) -> Descriptor:
     def value(z: Lanes, p: Parameters) -> Values:
         return np.asarray(sign * unit * frame.effort(z, p)[:, at])
 
-    return _made(frame, name, label, value)
+    return _make(frame, name, label, value)
 
 
 def travel(frame: FrameFields, load: str) -> Descriptor:

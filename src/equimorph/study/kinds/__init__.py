@@ -14,7 +14,7 @@ ORDER = (
 """Order in which kinds are answered and reported; further kinds follow by their names."""
 
 
-def _found() -> tuple[Kind[Any], ...]:
+def _find() -> tuple[Kind[Any], ...]:
     modules = [import_module(f"{__name__}.{each.name}") for each in pkgutil.iter_modules(__path__)]
     kinds = [
         each() for module in modules for each in vars(module).values()
@@ -24,4 +24,4 @@ def _found() -> tuple[Kind[Any], ...]:
     return tuple(sorted(kinds, key=lambda kind: (places.get(kind.table, len(ORDER)), kind.table)))
 
 
-KINDS = _found()
+KINDS = _find()

@@ -120,7 +120,7 @@ class Paths(ABC):
         return np.zeros(len(edges), bool)
 
     @abstractmethod
-    def known(self, side: Samples) -> Flags:
+    def is_known(self, side: Samples) -> Flags:
         """Whether the map is defined at settings, so that they can be compared."""
 
     @abstractmethod
@@ -274,7 +274,7 @@ def _looks_smooth(
     room = share[:, None] * length
     beside = paths(np.concatenate([p[:, places] - room, p[:, places] + room]))
     left, right = beside.take(np.arange(count)), beside.take(np.arange(count, 2 * count))
-    sure = paths.known(left) & paths.known(right) & (share < BESIDE)
+    sure = paths.is_known(left) & paths.is_known(right) & (share < BESIDE)
     return np.asarray(sure & ~is_sharp(paths, left, right, pairs, share))
 
 

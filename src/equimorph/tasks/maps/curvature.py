@@ -221,7 +221,7 @@ class FirstStablePaths(Paths):
         scale = self.sheet.structure.scales[self.load]
         return np.asarray((critical.p[:, self.load] - self.at) / scale)
 
-    def known(self, side: Samples) -> Flags:
+    def is_known(self, side: Samples) -> Flags:
         """Whether paths could start and were not lost."""
         return np.asarray(side.kind > PathStatus.LOST)
 
@@ -229,7 +229,7 @@ class FirstStablePaths(Paths):
         """Where states end, values jump, snapping begins, or the extremum moves elsewhere."""
         a, b = pairs.a, pairs.b
         jump = np.abs(a.value - b.value) > JUMP * np.maximum(np.abs(a.value), np.abs(b.value))
-        known = self.known(a) & self.known(b) & (_is_reached(a) | _is_reached(b))
+        known = self.is_known(a) & self.is_known(b) & (_is_reached(a) | _is_reached(b))
         both = _is_reached(a) & _is_reached(b)
         cases = [~known, ~both, jump, a.kind != b.kind]
         return np.select(cases, ["", "gap", "jump", "snap"], "place").astype(object)

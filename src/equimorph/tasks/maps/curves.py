@@ -132,7 +132,7 @@ def _confirm(
     high = np.abs(here.setting - wide.b.setting).sum(axis=1) < np.abs(room).sum(axis=1)
     left, right = wide.a.where(low, left), wide.b.where(high, right)
     sure = is_sharp(paths, left, right, wide, BESIDE)
-    sure &= paths.known(left) & paths.known(right)
+    sure &= paths.is_known(left) & paths.is_known(right)
     rest = Brackets(wide.a, left, wide.edge).with_more(Brackets(right, wide.b, wide.edge))
     again = np.isinf(sample_distance(structure, rest.a, rest.b)) & np.tile(sure, 2)
     narrow = Brackets(left, right, wide.edge)
@@ -150,7 +150,7 @@ def places_on(paths: Paths, vertices: Samples, shape: tuple[int, int]) -> tuple[
     structure, edges = paths.sheet.structure, grid_edges(shape)
     ends = (vertices.take(edges[:, k]) for k in (0, 1))
     # beyond the edge of definition, and where paths were lost, there is nothing to compare
-    known = paths.known(vertices)[edges].all(axis=1)
+    known = paths.is_known(vertices)[edges].all(axis=1)
     differences = np.where(known, sample_distance(structure, *ends), 0.0)
     fresh = np.flatnonzero(suspicious_edges(differences, shape) | paths.suspects(vertices, edges))
     tried, seen = np.zeros(len(edges), bool), np.zeros(0, int)

@@ -227,14 +227,14 @@ class LimitLoadRays(Paths):
         alike = np.einsum("li,li,i->l", v[a], v[b], structure.mass)
         return np.asarray((np.abs(alike) > ALIKE) & (alike * slope[a] * slope[b] < 0.0))
 
-    def known(self, side: Samples) -> Flags:
+    def is_known(self, side: Samples) -> Flags:
         """Whether there is a limit load."""
         return np.asarray(np.isfinite(side.value))
 
     def unexplained_kinds(self, pairs: Brackets) -> np.ndarray:
         """Jumps, kinks, and other places of the extremum that meets a constraint."""
         a, b = pairs.a, pairs.b
-        known = self.known(a) & self.known(b)
+        known = self.is_known(a) & self.is_known(b)
         moved = np.isin(a.kind, MET) & np.isin(b.kind, MET)
         kind = np.where(np.abs(a.value - b.value) > JUMP, "jump", np.where(moved, "place", "kink"))
         return np.where(known, kind, "").astype(object)

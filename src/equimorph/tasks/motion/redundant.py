@@ -77,7 +77,7 @@ def follow_redundant(
 ) -> Motion:
     """Follow a course with more actuators than targets."""
     here = _Here(start.z[None], start.p[None], 0.0, frozenset())
-    here = replace(here, held=_held(course, here, limits))
+    here = replace(here, held=_held_actuators(course, here, limits))
     track, step, why = [here], FIRST, ""
     while here.time < course.legs:
         corner = min(np.floor(here.time) + 1.0, course.legs)
@@ -86,7 +86,7 @@ def follow_redundant(
         there, error = _step(course, here, step, corner if last else here.time + step)
         why = _fault(course, here, there, error, within, limits)
         if not why:
-            here = replace(there, held=_held(course, there, limits))
+            here = replace(there, held=_held_actuators(course, there, limits))
             track.append(here)
             step *= float(np.clip(0.9 * (TOLERANCE / max(error, 1e-300)) ** 0.2, 0.5, 3.0))
             step = max(step, 4.0 * CLOSEST)
@@ -177,7 +177,7 @@ def _fault(
     return ""
 
 
-def _held(course: Course, here: _Here, limits: Limits) -> frozenset[int]:
+def _held_actuators(course: Course, here: _Here, limits: Limits) -> frozenset[int]:
     """Actuators at their limits that the shortest motion would carry beyond."""
     at = {
         place: float(np.sign(here.p[0, place] - 0.5 * (low + high)))

@@ -238,10 +238,10 @@ class _Trials:
         if not path.arrived:
             return float("nan")
         found = limit_load(path.end.state, self.load, within=self.within)
-        limited = found.kind in LIMITS and not self._overlooked(found)
+        limited = found.kind in LIMITS and not self._overlooks_fold(found)
         return found.value if limited else float("nan")
 
-    def _overlooked(self, found: LimitLoad) -> bool:
+    def _overlooks_fold(self, found: LimitLoad) -> bool:
         """Whether a fold near the perfect branch point was taken for a branch point.
 
         Imperfections near round-off unfold it by less than a path can tell; what they leave at the

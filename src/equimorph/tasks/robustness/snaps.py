@@ -115,7 +115,7 @@ def least_snap(eset: EquilibriumSet, state: State) -> LeastSnap:
     first = moves.shortest_to_the_boundary(distance.nearest)
     if first is None:
         return LeastSnap("refused", _why_none(distance), distance, {}, None)
-    best, infimum = moves.shortened(first)
+    best, infimum = moves.shorten(first)
     if infimum == best.length:
         return moves.answer("found", "", distance, best, infimum)
     why = (
@@ -236,7 +236,7 @@ class _Moves:
                 return _Snap(folds[k], float(length[k]), landing)
         return None
 
-    def shortened(self, snap: _Snap) -> tuple[_Snap, float]:
+    def shorten(self, snap: _Snap) -> tuple[_Snap, float]:
         """Snap as near as it comes on its fold, and the infimum of the lengths there.
 
         The nearest place of the fold is the answer if it snaps; else the fold is bisected between
