@@ -12,7 +12,7 @@ import equimorph as em
 from equimorph.errors import InputError
 from equimorph.model import Parameter
 from equimorph.structures import EnergyStructure, Spring, Unknown, from_identity
-from equimorph.structures.energy.expressions import FUNCTIONS, expression, written
+from equimorph.structures.energy.expressions import FUNCTIONS, expression, write_formulas
 from equimorph.structures.energy.tape import tape
 from oracles.specimens import closed_chain, written_spring
 
@@ -80,7 +80,7 @@ def test_formulas_are_written_and_read_back_bit_for_bit():
         ca.sin(x) ** 2 / (1 + ca.exp(-y)) - 1 / 3 * ca.sqrt(x * x + 0.1),
         ca.if_else(x < y, x**3.5, -y) + ca.fmin(x, y) * 2 + ca.atan2(y, x) - x**-2,
     )
-    definitions, texts = written(graph.elements(), [x, y])
+    definitions, texts = write_formulas(graph.elements(), [x, y])
     names = {"x": x, "part": y}
     for name, text in definitions.items():
         names[name] = expression(text, names, name)
