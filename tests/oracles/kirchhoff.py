@@ -238,8 +238,8 @@ class Rod:
     """A boundary value problem and a guess of its states at the beginnings of the pieces.
 
     stiffness: of twist, bending about the normal, bending about the binormal; natural: strains
-    without moment; give: compliances of stretch and shear; load: dead, per length. Each is one
-    row, or one a piece.
+    without moment; give: compliances of stretch and shear; load: dead, per length; kicks: dead
+    forces where pieces begin. Each is one row, or one a piece.
     """
 
     y: np.ndarray
@@ -249,6 +249,7 @@ class Rod:
     natural: np.ndarray = field(default_factory=lambda: np.zeros(3))
     give: np.ndarray = field(default_factory=lambda: np.zeros(3))
     load: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    kicks: np.ndarray = field(default_factory=lambda: np.zeros(3))
     length: float = 1.0
     steps: int = 3
 
@@ -286,6 +287,7 @@ class Rod:
         for i in range(count - 1):
             rows = slice(SIZE * i, SIZE * (i + 1))
             residual[rows] = ends[i][:, 0] - self.y[i + 1]
+            residual[rows][FORCE] -= np.broadcast_to(self.kicks, (count, 3))[i + 1]
             matrix[rows, rows] = ends[i][:, 1:]
             matrix[rows, SIZE * (i + 1) : SIZE * (i + 2)] = -unit
         row = SIZE * (count - 1)

@@ -1,4 +1,4 @@
-"""A film of a structure that follows a route, next to its point in the parameter plane."""
+"""A film of a structure that follows a route, next to its point in a plane."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -22,7 +23,7 @@ from equimorph.model import position
 from equimorph.plotting import style
 from equimorph.plotting.counts import hatch_cut, shade_regions
 from equimorph.plotting.curves import path_of, states_along, track
-from equimorph.plotting.labels import symbol
+from equimorph.plotting.labels import descriptor_label, parameter_label, symbol
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
 from equimorph.plotting.viewpoint import draw_triad
@@ -51,25 +52,26 @@ _HUNDREDTHS = 10
 
 @check_arguments
 def film(
-    route: Route,
+    route: Route | Path,
     path: str | FilePath,
-    eset: EquilibriumSet,
+    eset: EquilibriumSet | None = None,
     *,
     frames: int = 72,
     fps: int = 20,
 ) -> FilePath:
     """Write an animated GIF: the structure on the left, its point in the parameter plane right.
 
-    Every frame shows an equilibrium of the route, at even distances along it.
+    Every frame shows an equilibrium of the route, at even distances along it. Without a set the
+    point moves over the parameter that changes most, at the height of the structure's elevation.
 
     Parameters
     ----------
     route
-        A route with a path.
+        A route with a path, or a lifted path.
     path
         File to write; its folder must exist.
     eset
-        The equilibrium set on whose parameter plane the route is shown.
+        The equilibrium set on whose parameter plane the route is shown, if there is one.
     frames
         Number of pictures, at least 2.
     fps
@@ -85,12 +87,61 @@ def film(
         If the route has no path, or `frames` or `fps` is too small.
     """
     states = states_along(path_of(route), frames)
+    board = _Board(route, eset)
     with style.house_style(_LARGER):
-        stage = _set_stage(states, route, eset)
-        pictures = _pictures(stage, states, eset, path_of(route))
+        stage = _set_stage(states, board)
+        pictures = _pictures(stage, states, board)
     file = FilePath(path)
     _write(pictures, file, _durations(frames, fps))
     return file
+
+
+@dataclass(frozen=True)
+class _Board:
+    """The plane in which the point moves.
+
+    route: what it follows; eset: the set whose parameters are the plane, if there is one.
+    """
+
+    route: Route | Path
+    eset: EquilibriumSet | None
+
+    @property
+    def path(self) -> Path:
+        return path_of(self.route)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters to read: the free ones of the set, or the two that change most."""
+        if self.eset is not None:
+            return tuple(self.eset.names)
+        states = self.path.states
+        change = np.ptp(states.p, axis=0) / states.structure.scales
+        most = np.argsort(-change, kind="stable")[:2]
+        return tuple(states.structure.parameters[k].name for k in most if change[k] > 0.0)
+
+    def places(self, states: States) -> Float[np.ndarray, "states 2"]:
+        """Where states are in the plane."""
+        if self.eset is not None:
+            return track(self.eset, states)
+        heights = np.asarray(states.structure.elevation(states))
+        return np.column_stack([states[self.names[0]], heights])
+
+    def draw(self, ax: Axes) -> None:
+        """Draw what the point moves over."""
+        if self.eset is None:
+            structure = self.path.states.structure
+            ax.plot(*self.places(self.path.states).T, color=style.ROUTE_COLOUR, linewidth=0.8)
+            ax.set_xlabel(parameter_label(structure, self.names[0]))
+            ax.set_ylabel(descriptor_label(structure.elevation))
+            return
+        frame_plane(ax, self.eset)
+        regions = count_regions(self.eset.coordinates, self.eset.cells)
+        shade_regions(ax, self.eset, regions)
+        hatch_cut(ax, self.eset, regions, stable_only=False)
+        draw_folds(ax, self.eset)
+        assert isinstance(self.route, Route), "a plane of parameters shows a route"
+        draw_track(ax, self.eset, self.route, self.path).set_linewidth(0.8)
 
 
 @dataclass(frozen=True)
@@ -120,30 +171,26 @@ class _Stage:
         return (*in_depth, self.travelled, self.point, *self.texts)
 
 
-def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
+def _set_stage(states: States, board: _Board) -> _Stage:
     """Draw what stays and prepare what moves."""
     figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=_DOTS)
     canvas: Any = FigureCanvasAgg(figure)
     left = figure.add_axes((0.01, 0.15, 0.54, 0.84))
     right = figure.add_axes((0.64, 0.17, 0.335, 0.79))
-    around = Surroundings(states, obstacles_of(eset.constraints))
+    constraints = () if board.eset is None else board.eset.constraints
+    around = Surroundings(states, obstacles_of(constraints))
     frame_shapes(left, around, room=0.1)
     left.axis("off")
     around.draw_grounds(left)
     if around.viewpoint is not None:
         draw_triad(left, around.viewpoint, states.structure.length_unit)
     Surroundings(states[[0, -1]]).draw_shapes(left, [_START_AND_GOAL] * 2, 1, linewidths=2.0)
-    frame_plane(right, eset)
-    regions = count_regions(eset.coordinates, eset.cells)
-    shade_regions(right, eset, regions)
-    hatch_cut(right, eset, regions, stable_only=False)
-    draw_folds(right, eset)
-    draw_track(right, eset, route, path_of(route)).set_linewidth(0.8)
+    board.draw(right)
     shape = around.moving_shape(left, style.INDEX_COLOURS[0], 4, 3.0)
     (travelled,) = right.plot([], [], color=style.ROUTE_COLOUR, linewidth=2.4, zorder=8)
     (point,) = right.plot([], [], "o", color=style.INK, markeredgecolor="white", ms=7, zorder=9)
     parts = around.moving_parts(left)
-    texts, numbers = _place_readings(figure, _readings(states, eset, route))
+    texts, numbers = _place_readings(figure, _readings(states, board))
     # Animated artists are left out of the background.
     stage = _Stage(canvas, None, shape, parts, travelled, point, texts, numbers)
     for artist in stage._moving():
@@ -152,10 +199,10 @@ def _set_stage(states: States, route: Route, eset: EquilibriumSet) -> _Stage:
     return replace(stage, background=canvas.copy_from_bbox(figure.bbox))
 
 
-def _pictures(stage: _Stage, states: States, eset: EquilibriumSet, path: Path) -> list[Image.Image]:
+def _pictures(stage: _Stage, states: States, board: _Board) -> list[Image.Image]:
     """One picture per state."""
-    places = track(eset, states)
-    ways = _ways(path, places, eset)
+    places = board.places(states)
+    ways = _ways(board, places)
     pictures = []
     for k in range(len(states)):
         stage.shape.place(k)
@@ -169,12 +216,11 @@ def _pictures(stage: _Stage, states: States, eset: EquilibriumSet, path: Path) -
     return pictures
 
 
-def _ways(
-    path: Path, places: Float[np.ndarray, "frames 2"], eset: EquilibriumSet
-) -> list[Float[np.ndarray, "_ 2"]]:
+def _ways(board: _Board, places: Float[np.ndarray, "frames 2"]) -> list[Float[np.ndarray, "_ 2"]]:
     """Way to each place through all corners passed before it."""
+    path = board.path
     length = np.linspace(path.length[0], path.length[-1], len(places))
-    passed, corners = np.searchsorted(path.length, length), track(eset, path.states)
+    passed, corners = np.searchsorted(path.length, length), board.places(path.states)
     return [
         np.concatenate([corners[:count], place[None]])
         for count, place in zip(passed, places, strict=True)
@@ -190,13 +236,14 @@ class _Reading(NamedTuple):
     values: Values
 
 
-def _readings(states: States, eset: EquilibriumSet, route: Route) -> list[_Reading]:
+def _readings(states: States, board: _Board) -> list[_Reading]:
     """Free parameters, stability margin, and curvature if the schedule has it."""
-    parameters = states.structure.parameters
-    free = [parameters[position(parameters, name)] for name in eset.names]
+    parameters, route = states.structure.parameters, board.route
+    free = [parameters[position(parameters, name)] for name in board.names]
     readings = [_Reading(symbol(p.name), p.unit, "{:.2f}", states[p.name]) for p in free]
     readings.append(_Reading("stability margin", "", "{:.2f}", states.margin))
-    if route.schedule is not None and _CURVATURE in route.schedule.descriptors:
+    schedule = route.schedule if isinstance(route, Route) else None
+    if schedule is not None and _CURVATURE in schedule.descriptors:
         kappa = states.structure.descriptor(_CURVATURE)
         readings.append(_Reading(kappa.symbol, kappa.unit, "{:.1f}", kappa(states)))
     return readings

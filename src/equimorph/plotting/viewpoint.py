@@ -93,8 +93,8 @@ def draw_triad(ax: Axes, viewpoint: Viewpoint, unit: str) -> None:
         )  # fmt: skip
     words = f"{length:g}" if unit == "1" else f"{length:g} {unit}"
     ax.annotate(
-        words, tuple(foot), (0, -7), textcoords="offset points", size=6, va="top", ha="center",
-        color=style.FAINT, zorder=9,
+        words, tuple(foot + 0.3 * arms[0]), (0, -7), textcoords="offset points", size=6, va="top",
+        ha="left", color=style.FAINT, zorder=9,
     )  # fmt: skip
 
 
