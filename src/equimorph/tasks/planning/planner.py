@@ -19,6 +19,8 @@ from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.snap_routes import route_with_snaps
 from equimorph.tasks.planning.straightening import (
     check_ends,
+    directed,
+    ordered,
     route_over_corners,
     straight_corners,
     verify_way_points,
@@ -67,7 +69,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         What the route minimises: "length" (metric), "travel" (scaled parameters), "work" (of
         actuators that recover no energy), "clearance" (``∫ ds/margin``), `Rates` (time), or a sum
         ``[(1, "length"), (0.2, "work")]``; see `Objective`. The result is a local minimum near the
-        best path over the mesh.
+        best path over the mesh; from goal to start it is the same, backwards.
     snap_price
         Cost of a snap-through in units of the objective; None forbids them. With a price the route
         may leave its stable stratum over a fold and continue where the snap lands: `route.snaps`
@@ -130,11 +132,10 @@ def _with_reserves(
     """Route, the last one that was refused, or None where no path leads to the goal."""
     route = None
     for tightened in demands.with_reserves(min(end.margin for end in ends)):
-        path = cheapest_path(eset, ends, tightened)
+        path = cheapest_path(eset, ordered(ends), tightened)
         if path is not None:
-            route = route_over_corners(
-                eset, straight_corners(eset, path, tightened), demands, monitor
-            )
+            corners = directed(straight_corners(eset, path, tightened), ends)
+            route = route_over_corners(eset, corners, demands, monitor)
             if route.arrived:
                 return route
     return route

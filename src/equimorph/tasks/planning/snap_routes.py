@@ -27,6 +27,7 @@ from equimorph.tasks.planning.network import (
 from equimorph.tasks.planning.objectives import ROUGH
 from equimorph.tasks.planning.snap_places import cheapest_place
 from equimorph.tasks.planning.straightening import (
+    directed,
     route_over_corners,
     straight_corners,
     way_points_of,
@@ -223,8 +224,8 @@ def _verify(
 ) -> Route:
     """Lift every part finely; snaps start from where the lifts meet the folds."""
     if not path.gates:
-        corners = straight_corners(eset, path.stable[0], demands)
-        return route_over_corners(eset, corners, demands, monitor)
+        corners = straight_corners(eset, directed(path.stable[0], ends), demands)
+        return route_over_corners(eset, directed(corners, ends), demands, monitor)
     gates = gates_of(eset, demands)
     here, paths, snaps = ends[0], list[Path](), list[Landing]()
     part, begin, way_points = path.stable[0], Corners(), Corners()

@@ -177,6 +177,23 @@ def _promising(
     return np.flatnonzero(leg | (good & (cost <= allowed)))
 
 
+def ordered(ends: Ends) -> Ends:
+    """Both ends in an order that does not depend on which of them is the start.
+
+    No objective depends on the direction of a route; searched from the same end, a question and its
+    reverse have the same answer.
+    """
+    first, second = (np.concatenate([end.p, end.z]).tolist() for end in ends)
+    return ends if first <= second else ends[::-1]
+
+
+def directed(corners: States, ends: Ends) -> States:
+    """Corners between ordered ends, as they follow each other from start to goal."""
+    if ordered(ends) is ends:
+        return corners
+    return States(corners.structure, corners.z[::-1].copy(), corners.p[::-1].copy())
+
+
 def check_ends(eset: EquilibriumSet, ends: Ends) -> None:
     """Raise `InputError` unless start and goal are equilibria of the set's problem."""
     for name, state in zip(("start", "goal"), ends, strict=True):
