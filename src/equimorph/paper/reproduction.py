@@ -123,7 +123,7 @@ def page(found: Reproduction, examples: Sequence[Example], folder: Path) -> str:
             body.append(html.table(table.head, [[escape(c) for c in row] for row in cells]))
         rows = [[escape(cell) for cell in _cells(*row)] for row in found.rows(example.name)]
         if rows:
-            body.append(html.table(HEAD, rows))
+            body.append(html.table(HEAD, rows, "notes"))
         ours = found.numbers[example.name].items()
         listed = [[escape(key), in_words(value, 8)] for key, value in ours]
         if listed:
