@@ -14,6 +14,7 @@ from equimorph.structures.spatial.quaternions import (
     matrices,
     product,
 )
+from equimorph.study.structures import SpatialRodSection
 
 LATERAL = 1.601471549048
 """First lateral load of the round arch at (0.9, 0), by the planar second variation."""
@@ -325,6 +326,31 @@ def test_states_on_an_orbit_are_told():
         state = em.lift(start, [{"q": 0.3}, {"k": 0.0, "q": load}]).end.state
         assert state["k"] == 0.0
         assert bool(rod.warnings(state)) is told
+
+
+def test_a_study_file_describes_the_same_rod():
+    """The table of a study file, read and built, has the residuals of the rod itself."""
+    table = {
+        "kind": "spatial rod",
+        "section": {"kind": "round", "diameter": "2 mm", "E": "70 GPa", "nu": 0.33},
+        "length": "0.5 m",
+        "ends": ["clamped", {"rotation": "held", "x": "free"}],
+        "loads": {"q": {"term": "line load", "direction": [0, -1, 0.1]}},
+        "actuators": {"push": {"term": "curvature", "about": "n"}},
+        "side_curvature": [[0, 0], [1, 2]],
+    }
+    section = SpatialRodSection.model_validate(table)
+    made = em.structures.from_identity(section.model_dump(exclude_none=True))
+    own = em.SpatialRod(
+        section=em.Round("2 mm", E="70 GPa", nu=0.33), length="0.5 m",
+        ends=("clamped", em.SpatialEnd(x="free")),
+        loads={"q": em.LineLoad(direction=(0, -1, 0.1))},
+        actuators={"push": em.Curvature(about="n")}, side_curvature=[[0, 0], [1, 2]],
+    )  # fmt: skip
+    p = np.full((3, len(own.parameters)), 0.1)
+    z = own.sample(p, np.random.default_rng(0))
+    assert [each.name for each in made.parameters] == [each.name for each in own.parameters]
+    np.testing.assert_allclose(made.residual(z, p), own.residual(z, p), rtol=1e-12, atol=1e-15)
 
 
 # --- wrong input ---------------------------------------------------------------------------------

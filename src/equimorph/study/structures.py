@@ -34,12 +34,19 @@ def _profile(shape: Any) -> Any:
 
 
 def _end(given: Any) -> Any:
-    table = isinstance(given, dict) and set(given) <= {"angle", "x", "y", "slide"}
+    return _end_of(given, ("angle", "x", "y", "slide"))
+
+
+def _end_in_space(given: Any) -> Any:
+    return _end_of(given, ("rotation", "x", "y", "z"))
+
+
+def _end_of(given: Any, keys: tuple[str, ...]) -> Any:
+    table = isinstance(given, dict) and set(given) <= set(keys)
     parts = given.values() if table else [given]
     if not all(isinstance(part, str) or (table and is_number(part)) for part in parts):
-        raise requirement(
-            'be a word like "clamped", or a table like { angle = "free", x = "held", y = 2.0 }'
-        )
+        example = f'{{ {keys[0]} = "free", x = "held", y = 2.0 }}'
+        raise requirement(f'be a word like "clamped", or a table like {example}')
     return given
 
 
@@ -100,6 +107,7 @@ Profile = Annotated[Any, AfterValidator(_profile)]
 Term = Annotated[Any, AfterValidator(_terms)]
 CrossSection = Annotated[Any, AfterValidator(_section)]
 EndOfRod = Annotated[Any, AfterValidator(_end)]
+EndInSpace = Annotated[Any, AfterValidator(_end_in_space)]
 
 
 class StructureSection(Section):
@@ -139,6 +147,34 @@ class RodSection(StructureSection):
         if span is not None and not texts and info.data.get("axial") is None and not span < longest:
             raise requirement(f"be less than {longest:g}")
         return span
+
+
+class SpatialRodSection(StructureSection):
+    """A rod in space; see `equimorph.SpatialRod`."""
+
+    kind: Literal["spatial rod"]
+    load: Annotated[Any, AfterValidator(_load)] | None = None
+    torsion: Profile | None = None
+    lateral: Profile | None = None
+    section: CrossSection | None = None
+    ends: Annotated[list[EndInSpace], Field(min_length=2, max_length=2)] | None = None
+    stiffness: Profile | None = None
+    curvature: Profile | None = None
+    side_curvature: Profile | None = None
+    natural_twist: Profile | None = None
+    axial: Profile | None = None
+    shear: Profile | None = None
+    loads: dict[str, Term] | None = None
+    actuators: dict[str, Term] | None = None
+    coordinates: dict[str, dict[str, Number]] | None = None
+    span: Quantity | None = None
+    rise: Quantity | None = None
+    sideways: Quantity | None = None
+    EI: Quantity | None = None
+    length: Quantity | None = None
+    units: UnitSystem | None = None
+    elements: int | None = Field(default=None, ge=2, le=1000)
+    degree: int | None = Field(default=None, ge=3, le=16)
 
 
 class SpringSection(StructureSection):

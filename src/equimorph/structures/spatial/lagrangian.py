@@ -31,7 +31,15 @@ LARGEST_TAIL = 5e-4
 FORCES = 8.0
 """Spread of the support forces of random guesses."""
 
+BLOCK = 64
+"""Lanes computed together: their arrays stay in the cache."""
+
 Nodes = Float[np.ndarray, "lanes nodes 4"]
+
+
+def blocks_of(lanes: int) -> list[slice]:
+    """Slices of at most `BLOCK` lanes; an empty one for no lanes."""
+    return [slice(start, start + BLOCK) for start in range(0, max(lanes, 1), BLOCK)]
 
 
 class SpatialLagrangian:
@@ -201,6 +209,14 @@ class SpatialLagrangian:
 
     def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
         """F with its derivatives along directions."""
+        parts = [
+            self._equations(z[at], p[at], *((dz[at], dp[at]) for dz, dp in directions))
+            for at in blocks_of(len(z))
+        ]
+        return np.concatenate(parts, axis=1)
+
+    def _equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
+        """`equations` of one block of lanes."""
         given, y = self.jets(z, p, *directions)
         unit, inverse, square = normalised(given)
         slope = self.slope(unit, y)

@@ -3,7 +3,7 @@
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.linalg import Border, BorderedSolution
@@ -76,6 +76,10 @@ class MeasuredInSpace(Structure):
     ) -> Advance:
         """One Newton step, with tangent and inertia."""
         return self.mechanics.advance(z, p, dp, row, corner, defect)
+
+    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian."""
+        return self.mechanics.index(z, p)
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random guesses."""

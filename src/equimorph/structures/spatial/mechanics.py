@@ -16,7 +16,7 @@ from equimorph.structures.contract import (
     advance_by,
     joint_system,
 )
-from equimorph.structures.spatial.lagrangian import Nodes, SpatialLagrangian
+from equimorph.structures.spatial.lagrangian import Nodes, SpatialLagrangian, blocks_of
 from equimorph.structures.spatial.quaternions import FRAME, RIGHT, normalised
 from equimorph.structures.spatial.step_kernels import advance_lanes
 from equimorph.structures.spatial.tables import step_tables
@@ -56,6 +56,12 @@ class SpatialMechanics(SpatialLagrangian):
 
     def entries(self, z: Lanes, p: Parameters, shift: Values | None = None) -> Entries:
         """Entries of F_z − shift·mass in the order of `layout`."""
+        moved = np.zeros(len(z)) if shift is None else shift
+        parts = [self._entries(z[at], p[at], moved[at]) for at in blocks_of(len(z))]
+        return np.concatenate(parts)
+
+    def _entries(self, z: Lanes, p: Parameters, shift: Values) -> Entries:
+        """`entries` of one block of lanes."""
         given, y = self.jets(z, p)
         q, inverse, square = (jet[0] for jet in normalised(given))
         blocks, crossing, closing = self._second(q, y)
@@ -90,7 +96,7 @@ class SpatialMechanics(SpatialLagrangian):
         own: np.ndarray,
         border: np.ndarray,
         closing: np.ndarray,
-        shift: Values | None,
+        shift: Values,
     ) -> Entries:
         """Write blocks of elements and nodes, and the border, to their entries."""
         lanes, inner = len(blocks), self.model.unknown_nodes
@@ -105,8 +111,7 @@ class SpatialMechanics(SpatialLagrangian):
             out[:, self._slots[e]] += block[:, low[0], low[1]]
         slots = self._node_slots
         own = own[:, inner]
-        if shift is not None:
-            own[:, :, range(4), range(4)] -= shift[:, None, None] * self.mass.reshape(-1, 4)
+        own[:, :, range(4), range(4)] -= shift[:, None, None] * self.mass.reshape(-1, 4)
         low = np.tril_indices(4)
         out[:, slots] += own[:, :, low[0], low[1]]
         m = self.constraints
@@ -196,6 +201,11 @@ class SpatialMechanics(SpatialLagrangian):
         """Solve with F_z, given by its entries, bordered."""
         del z, p
         return self.layout.solve(entries, border, rhs)
+
+    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian, from the pivots of the fused step."""
+        row, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
+        return self.advance(z, p, np.zeros_like(p), row, one, none).index
 
     @cached_property
     def _step_tables(self) -> tuple[np.ndarray, ...]:
