@@ -92,7 +92,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     fixed
         Values of other parameters; those not named keep their defaults.
     within
-        Constraints that cut the set off, like ``[arch.max_curvature <= 20]``.
+        Constraints that cut the set off, like ``[arch.max_curvature <= 20]``. Those of the
+        structure (`validity`), within which its energy holds, are added.
     intervals
         Grid intervals along each parameter; see `INTERVALS` for the defaults.
     seed
@@ -260,7 +261,8 @@ def _setting(
     for corner in (box.lower, box.upper):
         values = dict(zip(box.names, corner.tolist(), strict=True))
         base = parameter_vector(structure.parameters, {**fixed, **values})
-    return Setting(structure, base, free, within)
+    validity = tuple(each for each in structure.validity if each not in within)
+    return Setting(structure, base, free, (*within, *validity))
 
 
 def _off_zero(setting: Setting) -> tuple[bool, ...]:

@@ -13,7 +13,14 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
-from equimorph.model import Descriptor, Drawing, Parameter, names_of, parameter_vector
+from equimorph.model import (
+    Constraint,
+    Descriptor,
+    Drawing,
+    Parameter,
+    names_of,
+    parameter_vector,
+)
 from equimorph.structures.approach import straight_arcs
 
 Direction = tuple[Lanes, Parameters]
@@ -271,6 +278,14 @@ class Structure(ABC):
     @abstractmethod
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether states lie within what the discretisation can represent."""
+
+    @property
+    def validity(self) -> tuple[Constraint, ...]:
+        """Constraints beyond which the energy does not describe the structure; none by default.
+
+        Sets end there as at constraints that are asked for.
+        """
+        return ()
 
     @abstractmethod
     def shape(

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from scipy.special import betaincinv
 
+SMALL_RESIDUAL = 1e-9
+"""Largest residual of a clean set."""
+
 
 @dataclass(frozen=True)
 class Audit:
@@ -84,21 +87,26 @@ class Audit:
 
     @property
     def clean(self) -> bool:
-        """Whether everything that must be zero is zero, and residuals are at round-off."""
-        faults = (
-            self.unpaired,
-            self.conflicts,
-            self.parity_violations,
-            self.undecided,
-            self.non_manifold,
-            self.contradictions,
-            self.wrong,
-            self.missing,
-            self.unrefined,
-            self.changed,
-            self.stopped,
+        """Whether there are no `faults`, and residuals are at round-off."""
+        return not self.faults and self.largest_residual < SMALL_RESIDUAL
+
+    @property
+    def faults(self) -> dict[str, int]:
+        """Everything that must be zero and is not, by name."""
+        names = (
+            "unpaired",
+            "conflicts",
+            "parity_violations",
+            "undecided",
+            "non_manifold",
+            "contradictions",
+            "wrong",
+            "missing",
+            "unrefined",
+            "changed",
+            "stopped",
         )
-        return not any(faults) and self.largest_residual < 1e-9
+        return {name: getattr(self, name) for name in names if getattr(self, name)}
 
     def rows(self) -> list[tuple[str, str]]:
         """Lines to print: each quantity with its value."""

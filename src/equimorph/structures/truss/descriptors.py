@@ -12,7 +12,7 @@ from equimorph.model import Descriptor, position
 from equimorph.structures.truss.mechanics import TrussMechanics
 
 WRITTEN = (
-    "force(bar), utilisation(bar), max_utilisation, displacement(joint, axis), travel(load), "
+    "force(bar), utilisation(bar), max_utilisation, max_shortening, displacement(joint, axis), travel(load), "
     "effort(parameter), energy"
 )
 _CALL = re.compile(r"(\w+)(?:\(([\w-]+)(?:,(\w+))?\))?")
@@ -63,6 +63,15 @@ def max_utilisation(truss: TrussMechanics) -> Descriptor:
     return Descriptor("max_utilisation", "1", value, "max U", truss.signature)
 
 
+def max_shortening(truss: TrussMechanics) -> Descriptor:
+    """Largest shortening of a bar relative to its rest length, 1 − l/l₀."""
+
+    def value(z: Lanes, p: Parameters) -> Values:
+        return np.asarray(truss.shortenings(z, p).max(axis=1))
+
+    return Descriptor("max_shortening", "1", value, "max(1 − l/l₀)", truss.signature)
+
+
 def displacement(truss: TrussMechanics, joint: str, axis: str) -> Descriptor:
     """Displacement of a joint along an axis, from where it is drawn."""
     at = truss.network.move(joint, axis)
@@ -111,6 +120,7 @@ def descriptor_from_text(truss: TrussMechanics, text: str) -> Descriptor:
         ("force", 1): force,
         ("utilisation", 1): utilisation,
         ("max_utilisation", 0): max_utilisation,
+        ("max_shortening", 0): max_shortening,
         ("displacement", 2): displacement,
         ("travel", 1): travel,
         ("effort", 1): effort,

@@ -22,8 +22,9 @@ from equimorph.structures.unit_system import UnitSystem
 
 BarValues = Float[np.ndarray, "lanes bars"]
 
-SHORTEST = 1e-6
-"""Length of a bar, relative to its rest length, at which its joints count as one."""
+COLLAPSED = 0.99
+"""Shortening of a bar, relative to its rest length, beyond which engineering strain says nothing:
+the energy has a kink where the joints meet, and sheets end there."""
 SMALLEST = 0.02
 """Least size of guesses, relative to the truss."""
 
@@ -73,6 +74,11 @@ class TrussMechanics(DiscreteStructure):
     def lengths(self, z: Lanes, p: Parameters) -> tuple[BarValues, BarValues]:
         """Squares of the lengths, and the rest lengths."""
         return np.asarray((self.spans(z) ** 2).sum(axis=2)), self.rest_lengths(p)
+
+    def shortenings(self, z: Lanes, p: Parameters) -> BarValues:
+        """Shortenings relative to the rest lengths, 1 − l/l₀."""
+        squared, rest = self.lengths(z, p)
+        return np.asarray(1.0 - np.sqrt(squared) / rest)
 
     @cached_property
     def _drawn(self) -> Float[np.ndarray, "bars space"]:
@@ -177,9 +183,10 @@ class TrussMechanics(DiscreteStructure):
         return np.asarray(guesses)
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
-        """No bar has shrunk to a point, and all rest lengths are positive."""
-        g, l0 = self.lengths(z, p)
-        return np.asarray(((l0 > 0.0) & (g > (SHORTEST * l0) ** 2)).all(axis=1))
+        """No bar has collapsed, and all rest lengths are positive."""
+        l0 = self.rest_lengths(p)
+        collapsed = (self.shortenings(z, p) > COLLAPSED).any(axis=1) & (not self.energies.green)
+        return np.asarray((l0 > 0.0).all(axis=1) & ~collapsed)
 
     def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
         """Green strain gives a polynomial of degree four, definite if no motion is free of strain.

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
-from equimorph.model import Descriptor, Parameter
+from equimorph.model import Constraint, Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.network import (
@@ -21,7 +21,7 @@ from equimorph.structures.network import (
 )
 from equimorph.structures.truss import descriptors
 from equimorph.structures.truss.bar import Energies, Strain
-from equimorph.structures.truss.mechanics import TrussMechanics, symmetries
+from equimorph.structures.truss.mechanics import COLLAPSED, TrussMechanics, symmetries
 from equimorph.structures.truss.network import AXES, TrussNetwork, truss_network
 from equimorph.structures.unit_system import Quantity, unit_system
 from equimorph.tolerances import SINGULAR
@@ -41,8 +41,8 @@ class Truss(TrussMechanics):
     them by a typical move: a tenth of a bar, or less if the stiffness changes sooner.
     The natural state is the equilibrium without load nearest to the drawing: the drawing itself,
     unless bars have other rest lengths. Engineering strain has a kink where a bar shrinks to a
-    point, and sheets of the set end there: keep a set away from it by a constraint such as
-    ``max_utilisation <= 1``.
+    point, and sheets of the set end there: sets are bounded by ``max_shortening <= 0.99``, and
+    states beyond are not resolved. Green strain has no kink.
 
     Parameters
     ----------
@@ -226,6 +226,16 @@ class Truss(TrussMechanics):
     def max_utilisation(self) -> Descriptor:
         """Largest utilisation of the bars that have a bending stiffness."""
         return descriptors.max_utilisation(self)
+
+    @property
+    def max_shortening(self) -> Descriptor:
+        """Largest shortening of a bar relative to its rest length, 1 − l/l₀."""
+        return descriptors.max_shortening(self)
+
+    @property
+    def validity(self) -> tuple[Constraint, ...]:
+        """With engineering strain no bar may collapse: ``max_shortening <= 0.99``."""
+        return () if self.energies.green else (self.max_shortening <= COLLAPSED,)
 
     @check_arguments
     def displacement(self, joint: str, axis: str) -> Descriptor:

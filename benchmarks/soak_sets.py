@@ -1,0 +1,209 @@
+"""Random equilibrium sets of all specimens: how many are clean, how long they take, what fails.
+
+``python benchmarks/soak_sets.py 0 1000`` lifts the sets with numbers 0 to 999 one after the other
+in one process and prints a line for each: number, specimen, outcome, vertices, processor time,
+memory, and the question itself, so that it can be asked again alone. Every set is determined by its
+number. A summary follows; ``python benchmarks/soak_sets.py summary FILES`` adds up the lines of
+several runs.
+
+Specimens are those of the tests of the contract: rods, frames, trusses, chains, springs. Boxes,
+grids, values of the other parameters and constraints are random; symmetric values, zero, are as
+frequent as others.
+"""
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "tests"))
+
+from equimorph.errors import InputError  # noqa: E402  # after the path of the specimens
+from equimorph.manifold import equilibrium_set  # noqa: E402
+from equimorph.model import Box, Constraint, Silent  # noqa: E402
+from oracles.specimens import SPECIMENS, Specimen  # noqa: E402
+
+LONGEST = 60.0
+"""Seconds of processor time that no set may take."""
+GIVEN_UP = 240.0
+"""Seconds of processor time after which a set is cancelled."""
+RANGES = {
+    "Theta": (0.2, 2.0),
+    "Delta": (-0.6, 0.6),
+    "nu": (0.65, 0.9),
+    "rod q": (-6.0, 9.0),
+    "x_l": (0.6, 1.3),
+    "spring F": (-0.3, 0.3),
+    "k": (0.8, 1.5),
+    "span": (0.55, 0.95),
+    "chain a": (0.0, 0.8),
+    "w": (-0.4, 0.9),
+    "truss": (-0.3, 0.3),
+    "toggle a": (-0.9, 0.9),
+    "toggle P": (-1.8, 1.7),
+    "frame k": (-1.0, 1.0),
+    "frame d": (-0.3, 0.3),
+    "frame P": (-5.0, 5.0),
+    "frame q": (-2.0, 2.0),
+}
+"""Ranges of parameters by name, or by structure and name; of others the centre of the specimen and
+`AROUND` both ways."""
+AROUND = 0.4
+DIMENSIONS, INTERVALS = (1, 2, 2, 2, 2, 2, 2, 2, 2, 3), {1: (20, 200), 2: (4, 18), 3: (2, 4)}
+"""Numbers of free parameters to choose from, and fewest and most intervals along each."""
+CAPS = 8.0, 24.0
+SYMMETRIC = 0.3
+"""Share of fixed parameters that are zero, where zero is in their range."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A set to be lifted."""
+
+    specimen: Specimen
+    box: Box
+    fixed: dict[str, float]
+    within: tuple[Constraint, ...]
+    intervals: tuple[int, ...]
+
+    def __str__(self) -> str:
+        sides = ", ".join(
+            f"{name}=({low:.4f}, {high:.4f})"
+            for name, low, high in zip(self.box.names, self.box.lower, self.box.upper, strict=True)
+        )
+        fixed = ", ".join(f"{name}={value:.4f}" for name, value in self.fixed.items())
+        within = " and ".join(map(str, self.within))
+        return f"Box({sides}); fixed {fixed or '-'}; within {within or '-'}; {self.intervals}"
+
+
+class OutOfTimeError(Exception):
+    """Raised where a set takes too long."""
+
+
+class Deadline(Silent):
+    """Progress that cancels after some processor time."""
+
+    def __init__(self) -> None:
+        self._start = time.process_time()
+
+    def report(self, stage: str, done: int, total: int | None) -> None:
+        """Cancel if it is late."""
+        if time.process_time() - self._start > GIVEN_UP:
+            raise OutOfTimeError(f"{stage}, {done} of {total}")
+
+
+def _range(specimen: Specimen, name: str) -> tuple[float, float]:
+    """Values that a parameter of a specimen may take."""
+    toggle = specimen.name == "frame of two members"
+    family = "toggle" if toggle else specimen.name.split()[0].rstrip(",")
+    for key in (f"{family} {name}", family if family == "truss" else name):
+        if key in RANGES:
+            return RANGES[key]
+    centre = specimen.centre[[p.name for p in specimen.structure.parameters].index(name)]
+    return centre - AROUND, centre + AROUND
+
+
+def question(number: int) -> Question:
+    """Return the question with a number."""
+    generator = np.random.default_rng([16, number])
+    specimen = SPECIMENS[number % len(SPECIMENS)]
+    names = [parameter.name for parameter in specimen.structure.parameters]
+    d = min(int(generator.choice(DIMENSIONS)), len(names))
+    free = sorted(generator.choice(len(names), d, replace=False).tolist())
+    ranges = {name: _range(specimen, name) for name in names}
+    sides = {}
+    for name in (names[k] for k in free):
+        low, high = np.sort(generator.uniform(*ranges[name], 2))
+        width = 0.05 * (ranges[name][1] - ranges[name][0])
+        sides[name] = (round(low, 4), round(max(high, low + width), 4))
+    fixed = {}
+    for name in names:
+        low, high = ranges[name]
+        zero = low <= 0.0 <= high and generator.random() < SYMMETRIC
+        if name not in sides:
+            fixed[name] = 0.0 if zero else round(generator.uniform(low, high), 4)
+    within: tuple[Constraint, ...] = ()
+    if hasattr(specimen.structure, "max_curvature"):
+        within = (specimen.structure.max_curvature <= round(generator.uniform(*CAPS), 2),)
+    fewest, most = INTERVALS[d]
+    intervals = tuple(generator.integers(fewest, most + 1, d).tolist())
+    return Question(specimen, Box(**sides), fixed, within, intervals)
+
+
+def outcome(asked: Question) -> tuple[str, int]:
+    """Whether a set is clean, or what fails; and its vertices."""
+    try:
+        eset = equilibrium_set(
+            asked.specimen.structure,
+            asked.box,
+            fixed=asked.fixed,
+            within=list(asked.within),
+            intervals=asked.intervals,
+            progress=Deadline(),
+        )
+    except InputError as error:
+        return f"refused: {error}", 0
+    except OutOfTimeError as error:
+        return f"out of time: {error}", 0
+    audit = eset.audit
+    if audit.clean:
+        return "clean", audit.vertices
+    faults = ", ".join(f"{name} {count}" for name, count in audit.faults.items())
+    return f"named: {faults}", audit.vertices
+
+
+def memory() -> int:
+    """Memory of this process in MB."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * 4096 // 2**20
+
+
+def run(first: int, count: int) -> Iterable[str]:
+    """Lines of the sets with these numbers."""
+    for number in range(first, first + count):
+        asked, start = question(number), time.process_time()
+        try:
+            said, vertices = outcome(asked)
+        except Exception as error:  # noqa: BLE001  # what a soak is for
+            said, vertices = f"error: {type(error).__name__}: {error}", 0
+        spent = time.process_time() - start
+        yield "\t".join(
+            [str(number), asked.specimen.name, said, str(vertices), f"{spent:.1f} s",
+             f"{memory()} MB", str(asked)]
+        )  # fmt: skip
+
+
+def summary(lines: Iterable[str]) -> str:
+    """Counts, time and memory of some lines."""
+    rows = [line.split("\t") for line in lines if line.count("\t") == 6]
+    kinds = Counter(row[2].split(":")[0] for row in rows)
+    seconds = np.array([float(row[4].split()[0]) for row in rows])
+    megabytes = [int(row[5].split()[0]) for row in rows]
+    counts = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+    return (
+        f"{len(rows)} sets: {counts}; median {np.median(seconds):.1f} s, longest "
+        f"{seconds.max():.1f} s, {int((seconds > LONGEST).sum())} over {LONGEST:.0f} s; memory "
+        f"{megabytes[len(rows) // 4]} MB after a quarter, {megabytes[-1]} MB at the end"
+    )
+
+
+def main(arguments: list[str]) -> None:
+    """Lift sets, or add up what was printed before."""
+    if arguments[:1] == ["summary"]:
+        texts = [Path(name).read_text(encoding="utf-8") for name in arguments[1:]]
+        print(summary(line for text in texts for line in text.splitlines()))  # noqa: T201
+        return
+    lines = []
+    for line in run(*(int(each) for each in arguments)):
+        lines.append(line)
+        print(line, flush=True)  # noqa: T201
+    print(summary(lines))  # noqa: T201
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
