@@ -25,8 +25,9 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from equimorph.errors import InputError  # noqa: E402  # after the path of the specimens
 from equimorph.manifold import equilibrium_set  # noqa: E402
-from equimorph.model import Box, Constraint, Silent  # noqa: E402
-from oracles.specimens import SPECIMENS, Specimen  # noqa: E402
+from equimorph.model import Box, Constraint, Descriptor, Silent  # noqa: E402
+from equimorph.structures import Truss  # noqa: E402
+from oracles.specimens import LINKS, SPECIMENS, Specimen  # noqa: E402
 
 LONGEST = 60.0
 """Seconds of processor time that no set may take."""
@@ -56,7 +57,8 @@ RANGES = {
 AROUND = 0.4
 DIMENSIONS, INTERVALS = (1, 2, 2, 2, 2, 2, 2, 2, 2, 3), {1: (20, 200), 2: (4, 18), 3: (2, 4)}
 """Numbers of free parameters to choose from, and fewest and most intervals along each."""
-CAPS = 8.0, 24.0
+CAPS, ANGLES, SHORTENINGS, HALF = (8.0, 24.0), (1.5, 3.5), (0.05, 0.5), 0.5
+"""Bounds of curvature, of the angles of a chain (which may wind for ever), and of shortenings."""
 SYMMETRIC = 0.3
 """Share of fixed parameters that are zero, where zero is in their range."""
 
@@ -108,6 +110,24 @@ def _range(specimen: Specimen, name: str) -> tuple[float, float]:
     return centre - AROUND, centre + AROUND
 
 
+def _within(specimen: Specimen, generator: np.random.Generator) -> tuple[Constraint, ...]:
+    """Cap of the curvature, of the angles of a chain, for half of the trusses of shortenings."""
+    structure = specimen.structure
+    share = generator.random()
+    if hasattr(structure, "max_curvature"):
+        return (structure.max_curvature <= round(_share(CAPS, share), 2),)
+    if specimen.name.startswith("chain"):
+        largest = Descriptor("largest_angle", "1", lambda z, p: np.abs(z[:, :LINKS]).max(axis=1))
+        return (largest <= round(_share(ANGLES, share), 2),)
+    if isinstance(structure, Truss) and share < HALF:
+        return (structure.max_shortening <= round(_share(SHORTENINGS, 2.0 * share), 2),)
+    return ()
+
+
+def _share(span: tuple[float, float], share: float) -> float:
+    return span[0] + share * (span[1] - span[0])
+
+
 def question(number: int) -> Question:
     """Return the question with a number."""
     generator = np.random.default_rng([16, number])
@@ -127,9 +147,7 @@ def question(number: int) -> Question:
         zero = low <= 0.0 <= high and generator.random() < SYMMETRIC
         if name not in sides:
             fixed[name] = 0.0 if zero else round(generator.uniform(low, high), 4)
-    within: tuple[Constraint, ...] = ()
-    if hasattr(specimen.structure, "max_curvature"):
-        within = (specimen.structure.max_curvature <= round(generator.uniform(*CAPS), 2),)
+    within = _within(specimen, generator)
     fewest, most = INTERVALS[d]
     intervals = tuple(generator.integers(fewest, most + 1, d).tolist())
     return Question(specimen, Box(**sides), fixed, within, intervals)
@@ -169,7 +187,7 @@ def run(first: int, count: int) -> Iterable[str]:
         asked, start = question(number), time.process_time()
         try:
             said, vertices = outcome(asked)
-        except Exception as error:  # noqa: BLE001  # what a soak is for
+        except Exception as error:  # what a soak is for
             said, vertices = f"error: {type(error).__name__}: {error}", 0
         spent = time.process_time() - start
         yield "\t".join(

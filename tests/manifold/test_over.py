@@ -6,7 +6,7 @@ import pytest
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box
-from equimorph.structures import Spring
+from equimorph.structures import Spring, States
 from oracles.surfaces import sphere, torus
 from typecheck import unchecked
 
@@ -177,6 +177,20 @@ def test_a_set_without_states_has_none_over_any_point(box):
 def test_no_points_give_no_states(spring_set):
     found = spring_set.over(x_l=np.zeros(0), F=np.zeros(0))
     assert (len(found), len(found.states)) == (0, 0)
+
+
+def test_states_of_a_set_are_told_from_others(spring_set):
+    """Both ways of asking agree: by the nearest cells, and by all states over the points."""
+    generator = np.random.default_rng(5)
+    x_l, load = generator.uniform(0.55, 1.25, 60), generator.uniform(-0.05, 0.05, 60)
+    over = spring_set.over(x_l=x_l, F=load)
+    known, cell = spring_set.holding(over.states)
+    assert known.all()
+    assert (spring_set.cell_index[cell] == over.index).all()
+    moved = States(over.states.structure, over.states.z + 1e-3, over.states.p)
+    known, cell = spring_set.holding(moved)
+    assert not known.any()
+    assert (cell == -1).all()
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,8 @@ from scipy.spatial import Delaunay
 import equimorph as em
 from equimorph.equilibria import Guards, settle
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex
-from equimorph.manifold.lookup.exact_states import ROUND_OFF, exact_states
+from equimorph.manifold.lookup.exact_states import CLOSEST, ROUND_OFF, exact_states, root_weights
 from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
-from equimorph.manifold.lookup.over import CLOSEST, root_weights
 from equimorph.structures import Spring
 
 

@@ -18,7 +18,7 @@ from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
-from equimorph.manifold.lookup.over import root_weights
+from equimorph.manifold.lookup.exact_states import root_weights
 from equimorph.structures import States
 from equimorph.tolerances import SAME_STATE
 

@@ -14,8 +14,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
-from equimorph.manifold.lookup.exact_states import exact_states
-from equimorph.manifold.lookup.over import root_weights
+from equimorph.manifold.lookup.exact_states import exact_states, root_weights
 from equimorph.structures import State, States
 
 AT_VERTEX = 1e-6

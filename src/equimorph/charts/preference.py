@@ -17,8 +17,7 @@ from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_o
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
-from equimorph.manifold.lookup.exact_states import exact_states
-from equimorph.manifold.lookup.over import root_weights
+from equimorph.manifold.lookup.exact_states import exact_states, root_weights
 from equimorph.manifold.queries.levels import part_of
 from equimorph.structures import States
 

@@ -45,14 +45,14 @@ GRIDS = 3
 over one parameter until nothing is missing. Of 218 sets one needed the second."""
 CHEAP = 4
 """Multiplier for the number of completeness checks in 1-D sets and symmetric slices."""
-SEARCHES = 6
+SEARCHES = 10
 """Rounds of independent checks; what one round finds missing is lifted before the next. Of 218 sets
-17 needed a second round; a coarse one under half a load needs four or more."""
-RECOVERED = 50
+17 needed a second round; trusses and chains with hundreds of sheets need up to ten."""
+RECOVERED = 200
 """Missing states, spread over all that were found, whose surroundings are lifted at once."""
 HIDDEN = 12
 """Rounds of bisection around missing states that bring no new equilibria over grid vertices."""
-LIMIT = 20_000, 30
+LIMIT = 60_000, 30
 """Default limit of the number of equilibria: this constant, or this many per grid point."""
 MOST_POINTS = 1_000_000
 """Points of a grid above which a set is refused, if no limit allows more: they take 6 GB."""
@@ -103,7 +103,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         search looks for equilibria that the set lacks; four times as many in diagrams over one
         parameter and in symmetric slices. In addition, Newton's method starts from 2000 random
         states, each over a different point. Equilibria found in this way are lifted like seeds and
-        new points are checked, until nothing is missing or six rounds are over. None disables all
+        new points are checked, until nothing is missing or ten rounds are over. None disables all
         checks.
     accuracy
         Largest distance of the straight cells from the set, in the metric, to which the set is
@@ -111,7 +111,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         the grid is too coarse: one of twice the intervals is lifted, at most twice.
     limit
         Largest number of equilibria over the grid. Beyond it lifting stops, the set holds what is
-        known by then, and its audit reports it (`stopped`). Default: 20 000, or 30 per grid point
+        known by then, and its audit reports it (`stopped`). Default: 60 000, or 30 per grid point
         if that is more.
     progress
         Sink for progress reports; an exception that it raises cancels the computation.

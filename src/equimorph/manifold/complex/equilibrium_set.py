@@ -6,7 +6,7 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
@@ -192,6 +192,19 @@ class EquilibriumSet:
         index = np.where(known, self.cell_index[cell], -1) if len(self.cells) else cell
         index[~known] = states[~known].index
         return StatesOver(states, point, cell, index, stratum, component, len(p))
+
+    @check_arguments
+    def holding(
+        self, states: States
+    ) -> tuple[Bool[np.ndarray, " lanes"], Int[np.ndarray, " lanes"]]:
+        """Which of some states the set has, and the cells that they lie on, −1 if not known.
+
+        Parameters
+        ----------
+        states
+            Equilibria over points of the box, within the constraints of the set.
+        """
+        return self._sheets.holding(states)
 
     def _parameters_over(
         self, at: Mapping[str, Float[np.ndarray, " points"]]

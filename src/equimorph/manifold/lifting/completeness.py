@@ -19,7 +19,6 @@ from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.model import Progress, position
 from equimorph.structures import States
-from equimorph.tolerances import SAME_SOLUTION
 
 STARTS = 200
 """Random starts of Newton's method in each independent search."""
@@ -118,12 +117,7 @@ def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator)
 
 def _lacking(found: States, eset: EquilibriumSet) -> States:
     """Those of the states, each over its own point, that a set lacks."""
-    known = eset.over(**{name: found[name] for name in eset.names})
-    n, mass = eset.structure.unknowns, eset.structure.mass
-    gap = np.sqrt((known.states.z - found.z[known.point])[:, :n] ** 2 @ mass)
-    closest = np.full(len(found), np.inf)
-    np.minimum.at(closest, known.point, gap)
-    return found[np.flatnonzero(closest > SAME_SOLUTION)]
+    return found[np.flatnonzero(~eset.holding(found)[0])]
 
 
 def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:

@@ -16,7 +16,6 @@ from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.structures import States
-from equimorph.tolerances import SAME_SOLUTION
 
 VERTICES = 8
 """Vertices of each stratum of index one from which the energy is followed downwards."""
@@ -152,12 +151,10 @@ def _within(eset: EquilibriumSet, z: Lanes, p: Parameters) -> Bool[np.ndarray, "
 
 def _strata(eset: EquilibriumSet, states: States) -> Some:
     """Strata of states over their own points; `NOWHERE` for those that the set lacks."""
-    known = eset.over(**{name: states[name] for name in eset.names})
-    n, mass = eset.structure.unknowns, eset.structure.mass
-    gap = np.sqrt((known.states.z - states.z[known.point])[:, :n] ** 2 @ mass)
-    near = np.flatnonzero(gap <= SAME_SOLUTION)
+    known, cell = eset.holding(states)
     out = np.full(len(states), NOWHERE)
-    out[known.point[near]] = known.stratum[near]
+    sure = known & (cell >= 0)
+    out[sure] = eset.stratum[cell[sure]]
     return out
 
 

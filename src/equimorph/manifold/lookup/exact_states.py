@@ -1,14 +1,14 @@
-"""Exact states at given parameters: by Newton from guesses, or along straight moves."""
+"""Exact states at given parameters: by Newton from guesses, or along straight moves; guesses."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.linalg.simd import LANES
-from equimorph.manifold.lookup.kernels import settle
+from equimorph.manifold.lookup.kernels import root_shares, settle
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
 
@@ -18,6 +18,11 @@ ROUND_OFF = 1e-14
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
 SETTLED = 2
 """Corrections after which a lane with another index than the requested one is abandoned."""
+CLOSEST = 1e-3
+"""Least share of a cell between its fold and a guess: at the fold Newton's matrix is singular."""
+NEAREST = 6
+"""States over a point that are lifted across a fold nearby, and cells that are tried for a state:
+the nearest ones. Hundreds of sheets of a chain or truss lie over one point."""
 
 Points = Float[np.ndarray, "points P"]
 
@@ -80,3 +85,26 @@ def lift_to(
     arrived = outcome.code == EventCode.ARRIVED
     which = np.concatenate([np.flatnonzero(still), moving[arrived]])
     return np.concatenate([states.z[still], outcome.z[arrived]]), which
+
+
+def nearest_pairs(
+    structure: Structure,
+    z: Float[np.ndarray, "pairs size"],
+    guess: Float[np.ndarray, "pairs size"],
+    group: Int[np.ndarray, " pairs"],
+) -> Int[np.ndarray, " chosen"]:
+    """Of pairs of states and guesses, in sorted groups, those nearest to each other."""
+    n = structure.unknowns
+    gap = (z[:, :n] - guess[:, :n]) ** 2 @ structure.mass
+    order = np.lexsort((gap, group))
+    rank = np.arange(len(order)) - np.searchsorted(group, group[order])
+    return np.sort(order[rank < NEAREST])
+
+
+def root_weights(
+    weights: Float[np.ndarray, "n corners"], folded: Bool[np.ndarray, "n corners"]
+) -> Float[np.ndarray, "n corners"]:
+    """Weights of corners with the root of the share of those off the fold as their share."""
+    weights = weights.copy()
+    root_shares(weights, folded, CLOSEST)
+    return weights

@@ -11,27 +11,31 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
-from equimorph.arrays import Lanes
+from equimorph.arrays import Flags, Lanes
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.geometry.topology import adjacency, senses
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits, Rims, cells_beside
-from equimorph.manifold.lookup.exact_states import Points, exact_states, lift_to, turned_back
+from equimorph.manifold.lookup.exact_states import (
+    CLOSEST,
+    Points,
+    exact_states,
+    lift_to,
+    nearest_pairs,
+    turned_back,
+)
 from equimorph.manifold.lookup.kernels import (
     balanced,
     guesses,
     one_of_each,
-    root_shares,
     worth_trying,
 )
 from equimorph.manifold.lookup.near_crossings import NearCrossings
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
-from equimorph.tolerances import SAME_STATE
+from equimorph.tolerances import SAME_SOLUTION, SAME_STATE
 
 OVERHANG = 0.3
 """Barycentric tolerance for using a cell as an initial guess."""
-CLOSEST = 1e-3
-"""Least share of a cell between its fold and a guess: at the fold Newton's matrix is singular."""
 PARTNERS = 3
 """Rounds in which states are looked for across folds, over points where some are missing. Of 15
 first rounds 13 brought states, of two second ones none."""
@@ -132,6 +136,33 @@ class Sheets:
         if self.crossings is not None:
             z, point, cell = self._beside_crossings(self.crossings, p, z, point, cell)
         return States(self.structure, z, p[point]), point, cell
+
+    def holding(self, states: States) -> tuple[Flags, Int[np.ndarray, " lanes"]]:
+        """Which states are among those over their own points; their cells, −1 if not known.
+
+        The cells whose guesses are nearest to a state are tried first; only for what is not found
+        so all states over the point are asked for.
+        """
+        z, p = states.z, states.p
+        near = self._near(p[:, self.free])
+        guess = self._guess(near)
+        some = nearest_pairs(self.structure, z[near.point], guess, near.point)
+        found, good, index = exact_states(self.structure, guess[some], p[near.point[some]])
+        good &= index == self.cell_index[near.cell[some]]
+        good &= self._are_same(z[near.point[some]], found)
+        known, cell = np.zeros(len(z), bool), np.full(len(z), -1)
+        of_good = some[good]
+        known[near.point[of_good]], cell[near.point[of_good]] = True, near.cell[of_good]
+        rest = np.flatnonzero(~known)
+        if len(rest):
+            over, point, of_over = self.over(p[rest])
+            same = np.flatnonzero(self._are_same(z[rest[point]], over.z))
+            known[rest[point[same]]], cell[rest[point[same]]] = True, of_over[same]
+        return known, cell
+
+    def _are_same(self, z: Lanes, other: Lanes) -> Flags:
+        n = self.structure.unknowns
+        return np.asarray((z[:, :n] - other[:, :n]) ** 2 @ self.structure.mass <= SAME_SOLUTION**2)
 
     def _beside_crossings(
         self,
@@ -323,6 +354,9 @@ class Sheets:
         first, last = (np.searchsorted(point, near.point[hit], side) for side in ("left", "right"))
         number = np.repeat(np.arange(len(hit)), last - first)
         state = np.concatenate([np.zeros(0, int), *map(np.arange, first, last)])
+        guess = self._guess(near)[hit]
+        nearest = nearest_pairs(self.structure, z[state], guess[number], number)
+        number, state = number[nearest], state[nearest]
         velocity = np.zeros((len(state), p.shape[1]))
         velocity[:, self.free] = way[number]
         found, which = turned_back(States(self.structure, z[state], p[point[state]]), velocity)
@@ -350,15 +384,6 @@ class Sheets:
         best = gap.argmin(axis=1)
         near = np.isfinite(gap[np.arange(len(z)), best])
         return np.where(near, mine.cell[best], -1)
-
-
-def root_weights(
-    weights: Float[np.ndarray, "n corners"], folded: Bool[np.ndarray, "n corners"]
-) -> Float[np.ndarray, "n corners"]:
-    """Weights of corners with the root of the share of those off the fold as their share."""
-    weights = weights.copy()
-    root_shares(weights, folded, CLOSEST)
-    return weights
 
 
 def _firsts(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:

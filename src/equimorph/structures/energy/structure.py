@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.model import Descriptor, Drawing, position
+from equimorph.model import Constraint, Descriptor, Drawing, position
 from equimorph.structures.contract import Direction, Growth, Majorant
 from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.energy.declared import (
@@ -23,8 +23,12 @@ from equimorph.structures.energy.declared import (
 )
 from equimorph.structures.energy.drawing import energy_drawing, forces_of, marks_of
 from equimorph.structures.energy.enclosures import can_enclose, enclosure
+from equimorph.structures.energy.independence import DEPENDENT, SAMPLES, Independence
 from equimorph.structures.energy.leading_form import grows
 from equimorph.structures.energy.tape import Derivatives, Tape, casadi, tape
+
+INDEPENDENCE = "constraint_independence"
+"""Descriptor of structures with constraints; see `Independence`."""
 
 
 class EnergyStructure(DiscreteStructure):
@@ -264,6 +268,18 @@ class EnergyStructure(DiscreteStructure):
         good = np.isfinite(z).all(axis=1) & ((lower < u) & (u < upper)).all(axis=1)
         return np.asarray(good)
 
+    @property
+    def validity(self) -> tuple[Constraint, ...]:
+        """Constraints must be independent; where they are not, no finite force holds them."""
+        return (self.descriptor(INDEPENDENCE) >= DEPENDENT,) if self.constraints else ()
+
+    @cached_property
+    def _independence(self) -> Independence:
+        generator = np.random.default_rng(0)
+        p = np.nan_to_num(np.repeat(self._reference[None], SAMPLES, axis=0), nan=1.0)
+        places = np.stack([self.layout.rows, self.layout.columns])
+        return Independence(self.entries, places, self.mass, (self.sample(p, generator), p))
+
     @cached_property
     def _corners(self) -> Tape:
         ca = casadi()
@@ -321,12 +337,15 @@ class EnergyStructure(DiscreteStructure):
             return self._make_descriptor(name, units[name], lambda z, p: z[:, at].copy())
         if name == "energy":
             return self._make_descriptor(name, "energy", self.energy)
+        if name == INDEPENDENCE and self.constraints:
+            return self._make_descriptor(name, "1", self._independence)
         if name.startswith("effort(") and name.endswith(")"):
             column = position(self.parameters, name[7:-1])
             return self._make_descriptor(
                 name, "1", lambda z, p: self.effort(z, p)[:, column].copy()
             )
-        known = ", ".join((*formulas.descriptors, *units, "energy", "effort(parameter)"))
+        own = (INDEPENDENCE,) if self.constraints else ()
+        known = ", ".join((*formulas.descriptors, *units, "energy", *own, "effort(parameter)"))
         raise InputError(f"`descriptor` must be one of {known}; got {text!r}.")
 
     def _make_descriptor(self, name: str, unit: str, function: Any) -> Descriptor:

@@ -12,8 +12,8 @@ from equimorph.model import Descriptor, position
 from equimorph.structures.truss.mechanics import TrussMechanics
 
 WRITTEN = (
-    "force(bar), utilisation(bar), max_utilisation, max_shortening, displacement(joint, axis), travel(load), "
-    "effort(parameter), energy"
+    "force(bar), utilisation(bar), max_utilisation, max_shortening, displacement(joint, axis), "
+    "travel(load), effort(parameter), energy"
 )
 _CALL = re.compile(r"(\w+)(?:\(([\w-]+)(?:,(\w+))?\))?")
 

@@ -1,0 +1,131 @@
+"""Sets end where energies say nothing: at collapsed bars, and at dependent constraints."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.manifold.geometry.points import VertexKind
+from oracles import specimens
+from oracles.complexes import assert_faithful
+from typecheck import unchecked
+
+
+def slide(strain="engineering") -> em.Truss:
+    """Bars A-P and P-B in one line; P moves along it by u, and A-P has the rest length 1 + a."""
+    return em.Truss(
+        {"A": (0.0, 0.0), "P": (1.0, 0.0), "B": (3.0, 0.0)},
+        [("A", "P"), ("P", "B")],
+        {"A": "xy", "P": "y", "B": "xy"},
+        {"F": {"P": (1.0, 0.0)}},
+        {"a": {"A-P": 1.0}},
+        strain,
+    )
+
+
+def test_a_sheet_ends_where_its_bar_collapses():
+    """u = F/1.5 up to 1 + u = 0.01, and beyond A the other sheet, u = (F − 2)/1.5."""
+    eset = em.equilibrium_set(slide(), em.Box(F=(-2.0, 0.4)), fixed={"a": 0.0}, intervals=(20,))
+    assert eset.audit.clean, eset.audit
+    assert (eset.audit.components, dict(eset.audit.loops)) == (2, {"box": 3, "cap": 1})
+    u, load = eset.points.z[:, 0], eset.points["F"]
+    here = u > -1.0
+    np.testing.assert_allclose(u, np.where(here, load, load - 2.0) / 1.5, atol=1e-9)
+    assert u[here].min() == pytest.approx(-0.99, abs=1e-9)
+
+
+def test_bars_collapse_along_a_curve():
+    """Over a and F the sheet (u − a)/(1 + a) + u/2 = F ends at 1 + u = (1 + a)/100."""
+    eset = em.equilibrium_set(slide(), em.Box(a=(-0.3, 0.4), F=(-2.0, 0.1)), intervals=(5, 9))
+    assert eset.audit.clean, eset.audit
+    assert_faithful(eset)
+    ends = np.flatnonzero(eset.kinds == VertexKind.CAP)
+    u, a = eset.points.z[ends, 0], eset.points["a"][ends]
+    assert len(ends) > 5
+    np.testing.assert_allclose(np.abs(1.0 + u), (1.0 + a) / 100, atol=1e-9)
+
+
+def test_green_strain_has_no_kink():
+    """(1 + u)((1 + u)² − 1)/2 + … = F is one cubic: its sheet passes u = −1 without an end."""
+    truss = slide("green")
+    assert truss.validity == ()
+    eset = em.equilibrium_set(truss, em.Box(F=(-1.0, 0.4)), fixed={"a": 0.0}, intervals=(20,))
+    assert eset.audit.clean, eset.audit
+    assert set(dict(eset.audit.loops)) == {"box"}
+
+
+@pytest.mark.parametrize(
+    ("box", "grid"),
+    [
+        (em.Box(a=(-0.2547, 0.2844), F=(-0.2957, -0.1195)), (9, 13)),
+        pytest.param(
+            em.Box(a=(0.1614, 0.2316), F=(-0.1236, 0.0103)), (14, 11), marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_tripods_whose_legs_collapse_are_clean(box, grid):
+    """Joint D comes to its foot A at (1, 0, 0): 55 rays there could not be traced."""
+    with unchecked():
+        eset = em.equilibrium_set(specimens.tripod(), box, intervals=grid, checks=1)
+    assert eset.audit.clean, eset.audit
+
+
+def two_links() -> em.EnergyStructure:
+    """Two links between supports a span apart, φ₁ = −φ₂ = ±acos(span), and a spring aside."""
+    return em.EnergyStructure(
+        "(a1 - a2)**2/2 - w*sin(a1) + b**2/2",
+        [
+            em.Unknown("a1", "acos(span)", (-1.5, 1.5)),
+            em.Unknown("a2", "-acos(span)", (-1.5, 1.5)),
+            em.Unknown("b", "0"),
+        ],
+        [
+            em.Parameter("span", "1", 1.0, "actuator", 0.8, 0.0, 1.0),
+            em.Parameter("w", "1", 1.0, "load"),
+        ],
+        constraints=["(cos(a1) + cos(a2))/2 - span", "(sin(a1) + sin(a2))/2"],
+    )
+
+
+def test_a_sheet_ends_where_constraints_become_dependent():
+    """Stretched out, the forces of the constraints grow like 1/sin φ; all sheets end before.
+
+    There are two, ±acos(span), and any number of their copies whole turns away.
+    """
+    links = two_links()
+    independence = links.descriptor("constraint_independence")
+    box = em.Box(span=(0.6, 0.99999))
+    eset = em.equilibrium_set(links, box, fixed={"w": 0.1}, intervals=(9,))
+    assert eset.audit.clean, eset.audit
+    count = eset.audit.components
+    assert count >= 2
+    assert dict(eset.audit.loops) == {"box": count, "cap": count}
+    angle, span = eset.points.z[:, 0], eset.points["span"]
+    np.testing.assert_allclose(np.cos(angle), span, atol=1e-9)
+    # gradients are (−s, s)/2 and (c, c)/2: singular values s/√2 and c/√2
+    sine = np.abs(np.sin(angle))
+    share = (independence(eset.points) / sine)[sine < 0.5]
+    np.testing.assert_allclose(share, share[0], rtol=1e-6)
+    ends = eset.kinds == VertexKind.CAP
+    np.testing.assert_allclose(independence(eset.points)[ends], 0.02, rtol=1e-6)
+
+
+def test_chains_with_a_reversed_link_end_where_they_lie_in_one_line():
+    """Four links one way and one the other: at span 3/5, whatever the load; 2280 rays were lost."""
+    chain = specimens.closed_chain()
+    largest = em.Descriptor("largest", "1", lambda z, p: np.abs(z[:, :5]).max(axis=1))
+    with unchecked():
+        eset = em.equilibrium_set(
+            chain,
+            em.Box(span=(0.57, 0.64)),
+            fixed={"a": 0.6823, "w": 0.5},
+            within=[largest <= 3.6],
+            intervals=(6,),
+            checks=0,
+        )
+    assert eset.audit.clean, eset.audit
+    turned = np.abs(eset.points.z[:, :5]).max(axis=1)
+    ends = (eset.kinds == VertexKind.CAP) & (turned < 3.59)
+    assert ends.sum() > 10
+    np.testing.assert_allclose(eset.points["span"][ends], 0.6, atol=0.01)
+    lined_up = np.abs(np.sin(eset.points.z[ends, :5])).max(axis=1)
+    assert lined_up.max() < 0.1
