@@ -60,4 +60,4 @@ class Independence:
     def _gradients(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes constraints n"]:
         out = np.zeros((len(z), self._count, len(self._mass)))
         out[:, *self._at] = self._entries(z, p)[:, self._own]
-        return out / np.sqrt(self._mass)
+        return np.asarray(out / np.sqrt(self._mass))
