@@ -12,6 +12,7 @@ from equimorph.storage.results import (
     write_results,
 )
 from equimorph.storage.schedule import read_schedule, write_schedule
+from equimorph.storage.shapes import write_shapes
 from equimorph.storage.surface import write_surface
 
 __all__ = [
@@ -27,5 +28,6 @@ __all__ = [
     "write_map",
     "write_results",
     "write_schedule",
+    "write_shapes",
     "write_surface",
 ]

@@ -153,20 +153,44 @@ def _word(name: str) -> str:
 
 
 def _vtp(surface: _Surface) -> bytes:
-    """XML with its numbers in base64."""
     group, _ = SIMPLEX[surface.cells.shape[1]]
     ends = surface.cells.shape[1] * np.arange(1, len(surface.cells) + 1)
+    corners = surface.cells.ravel()
+    return vtp_file(surface.points, group, (corners, ends), surface.on_points, surface.on_cells)
+
+
+def vtp_file(
+    points: Float[np.ndarray, "points 3"],
+    group: str,
+    cells: tuple[Int[np.ndarray, " corners"], Int[np.ndarray, " cells"]],
+    on_points: dict[str, Shaped[np.ndarray, "..."]],
+    on_cells: dict[str, Shaped[np.ndarray, "..."]],
+) -> bytes:
+    """XML of VTK with its numbers in base64.
+
+    Parameters
+    ----------
+    points
+        Places.
+    group
+        "Lines" or "Polys".
+    cells
+        Corners of all cells one after the other, and where each cell ends.
+    on_points, on_cells
+        Numbers or vectors by name.
+    """
+    connectivity, ends = cells
     number = dict.fromkeys(("Verts", "Lines", "Strips", "Polys"), 0)
-    number[group] = len(surface.cells)
+    number[group] = len(ends)
     counts = " ".join(f'NumberOf{name}="{count}"' for name, count in number.items())
     parts = [
         '<?xml version="1.0"?>',
         '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
-        f'<PolyData><Piece NumberOfPoints="{len(surface.points)}" {counts}>',
-        _data("Points", {"Points": surface.points}),
-        _data(group, {"connectivity": surface.cells.ravel(), "offsets": ends}),
-        _data("PointData", surface.on_points),
-        _data("CellData", surface.on_cells),
+        f'<PolyData><Piece NumberOfPoints="{len(points)}" {counts}>',
+        _data("Points", {"Points": points}),
+        _data(group, {"connectivity": connectivity, "offsets": ends}),
+        _data("PointData", on_points),
+        _data("CellData", on_cells),
         "</Piece></PolyData></VTKFile>\n",
     ]
     return "\n".join(parts).encode("utf-8")
