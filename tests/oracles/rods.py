@@ -203,6 +203,31 @@ def inflated_rod():
     return rod, (0.8, 1.2, 0.5, 0.85, 0.05), lagrangian
 
 
+def inflated_rod_on_a_slope():
+    """Pressure on a rod that rolls along a line: −p (V − ½ X Y) along and across this line."""
+    slope = 0.4
+    rod = Rod(
+        ends=("clamped", End(angle="free", slide=slope)),
+        curvature=-1.5,
+        loads={"p": Pressure()},
+        elements=4,
+        degree=5,
+    )
+    g = Quadrature(rod)
+
+    def lagrangian(z, p):
+        start, pressure, offset = p.T
+        theta = np.concatenate([start[:, None], z[:, :-1]], axis=1)
+        lam, angles = z[:, -1], theta[:, g.at]
+        out = bending(g, theta, 1 / (4 * np.pi**2), -1.5)
+        along, across = g.total(np.cos(angles - slope)), g.total(np.sin(angles - slope))
+        x, y = places(rod.mesh, np.cos(angles)), places(rod.mesh, np.sin(angles))
+        area = 0.5 * g.total(y * np.cos(angles) - x * np.sin(angles)) - 0.5 * along * across
+        return out + lam * (across - offset) - pressure * area
+
+    return rod, (0.8, 1.2, 0.05), lagrangian
+
+
 def pulled_rod():
     """Cables along a part of a stretchable rod: they bend and compress it."""
     rod = Rod(

@@ -244,6 +244,7 @@ SPECIMENS = (
     _general("rolling rod", rods.rolling_rod),
     _general("stretchable arch", rods.stretchable_arch),
     _general("inflated rod", rods.inflated_rod),
+    _general("inflated rod on a slope", rods.inflated_rod_on_a_slope),
     _general("pulled rod", rods.pulled_rod),
     _general("arch in space", spatial_rods.arch),
     _general("everything on a rod in space", spatial_rods.everything),

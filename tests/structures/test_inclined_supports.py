@@ -135,6 +135,9 @@ def test_inclined_rollers_that_mean_nothing(ends, message):
         prepare(parse_study(text, "roller.toml"))
 
 
-def test_pressure_needs_ends_that_stay():
+def test_pressure_needs_ends_that_move_along_a_line_at_most():
+    assert em.Rod(
+        ends=("clamped", em.End("free", slide=0.3)), loads={"p": em.Pressure()}
+    ).constraints
     with pytest.raises(InputError, match="a follower load without a potential"):
-        em.Rod(ends=("clamped", em.End("free", slide=0.3)), loads={"p": em.Pressure()})
+        em.Rod(ends=("clamped", em.End("free", "free", "free")), loads={"p": em.Pressure()})

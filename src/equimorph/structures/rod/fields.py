@@ -145,7 +145,7 @@ class GeneralFields:
         coarse = model.mesh.reference
         spread = legendre.legvander(2.0 * self.reference.nodes - 1.0, coarse.degree)
         rows = (fine.across, fine.along, fine.bending, fine.tension)
-        area = EnclosedArea(model.mesh)
+        area = EnclosedArea(model.mesh, model.closing)
         pressed = area.rows[:, 0] if model.pressure.any() else np.zeros((0, 0))
         return (
             model.bending_stiffness,
@@ -167,6 +167,7 @@ class GeneralFields:
             model.mesh.lengths,
             model.pressure,
             np.ascontiguousarray(pressed),
+            area.pole,
             model.mesh.weights,
         )
 

@@ -47,7 +47,7 @@ class GeneralMechanics(Mechanics):
         self.layout = CondensedLayout(np.ascontiguousarray(model.stiffness), ends)
         self.mass = model.mesh.weights[self.unknown_nodes].copy()
         self.unknowns = len(self.mass)
-        self._area = EnclosedArea(model.mesh) if model.pressure.any() else None
+        self._area = EnclosedArea(model.mesh, model.closing) if model.pressure.any() else None
 
     @property
     def unknown_nodes(self) -> slice:
@@ -174,9 +174,10 @@ class GeneralMechanics(Mechanics):
         """Force of the support at A: multipliers, or what balances the loads."""
         y = self.scalars(z, p)
         force = np.einsum("kj,lj->lk", self.model.reaction, y)
-        if self._area is not None:  # half of the pressure on the chord is taken up at each end
-            x, rise = -np.einsum("kj,lj->kl", self.model.quadratic[: self.constraints], y)
-            force += 0.5 * self._pressure(y)[:, None] * np.stack([rise, -x], axis=1)
+        if self._area is not None:  # pressure on the chord up to its pole is taken up at A
+            chord = self._area.chord(self.nodal_angles(z, p))
+            x, y_pole = (chord @ self._area.pole.T).T
+            force += self._pressure(y)[:, None] * np.stack([y_pole, -x], axis=1)
         return np.asarray(force)
 
     def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
@@ -309,9 +310,8 @@ class GeneralMechanics(Mechanics):
         inner = self.unknown_nodes
         theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
         own = (diagonal - pull * area.curvature(theta))[:, inner]
-        angles, matrices = theta[:, inner], (self.layout.assembled, area.matrix)
-        stiff, swept = (matrix[inner, inner] for matrix in matrices)
-        return lower_triangle(angles, pull, stiff, swept, own, border[:, :, inner], trailing)
+        angles, stiff = theta[:, inner], self.layout.assembled[inner, inner]
+        return lower_triangle(angles, pull, stiff, area, inner, own, border[:, :, inner], trailing)
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values

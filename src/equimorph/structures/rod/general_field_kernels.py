@@ -51,29 +51,35 @@ def _integrate(matrix, start, length, values, at, out, row):
 
 
 @njit(**INNER)
-def _start_pressure(pressure, pressed, weights, angles, scalars, press, moments):
-    """Pressure and half the way from A to B; what pressure adds to the left moments of elements.
+def _start_pressure(pressure, pressed, pole, weights, first, angles, scalars, press, moments):
+    """Pressure and the way from A to its pole; what pressure adds to the left moments of elements.
 
-    pressed (elements, nodes): rows of W in `area.EnclosedArea` at the elements' left ends.
+    pressed (elements, nodes): rows of W in `pressure.EnclosedArea` at the elements' left ends;
+    pole (2, 2): P there; first (elements, order): weights of nodes in elements.
     """
     total = spread(0.0)
     for j in range(len(pressure)):
         total = total + spread(pressure[j]) * load(scalars, j)
     degree = (len(weights) - 1) // len(pressed)
     x, y = spread(0.0), spread(0.0)
+    for i in range(len(weights)):
+        s, c = sincos(load(angles, i))
+        x, y = x + spread(weights[i]) * c, y + spread(weights[i]) * s
+    # Q d, which P holds beside a half
+    x_closed = spread(0.0) - spread(pole[1, 0]) * x - spread(pole[1, 1] - 0.5) * y
+    y_closed = spread(pole[0, 0] - 0.5) * x + spread(pole[0, 1]) * y
     for e in range(len(pressed)):
         across, along = spread(0.0), spread(0.0)
         for i in range(len(weights)):
             s, c = sincos(load(angles, i))
             across = across + spread(pressed[e, i]) * c
             along = along + spread(pressed[e, i]) * s
-            if e == 0:
-                x, y = x + spread(weights[i]) * c, y + spread(weights[i]) * s
         s, c = sincos(load(angles, e * degree))
-        store(moments, e, total * (across * c + along * s))
+        closed = spread(first[e, 0]) * (x_closed * s - y_closed * c)
+        store(moments, e, total * (across * c + along * s + closed))
     store(press, 0, total)
-    store(press, 1, spread(0.5) * x)
-    store(press, 2, spread(0.5) * y)
+    store(press, 1, spread(pole[0, 0]) * x + spread(pole[0, 1]) * y)
+    store(press, 2, spread(pole[1, 0]) * x + spread(pole[1, 1]) * y)
 
 
 @njit(**INNER)
@@ -98,7 +104,7 @@ def _left_moment(
 
 @njit(**INNER)
 def _place(integral, length, corner, press, theta, new, out):
-    """Places under pressure from the last angles, less half the way from A to B."""
+    """Places under pressure from the last angles, less the way from A to the pole."""
     fine = len(integral)
     for i in range(fine):
         s, c = sincos(load(theta, i))
@@ -156,7 +162,7 @@ def fields_lanes(
     stiffness, slope, weight, softness, along, across, tension, fine_along, fine_across,
     fine_bending, fine_tension, give, fine_softness, across_rows, along_rows, bending_rows,
     tension_rows, refine, integral, lengths,
-    pressure, pressed, weights, angles, scalars, out,
+    pressure, pressed, pole, weights, angles, scalars, out,
 ):  # fmt: skip
     """θ, κ, x, y and M of every lane at the finer nodes: out (lanes, elements · 5 · fine).
 
@@ -177,7 +183,7 @@ def fields_lanes(
         read_lanes(angles, start * nodes, nodes, nodes, nodal, 0, 1)
         read_lanes(scalars, start * count, count, count, y, 0, 1)
         if len(pressed) > 0:
-            _start_pressure(pressure, pressed, weights, nodal, y, press, moments)
+            _start_pressure(pressure, pressed, pole, weights, weight, nodal, y, press, moments)
         x_left, y_left = spread(0.0), spread(0.0)
         for e in range(elements):
             base, length = e * (order - 1), lengths[e]

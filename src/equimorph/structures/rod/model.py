@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.ends import FREE, HELD, Axis, End, compliance, support_axes
+from equimorph.structures.rod.pressure import closing
 from equimorph.structures.rod.profiles import LoadShape, at_nodes
 from equimorph.structures.rod.terms import Effects, Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
@@ -63,7 +64,7 @@ class RodModel:
 
     ``L = ½ θᵀKθ − θ·(slope y) + Σ (N − ½ γ (N + T)²) + ½ yᵀ Q y − p V`` with the sum over the nodes
     of every element, ``N = A sin θ + B cos θ``, ``A = m · across y``, ``B = m · along y``,
-    ``T = m · tension y`` of cables, quadrature weights m, and V as in `area.EnclosedArea`. N/m is
+    ``T = m · tension y`` of cables, quadrature weights m, and V of `pressure.EnclosedArea`. N/m is
     the compressive force and γ the axial compliance over m: a stretchable rod's strain is
     eliminated node by node. Prescribed end angles are ``turned y``.
 
@@ -87,6 +88,8 @@ class RodModel:
         Coordinates of end A (`from_start`) or B. Like all rows, they combine the scalars.
     pressure
         p, on the enclosed area V.
+    closing
+        Q of V, see `pressure.closing`.
     """
 
     mesh: Mesh
@@ -107,6 +110,7 @@ class RodModel:
     origin: Float[np.ndarray, "2 scalars"]
     from_start: tuple[bool, bool]
     pressure: Float[np.ndarray, " scalars"]
+    closing: Float[np.ndarray, "2 2"]
 
     @property
     def scalars(self) -> int:
@@ -219,7 +223,13 @@ def raw_model(build: Build) -> RodModel:
         origin,
         from_start,
         pressure,
+        closing((_moves(axes, 0), _moves(axes, 1)), float(np.arctan2(*axes[0].unit[::-1]))),
     )
+
+
+def _moves(axes: Sequence[Axis], side: int) -> list[int]:
+    """Axes along which an end may move."""
+    return [at for at, axis in enumerate(axes) if (axis.first, axis.last)[side] != HELD]
 
 
 def _sum_effects(terms: Sequence[Term], mesh: Mesh) -> Effects:

@@ -1,5 +1,6 @@
 """Conservative pressure on a rod: the enclosed area, and a matrix that couples all angles."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,13 +14,25 @@ from equimorph.structures.rod.discretisation import Mesh
 
 @dataclass(frozen=True, eq=False)
 class EnclosedArea:
-    """``V = ½ ∫ (y cos θ − x sin θ) ds``, the area left of the chord from end A to end B.
+    """``V = ½ ∫ (y cos θ − x sin θ) ds + ½ dᵀ Q d``, whose gradient is the work of pressure.
 
-    Double quadrature at the nodes: ``V = Σ cos θᵢ Wᵢⱼ sin θⱼ`` with an antisymmetric W, so that V
-    does not change when the rod turns as a whole.
+    The integral is the area left of the chord d from end A to end B. Double quadrature at the
+    nodes: ``Σ cos θᵢ Wᵢⱼ sin θⱼ`` with an antisymmetric W, so that it does not change when the rod
+    turns as a whole. Q closes the area where an end moves along a line, see `closing`.
     """
 
     mesh: Mesh
+    closing: Float[np.ndarray, "2 2"]
+
+    @property
+    def pole(self) -> Float[np.ndarray, "2 2"]:
+        """P: the place A + P d about which pressure works on the multipliers' forces.
+
+        The force on a cross-section at r is that without pressure, and p (r − A − P d) turned by a
+        quarter; P is ½ between held ends.
+        """
+        (xx, xy), (yx, yy) = self.closing
+        return np.array([[0.5 + yx, yy], [-xx, 0.5 - xy]])
 
     @cached_property
     def rows(self) -> Float[np.ndarray, "elements order nodes"]:
@@ -41,19 +54,34 @@ class EnclosedArea:
         np.add.at(total, self.mesh.element_nodes, self.rows)
         return total
 
+    def chord(self, theta: Nodal) -> Float[np.ndarray, "lanes 2"]:
+        """d."""
+        both = np.stack([np.cos(theta), np.sin(theta)], axis=2)
+        return np.asarray(np.einsum("lnk,n->lk", both, self.mesh.weights))
+
+    def _closed(self, theta: Nodal) -> Float[np.ndarray, "2 lanes 1"]:
+        """Q d."""
+        return np.asarray((self.chord(theta) @ self.closing).T[:, :, None])
+
     def value(self, theta: Nodal) -> Values:
         """V."""
-        return np.asarray((np.cos(theta) * multiply(np.sin(theta), self.matrix.T)).sum(axis=1))
+        chorded = (np.cos(theta) * multiply(np.sin(theta), self.matrix.T)).sum(axis=1)
+        d = self.chord(theta)
+        return np.asarray(chorded + 0.5 * np.einsum("li,ij,lj->l", d, self.closing, d))
 
     def gradient(self, theta: Nodal) -> Nodal:
-        """∂V/∂θ: −sin θ (W sin θ) − cos θ (W cos θ)."""
+        """∂V/∂θ: −sin θ (W sin θ) − cos θ (W cos θ) + (Q d)·∂d/∂θ."""
         s, c = np.sin(theta), np.cos(theta)
-        return np.asarray(-s * multiply(s, self.matrix.T) - c * multiply(c, self.matrix.T))
+        x, y = self._closed(theta)
+        chorded = -s * multiply(s, self.matrix.T) - c * multiply(c, self.matrix.T)
+        return np.asarray(chorded + self.mesh.weights * (y * c - x * s))
 
     def hessian(self, theta: Nodal) -> Float[np.ndarray, "lanes nodes nodes"]:
-        """∂²V/∂θᵢ∂θⱼ: ``Wᵢⱼ sin(θⱼ − θᵢ)`` off the diagonal."""
+        """∂²V/∂θᵢ∂θⱼ: ``Wᵢⱼ sin(θⱼ − θᵢ) + (∂d/∂θᵢ)ᵀ Q ∂d/∂θⱼ`` off the diagonal."""
         s, c = np.sin(theta), np.cos(theta)
         out = self.matrix * (c[:, :, None] * s[:, None, :] - s[:, :, None] * c[:, None, :])
+        slope = self.mesh.weights * np.stack([-s, c], axis=1)
+        out += np.einsum("lan,ab,lbm->lnm", slope, self.closing, slope)
         at = np.arange(theta.shape[1])
         out[:, at, at] = self.curvature(theta)
         return np.asarray(out)
@@ -61,14 +89,24 @@ class EnclosedArea:
     def curvature(self, theta: Nodal) -> Nodal:
         """∂²V/∂θᵢ²."""
         s, c = np.sin(theta), np.cos(theta)
-        return np.asarray(s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T))
+        chorded = s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T)
+        slope = self.mesh.weights * np.stack([-s, c])
+        both = np.einsum("aln,ab,bln->ln", slope, self.closing, slope)
+        return np.asarray(chorded + self._bend(theta) + both)
+
+    def _bend(self, theta: Nodal) -> Nodal:
+        """(Q d)·∂²d/∂θ²."""
+        x, y = self._closed(theta)
+        return np.asarray(-self.mesh.weights * (x * np.cos(theta) + y * np.sin(theta)))
 
     def gradient_derivative(self, theta: Nodal, v: Nodal) -> Nodal:
         """Derivative of the gradient along v."""
         s, c = np.sin(theta), np.cos(theta)
         own = s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T)
         others = c * multiply(s * v, self.matrix.T) - s * multiply(c * v, self.matrix.T)
-        return np.asarray(own * v + others)
+        slope = self.mesh.weights * np.stack([-s, c])
+        turned = np.einsum("aln,ab,bl->ln", slope, self.closing, (slope * v).sum(axis=2))
+        return np.asarray((own + self._bend(theta)) * v + others + turned)
 
     def second(self, theta: Nodal, v: Nodal, w: Nodal) -> Nodal:
         """Second derivative of the gradient along v and w."""
@@ -79,7 +117,22 @@ class EnclosedArea:
             return np.asarray(turned)
 
         whole = both(np.ones_like(theta))
-        return np.asarray(v * w * whole - v * both(w) - w * both(v) + both(v * w))
+        chorded = v * w * whole - v * both(w) - w * both(v) + both(v * w)
+        return np.asarray(chorded + self._closed_second(theta, v, w))
+
+    def _closed_second(self, theta: Nodal, v: Nodal, w: Nodal) -> Nodal:
+        """Second derivative of ``(Q d)·∂d/∂θ`` along v and w, by the product rule."""
+        s, c = np.sin(theta), np.cos(theta)
+        slope, bend, third = (
+            self.mesh.weights * np.stack(pair) for pair in ((-s, c), (-c, -s), (s, -c))
+        )
+
+        def along(row: Float[np.ndarray, "2 lanes nodes"]) -> Float[np.ndarray, "2 lanes 1"]:
+            return np.einsum("ab,bl->al", self.closing, row.sum(axis=2))[:, :, None]
+
+        total = third * v * w * self._closed(theta) + bend * v * along(slope * w)
+        total = total + bend * w * along(slope * v) + slope * along(bend * v * w)
+        return np.asarray(total.sum(axis=0))
 
 
 Angles = Float[np.ndarray, "lanes unknowns"]
@@ -93,12 +146,13 @@ def lower_triangle(
     theta: Angles,
     pull: Float[np.ndarray, "lanes 1"],
     stiffness: Square,
-    area: Square,
+    area: EnclosedArea,
+    inner: slice,
     diagonal: Angles,
     border: Float[np.ndarray, "lanes m unknowns"],
     trailing: Float[np.ndarray, "lanes m m"],
 ) -> Entries:
-    """Entries of F_z, row by row: ``K_ij − p W_ij sin(θ_j − θ_i)``, then the multipliers' rows.
+    """Entries of F_z, row by row: ``K_ij − p ∂²V/∂θ_i∂θ_j``, then the multipliers' rows.
 
     Parameters
     ----------
@@ -106,8 +160,10 @@ def lower_triangle(
         Unknown angles.
     pull
         Pressure p.
-    stiffness, area
-        K, and W of the enclosed area.
+    stiffness
+        K.
+    area, inner
+        V, and the nodes of the unknown angles.
     diagonal
         Further terms of the diagonal.
     border, trailing
@@ -117,7 +173,10 @@ def lower_triangle(
     entries = np.empty((lanes, (n + m) * (n + m + 1) // 2))
     for start in range(0, lanes, BLOCK):
         some = slice(start, start + BLOCK)
-        entries[some, : n * (n + 1) // 2] = _angles(theta[some], pull[some], stiffness, area).T
+        angles = _angles(theta[some], pull[some], stiffness, area.matrix[inner, inner])
+        if area.closing.any():
+            _close(angles, theta[some], pull[some], area.closing, area.mesh.weights[inner])
+        entries[some, : n * (n + 1) // 2] = angles.T
     entries[:, _row_ends(0, n)] += diagonal
     for k, stop in enumerate(_row_ends(n, n + m)):
         first = stop - n - k
@@ -140,6 +199,51 @@ def _angles(
         row *= area[i, before, None]
         row += stiff[i, before, None]
     return out
+
+
+def _close(
+    out: Float[np.ndarray, "entries lanes"],
+    theta: Angles,
+    pull: Float[np.ndarray, "lanes 1"],
+    closing: Float[np.ndarray, "2 2"],
+    weights: Float[np.ndarray, " unknowns"],
+) -> None:
+    """Subtract ``p (∂d/∂θ_i)ᵀ Q ∂d/∂θ_j`` off the diagonal of the rows of the angles."""
+    slope = weights[:, None] * np.stack([-np.sin(theta).T, np.cos(theta).T])
+    pressed = pull[:, 0] * np.einsum("ab,bnl->anl", closing, slope)
+    for i, stop in enumerate(_row_ends(0, theta.shape[1])):
+        out[stop - i : stop] -= (pressed[:, i : i + 1] * slope[:, :i]).sum(axis=0)
+
+
+def closing(moves: tuple[Sequence[int], Sequence[int]], slide: float) -> Float[np.ndarray, "2 2"]:
+    """Q of the area that pressure works on where end A, end B or both move along a line.
+
+    Pressure p on the left side does the work ``p ∫ n·δr ds = −p (δA − ½ [r × δr]_A^B)`` with
+    ``A = ½ ∫ r × dr``. It has a potential where ``r × δr`` of both ends is exact: at an end that is
+    held, or moves along a line, through the origin say, which may be chosen so for each of two
+    perpendicular lines. Closing A by the triangle of the origin and the chord gives
+    ``−p (V ± ½ X Y)`` with the chord's components along and across the line of the slide: plus if A
+    moves along or B across, minus the other way round.
+
+    Parameters
+    ----------
+    moves
+        For A and for B the axis along which it moves, 0 along and 1 across; empty if held.
+    slide
+        Angle of the first axis from x, in radians.
+
+    Returns
+    -------
+    Zero if both are held.
+    """
+    first, last = moves
+    sign = 0.0
+    for axis in first:
+        sign = 1.0 - 2.0 * axis
+    for axis in last:
+        sign = 2.0 * axis - 1.0
+    s, c = np.sin(2.0 * slide), np.cos(2.0 * slide)
+    return np.asarray(0.5 * sign * np.array([[-s, c], [c, s]]))
 
 
 def _row_ends(first: int, stop: int) -> Int[np.ndarray, " rows"]:

@@ -44,7 +44,7 @@ def _symmetry_map(
 
 def _features(model: RodModel, *, reverse: bool, sign: float) -> Float[np.ndarray, "scalars some"]:
     """Coefficients of all scalars, in the image of the rod."""
-    step = -1 if reverse else 1
+    step, mirrored = -1 if reverse else 1, np.diag([1.0, sign])
     parts = (
         sign * model.sine[:, ::step],
         model.cosine[:, ::step],
@@ -52,6 +52,7 @@ def _features(model: RodModel, *, reverse: bool, sign: float) -> Float[np.ndarra
         sign * model.slope[:, ::step],
         sign * model.turned.T[:, ::step],
         sign * step * model.pressure[:, None],
+        model.pressure[:, None] * (mirrored @ model.closing @ mirrored).ravel(),
     )
     return np.concatenate(parts, axis=1)
 
