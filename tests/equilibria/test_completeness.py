@@ -69,3 +69,33 @@ def test_states_beyond_the_discretisation_are_not_counted_as_none():
     assert len(found) == 0
     assert found.completeness.upper == np.inf
     assert "the discretisation does not resolve: refine it" in repr(found)
+
+
+@pytest.mark.parametrize("load", ["uniform", "left-half"])
+@pytest.mark.parametrize("q", [2.5, 10.0, 20.0, 50.0, 100.0, 200.0, -50.0, -200.0])
+def test_the_bound_holds_for_finer_meshes_too(load, q):
+    """Twelve elements never find more than what six allow.
+
+    Under q = 50 six elements resolve one of at least five states up to max |κ| = 30.
+    """
+    coarse, fine = em.Rod(load=load), em.Rod(load=load, elements=12)
+    at = {"Theta": 1.0, "Delta": 0.0, "q": q}
+    for cap in (20.0, 30.0):
+        few = em.find_equilibria(coarse, at, within=[coarse.max_curvature <= cap])
+        many = em.find_equilibria(fine, at, within=[fine.max_curvature <= cap])
+        assert len(many) <= few.completeness.upper
+    if abs(q) <= 6.0:
+        assert few.completeness.upper == len(many) == len(few)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("span", [0.6, 0.7, 0.8, 0.9])
+def test_the_bound_holds_for_other_spans(span):
+    """As above, for loads between."""
+    for load in ("uniform", "left-half"):
+        coarse, fine = (em.Rod(load=load, span=span, elements=n) for n in (6, 12))
+        for q in np.linspace(-60.0, 60.0, 13):
+            at = {"Theta": 1.2, "Delta": 0.1, "q": q}
+            few = em.find_equilibria(coarse, at, within=[coarse.max_curvature <= 30.0])
+            many = em.find_equilibria(fine, at, within=[fine.max_curvature <= 30.0])
+            assert len(many) <= few.completeness.upper, (load, q, few, many)

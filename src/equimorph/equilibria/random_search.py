@@ -19,6 +19,8 @@ Groups = Int[np.ndarray, " lanes"]
 
 UNRESOLVED = "not resolved by the discretisation"
 """Why a start led to no equilibrium, among the reasons in `failures`."""
+BEYOND = "not resolved by the discretisation, beyond the constraints"
+"""The same where the state violates a constraint, as far as it can be told."""
 LINES = 3
 """Random lines through each equilibrium, followed both ways."""
 REACH = 4.0
@@ -213,7 +215,10 @@ class Pools:
         """Add what is resolved, not far outside the constraints, and new in its group."""
         structure = self.ground.structure
         good = structure.resolved(z, self.ground.p[group])
-        self.failures.append((UNRESOLVED, group[~good]))
+        beyond = ~good
+        beyond[~good] = self.ground.excess(z[~good], group[~good]) > 0.0  # not a number is no sign
+        self.failures.append((UNRESOLVED, group[~good & ~beyond]))
+        self.failures.append((BEYOND, group[beyond]))
         z, group = z[good], group[good]
         # a little outside, states still serve as stepping stones
         z, group = (part[self.ground.excess(z, group) < 1.0] for part in (z, group))

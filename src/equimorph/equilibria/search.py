@@ -14,7 +14,7 @@ from scipy.special import gammaln, xlogy
 from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.arguments import Argument, arguments_of, contradicts
 from equimorph.equilibria.minima_graph import MinimaGraph
-from equimorph.equilibria.random_search import UNRESOLVED, Ground, Pools, distinct
+from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
 
@@ -36,7 +36,8 @@ class Completeness:
         Whether each run found each equilibrium; no run found those that descents and searches
         between minima have added.
     unresolved
-        Starts that led to states which the discretisation does not resolve.
+        Starts that led to states which the discretisation does not resolve, and which may obey the
+        constraints; all of them if nothing was found.
 
     References
     ----------
@@ -77,11 +78,12 @@ class Completeness:
         """Number of equilibria at about 95 % confidence, if all are as easy to find as those found.
 
         Largest number that the profile likelihood does not reject [Cormack1992]_; infinite where
-        no equilibrium was found twice, or none at all but some that are not resolved. Never below
-        `estimate`.
+        no equilibrium was found twice, or some that are not resolved. Never below `estimate`.
         """
+        if self.unresolved:
+            return np.inf
         if self.found == 0:
-            return np.inf if self.unresolved else self.estimate
+            return self.estimate
         if int(self.captured.sum()) == int(self.captured.any(axis=0).sum()):
             return np.inf
         number = int(self.captured.any(axis=0).sum())
@@ -109,15 +111,17 @@ class Completeness:
 
     def __str__(self) -> str:
         """One line with all numbers."""
-        if self.found == 0 and self.unresolved:
-            return (
-                f"0 found; {self.unresolved} starts led to states that the discretisation does not "
-                "resolve: refine it"
-            )
         runs = ", ".join(str(count) for count in self.per_run)
+        found = f"{self.found} found" + (f" (in single runs {runs})" if self.found else "")
+        if self.unresolved:
+            return (
+                f"{found}; there may be any number more, as {self.unresolved} starts led to states "
+                "that the discretisation does not resolve: refine it, or exclude them by a "
+                "constraint"
+            )
         return (
-            f"{self.found} found (in single runs {runs}); estimated {self.estimate:.1f}, "
-            f"at most {self.upper:.0f} (95 %) if all are equally easy to find"
+            f"{found}; estimated {self.estimate:.1f}, at most {self.upper:.0f} (95 %) if all are "
+            "equally easy to find"
         )
 
 
@@ -209,6 +213,7 @@ def find_equilibria(
     return search_points(structure, points, within=within, starts=starts, runs=runs, seed=seed)[0]
 
 
+@check_arguments
 def search_points(
     structure: Structure,
     points: Points,
@@ -355,5 +360,7 @@ class _Catch:
         """Return the result."""
         z = self.z[self.kept]
         p = np.tile(self.ground.p, (len(z), 1))
-        completeness = Completeness(self.captured, self.failures.get(UNRESOLVED, 0))
+        reasons = (UNRESOLVED,) if len(z) else (UNRESOLVED, BEYOND)
+        unresolved = sum(self.failures.get(reason, 0) for reason in reasons)
+        completeness = Completeness(self.captured, unresolved)
         return FoundStates(self.ground.structure, z, p, completeness, self.failures, arguments)
