@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from argument_faults import outcome
 from equimorph.argument_checks import CHECKED
 from equimorph.argument_kinds import NUMBERS
 from equimorph.errors import InputError
@@ -257,24 +258,6 @@ def belonging(right: Mapping[str, Any], but: str) -> list[str]:
     return [name for name, value in right.items() if name != but and isinstance(value, owners)]
 
 
-def call(function: Callable[..., Any], arguments: Mapping[str, Any]) -> str:
-    """Outcome of a call with one fault: empty if it is refused as it should be."""
-    parameters = inspect.signature(function).parameters
-    first = [name for name, each in parameters.items() if each.kind is each.POSITIONAL_ONLY]
-    try:
-        with unchecked():
-            function(
-                *(arguments[name] for name in first if name in arguments),
-                **{name: value for name, value in arguments.items() if name not in first},
-            )
-    except InputError as error:
-        text = str(error)
-        return "" if "\n" not in text and "; got" in text else f"refused in other words: {text}"
-    except Exception as error:
-        return f"raw {type(error).__name__}: {error}"
-    return "accepted"
-
-
 @pytest.fixture(scope="module")
 def things():
     return Things()
@@ -287,9 +270,9 @@ def test_every_single_fault_is_refused_in_one_line(things, tmp_path, monkeypatch
     for label, function in public_functions(things):
         for name, value, arguments in single_faults(things, function):
             calls += 1
-            outcome = call(function, arguments)
-            if outcome:
-                leaks.append(f"{label}({name}={value!r:.60}): {outcome:.120}")
+            told = outcome(function, arguments)
+            if told:
+                leaks.append(f"{label}({name}={value!r:.60}): {told:.120}")
     assert list(tmp_path.iterdir()) == []
     assert not leaks, f"{len(leaks)} of {calls}:\n" + "\n".join(leaks[:100])
     assert calls >= LEAST_CALLS

@@ -1,7 +1,10 @@
 """Kinds of arguments: what the annotation and the name of a parameter allow, and in which words.
 
-`check_arguments` checks the arguments of public functions by them. Ranges of numbers and the words
-for classes are listed in `argument_vocabulary`.
+`check_arguments` checks the arguments of public functions by them. Nothing here knows a structure:
+classes are named in `CLASSES`, numbers whose names mean the same in all functions in `RANGES`, both
+in `argument_vocabulary`. An annotation may be more precise by ``Annotated[type, note]``: a text
+replaces the words made from the type, a `Range` limits a number, a `Kind` or a function that makes
+one from type and name replaces all.
 """
 
 import types
@@ -14,7 +17,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
-from equimorph.argument_vocabulary import CLASSES, FINITE, RANGES, WHOLE
+from equimorph.argument_vocabulary import CLASSES, FINITE, LARGEST, RANGES, WHOLE, Range
 
 SHOWN = 80
 """Characters of a refused value that a message shows."""
@@ -106,10 +109,7 @@ def kind_of(annotation: Any, name: str) -> Kind:
     origin = get_origin(annotation)
     if origin is Annotated:
         plain, note, *_ = get_args(annotation)
-        if isinstance(note, Kind):
-            return note
-        kind = kind_of(plain, name)
-        return replace(kind, words=note, several=note) if isinstance(note, str) else kind
+        return _noted(plain, note, name)
     if origin in (Union, types.UnionType):
         return _either([kind_of(each, name) for each in get_args(annotation)])
     for applies, make in MAKERS:
@@ -118,14 +118,27 @@ def kind_of(annotation: Any, name: str) -> Kind:
     return ANYTHING
 
 
-def _number(annotation: Any, name: str) -> Kind:
+def _noted(plain: Any, note: Any, name: str) -> Kind:
+    """Kind of an annotation that says more than its type."""
+    if isinstance(note, Kind):
+        return note
+    if isinstance(note, Range):
+        return number_kind(plain, name, note)
+    if isinstance(note, str):
+        return replace(kind_of(plain, name), words=note, several=note)
+    return note(plain, name) if callable(note) else kind_of(plain, name)
+
+
+def number_kind(annotation: Any, name: str, limits: Range | None = None) -> Kind:
+    """Kind of a number, whole if the annotation is int, in limits or those of its name."""
     whole = annotation is int
-    allowed = RANGES.get(name, WHOLE if whole else FINITE)
+    allowed = limits or RANGES.get(name, WHOLE if whole else FINITE)
 
     def fits(value: Any) -> bool:
-        if whole and not isinstance(value, Integral):
+        if not is_number(value) or (whole and not isinstance(value, Integral)):
             return False
-        return is_number(value) and allowed.holds(value)
+        small = whole or isinstance(value, float) or abs(value) <= LARGEST
+        return small and allowed.holds(value)
 
     def convert(value: Any) -> float:
         number = value.item() if isinstance(value, np.ndarray) else value
@@ -136,11 +149,15 @@ def _number(annotation: Any, name: str) -> Kind:
     return Kind(allowed.words, allowed.several, fits, convert)
 
 
-def _word(annotation: Any, _: str) -> Kind:
-    options = get_args(annotation)
+def one_of(*options: Any) -> Kind:
+    """Kind of a text among some, where type checkers need not know which."""
     listed = "one of " + ", ".join(map(str, options))
     words = listed if len(options) > 3 else " or ".join(map(str, options))
     return Kind(words, words, lambda value: isinstance(value, str) and value in options)
+
+
+def _word(annotation: Any, _: str) -> Kind:
+    return one_of(*get_args(annotation))
 
 
 def _object(annotation: Any, _: str) -> Kind:
@@ -157,7 +174,8 @@ def _object(annotation: Any, _: str) -> Kind:
 
 def _array(annotation: Any, _: str) -> Kind:
     dims = annotation.dim_str.split()
-    axes = None if any(each.startswith(("*", "...")) for each in dims) else len(dims)
+    fixed = sum(not each.startswith(("*", "...")) for each in dims)
+    most = fixed if fixed == len(dims) else np.inf
     numeric = "biu" if "int" in str(annotation.dtypes) else "iuf"
     if all("bool" in each for each in annotation.dtypes):
         numeric = "b"
@@ -165,7 +183,7 @@ def _array(annotation: Any, _: str) -> Kind:
     def fits(value: Any) -> bool:
         if not isinstance(value, np.ndarray) or value.dtype.kind not in numeric:
             return False
-        return (axes is None or value.ndim == axes) and bool(np.isfinite(value).all())
+        return fixed <= value.ndim <= most and bool(np.isfinite(value).all())
 
     words = f"an array of finite numbers ({', '.join(dims)})"
     return Kind(words, "arrays of numbers", fits, lambda value: _as_array(value, numeric))
@@ -176,6 +194,9 @@ def _as_array(value: Any, numeric: str) -> np.ndarray:
         raise TypeError
     array = np.asarray(value)
     if array.dtype.kind not in numeric or array.dtype.kind == "b" != numeric:
+        raise TypeError
+    mixed = array is not value and array.dtype.kind != "b"
+    if mixed and any(isinstance(each, bool) for each in np.asarray(value, object).ravel()):
         raise TypeError
     return array.astype(float) if "f" in numeric else array
 
@@ -223,11 +244,15 @@ def _sequence(annotation: Any, name: str) -> Kind:
     return Kind(words, f"lists of {entry.several}", fits, culprit=culprit, holds=entry.holds)
 
 
-def _iterable(_: Any, __: str) -> Kind:
-    def fits(value: Any) -> bool:
-        return isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
+def _iterable(annotation: Any, name: str) -> Kind:
+    """Kind of what is gone through once: a list is made of it, and checked as one."""
 
-    return Kind("a list", "lists", fits)
+    def convert(value: Any) -> Any:
+        if isinstance(value, str | bytes | Mapping):
+            raise TypeError
+        return list(value)
+
+    return replace(_sequence(annotation, name), convert=convert)
 
 
 def _mapping(annotation: Any, name: str) -> Kind:
@@ -249,8 +274,9 @@ def _mapping(annotation: Any, name: str) -> Kind:
         if strange:
             return f"the key {short(strange[0])}"
         wrong = [key for key, each in value.items() if not values.fits(each)]
-        label = getattr(wrong[0], "name", wrong[0])
-        return f"{label} = {values.refused(value[wrong[0]])}"
+        label, inside = getattr(wrong[0], "name", wrong[0]), value[wrong[0]]
+        joint = "." if isinstance(inside, Mapping) and inside else " = "
+        return f"{label}{joint}{values.refused(inside)}"
 
     numeric = by == "name" and values.fits(0.5)
     plain = values.several if values.words != ANYTHING.words else "values"
@@ -323,7 +349,7 @@ def _is_class(annotation: Any, origin: Any) -> bool:
 MAKERS: tuple[tuple[Callable[[Any, Any], bool], Make], ...] = (
     (lambda annotation, _: annotation in (None, types.NoneType), _always(NOTHING)),
     (_is(bool), _always(TRUTH)),
-    (_is(float, int), _number),
+    (_is(float, int), number_kind),
     (_is(str), _always(TEXT)),
     (_is(Path), _object),
     (_is(Literal), _word),

@@ -37,15 +37,21 @@ class Range:
 FINITE = Range(-LARGEST, LARGEST, "a finite number", "finite numbers")
 NOT_NEGATIVE = Range(0.0, np.inf, "a number >= 0", "numbers >= 0")
 POSITIVE = Range(0.0, LARGEST, "positive and finite", "positive numbers", above=True)
+SHARE = Range(0.0, 1.0, "a share of the length, from 0 to 1", "shares of the length, from 0 to 1")
+BETWEEN = Range(
+    0.0, float(np.nextafter(1.0, 0.0)), "between 0 and 1 (both excluded)",
+    "numbers between 0 and 1 (both excluded)", above=True,
+)  # fmt: skip
 EXTENDED = Range(-np.inf, np.inf, "a number", "numbers")
 
 
-def _count(least: int, most: float = MANY) -> Range:
+def count(least: int, most: float = MANY) -> Range:
+    """Whole numbers from `least` to `most`."""
     limits = f">= {least}" if np.isinf(most) else f"from {least} to {most}"
     return Range(least, most, f"a whole number {limits}", f"whole numbers {limits}")
 
 
-WHOLE = _count(0, np.inf)
+WHOLE = count(0, np.inf)
 RANGES: Mapping[str, Range] = {
     **dict.fromkeys(("accuracy", "snap_price", "tolerance", "most", "reach", "distance"), POSITIVE),
     **dict.fromkeys(
@@ -53,22 +59,27 @@ RANGES: Mapping[str, Range] = {
     ),
     **dict.fromkeys(("first_step", "largest_step", "smallest_step", "turning"), POSITIVE),
     **dict.fromkeys(("lower", "upper"), EXTENDED),
+    **dict.fromkeys(("EI", "EI_out", "GJ", "EA", "E", "rest", "length", "mass"), POSITIVE),
+    **dict.fromkeys(("width", "thickness", "diameter", "wall", "density", "weight"), POSITIVE),
+    **dict.fromkeys(("s", "start", "stop"), SHARE),
+    "kinks": BETWEEN,
+    "degree": count(3, 16),
     "margin": NOT_NEGATIVE,
     "radius": Range(0.0, LARGEST, "a finite number >= 0", "finite numbers >= 0"),
-    "intervals": _count(2, np.inf),
+    "intervals": count(2, np.inf),
     "confidence": Range(0.5, 1.0 - 1e-12, "between 0.5 and 1", "between 0.5 and 1", above=True),
     "slide": Range(
         -2.0 * np.pi, 2.0 * np.pi, "a direction in radians, within ±2π", "directions in radians"
     ),
     "seed": WHOLE,
-    "checks": _count(0, 100_000),
-    "retries": _count(0, 20),
-    **dict.fromkeys(("samples", "frames"), _count(2)),
-    **dict.fromkeys(("starts", "runs", "trials", "batch", "fps"), _count(1)),
-    "count": _count(1, 10_000),
-    "limit": _count(1, 100 * MANY),
-    "lifts": _count(1, 100 * MANY),
-    "steps": _count(1, 1000 * MANY),
+    "checks": count(0, 100_000),
+    "retries": count(0, 20),
+    **dict.fromkeys(("samples", "frames"), count(2)),
+    **dict.fromkeys(("starts", "runs", "trials", "batch", "fps"), count(1)),
+    "count": count(1, 10_000),
+    "limit": count(1, 100 * MANY),
+    "lifts": count(1, 100 * MANY),
+    "steps": count(1, 1000 * MANY),
 }
 """Ranges of numbers whose names mean the same in all functions, alone or in lists and mappings."""
 
@@ -97,6 +108,13 @@ CLASSES: Mapping[str, tuple[str, str]] = {
     "Location": ("an answer of `locate`", "answers of `locate`"),
     "Route": ("a route, like `plan(...)`", "routes"),
     "Path": ("a path, like `lift(...)`", "paths"),
+    "Term": ("a term, like `PointForce(1.0)`", "terms, like `PointForce(1.0)`"),
+    "CrossSection": ('a section, like `Round("2 mm", E="70 GPa", nu=0.3)`', "sections"),
+    "Bar": ("a bar, like `Bar(('A', 'B'))`", "bars, like `Bar(('A', 'B'))`"),
+    "Member": ("a member, like `Member(('A', 'B'))`", "members, like `Member(('A', 'B'))`"),
+    "Unknown": ('an unknown, like `Unknown("x")`', 'unknowns, like `Unknown("x")`'),
+    "Parameter": ("a parameter, like `Parameter(...)`", "parameters, like `Parameter(...)`"),
+    "End": ('an end, like `End(angle="free")`', 'ends, like `End(angle="free")`'),
     "Axes": ("axes of matplotlib", "axes"),
 }
 """What objects of a class are called: one of them, and several."""

@@ -77,7 +77,7 @@ def test_distances_from_a_half_plane_do_not_depend_on_the_length_of_its_normal()
     places = np.array([[1.0, 0.0], [1.6, 0.8], [0.0, 0.0]])
     assert wall.distance(places) == pytest.approx([0.0, 1.0, -0.6], abs=1e-15)
     assert str(wall) == "half_plane(1, 0, 0.6, 0.8)"
-    with pytest.raises(InputError, match=r"`normal` must not be zero; got \(0, 0\)\."):
+    with pytest.raises(InputError, match=r"`normal` must be .*, not both 0; got"):
         HalfPlane((0.0, 0.0), (0.0, 0.0))
 
 

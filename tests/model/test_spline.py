@@ -35,8 +35,8 @@ def test_knots_grow_from_zero_to_one(t):
         ({}, "`Spline` must name at least one parameter; got none."),
         ({"q": [1.0]}, "as many of each parameter; got {'q': 1}."),
         ({"q": [1.0, 2.0], "F": [1.0] * 3}, "as many of each parameter; got {'q': 2, 'F': 3}."),
-        ({"q": [1.0, np.nan]}, "`q` must be a list of finite numbers; got [1.0, nan]."),
-        ({"q": 1.0}, "`q` must be a list of finite numbers; got 1.0."),
+        ({"q": [1.0, np.nan]}, "an array of finite numbers (knots, *lanes); got nan."),
+        ({"q": 1.0}, "an array of finite numbers (knots, *lanes); got 1.0."),
     ],
 )
 def test_samples_are_two_or_more_numbers_each(samples, said):

@@ -125,7 +125,7 @@ def test_descriptors_by_name(spring, text):
         ("distance(disc(1, 2, r))", "must be that from half_plane"),
         ("outside(x_l 1)", "must read like outside"),
         ("outside(x_l 2 to 1)", "lower < upper"),
-        ("shape_y(2)", "at s from 0 to 1; got y at 2"),
+        ("shape_y(2)", "`s` must be a share of the length, from 0 to 1; got 2"),
         ("shape_y(s)", "must be at a number"),
         ("curl", "curl"),
     ],

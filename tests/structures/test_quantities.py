@@ -127,11 +127,11 @@ def test_rates_tell_when_a_schedule_can_be_there():
 
 
 def test_meaningless_obstacles_are_refused():
-    with pytest.raises(InputError, match="`normal` must not be zero"):
+    with pytest.raises(InputError, match="`normal` must be two finite numbers"):
         em.HalfPlane((0, 0), (0, 0))
     with pytest.raises(InputError, match="`radius` must be a finite number"):
         em.Disc((0, 0), -1.0)
-    with pytest.raises(InputError, match="`centre` must be 2 finite numbers"):
+    with pytest.raises(InputError, match="`centre` must be two finite numbers"):
         em.Disc((0, np.nan), 1.0)
     with pytest.raises(InputError, match="must be a parameter"):
         em.effort_of(ARCH, "theta")

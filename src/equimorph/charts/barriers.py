@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Points
 from equimorph.charts.domain import Domain, kinds_along, without_slivers
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds
@@ -59,6 +60,7 @@ class Barrier:
         low, high = self.jump.min(), self.jump.max()
         return f"Barrier({self.kind}: {len(self.points)} points, jumps {low:.3g} to {high:.3g})"
 
+    @check_arguments
     def distance(self, points: Points, size: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
         """Distance of points from it as it is drawn, in units of `size`."""
         if self.points.shape[1] != 2 or len(self.points) < 2:

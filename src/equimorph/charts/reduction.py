@@ -90,6 +90,7 @@ class Reduction(Chart):
         """Points of the box without a state."""
         return gaps_of(self.domain, self.eset.box, typical_extent(self.cells))
 
+    @check_arguments
     def state(self, coords: Points) -> Charted:
         """Preferred states over points; see `Chart.state`."""
         points = self._check_width(coords)

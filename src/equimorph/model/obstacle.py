@@ -2,26 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
-from equimorph.errors import InputError
+from equimorph.argument_notes import DIRECTION, PAIR
 
-Pair = tuple[float, float]
+Pair = Annotated[Sequence[float], PAIR]
 Places = Float[np.ndarray, "*points 2"]
 Values = Float[np.ndarray, "*points"]
-
-
-def _pair(name: str, value: Sequence[float]) -> Pair:
-    try:
-        x, y = (float(entry) for entry in value)
-    except (TypeError, ValueError):
-        x = y = np.nan
-    if not np.isfinite((x, y)).all():
-        raise InputError(f"`{name}` must be two finite numbers (x, y); got {value!r}.")
-    return x, y
 
 
 @check_arguments
@@ -38,15 +29,13 @@ class HalfPlane:
     """
 
     point: Pair
-    normal: Pair
+    normal: Annotated[Sequence[float], DIRECTION]
 
     def __post_init__(self) -> None:
-        """Check both, and give the normal unit length."""
-        x, y = _pair("normal", self.normal)
+        """Give the normal unit length."""
+        x, y = map(float, self.normal)
         size = float(np.hypot(x, y))
-        if size == 0.0:
-            raise InputError("`normal` must not be zero; got (0, 0).")
-        object.__setattr__(self, "point", _pair("point", self.point))
+        object.__setattr__(self, "point", tuple(map(float, self.point)))
         object.__setattr__(self, "normal", (x / size, y / size))
 
     def __str__(self) -> str:
@@ -82,10 +71,8 @@ class Disc:
     inside: bool = False
 
     def __post_init__(self) -> None:
-        """Check the centre and the radius."""
-        object.__setattr__(self, "centre", _pair("centre", self.centre))
-        if not (np.isfinite(self.radius) and self.radius >= 0.0):
-            raise InputError(f"`radius` must be a finite number >= 0; got {self.radius!r}.")
+        """Make numbers of the centre's coordinates."""
+        object.__setattr__(self, "centre", tuple(map(float, self.centre)))
 
     def __str__(self) -> str:
         """Return it as it is written."""

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
-from equimorph.argument_kinds import is_listed, is_number, short
-from equimorph.argument_vocabulary import FINITE
+from equimorph.argument_kinds import is_number
+from equimorph.argument_notes import BOUNDS, DIVIDED
+from equimorph.argument_vocabulary import FINITE, POSITIVE
 from equimorph.errors import InputError, suggestion
 
 Role = Literal["actuator", "load", "fixed"]
@@ -27,7 +28,7 @@ class Parameter:
 
     name: str
     unit: str
-    scale: float
+    scale: Annotated[float, POSITIVE]
     role: Role
     default: float | None = None
     lower: float = -np.inf
@@ -89,25 +90,14 @@ def parameter_vector(
     return vector
 
 
-def _bounds(name: str, value: Any, count: int) -> tuple[float, ...]:
-    meaning = "(lower, upper)" if count == 2 else "(lower, upper, intervals)"
-    if not is_listed(value) or len(value) != count:
-        raise InputError(f"`{name}` must be {meaning}; got {short(value)}.")
-    if not all(map(is_number, value)):
-        raise InputError(f"`{name}` must be numbers {meaning}; got {short(value)}.")
-    numbers = tuple(float(entry) if FINITE.holds(entry) else np.nan for entry in value)
-    if not (np.isfinite(numbers).all() and numbers[0] < numbers[1]):
-        raise InputError(f"`{name}` must have finite lower < upper; got {short(value)}.")
-    return numbers
-
-
 class Box:
     """An axis-parallel box: ``Box(Theta=(0.2, 2.5), Delta=(-2, 2))``."""
 
-    def __init__(self, **bounds: Sequence[float]) -> None:
+    @check_arguments
+    def __init__(self, **bounds: Annotated[Sequence[float], BOUNDS]) -> None:
         if not bounds:
             raise InputError("`Box` must name at least one parameter; got none.")
-        pairs = [_bounds(name, value, 2) for name, value in bounds.items()]
+        pairs = [tuple(map(float, value)) for value in bounds.values()]
         self.names: tuple[str, ...] = tuple(bounds)
         self.lower: Float[np.ndarray, " d"] = np.array([pair[0] for pair in pairs])
         self.upper: Float[np.ndarray, " d"] = np.array([pair[1] for pair in pairs])
@@ -136,18 +126,13 @@ class Box:
 class Grid:
     """A regular grid of settings: ``Grid(Theta=(0.2, 2.5, 93), ...)`` has 93 intervals in Theta."""
 
-    def __init__(self, **ranges: Sequence[float]) -> None:
+    @check_arguments
+    def __init__(self, **ranges: Annotated[Sequence[float], DIVIDED]) -> None:
         if not ranges:
             raise InputError("`Grid` must name at least one parameter; got none.")
-        triples = {name: _bounds(name, value, 3) for name, value in ranges.items()}
-        for name, triple in triples.items():
-            if triple[2] < 1 or triple[2] != int(triple[2]):
-                raise InputError(
-                    f"`{name}` must have a whole number of intervals >= 1; got {triple[2]:g}."
-                )
-        self.box = Box(**{name: triple[:2] for name, triple in triples.items()})
+        self.box = Box(**{name: triple[:2] for name, triple in ranges.items()})
         self.names = self.box.names
-        self.intervals: tuple[int, ...] = tuple(int(triple[2]) for triple in triples.values())
+        self.intervals: tuple[int, ...] = tuple(int(triple[2]) for triple in ranges.values())
 
     def __repr__(self) -> str:
         """Return the call that makes this grid."""

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
-from equimorph.argument_kinds import NUMBERS
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 
 Samples = Float[np.ndarray, "knots *lanes"]
@@ -24,7 +24,7 @@ class Spline:
     ----------
     t
         Knots, increasing from 0 to 1; equidistant if None.
-    samples
+    values
         Values of each parameter at the knots: (knots,), or (knots, lanes) for many lanes.
 
     Raises
@@ -39,22 +39,23 @@ class Spline:
     {'q': array(0.25)}
     """
 
+    @check_arguments
     def __init__(
         self,
         t: Sequence[float] | Float[np.ndarray, " knots"] | None = None,
         /,
-        **samples: Sequence[float] | Samples,
+        **values: Sequence[float] | Samples,
     ) -> None:
-        if not samples:
+        if not values:
             raise InputError("`Spline` must name at least one parameter; got none.")
-        self.samples = {name: _numbers(name, values) for name, values in samples.items()}
+        self.samples = {name: np.array(each, dtype=float) for name, each in values.items()}
         counts = {name: len(values) for name, values in self.samples.items()}
         knots = next(iter(counts.values()))
         if knots < 2 or len(set(counts.values())) > 1:
             raise InputError(
                 f"`Spline` must have two or more samples, as many of each parameter; got {counts}."
             )
-        self.t = np.linspace(0.0, 1.0, knots) if t is None else _numbers("t", t)
+        self.t = np.linspace(0.0, 1.0, knots) if t is None else np.array(t, dtype=float)
         good = self.t.shape == (knots,) and self.t[0] == 0.0 and self.t[-1] == 1.0
         if not (good and (np.diff(self.t) > 0.0).all()):
             raise InputError(
@@ -70,14 +71,7 @@ class Spline:
         """The cubics of each parameter."""
         return {name: CubicSpline(self.t, values) for name, values in self.samples.items()}
 
+    @check_arguments
     def __call__(self, t: float) -> dict[str, Float[np.ndarray, " *lanes"]]:
         """Values of the parameters at t between 0 and 1."""
         return {name: np.asarray(cubics(t)) for name, cubics in self.pieces.items()}
-
-
-def _numbers(name: str, values: object) -> Samples:
-    given = np.asarray(values) if NUMBERS.fits(values) else np.nan
-    numbers = np.array(given, dtype=float)
-    if numbers.ndim == 0 or not np.isfinite(numbers).all():
-        raise InputError(f"`{name}` must be a list of finite numbers; got {values!r}.")
-    return numbers

@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 from time import perf_counter
 
+from equimorph.argument_checks import check_arguments
 from equimorph.model import Progress, Silent
 from equimorph.paper.examples import EXAMPLES, Example
 from equimorph.paper.quoted import CONVENTION, QUOTED, TABLES, Quoted, QuotedTable
@@ -53,6 +54,7 @@ class Reproduction:
         ]  # fmt: skip
 
 
+@check_arguments
 def reproduce(
     folder: Path, *, examples: Sequence[Example] = EXAMPLES, progress: Progress | None = None
 ) -> Reproduction:

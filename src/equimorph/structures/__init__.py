@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.structures.contract import (
     Advance,
@@ -103,6 +104,7 @@ __all__ = [
 ]
 
 
+@check_arguments
 def from_identity(identity: Mapping[str, Any]) -> Structure:
     """Build the structure that ``Structure.identity`` describes.
 

@@ -1,22 +1,25 @@
 """Networks of named joints and edges between them: what trusses and frames have in common."""
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Annotated, Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_notes import NAME
 from equimorph.errors import InputError, suggestion
-from equimorph.structures.unit_system import UnitSystem
+from equimorph.structures.unit_system import Quantity, UnitSystem
 
-_NAME = re.compile(r"[A-Za-z0-9_]+")
-
+Part = TypeVar("Part")
 Ends = Int[np.ndarray, "edges 2"]
 Places = Float[np.ndarray, "joints space"]
+Joints = Annotated[
+    Mapping[str, Sequence[Quantity]],
+    "places of finite numbers, or texts with their unit, by joint, like `{'A': (0, 1)}`",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,33 +108,31 @@ class Network(ABC):
 
 
 def places_of_joints(
-    given: Any, system: UnitSystem, spaces: Sequence[int], reserved: Sequence[str] = ()
+    given: Joints, system: UnitSystem, spaces: Sequence[int], reserved: Sequence[str] = ()
 ) -> tuple[tuple[str, ...], Places]:
     """Names of joints and their places, all of one dimension among `spaces`.
 
     Raises
     ------
     InputError
-        For fewer than two joints, a name that is no word or `reserved`, or a place that is not
-        finite.
+        For fewer than two joints, a name that is no word or `reserved`, or a place of another
+        dimension.
     """
-    table = dict(items(given, "joints", "name"))
-    if len(table) < 2:
-        raise InputError(f"`joints` must be at least two; got {len(table)}.")
-    for name in table:
-        if not (isinstance(name, str) and _NAME.fullmatch(name)) or name in reserved:
+    if len(given) < 2:
+        raise InputError(f"`joints` must be at least two; got {len(given)}.")
+    for name in given:
+        if not NAME.fullmatch(name) or name in reserved:
             other = f", other than {', '.join(reserved)}" if reserved else ""
             raise InputError(
                 f"`joints` must have names of letters, digits and underscores{other}; got {name!r}."
             )
-    first = next(iter(table.values()))
-    known = isinstance(first, Sequence) and len(first) in spaces
-    space = len(first) if known else spaces[0]
+    first = len(next(iter(given.values())))
+    space = first if first in spaces else spaces[0]
     places = []
-    for name, place in table.items():
+    for name, place in given.items():
         what = f"joints.{name}"
-        places.append(numbers(system.numbers(place, "length", what), [space], what))
-    return tuple(table), np.array(places)
+        places.append(vector(system.numbers(place, "length", what), [space], what))
+    return tuple(given), np.array(places)
 
 
 @runtime_checkable
@@ -166,7 +167,9 @@ def ends_of_edges(edges: Iterable[Edge], joints: Sequence[str], edge: str) -> En
     return np.array(found, dtype=int).reshape(-1, 2)
 
 
-def supported_joints(given: Any, joints: Sequence[str]) -> Iterable[tuple[int, str, Any]]:
+def supported_joints(
+    given: Mapping[str, Any], joints: Sequence[str]
+) -> Iterable[tuple[int, str, Any]]:
     """Number and name of each supported joint, and what is said of its support.
 
     Raises
@@ -174,7 +177,7 @@ def supported_joints(given: Any, joints: Sequence[str]) -> Iterable[tuple[int, s
     InputError
         For an unknown joint.
     """
-    for joint, support in items(given, "supports", "joint"):
+    for joint, support in given.items():
         if joint not in joints:
             raise InputError(f"`supports` must be at joints ({', '.join(joints)}); got {joint}.")
         yield joints.index(joint), joint, support
@@ -196,7 +199,7 @@ def position_of_joint(name: Any, joints: Sequence[str]) -> int:
     return joints.index(name)
 
 
-def check_parameter_names(names: Sequence[Any]) -> None:
+def check_parameter_names(names: Sequence[str]) -> None:
     """Refuse names of loads and actuators that are no words, or used twice.
 
     Raises
@@ -207,11 +210,32 @@ def check_parameter_names(names: Sequence[Any]) -> None:
     if not names:
         raise InputError("`loads` or `actuators` must name a parameter; got none.")
     for i, name in enumerate(names):
-        if not (isinstance(name, str) and name.isidentifier()) or name in names[:i]:
+        if not name.isidentifier() or name in names[:i]:
             raise InputError(
                 "`loads` and `actuators` must have different names of letters, digits and "
                 f"underscores; got {name!r}."
             )
+
+
+def built(kind: type[Part], given: Any, what: str) -> Part:
+    """Edge of a network from one, from its data, or from the names of its ends.
+
+    Raises
+    ------
+    InputError
+        For data that the kind does not take; what is wrong with one value is said by the kind.
+    """
+    if isinstance(given, kind):
+        return given
+    data = given if isinstance(given, Mapping) else {"ends": given}
+    known = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # all are dataclasses
+    strange = [name for name in data if name not in known]
+    if strange or "ends" not in data:
+        raise InputError(
+            f"`{what}` must hold {kind.__name__}s ({', '.join(known)}) or pairs of joints; got "
+            f"{given!r}."
+        )
+    return kind(**data)
 
 
 def length_limits(
@@ -237,23 +261,18 @@ def direction_of_mechanism(moves: Float[np.ndarray, "joints space"]) -> tuple[in
     return at, ", ".join(f"{x:.3g}" for x in along + 0.0)
 
 
-def items(given: Any, what: str, by: str) -> Iterable[tuple[Any, Any]]:
-    """Pairs of a table, or InputError."""
-    if not isinstance(given, Mapping):
-        raise InputError(f"`{what}` must be a table by {by}; got {given!r}.")
-    return given.items()
+def vector(given: Sequence[float], counts: Sequence[int], what: str) -> list[float]:
+    """Numbers, as many as one of `counts`.
 
-
-def numbers(given: Any, counts: Sequence[int], what: str) -> list[float]:
-    """Finite numbers, as many as one of `counts`, or InputError."""
-    try:
-        found = [float(x) for x in given]
-    except (TypeError, ValueError):
-        found = []
-    if len(found) not in counts or not np.isfinite(found).all():
+    Raises
+    ------
+    InputError
+        For more or fewer.
+    """
+    if len(given) not in counts:
         many = " or ".join(map(str, counts))
         raise InputError(f"`{what}` must be {many} finite numbers; got {given!r}.")
-    return found
+    return [float(x) for x in given]
 
 
 def walk_along(ends: Int[np.ndarray, "edges 2"], joints: int) -> Int[np.ndarray, " steps"]:

@@ -254,6 +254,7 @@ class Spring(Structure):
         """δ."""
         return self.angle
 
+    @check_arguments
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written as ``angle``, ``height`` or ``energy``."""
         name = re.sub(r"\s", "", text)

@@ -4,21 +4,27 @@ See docs/decisions.md, "Units are converted where numbers enter".
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
-from equimorph.argument_kinds import is_number
+from equimorph.argument_kinds import is_number, one_of
+from equimorph.argument_notes import QUANTITY, quantity
 from equimorph.errors import InputError, suggestion
 
 Dimension = tuple[int, int, int]
 """Powers of kilogram, metre and second."""
 Unit = tuple[float, Dimension]
-Quantity = float | str
+Quantity = Annotated[float | str, quantity]
 """A number in the units at hand, or a text with a unit, like "12 kN"."""
+Units = Annotated[
+    Mapping[Annotated[str, one_of("force", "length")], str],
+    'names of units by what they measure, like `{"force": "N", "length": "mm"}`',
+]
+"""Units in which plain numbers are."""
 
 STANDARD_GRAVITY = 9.80665
 """m/s², by definition [BIPM2019]_: what turns a mass per length into a weight per length."""
@@ -45,7 +51,6 @@ UNITS: dict[str, Unit] = {
 }  # fmt: skip
 """Values in SI."""
 _FACTOR = re.compile(r"\s*([·*/]?)\s*([A-Za-z]+|1)(?:\^?(-?\d+))?\s*")
-_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
 _POWERS = str.maketrans({"²": "2", "³": "3", "⁴": "4"})
 Part = TypeVar("Part")
 
@@ -162,7 +167,7 @@ class UnitSystem:
         """
         if not isinstance(given, str):
             return given
-        found = _NUMBER.fullmatch(given)
+        found = QUANTITY.fullmatch(given)
         if found is None or not found.group(2).strip():
             raise InputError(f"`{what}` must be a number, with or without its unit; got {given!r}.")
         value, dimension = read_unit(found.group(2).strip(), UNITS, what)
@@ -204,10 +209,8 @@ class UnitSystem:
                 f"{given[name]!r}. Or add `units`, in which plain numbers are."
             )
 
-    def numbers(self, given: Any, quantity: str, what: str) -> Any:
+    def numbers(self, given: Sequence[Any], quantity: str, what: str) -> list[Any]:
         """The same for every entry of a list of numbers or texts."""
-        if not isinstance(given, list | tuple) or not any(isinstance(each, str) for each in given):
-            return given
         return [self.number(each, quantity, what) for each in given]
 
     def measured(self, part: Part, quantities: Mapping[str, str], what: str) -> Part:
@@ -224,26 +227,18 @@ class UnitSystem:
         return {} if self.plain else given
 
 
-def unit_system(given: Any) -> UnitSystem:
+def unit_system(given: Units | None) -> UnitSystem:
     """System of units from a table, or none.
 
     Raises
     ------
     InputError
-        For anything but ``{"force": ..., "length": ...}``.
+        For one unit without the other, or unknown units.
     """
-    if given is None or isinstance(given, UnitSystem):
-        return given or UnitSystem()
-    if not isinstance(given, Mapping) or set(given) != {"force", "length"}:
+    if given is None:
+        return UnitSystem()
+    if len(given) < 2:
         raise InputError(
             f'`units` must be a table like {{"force": "N", "length": "mm"}}; got {given!r}.'
         )
     return UnitSystem(**given)
-
-
-def check_positive(value: Any, what: str, of: str = "") -> None:
-    """Refuse what is neither a positive number nor a text that begins with one."""
-    found = _NUMBER.fullmatch(value) if isinstance(value, str) else None
-    number = float(found.group(1)) if found else value
-    if not (isinstance(number, int | float) and 0.0 < number < np.inf):
-        raise InputError(f"`{what}`{of} must be positive; got {value!r}.")

@@ -3,18 +3,30 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from equimorph.argument_checks import check_arguments
+from equimorph.argument_kinds import is_listed, short
+from equimorph.argument_notes import BOUNDS
 from equimorph.errors import InputError
 from equimorph.model import Parameter
-from equimorph.structures.energy.expressions import CONSTANTS, FUNCTIONS, expression, write_formulas
+from equimorph.structures.energy.expressions import (
+    CONSTANTS,
+    FORMULA,
+    FUNCTIONS,
+    SYMBOLS,
+    expression,
+    write_formulas,
+)
 from equimorph.structures.energy.tape import casadi, rough_operations
 
+Formula = Annotated[Any, FORMULA]
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
+@check_arguments
 @dataclass(frozen=True)
 class Unknown:
     """One unknown of an energy.
@@ -38,26 +50,20 @@ class Unknown:
     """
 
     name: str
-    natural: Any = 0.0
-    guesses: Sequence[float] | None = None
+    natural: Formula = 0.0
+    guesses: Annotated[Sequence[float], BOUNDS] | None = None
     lower: float = -np.inf
     upper: float = np.inf
     mass: float = 1.0
     unit: str = "1"
 
     def __post_init__(self) -> None:
-        """Check ranges and mass."""
-        if self.guesses is not None and not _increasing(self.guesses, finite=True):
-            raise InputError(
-                f"`guesses` of {self.name} must be finite (lower, upper); got {self.guesses!r}."
-            )
-        if not _increasing((self.lower, self.upper), finite=False):
+        """Check the limits."""
+        if not self.lower < self.upper:
             raise InputError(
                 f"`lower` of {self.name} must be less than `upper`; got {self.lower!r} and "
                 f"{self.upper!r}."
             )
-        if not (isinstance(self.mass, int | float) and 0.0 < self.mass < np.inf):
-            raise InputError(f"`mass` of {self.name} must be positive; got {self.mass!r}.")
 
     @property
     def range(self) -> tuple[float, float] | None:
@@ -66,14 +72,6 @@ class Unknown:
             return float(self.guesses[0]), float(self.guesses[1])
         bounded = np.isfinite(self.lower) and np.isfinite(self.upper)
         return (self.lower, self.upper) if bounded else None
-
-
-def _increasing(pair: Any, *, finite: bool) -> bool:
-    try:
-        low, high = (float(x) for x in pair)
-    except (TypeError, ValueError):
-        return False
-    return low < high and not (finite and (np.isinf(low) or np.isinf(high)))
 
 
 @dataclass(frozen=True)
@@ -115,10 +113,20 @@ class Formulas:
         return ["energy", *constraints, *named, *points, *described]
 
 
-def unknowns_of(given: Any) -> tuple[Unknown, ...]:
+UnknownSpec = Annotated[
+    Unknown | str | Mapping[str, Any] | Annotated[Any, SYMBOLS],
+    "names, unknowns, their data, or symbols of casadi.SX",
+]
+ParameterSpec = Annotated[
+    Parameter | Mapping[str, Any], "parameters, like `Parameter(...)`, or their data"
+]
+
+
+def unknowns_of(given: UnknownSpec | Sequence[UnknownSpec]) -> tuple[Unknown, ...]:
     """Unknowns from names, symbols, `Unknown`s or their data."""
     unknowns: list[Unknown] = []
-    for each in given if isinstance(given, list | tuple) else [given]:
+    several: Any = given if is_listed(given) else [given]
+    for each in several:
         if isinstance(each, Unknown):
             unknowns.append(each)
         elif isinstance(each, Mapping):
@@ -130,17 +138,13 @@ def unknowns_of(given: Any) -> tuple[Unknown, ...]:
     return tuple(unknowns)
 
 
-def parameters_of(given: Iterable[Any]) -> tuple[Parameter, ...]:
+def parameters_of(given: Iterable[ParameterSpec]) -> tuple[Parameter, ...]:
     """Parameters from `Parameter`s or their data."""
     made = []
     for each in given:
         one: Parameter = (
             each if isinstance(each, Parameter) else _build(Parameter, each, "parameters")
         )
-        if one.role not in ("actuator", "load", "fixed"):
-            raise InputError(
-                f"`role` of {one.name} must be actuator, load or fixed; got {one.role!r}."
-            )
         default = one.default
         if one.role == "load" and default is None:
             default = 0.0
@@ -159,21 +163,19 @@ def data_of(one: Parameter | Unknown) -> dict[str, Any]:
 
 def _build(kind: Any, data: Any, what: str) -> Any:
     defaults = {"unit": "1", "scale": 1.0, "role": "actuator"} if kind is Parameter else {}
-    try:
-        return kind(**{**defaults, **data})
-    except TypeError:
+    if not ("name" in data and set(data) <= set(kind.__dataclass_fields__)):
         fields = ", ".join(kind.__dataclass_fields__)
-        raise InputError(f"`{what}` must hold {kind.__name__}s ({fields}); got {data!r}.") from None
+        raise InputError(f"`{what}` must hold {kind.__name__}s ({fields}); got {data!r}.")
+    return kind(**{**defaults, **data})
 
 
 def _symbol_names(given: Any) -> list[str]:
     if isinstance(given, str):
         return [given]
-    ca = casadi()
-    if isinstance(given, ca.SX) and given.is_valid_input():
+    if isinstance(given, casadi().SX) and given.is_valid_input():
         return [entry.name() for entry in given.elements()]
     raise InputError(
-        f"`unknowns` must be names, symbols of casadi.SX or Unknowns; got {type(given).__name__}."
+        f"`unknowns` must be names, symbols of casadi.SX or Unknowns; got {short(given)}."
     )
 
 
@@ -190,6 +192,7 @@ class Symbols:
         ca = casadi()
         names = [unknown.name for unknown in unknowns] + [each.name for each in parameters]
         _check_names([*names, *definitions])
+        _check_words(formulas.descriptors)
         given = [*definitions.values(), *formulas.flat()]
         graphs = [each for each in given if isinstance(each, ca.SX)]
         found: dict[str, Any] = {}
@@ -255,13 +258,18 @@ class Symbols:
         return definitions, self.formulas.fill(flat)
 
 
-def _check_names(names: Sequence[str]) -> None:
-    taken = {*CONSTANTS, *FUNCTIONS}
+def _check_words(names: Iterable[str]) -> None:
     for name in names:
-        if not (isinstance(name, str) and _NAME.fullmatch(name)):
+        if not _NAME.fullmatch(name):
             raise InputError(
                 f"`name` must be a letter, then letters, digits and underscores; got {name!r}."
             )
+
+
+def _check_names(names: Sequence[str]) -> None:
+    _check_words(names)
+    taken = {*CONSTANTS, *FUNCTIONS}
+    for name in names:
         if name in taken:
             raise InputError(f"`name` must be given once, and be no function; got {name} again.")
         taken.add(name)

@@ -1,14 +1,26 @@
 """Supports and forces that the author of an energy puts on the points of its line."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from equimorph.argument_kinds import is_number, one_of, short
+from equimorph.argument_vocabulary import FINITE
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Forces, Support, SupportKind
+from equimorph.structures.energy.expressions import POINT
+
+DrawnSupport = Annotated[
+    Mapping[Annotated[str, one_of("point", "kind", "angle")], Any],
+    "tables of point, kind and angle, like `{'point': 0, 'kind': 'pin'}`",
+]
+DrawnForce = Annotated[
+    Mapping[Annotated[str, one_of("point", "force")], Any],
+    "tables of point and force, like `{'point': 1, 'force': [0, 'F']}`",
+]
 
 
 @dataclass(frozen=True)
@@ -24,24 +36,23 @@ class Mark:
         return {"point": self.point, "kind": str(self.kind), "angle": self.angle}
 
 
-def marks_of(given: Iterable[Any], points: int) -> tuple[Mark, ...]:
+def marks_of(given: Sequence[DrawnSupport], points: int) -> tuple[Mark, ...]:
     """Supports from tables with the keys point, kind and angle.
 
     Raises
     ------
     InputError
-        For another key, an unknown kind, or a point that is not drawn.
+        For an unknown kind, or a point that is not drawn.
     """
-    found = []
-    for i, table in enumerate(given):
-        data = _table(table, {"point", "kind", "angle"}, f"supports[{i}]")
+    found: list[Mark] = []
+    for i, data in enumerate(given):
         point = _point(data, points, f"supports[{i}]")
         kind, angle = data.get("kind", "pin"), data.get("angle", 0.0)
-        if kind not in list(SupportKind):
+        if not isinstance(kind, str) or kind not in list(SupportKind):
             raise InputError(
                 f"`supports[{i}].kind` must be one of {', '.join(SupportKind)}; got {kind!r}."
             )
-        if not (isinstance(angle, int | float) and np.isfinite(angle)):
+        if not (is_number(angle) and FINITE.holds(angle)):
             raise InputError(
                 f"`supports[{i}].angle` must be a finite number in radians; got {angle!r}."
             )
@@ -50,24 +61,22 @@ def marks_of(given: Iterable[Any], points: int) -> tuple[Mark, ...]:
 
 
 def forces_of(
-    given: Iterable[Any], points: int
+    given: Sequence[DrawnForce], points: int
 ) -> tuple[tuple[int, ...], tuple[tuple[Any, Any], ...]]:
     """Points on which forces act, and their components, from tables with point and force.
 
     Raises
     ------
     InputError
-        For another key, a force that has not two components, or a point that is not drawn.
+        For a force that has not two components, or a point that is not drawn.
     """
     places, vectors = [], []
-    for i, table in enumerate(given):
-        data = _table(table, {"point", "force"}, f"forces[{i}]")
+    for i, data in enumerate(given):
         places.append(_point(data, points, f"forces[{i}]"))
-        force = data.get("force")
-        pair = () if isinstance(force, str) or not isinstance(force, Sequence) else tuple(force)
-        if len(pair) != 2:
-            raise InputError(f"`forces[{i}].force` must be two expressions [x, y]; got {force!r}.")
-        vectors.append((pair[0], pair[1]))
+        force: Any = data.get("force")
+        if not POINT.fits(force):
+            raise InputError(f"`forces[{i}].force` must be {POINT.words}; got {short(force)}.")
+        vectors.append((force[0], force[1]))
     return tuple(places), tuple(vectors)
 
 
@@ -93,15 +102,9 @@ def energy_drawing(
     return Drawing(supports, forces)
 
 
-def _table(given: Any, keys: set[str], what: str) -> Mapping[str, Any]:
-    if not (isinstance(given, Mapping) and set(given) <= keys):
-        raise InputError(f"`{what}` must be a table of {', '.join(sorted(keys))}; got {given!r}.")
-    return given
-
-
 def _point(data: Mapping[str, Any], points: int, what: str) -> int:
     at = data.get("point")
-    if not (isinstance(at, int) and 0 <= at < points):
+    if not (type(at) is int and 0 <= at < points):
         raise InputError(
             f"`{what}.point` must be the number of a point of `draw`, counted from 0; got {at!r}."
         )

@@ -8,6 +8,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from equimorph.argument_kinds import Kind, is_listed, is_number
+from equimorph.argument_vocabulary import FINITE
 from equimorph.errors import InputError
 from equimorph.structures.energy.tape import casadi, instructions
 
@@ -17,6 +19,27 @@ FUNCTIONS = (
     "atanh", "exp", "log", "sqrt", "log1p", "expm1", "hypot", "erf", "fabs", "sign", "fmin",
     "fmax", "if_else",
 )  # fmt: skip
+
+
+def _is_graph(value: Any) -> bool:
+    return type(value).__module__.startswith("casadi")
+
+
+def _is_formula(value: Any) -> bool:
+    number = is_number(value) and FINITE.holds(value)
+    return isinstance(value, str) or number or _is_graph(value)
+
+
+FORMULA = Kind(
+    "a formula as text, a number or a casadi.SX expression", "formulas, as texts or numbers",
+    _is_formula,
+)  # fmt: skip
+POINT = Kind(
+    "two formulas [x, y]",
+    "points of two formulas [x, y]",
+    lambda value: is_listed(value) and len(value) == 2 and all(map(_is_formula, value)),
+)
+SYMBOLS = Kind("symbols of casadi.SX", "symbols of casadi.SX", _is_graph)
 _UNARY: dict[type, Callable[[Any], Any]] = {ast.UAdd: lambda a: a, ast.USub: lambda a: -a}
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: lambda a, b: a + b,

@@ -3,11 +3,12 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
@@ -15,14 +16,24 @@ from equimorph.model import Constraint, Descriptor, Drawing, position
 from equimorph.structures.contract import Direction, Growth, Majorant
 from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.energy.declared import (
+    Formula,
     Formulas,
+    ParameterSpec,
     Symbols,
+    UnknownSpec,
     data_of,
     parameters_of,
     unknowns_of,
 )
-from equimorph.structures.energy.drawing import energy_drawing, forces_of, marks_of
+from equimorph.structures.energy.drawing import (
+    DrawnForce,
+    DrawnSupport,
+    energy_drawing,
+    forces_of,
+    marks_of,
+)
 from equimorph.structures.energy.enclosures import can_enclose, enclosure
+from equimorph.structures.energy.expressions import POINT
 from equimorph.structures.energy.independence import DEPENDENT, SAMPLES, Independence
 from equimorph.structures.energy.leading_form import grows
 from equimorph.structures.energy.tape import Derivatives, Tape, casadi, tape
@@ -99,18 +110,19 @@ class EnergyStructure(DiscreteStructure):
 
     kind: ClassVar[str] = "energy"
 
+    @check_arguments
     def __init__(  # noqa: PLR0913  # what an energy can have
         self,
-        energy: Any,
-        unknowns: Any,
-        parameters: Iterable[Any],
+        energy: Formula,
+        unknowns: UnknownSpec | Sequence[UnknownSpec],
+        parameters: Iterable[ParameterSpec],
         *,
-        constraints: Sequence[Any] = (),
-        draw: Sequence[Sequence[Any]] = (),
-        supports: Sequence[Mapping[str, Any]] = (),
-        forces: Sequence[Mapping[str, Any]] = (),
-        descriptors: Mapping[str, Any] | None = None,
-        definitions: Mapping[str, Any] | None = None,
+        constraints: Sequence[Formula] = (),
+        draw: Sequence[Annotated[Sequence[Any], POINT]] = (),
+        supports: Sequence[DrawnSupport] = (),
+        forces: Sequence[DrawnForce] = (),
+        descriptors: Mapping[str, Formula] | None = None,
+        definitions: Mapping[str, Formula] | None = None,
         coercive: bool = False,
     ) -> None:
         self._unknowns, self.parameters = unknowns_of(unknowns), parameters_of(parameters)
@@ -118,7 +130,8 @@ class EnergyStructure(DiscreteStructure):
         self.mass = np.array([float(unknown.mass) for unknown in self._unknowns])
         natural = tuple(unknown.natural for unknown in self._unknowns)
         points = _points(draw)
-        self._coercive = _promise(coercive, self.constraints)
+        _check_promise(coercive, self.constraints)
+        self._coercive = coercive
         self._marks = marks_of(supports, len(points))
         self._loaded, pushes = forces_of(forces, len(points))
         given = Formulas(
@@ -324,6 +337,7 @@ class EnergyStructure(DiscreteStructure):
         """The first descriptor of the author, or else the first unknown."""
         return self.descriptor(next(iter((*self._given.descriptors, self._unknowns[0].name))))
 
+    @check_arguments
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written as its name, or as ``effort(name)`` of a parameter."""
         name = text.replace(" ", "")
@@ -354,23 +368,14 @@ class EnergyStructure(DiscreteStructure):
 
 def _points(draw: Sequence[Sequence[Any]]) -> tuple[tuple[Any, Any], ...]:
     """Points to draw: none, or at least two, of two coordinates each."""
-    points = []
-    for i, point in enumerate(draw):
-        pair = () if isinstance(point, str) else tuple(point)
-        if len(pair) != 2:
-            raise InputError(f"`draw[{i}]` must be two expressions [x, y]; got {point!r}.")
-        points.append((pair[0], pair[1]))
-    if len(points) == 1:
+    if len(draw) == 1:
         raise InputError("`draw` must have at least two points; got one.")
-    return tuple(points)
+    return tuple((point[0], point[1]) for point in draw)
 
 
-def _promise(coercive: Any, constraints: int) -> bool:
-    """Check the promise of growth."""
-    if not isinstance(coercive, bool):
-        raise InputError(f"`coercive` must be True or False; got {coercive!r}.")
+def _check_promise(coercive: bool, constraints: int) -> None:
+    """Refuse the promise of growth beside constraints."""
     if coercive and constraints:
         raise InputError(
             f"`coercive` must be False for energies with constraints; got {constraints} of them."
         )
-    return coercive

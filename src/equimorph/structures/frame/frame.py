@@ -1,14 +1,15 @@
 """The frame: rods between rigid or hinged joints, loads on them, rods that bend or lengthen."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.argument_vocabulary import count
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Drawing, Parameter
@@ -16,16 +17,20 @@ from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame import descriptors
 from equimorph.structures.frame.drawing import frame_drawing
 from equimorph.structures.frame.fields import FrameFields
-from equimorph.structures.frame.member import support_data
+from equimorph.structures.frame.member import MemberSpec, SupportSpec, support_data
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import FrameNetwork, frame_network
-from equimorph.structures.frame.patterns import Given, Patterns, patterns
+from equimorph.structures.frame.patterns import Actuators, Loads, Patterns, patterns
 from equimorph.structures.frame.symmetry import symmetries
-from equimorph.structures.network import direction_of_mechanism, length_limits
+from equimorph.structures.network import Joints, direction_of_mechanism, length_limits
 from equimorph.structures.rod.discretisation import Mesh, error_by_refinement, reference_element
-from equimorph.structures.unit_system import Quantity, unit_system
+from equimorph.structures.unit_system import Units, unit_system
 from equimorph.tolerances import SINGULAR
 
+SUPPORTS = (
+    "supports by joint: fixed, pinned, axes to hold (x, y or xy), or a table of x, y, angle to "
+    "'held' or a positive stiffness"
+)
 WALKED = 17
 """Places along a member where it is drawn."""
 
@@ -83,22 +88,19 @@ class Frame(FrameFields):
     0.49346
     """
 
+    @check_arguments
     def __init__(
         self,
-        joints: Mapping[str, Sequence[Quantity]],
-        members: Iterable[Any],
-        supports: Mapping[str, Any],
-        loads: Given | None = None,
-        actuators: Given | None = None,
+        joints: Joints,
+        members: Iterable[MemberSpec],
+        supports: Annotated[Mapping[str, SupportSpec], SUPPORTS],
+        loads: Loads | None = None,
+        actuators: Actuators | None = None,
         *,
-        elements: int = 2,
+        elements: Annotated[int, count(1, 1000)] = 2,
         degree: int = 8,
-        units: Mapping[str, Any] | None = None,
+        units: Units | None = None,
     ) -> None:
-        if not (isinstance(elements, int) and elements >= 1):
-            raise InputError(f"`elements` must be a whole number >= 1; got {elements!r}.")
-        if not (isinstance(degree, int) and 3 <= degree <= 16):
-            raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
         system = unit_system(units)
         made = frame_network(joints, members, supports, system)
         self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
@@ -270,6 +272,7 @@ class Frame(FrameFields):
         """The travel of the first load, or the turn of a joint."""
         return descriptors.elevation(self)
 
+    @check_arguments
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written like ``displacement(B,y)`` or ``moment(A-B,A)``."""
         return descriptors.descriptor_from_text(self, text)

@@ -2,13 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_checks import check_arguments
+from equimorph.argument_kinds import one_of
+from equimorph.argument_notes import TWO_NAMES, positive_quantity
 from equimorph.errors import InputError
-from equimorph.structures.unit_system import Quantity, UnitSystem, check_positive
+from equimorph.structures.network import built
+from equimorph.structures.unit_system import Quantity, UnitSystem
 
 QUANTITIES = {
     "EI": "force·length²",
@@ -21,6 +25,7 @@ SLENDER = 0.5
 """Largest radius of gyration √(EI/EA) of a member, relative to its length."""
 
 
+@check_arguments
 @dataclass(frozen=True)
 class Member:
     """An elastic rod between two joints, straight or a circular arc where it is free of stress.
@@ -44,7 +49,7 @@ class Member:
         Weight per length, for loads on "weight", or a text like "0.1 kg/m"; None: without.
     """
 
-    ends: Sequence[str]
+    ends: Annotated[Sequence[str], TWO_NAMES]
     EI: Quantity = 1.0
     EA: Quantity | None = None
     curvature: Quantity = 0.0
@@ -52,24 +57,9 @@ class Member:
     weight: Quantity | None = None
 
     def __post_init__(self) -> None:
-        """Check ends and numbers."""
-        two = not isinstance(self.ends, str) and len(self.ends) == 2
-        if not (two and all(isinstance(end, str) for end in self.ends)):
-            raise InputError(
-                f"`ends` of a member must be the names of two joints; got {self.ends!r}."
-            )
-        if self.ends[0] == self.ends[1]:
-            raise InputError(f"`ends` of a member must differ; got {self.ends[0]} twice.")
-        for name in ("EI", "EA", "weight"):
-            value = getattr(self, name)
-            if value is not None or name == "EI":
-                check_positive(value, name, f" of member {self.name}")
-        if not (isinstance(self.curvature, str) or _finite(self.curvature)):
-            raise InputError(
-                f"`curvature` of member {self.name} must be finite; got {self.curvature!r}."
-            )
-        fine = not isinstance(self.hinges, str) and all(end in self.ends for end in self.hinges)
-        if not fine or len(set(self.hinges)) < len(self.hinges):
+        """Check the hinges."""
+        strange = [end for end in self.hinges if end not in self.ends]
+        if strange or len(set(self.hinges)) < len(self.hinges):
             raise InputError(
                 f"`hinges` of member {self.name} must name one or both of its ends, each once; "
                 f"got {self.hinges!r}."
@@ -108,32 +98,37 @@ class Member:
         return {**given, "ends": list(self.ends), "hinges": list(self.hinges)}
 
 
-def _finite(value: Any) -> bool:
-    return isinstance(value, int | float) and bool(np.isfinite(value))
+MemberSpec = Annotated[
+    Member | Annotated[Sequence[str], TWO_NAMES] | Mapping[str, Any],
+    "members, pairs of different joints, or data of members",
+]
 
 
-def member_of(given: Any) -> Member:
+def member_of(given: MemberSpec) -> Member:
     """Member from a `Member`, its data, or the names of its ends."""
-    if isinstance(given, Member):
-        return given
-    data = given if isinstance(given, Mapping) else {"ends": given}
-    try:
-        return Member(**data)
-    except TypeError:
-        raise InputError(
-            "`members` must hold Members (ends, EI, EA, curvature, hinges, weight) or pairs of "
-            f"joints; got {given!r}."
-        ) from None
+    return built(Member, given, "members")
 
 
 AXES = ("x", "y", "angle")
+Stiffness = Annotated[float | str, positive_quantity]
 WORDS = {"fixed": AXES, "pinned": ("x", "y")}
 HELD = "held"
 SPRINGS = {"x": "force/length", "y": "force/length", "angle": "force·length"}
 """What the stiffnesses of springs measure."""
 
 
-def stiffnesses(joint: str, given: Any, system: UnitSystem) -> Float[np.ndarray, "3"]:
+SupportSpec = (
+    str
+    | Annotated[
+        Mapping[
+            Annotated[str, one_of("x", "y", "angle")], Annotated[str, one_of("held")] | Stiffness
+        ],
+        "tables",
+    ]
+)
+
+
+def stiffnesses(joint: str, given: SupportSpec, system: UnitSystem) -> Float[np.ndarray, "3"]:
     """Stiffness of a support against moves in x, in y and against turning; ∞ where it holds.
 
     Parameters
@@ -146,13 +141,15 @@ def stiffnesses(joint: str, given: Any, system: UnitSystem) -> Float[np.ndarray,
     system
         Units of the stiffnesses.
     """
-    table = given
-    if isinstance(given, str):
+    table: Mapping[str, Any] = {}
+    if not isinstance(given, str):
+        table = given
+    else:
         axes = WORDS.get(given, tuple(given))
         table = dict.fromkeys(axes, HELD)
         if len(table) < len(axes):
             table = {}
-    if not isinstance(table, Mapping) or not table or not set(table) <= set(AXES):
+    if not table or not set(table) <= set(AXES):
         raise InputError(
             f"`supports.{joint}` must be fixed, pinned, axes to hold (x, y or xy), or a table of "
             f"x, y, angle; got {given!r}."
@@ -161,9 +158,6 @@ def stiffnesses(joint: str, given: Any, system: UnitSystem) -> Float[np.ndarray,
     for axis, value in table.items():
         what = f"supports.{joint}.{axis}"
         stiff = np.inf if value == HELD else system.number(value, SPRINGS[axis], what)
-        spring = isinstance(stiff, int | float) and 0.0 < stiff < np.inf
-        if value != HELD and not spring:
-            raise InputError(f"`{what}` must be held or a positive stiffness; got {value!r}.")
         values[AXES.index(axis)] = stiff
     return values
 

@@ -1,16 +1,24 @@
 """The network of a frame: joints, members, hinges and supports."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.errors import InputError
-from equimorph.structures.frame.member import AXES, Member, member_of, stiffnesses
+from equimorph.structures.frame.member import (
+    AXES,
+    Member,
+    MemberSpec,
+    SupportSpec,
+    member_of,
+    stiffnesses,
+)
 from equimorph.structures.network import (
+    Joints,
     Network,
     ends_of_edges,
     places_of_joints,
@@ -57,7 +65,7 @@ class FrameNetwork(Network):
         found[self.ends[~self.hinged]] = True
         return found
 
-    def member(self, name: Any) -> tuple[int, float]:
+    def member(self, name: str) -> tuple[int, float]:
         """Place of a member in the list, and −1 if it is named from end to start, else 1."""
         return self.place_of_edge(name)
 
@@ -71,7 +79,7 @@ class FrameNetwork(Network):
             )
         return at, list(ends).index(joint)
 
-    def support_place(self, joint: Any, axis: Any) -> tuple[int, int]:
+    def support_place(self, joint: str, axis: str) -> tuple[int, int]:
         """Joint and axis (0, 1, 2) of a support."""
         if axis not in AXES:
             raise InputError(f"`axis` must be one of {', '.join(AXES)}; got {axis!r}.")
@@ -82,7 +90,10 @@ class FrameNetwork(Network):
 
 
 def frame_network(
-    joints: Any, members: Iterable[Any], supports: Any, system: UnitSystem
+    joints: Joints,
+    members: Iterable[MemberSpec],
+    supports: Mapping[str, SupportSpec],
+    system: UnitSystem,
 ) -> FrameNetwork:
     """Network from what a user gives, checked.
 

@@ -1,17 +1,31 @@
 """Effects of the parameters of a frame, loads and actuators, as arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from equimorph.argument_kinds import is_listed, is_number, one_of
 from equimorph.errors import InputError
 from equimorph.structures.frame.network import WEIGHT, FrameNetwork
-from equimorph.structures.network import check_parameter_names, items, numbers
+from equimorph.structures.network import check_parameter_names, vector
 
-Given = Mapping[str, Mapping[str, Any]]
+Loads = Annotated[
+    Mapping[str, Mapping[str, Sequence[float]]],
+    "forces or line loads of finite numbers by joint or member, by the name of the load, like "
+    "`{'F': {'B': (0, -1)}}`",
+]
+Effects = Mapping[
+    Annotated[str, one_of("curvature", "length", "move", "turn")],
+    Mapping[str, float | Sequence[float]],
+]
+Actuators = Annotated[
+    Mapping[str, Effects],
+    "effects of finite numbers (curvature, length, move, turn) by the name of the actuator, like "
+    "`{'a': {'curvature': {'A-B': 1.0}}}`",
+]
 KINDS = ("curvature", "length", "move", "turn")
 
 
@@ -78,7 +92,7 @@ class Patterns:
         return 1.0 / float(max(sizes))
 
 
-def patterns(made: FrameNetwork, actuators: Given, loads: Given) -> Patterns:
+def patterns(made: FrameNetwork, actuators: Actuators, loads: Loads) -> Patterns:
     """Patterns of all parameters, actuators first.
 
     Raises
@@ -97,29 +111,25 @@ def patterns(made: FrameNetwork, actuators: Given, loads: Given) -> Patterns:
     )  # fmt: skip
     for k, (name, given) in enumerate(actuators.items()):
         _fill_actuator(made, found, k, f"actuators.{name}", given)
-    for k, (name, given) in enumerate(loads.items(), len(actuators)):
-        _fill_load(made, found, k, f"loads.{name}", given)
+    for k, (name, forces) in enumerate(loads.items(), len(actuators)):
+        _fill_load(made, found, k, f"loads.{name}", forces)
     return found
 
 
 def _number(value: Any, what: str) -> float:
-    if not (isinstance(value, int | float) and np.isfinite(value) and value):
+    if not (is_number(value) and value):
         raise InputError(f"`{what}` must be a finite number other than 0; got {value!r}.")
     return float(value)
 
 
-def _fill_actuator(made: FrameNetwork, into: Patterns, k: int, what: str, given: Any) -> None:
-    pairs = list(items(given, what, f"effect ({', '.join(KINDS)})"))
-    if not pairs:
+def _fill_actuator(made: FrameNetwork, into: Patterns, k: int, what: str, given: Effects) -> None:
+    if not given:
         raise InputError(f"`{what}` must have an effect ({', '.join(KINDS)}); got none.")
-    for kind, table in pairs:
-        if kind not in KINDS:
-            raise InputError(f"`{what}` must have effects {', '.join(KINDS)}; got {kind!r}.")
+    for kind, table in given.items():
         where = f"{what}.{kind}"
-        entries = list(items(table, where, "member" if kind in KINDS[:2] else "joint"))
-        if not entries:
+        if not table:
             raise InputError(f"`{where}` must say where it acts; got an empty table.")
-        for name, value in entries:
+        for name, value in table.items():
             here = f"{where}.{name}"
             if kind == "move":
                 _fill_move(made, into, k, here, name, value)
@@ -134,35 +144,36 @@ def _fill_actuator(made: FrameNetwork, into: Patterns, k: int, what: str, given:
 def _fill_move(
     made: FrameNetwork, into: Patterns, k: int, what: str, name: Any, given: Any
 ) -> None:
-    vector = numbers(given, [2], what)
-    for axis, value in enumerate(vector):
+    move = vector(given if is_listed(given) else [given], [2], what)
+    for axis, value in enumerate(move):
         if value:
             into.moves[k, made.support_place(name, "xy"[axis])[0], axis] = value
-    if not any(vector):
+    if not any(move):
         raise InputError(f"`{what}` must not be zero; got {given!r}.")
 
 
-def _fill_load(made: FrameNetwork, into: Patterns, k: int, what: str, given: Any) -> None:
-    entries = list(items(given, what, f"joint, member, or {WEIGHT}"))
-    for name, value in entries:
+def _fill_load(
+    made: FrameNetwork, into: Patterns, k: int, what: str, given: Mapping[str, Sequence[float]]
+) -> None:
+    for name, value in given.items():
         here = f"{what}.{name}"
         if name == WEIGHT:
             weights = np.array([float(member.weight or 0.0) for member in made.members])
             if not weights.any():
                 raise InputError(f"`{here}` must act on members with a weight; got none that has.")
             into.factors[k] = True
-            into.lines[k] += weights[:, None] * np.array(numbers(value, [2], here))
+            into.lines[k] += weights[:, None] * np.array(vector(value, [2], here))
         elif name in made.joints:
-            vector = numbers(value, [2, 3], here)
+            force = vector(value, [2, 3], here)
             joint = made.joint(name)
-            into.forces[k, joint] = vector[:2]
-            into.couples[k, joint] = vector[2] if len(vector) == 3 else 0.0
+            into.forces[k, joint] = force[:2]
+            into.couples[k, joint] = force[2] if len(force) == 3 else 0.0
             if into.couples[k, joint] and not made.rigid[joint]:
                 raise InputError(
                     f"`{here}` must have no couple where every member is hinged; got {value!r}."
                 )
-        elif isinstance(name, str) and "-" in name:
-            into.lines[k, made.member(name)[0]] += numbers(value, [2], here)
+        elif "-" in name:
+            into.lines[k, made.member(name)[0]] += vector(value, [2], here)
         else:
             made.joint(name)
     _check_effect(made, into, k, what)

@@ -207,6 +207,7 @@ class Described(Measured):
                 found.append(f"the rod buckles out of its plane: eigenvalue {margin:.3g}")
         return tuple(found)
 
+    @check_arguments
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
         found = space.LATERAL.fullmatch(text)

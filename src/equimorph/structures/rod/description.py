@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,13 @@ from equimorph.errors import InputError, suggestion
 from equimorph.model import Parameter
 from equimorph.model.parameter import Role
 from equimorph.structures.rod.discretisation import mesh_with_kinks
-from equimorph.structures.rod.ends import End, check_supports, end, support_axes
+from equimorph.structures.rod.ends import HELD, End, EndSpec, check_supports, end, support_axes
 from equimorph.structures.rod.general import GeneralMechanics
 from equimorph.structures.rod.model import Build, RodModel, raw_model
-from equimorph.structures.rod.profiles import LoadShape, profile
-from equimorph.structures.rod.terms import Pressure, Term, term
+from equimorph.structures.rod.profiles import LoadShape, ProfileSpec, profile
+from equimorph.structures.rod.terms import Pressure, Term, Terms, term
 from equimorph.structures.rod.units import Units
 
-Terms = Mapping[str, Any]
 Matrix = Float[np.ndarray, "scalars others"]
 TURNING = {
     "Theta": {"theta_A": 1.0, "theta_B": -1.0},
@@ -28,6 +28,8 @@ TURNING = {
 }
 """Coordinates of the end angles of a rod that is held at both."""
 RESERVED = ("theta_A", "theta_B", "nu", "rise", "offset")
+SIDES = (attrgetter("first"), attrgetter("last"))
+"""How ends A and B are held along an axis."""
 CLOSEST = 1e-6
 """Shortest piece of a rod between kinks."""
 
@@ -36,10 +38,10 @@ CLOSEST = 1e-6
 class Description:
     """A general rod as its user describes it; see `Rod`."""
 
-    ends: Sequence[Any]
-    stiffness: Any
-    curvature: Any
-    axial: Any
+    ends: Sequence[EndSpec]
+    stiffness: ProfileSpec
+    curvature: ProfileSpec
+    axial: ProfileSpec | None
     loads: Terms
     actuators: Terms
     coordinates: Mapping[str, Mapping[str, float]] | None
@@ -53,9 +55,9 @@ class Description:
     @cached_property
     def supports(self) -> tuple[End, End]:
         """Both ends, checked."""
-        if isinstance(self.ends, str) or len(self.ends) != 2:
+        if len(self.ends) != 2:
             raise InputError(f"`ends` must be two ends, A and B; got {self.ends!r}.")
-        first, last = (end(spec, f"ends[{i}]") for i, spec in enumerate(self.ends))
+        first, last = (end(spec) for spec in self.ends)
         check_supports((first, last))
         return first, last
 
@@ -64,8 +66,6 @@ class Description:
         """Terms by the name of their amplitude, actuators first."""
         out: dict[str, tuple[Term, ...]] = {}
         for group, given in (("actuators", self.actuators), ("loads", self.loads)):
-            if not isinstance(given, Mapping):
-                raise InputError(f"`{group}` must map names to terms; got {given!r}.")
             for name, spec in given.items():
                 key = f"{group}.{name}"
                 if name in RESERVED or name in out or not name.isidentifier():
@@ -116,11 +116,19 @@ class Description:
         for name, terms in self.terms.items():
             if not any(isinstance(one, Pressure) for one in terms):
                 continue
-            if not all(end.x == end.y == "held" and end.slide is None for end in self.supports):
+            axes = support_axes(self.supports)
+            moves = [{at for at, axis in enumerate(axes) if each(axis) != HELD} for each in SIDES]
+            if max(map(len, moves)) > 1:
                 raise InputError(
-                    f"`ends` must hold x and y of both ends of a rod under the pressure `{name}`; "
-                    "got one that moves: where the chord moves, pressure is a follower load "
-                    "without a potential. Hold the ends, or use a dead line load."
+                    f"`ends` must leave each end of a rod under the pressure `{name}` one "
+                    "direction at most in which it moves; got one that moves in x and y, at which "
+                    "pressure is a follower load without a potential. Hold x or y, or use a dead "
+                    "line load."
+                )
+            if moves[0] & moves[1]:
+                raise InputError(
+                    f"`ends` must not both move along {'xy'[min(moves[0])]} on a rod under the "
+                    f"pressure `{name}`; got two that do. Hold one of them."
                 )
             if self.axial is not None:
                 raise InputError(
@@ -166,19 +174,17 @@ class Description:
         if given is None:
             return TURNING if both else {}
         for name, weights in given.items():
-            if not isinstance(weights, Mapping) or not weights:
+            if not name.isidentifier():
                 raise InputError(
-                    f"`coordinates.{name}` must map parameters to weights; got {weights!r}."
+                    f"`coordinates` must have names of letters, digits and _; got {name!r}."
                 )
-            for raw, weight in weights.items():
+            if not weights:
+                raise InputError(f"`coordinates.{name}` must combine parameters; got none.")
+            for raw in weights:
                 if raw not in self._raw:
                     raise InputError(
                         f"`coordinates.{name}` must combine {', '.join(self._raw)}; got {raw!r}."
                         f"{suggestion(raw, self._raw)}"
-                    )
-                if not (isinstance(weight, int | float) and np.isfinite(weight)):
-                    raise InputError(
-                        f"`coordinates.{name}.{raw}` must be a finite number; got {weight!r}."
                     )
         return {name: dict(weights) for name, weights in given.items()}
 

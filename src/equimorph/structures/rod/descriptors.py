@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.argument_vocabulary import SHARE
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Descriptor
@@ -27,14 +28,10 @@ _SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
 
 
 def check_arclength(s: float) -> float:
-    """Refuse what is no arclength."""
-    try:
-        value = float(s)
-    except (TypeError, ValueError):
-        value = np.nan
-    if not 0.0 <= value <= 1.0:
-        raise InputError(f"`s` must be an arclength between 0 and 1; got {s!r}.")
-    return value
+    """Refuse what is no arclength, in texts: numbers are checked before."""
+    if not 0.0 <= s <= 1.0:
+        raise InputError(f"`s` must be {SHARE.words}; got {s!r}.")
+    return float(s)
 
 
 def name_at(name: str, s: float) -> str:

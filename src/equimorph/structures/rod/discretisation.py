@@ -4,11 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
+from equimorph.argument_vocabulary import count
 from equimorph.arrays import Lanes, Values
 
 REFINING = 6
@@ -17,6 +19,10 @@ SOLVED = 1e-6
 """Last correction from which one more Newton step would be below round-off."""
 SAFETY = 2.0
 """The change to a finer mesh is an error less a much smaller one, taken at some places only."""
+
+
+ElementCount = Annotated[int, count(2, 10_000)]
+"""Elements of a rod: more would need matrices beyond any memory, and no rod needs them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,14 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
+from equimorph.argument_kinds import one_of
+from equimorph.argument_vocabulary import POSITIVE
 from equimorph.errors import InputError
 
-Holding = str | float
+Holding = Annotated[
+    Annotated[str, one_of("held", "free")] | Annotated[float, POSITIVE],
+    "'held', 'free' or the stiffness of a spring, a positive number",
+]
 HELD, FREE = "held", "free"
 WORDS: dict[str, tuple[Holding, Holding, Holding]] = {
     "clamped": (HELD, HELD, HELD),
@@ -44,30 +49,8 @@ class End:
     slide: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the words and stiffnesses."""
-        for name in ("angle", "x", "y"):
-            value = getattr(self, name)
-            if value in (HELD, FREE):
-                continue
-            number = np.nan
-            if isinstance(value, int | float) and not isinstance(value, bool):
-                number = float(value)
-            if not 0.0 < number < np.inf:
-                raise InputError(
-                    f"`{name}` of an end must be 'held', 'free' or the stiffness of a spring, a "
-                    f"positive number; got {value!r}."
-                )
-
-        if self.slide is not None:
-            self._check_slide(self.slide)
-
-    def _check_slide(self, slide: Any) -> None:
-        number = isinstance(slide, int | float) and not isinstance(slide, bool)
-        if not (number and -2.0 * np.pi <= slide <= 2.0 * np.pi):
-            raise InputError(
-                f"`slide` of an end must be a direction in radians, within ±2π; got {slide!r}."
-            )
-        if (self.x, self.y) != (HELD, HELD):
+        """Refuse a slide of an end that is not held across it."""
+        if self.slide is not None and (self.x, self.y) != (HELD, HELD):
             raise InputError(
                 "`slide` must be given to an end whose x and y are 'held': it says along which "
                 f"line they are not; got x = {self.x!r}, y = {self.y!r}."
@@ -88,24 +71,19 @@ class End:
         return words[0] if words else dict(zip(("angle", "x", "y"), parts, strict=True))
 
 
-def end(spec: Any, name: str) -> End:
-    """End of a word, of plain data, or the end itself.
+EndSpec = Annotated[
+    End
+    | Annotated[str, one_of("clamped", "pinned", "free", "sliding")]
+    | Mapping[Annotated[str, one_of("angle", "x", "y", "slide")], Any],
+    "ends: 'clamped', 'pinned', 'free', 'sliding', or an `End` or its data",
+]
 
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+
+def end(spec: EndSpec) -> End:
+    """End of a word, of plain data, or the end itself."""
     if isinstance(spec, End):
         return spec
-    if isinstance(spec, str) and spec in WORDS:
-        return End(*WORDS[spec])
-    if isinstance(spec, Mapping) and set(spec) <= {"angle", "x", "y", "slide"}:
-        return End(**spec)
-    raise InputError(
-        f"`{name}` must be one of {', '.join(map(repr, WORDS))}, or an End(angle, x, y, slide) of "
-        f"'held', 'free' and spring stiffnesses; got {spec!r}."
-    )
+    return End(*WORDS[spec]) if isinstance(spec, str) else End(**spec)
 
 
 @dataclass(frozen=True)

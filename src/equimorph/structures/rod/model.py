@@ -223,7 +223,9 @@ def raw_model(build: Build) -> RodModel:
         origin,
         from_start,
         pressure,
-        closing((_moves(axes, 0), _moves(axes, 1)), float(np.arctan2(*axes[0].unit[::-1]))),
+        closing(
+            (_moves(axes, 0), _moves(axes, 1)), float(np.arctan2(axes[0].unit[1], axes[0].unit[0]))
+        ),
     )
 
 

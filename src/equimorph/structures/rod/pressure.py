@@ -128,7 +128,7 @@ class EnclosedArea:
         )
 
         def along(row: Float[np.ndarray, "2 lanes nodes"]) -> Float[np.ndarray, "2 lanes 1"]:
-            return np.einsum("ab,bl->al", self.closing, row.sum(axis=2))[:, :, None]
+            return np.asarray(np.einsum("ab,bl->al", self.closing, row.sum(axis=2))[:, :, None])
 
         total = third * v * w * self._closed(theta) + bend * v * along(slope * w)
         total = total + bend * w * along(slope * v) + slope * along(bend * v * w)

@@ -16,21 +16,27 @@ from equimorph.structures.rod import descriptors
 from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.described import Described
 from equimorph.structures.rod.description import Description
-from equimorph.structures.rod.discretisation import mesh_with_kinks
+from equimorph.structures.rod.discretisation import ElementCount, mesh_with_kinks
 from equimorph.structures.rod.drawing import Amplitudes, rod_drawing
-from equimorph.structures.rod.ends import End
+from equimorph.structures.rod.ends import End, EndSpec
 from equimorph.structures.rod.general import GeneralMechanics
 from equimorph.structures.rod.mechanics import Mechanics
 from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch, natural_rod
-from equimorph.structures.rod.profiles import LoadShape, LoadSpec, load_shape
-from equimorph.structures.rod.sections import SectionProperties, cross_section
+from equimorph.structures.rod.profiles import (
+    LoadShape,
+    LoadSpec,
+    MeasuredProfile,
+    ProfileSpec,
+    load_shape,
+)
+from equimorph.structures.rod.sections import CrossSection, SectionProperties, cross_section
 from equimorph.structures.rod.space import check_terms
 from equimorph.structures.rod.space_options import SpaceOptions
-from equimorph.structures.rod.terms import LineLoad, Term
+from equimorph.structures.rod.terms import LineLoad, Term, Terms
 from equimorph.structures.rod.units import rod_units
 from equimorph.structures.states import State, States
-from equimorph.structures.unit_system import Quantity, unit_system
+from equimorph.structures.unit_system import Quantity, Units, unit_system
 
 DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")
@@ -152,33 +158,30 @@ class Rod(Described):
     kind: ClassVar[str] = "rod"
     endless_in: ClassVar[str] = "max_curvature"
 
+    @check_arguments
     def __init__(  # noqa: PLR0913  # what a rod can have
         self,
         load: LoadSpec | None = None,
         span: Quantity | None = None,
         *,
         kinks: Sequence[float] = (),
-        elements: int = 6,
+        elements: ElementCount = 6,
         degree: int = 9,
-        ends: Sequence[Any] = CLAMPED,
-        stiffness: Any = 1.0,
-        curvature: Any = 0.0,
-        axial: Any = None,
-        loads: Mapping[str, Any] | None = None,
-        actuators: Mapping[str, Any] | None = None,
+        ends: Sequence[EndSpec] = CLAMPED,
+        stiffness: ProfileSpec = 1.0,
+        curvature: MeasuredProfile = 0.0,
+        axial: MeasuredProfile | None = None,
+        loads: Terms | None = None,
+        actuators: Terms | None = None,
         coordinates: Mapping[str, Mapping[str, float]] | None = None,
         rise: Quantity = 0.0,
         EI: Quantity | None = None,
         length: Quantity | None = None,
-        units: Mapping[str, Any] | None = None,
-        torsion: Any = None,
-        lateral: Any = None,
-        section: Any = None,
+        units: Units | None = None,
+        torsion: MeasuredProfile | None = None,
+        lateral: MeasuredProfile | None = None,
+        section: CrossSection | Mapping[str, Any] | None = None,
     ) -> None:
-        if not (isinstance(elements, int) and elements >= 2):
-            raise InputError(f"`elements` must be a whole number >= 2; got {elements!r}.")
-        if not (isinstance(degree, int) and 3 <= degree <= 16):
-            raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
         system = unit_system(units)
         made = None if section is None else cross_section(section)
         self._space = SpaceOptions(torsion, lateral, made).check(EI, length)
@@ -187,28 +190,29 @@ class Rod(Described):
         self.lateral_stiffness = self._space.stiffness(self.units, kinks)
         breaks = [] if self.lateral_stiffness is None else self.lateral_stiffness.breaks
         number = self.units.number
-        axial = number(axial, "force", "axial")
-        curvature = number(curvature, "1/length", "curvature")
+        stretched: ProfileSpec | None = number(axial, "force", "axial")
+        curved: ProfileSpec = number(curvature, "1/length", "curvature")
         self._resolution, self._breaks = (elements, degree), breaks
         shape = "uniform" if load is None and loads is None else load
         self._load = None if shape is None else load_shape(shape, kinks)
         self._general: Description | None = None
-        options = (axial is not None, loads is not None, actuators, coordinates is not None, rise)
+        given = (stretched, loads, coordinates)
+        options = (*(each is not None for each in given), actuators, rise)
         arch = self._load is not None and tuple(ends) == CLAMPED and self.units.plain
-        if self._load is not None and arch and _all_default(stiffness, curvature, *options):
+        if self._load is not None and arch and _all_default(stiffness, curved, *options):
             self._become_arch(
                 self._load, DEFAULT_SPAN if span is None else number(span, "length", "span")
             )
         else:
             own = {} if shape is None else {"q": LineLoad(shape, kinks=kinks)}
-            given = (span, length)
+            written = (span, length)
             span = DEFAULT_SPAN * self.units.value("length") if span is None else span
             self._general = Description(
-                ends, stiffness, curvature, axial, {**own, **(loads or {})}, actuators or {},
+                ends, stiffness, curved, stretched, {**own, **(loads or {})}, actuators or {},
                 coordinates, number(span, "length", "span"), number(rise, "length", "rise"),
                 kinks, self.units, breaks,
             )  # fmt: skip
-            self._general.check_span(*given)
+            self._general.check_span(*written)
             self._become_general(self._general)
         if self.has_lateral_stiffness:
             check_terms(self.terms)
@@ -236,10 +240,7 @@ class Rod(Described):
 
     @staticmethod
     def _checked_span(span: float) -> float:
-        try:
-            value = float(span)
-        except (TypeError, ValueError):
-            value = np.nan
+        value = float(span)
         if not 0.0 < value < 1.0:
             raise InputError(
                 f"`span` must lie between 0 and 1 (both excluded), the rod has length 1; "

@@ -3,18 +3,21 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from equimorph.argument_checks import check_arguments
+from equimorph.argument_vocabulary import Range
 from equimorph.errors import InputError, suggestion
 from equimorph.structures.rod.units import SI
-from equimorph.structures.unit_system import Quantity, UnitSystem, check_positive, unit_system
+from equimorph.structures.unit_system import Quantity, Units, UnitSystem, unit_system
 
 SERIES = 2.0 * np.arange(500) + 1.0
 """Odd numbers of the torsion series: what follows them is 1e-13 of the whole."""
 
 
+@check_arguments
 @dataclass(frozen=True)
 class SectionProperties:
     """What a rod needs of its cross-section, as numbers in one system of units.
@@ -55,7 +58,8 @@ class CrossSection(ABC):
 
     word: ClassVar[str]
 
-    def properties(self, units: Any = None) -> SectionProperties:
+    @check_arguments
+    def properties(self, units: Units | None = None) -> SectionProperties:
         """Stiffnesses and weight in a system of units like ``{"force": "N", "length": "mm"}``.
 
         Parameters
@@ -68,7 +72,10 @@ class CrossSection(ABC):
         InputError
             For units of other quantities.
         """
-        system = unit_system(units)
+        return self.in_system(unit_system(units))
+
+    def in_system(self, system: UnitSystem) -> SectionProperties:
+        """`properties` in a system of units; SI if it names none."""
         return self._in(SI if system.plain else system)
 
     @abstractmethod
@@ -81,32 +88,22 @@ class CrossSection(ABC):
         given = {name: getattr(self, name) for name in names}
         return {"kind": self.word, **{name: x for name, x in given.items() if x is not None}}
 
-    def _check(self, *names: str) -> None:
-        """Refuse quantities that are neither positive nor left out."""
-        for name in names:
-            if getattr(self, name) is not None:
-                check_positive(getattr(self, name), name, f" of the {self.word}")
-
     def _number(self, name: str, quantity: str, system: UnitSystem) -> Any:
         return system.number(getattr(self, name), quantity, f"{name} of the {self.word}")
+
+
+PoissonRatio = Annotated[
+    float,
+    Range(-1.0, 0.5, "Poisson's ratio, above -1 and at most 0.5", "Poisson's ratios", above=True),
+]
 
 
 class _Shape(CrossSection):
     """A section of one isotropic material."""
 
     E: Quantity
-    nu: float
+    nu: PoissonRatio
     density: Quantity | None
-
-    def _check_material(self) -> None:
-        """Check Young's modulus, Poisson's ratio and the density."""
-        number = isinstance(self.nu, int | float) and not isinstance(self.nu, bool)
-        if not (number and -1.0 < self.nu <= 0.5):
-            raise InputError(
-                f"`nu` of the {self.word} must be Poisson's ratio, above -1 and at most 0.5; got "
-                f"{self.nu!r}."
-            )
-        self._check("E", "density")
 
     def _stiffnesses(
         self, area: float, second: tuple[float, float], torsion: float, system: UnitSystem
@@ -122,6 +119,7 @@ class _Shape(CrossSection):
         return SectionProperties(*stiff, heavy)
 
 
+@check_arguments
 @dataclass(frozen=True)
 class Strip(_Shape):
     """A rectangular strip that bends over its thickness: A = (width/thickness)².
@@ -159,14 +157,9 @@ class Strip(_Shape):
     width: Quantity
     thickness: Quantity
     E: Quantity
-    nu: float
+    nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "strip"
-
-    def __post_init__(self) -> None:
-        """Check that all is positive."""
-        self._check("width", "thickness")
-        self._check_material()
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         w, t = (self._number(name, "length", system) for name in ("width", "thickness"))
@@ -193,6 +186,7 @@ def torsion_constant(width: float, thickness: float) -> float:
     return float(a * b**3 / 3.0 * (1.0 - 192.0 * b / (np.pi**5 * a) * series))
 
 
+@check_arguments
 @dataclass(frozen=True)
 class Tube(_Shape):
     """A circular tube; arguments besides these as of `Strip`.
@@ -218,14 +212,9 @@ class Tube(_Shape):
     diameter: Quantity
     wall: Quantity
     E: Quantity
-    nu: float
+    nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "tube"
-
-    def __post_init__(self) -> None:
-        """Check that all is positive."""
-        self._check("diameter", "wall")
-        self._check_material()
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         d, wall = (self._number(name, "length", system) for name in ("diameter", "wall"))
@@ -240,6 +229,7 @@ class Tube(_Shape):
         return self._stiffnesses(area, (second, second), 2.0 * second, system)
 
 
+@check_arguments
 @dataclass(frozen=True)
 class Round(_Shape):
     """A solid circular rod: A = 1, C = 1/(1 + ν); arguments besides `diameter` as of `Strip`.
@@ -253,14 +243,9 @@ class Round(_Shape):
 
     diameter: Quantity
     E: Quantity
-    nu: float
+    nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "round"
-
-    def __post_init__(self) -> None:
-        """Check that all is positive."""
-        self._check("diameter")
-        self._check_material()
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         d = self._number("diameter", "length", system)
@@ -268,6 +253,7 @@ class Round(_Shape):
         return self._stiffnesses(np.pi / 4.0 * d**2, (second, second), 2.0 * second, system)
 
 
+@check_arguments
 @dataclass(frozen=True)
 class OwnSection(CrossSection):
     """A cross-section whose stiffnesses are known, from tests or another program.
@@ -293,10 +279,6 @@ class OwnSection(CrossSection):
     EA: Quantity | None = None
     weight: Quantity | None = None
     word: ClassVar[str] = "own section"
-
-    def __post_init__(self) -> None:
-        """Check that all is positive."""
-        self._check("EI", "EI_out", "GJ", "EA", "weight")
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         stiff = [self._number(name, "force·length²", system) for name in ("EI", "EI_out", "GJ")]

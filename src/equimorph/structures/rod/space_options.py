@@ -50,11 +50,11 @@ class SpaceOptions:
         """EI of the section, if there is one."""
         if self.section is None:
             return EI
-        return self.section.properties(system).EI
+        return self.section.in_system(system).EI
 
     def properties(self, units: Units) -> SectionProperties | None:
         """Those of the section, in the rod's units."""
-        return None if self.section is None else self.section.properties(units.system)
+        return None if self.section is None else self.section.in_system(units.system)
 
     def stiffness(self, units: Units, kinks: Sequence[float]) -> LateralStiffness | None:
         """Torsional and lateral stiffness relative to that in the plane; None if not given."""

@@ -3,15 +3,24 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.argument_notes import LOAD_DIRECTION
 from equimorph.errors import InputError
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.profiles import LoadShape, at_nodes, inside, load_shape, profile
+from equimorph.structures.rod.profiles import (
+    LoadShape,
+    LoadSpec,
+    ProfileSpec,
+    at_nodes,
+    inside,
+    load_shape,
+    profile,
+)
 
 ElementNodes = Float[np.ndarray, "elements order"]
 DOWN = (0.0, -1.0)
@@ -20,46 +29,17 @@ SPATIAL = ("about", "binormal")
 """Fields of terms that differ from their defaults on rods in space only."""
 
 
-def _arclength(value: Any, name: str) -> float:
-    try:
-        s = float(value)
-    except (TypeError, ValueError):
-        s = np.nan
-    if not 0.0 <= s <= 1.0:
-        raise InputError(
-            f"`{name}` must be a share of the rod's length, from 0 to 1; got {value!r}."
-        )
-    return s
-
-
-def _stretch(start: Any, stop: Any) -> tuple[float, float]:
-    first, last = _arclength(start, "start"), _arclength(stop, "stop")
-    if not first < last:
+def _check_stretch(start: float, stop: float) -> None:
+    if not start < stop:
         raise InputError(f"`start` must be less than `stop`; got {start!r} and {stop!r}.")
-    return first, last
 
 
-def _direction(value: Any) -> tuple[float, float, float]:
-    """Direction (x, y, z) of two or three numbers."""
-    try:
-        parts = [float(component) for component in value]
-    except (TypeError, ValueError):
-        parts = []
-    if len(parts) not in (2, 3) or not np.isfinite(parts).all() or not any(parts):
-        raise InputError(
-            "`direction` must be two numbers (x, y), not both 0, or for a rod in space three "
-            f"(x, y, z); got {value!r}."
-        )
-    x, y, *z = parts
-    return x, y, z[0] if z else 0.0
-
-
-def _in_plane(value: Any) -> tuple[float, float]:
+def _in_plane(direction: Sequence[float]) -> tuple[float, float]:
     """Direction (x, y) of a load on a planar rod."""
-    x, y, z = _direction(value)
-    if z != 0.0:
+    x, y, *z = map(float, direction)
+    if any(z):
         raise InputError(
-            f"`direction` must lie in the plane of the rod, z = 0; got {value!r}. Loads across "
+            f"`direction` must lie in the plane of the rod, z = 0; got {direction!r}. Loads across "
             "the plane need a `SpatialRod`."
         )
     return x, y
@@ -149,15 +129,14 @@ class LineLoad(Term):
         Arclengths where a callable is not smooth.
     """
 
-    shape: Any = "uniform"
-    direction: Sequence[float] = DOWN
+    shape: LoadSpec = "uniform"
+    direction: Annotated[Sequence[float], LOAD_DIRECTION] = DOWN
     kinks: Sequence[float] = ()
     word: ClassVar[str] = "line load"
     measure: ClassVar[str] = "line"
 
     def __post_init__(self) -> None:
-        """Check shape and direction."""
-        _direction(self.direction)
+        """Check the shape."""
         self.density()
 
     def density(self) -> LoadShape:
@@ -192,14 +171,9 @@ class PointForce(Term):
     """
 
     s: float
-    direction: Sequence[float] = DOWN
+    direction: Annotated[Sequence[float], LOAD_DIRECTION] = DOWN
     word: ClassVar[str] = "point force"
     measure: ClassVar[str] = "force"
-
-    def __post_init__(self) -> None:
-        """Check place and direction."""
-        _arclength(self.s, "s")
-        _direction(self.direction)
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -221,10 +195,6 @@ class Couple(Term):
     s: float
     word: ClassVar[str] = "couple"
     measure: ClassVar[str] = "couple"
-
-    def __post_init__(self) -> None:
-        """Check the place."""
-        _arclength(self.s, "s")
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -254,7 +224,7 @@ class Curvature(Term):
         in space also "n", out of the plane, or "t", as an intrinsic twist.
     """
 
-    pattern: Any = 1.0
+    pattern: ProfileSpec = 1.0
     start: float = 0.0
     stop: float = 1.0
     kinks: Sequence[float] = ()
@@ -263,11 +233,9 @@ class Curvature(Term):
     measure: ClassVar[str] = "curvature"
 
     def __post_init__(self) -> None:
-        """Check pattern, stretch and axis."""
-        _stretch(self.start, self.stop)
+        """Check pattern and stretch."""
+        _check_stretch(self.start, self.stop)
         self.profile()
-        if self.about not in ("t", "n", "b"):
-            raise InputError(f"`about` must be 't', 'n' or 'b'; got {self.about!r}.")
 
     def profile(self) -> LoadShape:
         """Its pattern."""
@@ -309,7 +277,7 @@ class Tendon(Term):
         Offset along the binormal, of a cable on a rod in space.
     """
 
-    offset: Any
+    offset: ProfileSpec
     start: float = 0.0
     stop: float = 1.0
     kinks: Sequence[float] = ()
@@ -319,7 +287,7 @@ class Tendon(Term):
 
     def __post_init__(self) -> None:
         """Check offsets and stretch."""
-        _stretch(self.start, self.stop)
+        _check_stretch(self.start, self.stop)
         self.profiles()
 
     def profiles(self) -> tuple[LoadShape, LoadShape]:
@@ -345,13 +313,17 @@ class Tendon(Term):
         return Effects(bending=there * offset, tension=along, torsion=there * offset**2)
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Pressure(Term):
-    """Pressure all along a rod between two held ends, as of a gas in the chamber that it closes.
+    """Pressure all along a rod, as of a gas in the chamber that it closes.
 
     The amplitude is a force per arclength, normal to the rod wherever it turns, towards its left
-    (upward on an arch from A to B) if positive. Its potential is −p times the area between the
-    rod and its chord: conservative, as both ends of the rod stay where they are.
+    (upward on an arch from A to B) if positive. Between held ends its potential is −p times the
+    area V between the rod and its chord. Each end may also move along a line, free or on a spring:
+    pressure then has the potential −p (V ± ½ X Y), with the chord's components X and Y along and
+    across the line (`closing` in `structures/rod/pressure.py` derives it). An end that moves in x
+    and y makes pressure a follower load without a potential, which `Rod` refuses.
     """
 
     word: ClassVar[str] = "pressure"
@@ -367,6 +339,14 @@ class Pressure(Term):
         return Effects(pressure=1.0)
 
 
+TermSpec = Annotated[
+    Term | Mapping[str, Any],
+    'a term, like `PointForce(1.0)`, or its data, like `{"term": "couple", "s": 0.5}`',
+]
+Terms = Annotated[
+    Mapping[str, TermSpec | Sequence[TermSpec]],
+    'terms, or lists of terms, by name, like `{"P": PointForce(1.0)}`',
+]
 TERMS: dict[str, type[Term]] = {
     kind.word: kind for kind in (LineLoad, PointForce, Couple, Curvature, Tendon, Pressure)
 }

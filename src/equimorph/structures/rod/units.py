@@ -56,9 +56,6 @@ class Units:
                 raise InputError(
                     f"`{name}` must be given together with `{other}`; got {other} alone."
                 )
-            number = float(value) if isinstance(value, int | float) else np.nan
-            if not 0.0 < number < np.inf:
-                raise InputError(f"`{name}` must be a positive number; got {value!r}.")
 
     @property
     def plain(self) -> bool:

@@ -11,10 +11,11 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters
-from equimorph.structures.rod.profiles import LoadSpec, load_shape
-from equimorph.structures.rod.sections import SectionProperties, cross_section
+from equimorph.structures.rod.discretisation import ElementCount
+from equimorph.structures.rod.profiles import LoadSpec, MeasuredProfile, ProfileSpec, load_shape
+from equimorph.structures.rod.sections import CrossSection, SectionProperties, cross_section
 from equimorph.structures.rod.space_options import SpaceOptions
-from equimorph.structures.rod.terms import LineLoad, Term
+from equimorph.structures.rod.terms import LineLoad, Term, Terms
 from equimorph.structures.rod.units import rod_units
 from equimorph.structures.spatial.described import DescribedInSpace
 from equimorph.structures.spatial.description import SpatialDescription
@@ -26,7 +27,7 @@ from equimorph.structures.spatial.model import raw_model
 from equimorph.structures.spatial.natural import natural_states
 from equimorph.structures.spatial.planar import planar_guess
 from equimorph.structures.states import State, States
-from equimorph.structures.unit_system import Quantity, unit_system
+from equimorph.structures.unit_system import Quantity, Units, unit_system
 
 DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")
@@ -124,37 +125,34 @@ class SpatialRod(DescribedInSpace):
     kind: ClassVar[str] = "spatial rod"
     endless_in: ClassVar[str] = "max_curvature"
 
+    @check_arguments
     def __init__(  # noqa: PLR0913  # what a rod can have
         self,
         load: LoadSpec | None = None,
         span: Quantity | None = None,
         *,
-        torsion: Any = None,
-        lateral: Any = None,
-        section: Any = None,
+        torsion: MeasuredProfile | None = None,
+        lateral: MeasuredProfile | None = None,
+        section: CrossSection | Mapping[str, Any] | None = None,
         ends: Sequence[Any] = CLAMPED,
-        stiffness: Any = 1.0,
-        curvature: Any = 0.0,
-        side_curvature: Any = 0.0,
-        natural_twist: Any = 0.0,
-        axial: Any = None,
-        shear: Any = None,
-        loads: Mapping[str, Any] | None = None,
-        actuators: Mapping[str, Any] | None = None,
+        stiffness: ProfileSpec = 1.0,
+        curvature: MeasuredProfile = 0.0,
+        side_curvature: MeasuredProfile = 0.0,
+        natural_twist: MeasuredProfile = 0.0,
+        axial: MeasuredProfile | None = None,
+        shear: MeasuredProfile | None = None,
+        loads: Terms | None = None,
+        actuators: Terms | None = None,
         coordinates: Mapping[str, Mapping[str, float]] | None = None,
         rise: Quantity = 0.0,
         sideways: Quantity = 0.0,
         kinks: Sequence[float] = (),
-        elements: int = 6,
+        elements: ElementCount = 6,
         degree: int = 6,
         EI: Quantity | None = None,
         length: Quantity | None = None,
-        units: Mapping[str, Any] | None = None,
+        units: Units | None = None,
     ) -> None:
-        if not (isinstance(elements, int) and elements >= 2):
-            raise InputError(f"`elements` must be a whole number >= 2; got {elements!r}.")
-        if not (isinstance(degree, int) and 3 <= degree <= 16):
-            raise InputError(f"`degree` must be a whole number from 3 to 16; got {degree!r}.")
         system = unit_system(units)
         made = None if section is None else cross_section(section)
         self._space = SpaceOptions(torsion, lateral, made).check(EI, length)

@@ -2,18 +2,21 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.errors import InputError
-from equimorph.structures.unit_system import Quantity, UnitSystem, check_positive
+from equimorph.argument_checks import check_arguments
+from equimorph.argument_notes import TWO_NAMES
+from equimorph.structures.network import built
+from equimorph.structures.unit_system import Quantity, UnitSystem
 
 QUANTITIES = {"EA": "force", "EI": "force·length²", "rest": "length"}
 """What each number of a bar measures."""
 
 
+@check_arguments
 @dataclass(frozen=True)
 class Bar:
     """A straight bar between two joints, which it does not bend.
@@ -32,22 +35,10 @@ class Bar:
         Length at which it is free of stress; None for the distance of its joints.
     """
 
-    ends: Sequence[str]
+    ends: Annotated[Sequence[str], TWO_NAMES]
     EA: Quantity = 1.0
     EI: Quantity | None = None
     rest: Quantity | None = None
-
-    def __post_init__(self) -> None:
-        """Check ends and numbers."""
-        two = not isinstance(self.ends, str) and len(self.ends) == 2
-        if not (two and all(isinstance(end, str) for end in self.ends)):
-            raise InputError(f"`ends` of a bar must be the names of two joints; got {self.ends!r}.")
-        if self.ends[0] == self.ends[1]:
-            raise InputError(f"`ends` of a bar must differ; got {self.ends[0]} twice.")
-        for name in QUANTITIES:
-            value = getattr(self, name)
-            if value is not None or name == "EA":
-                check_positive(value, name, f" of bar {self.name}")
 
     @property
     def name(self) -> str:
@@ -64,17 +55,15 @@ class Bar:
         return {**given, "ends": list(self.ends)}
 
 
-def bar_of(given: Any) -> Bar:
+BarSpec = Annotated[
+    Bar | Annotated[Sequence[str], TWO_NAMES] | Mapping[str, Any],
+    "bars, pairs of different joints, or data of bars",
+]
+
+
+def bar_of(given: BarSpec) -> Bar:
     """Bar from a `Bar`, its data, or the names of its ends."""
-    if isinstance(given, Bar):
-        return given
-    data = given if isinstance(given, Mapping) else {"ends": given}
-    try:
-        return Bar(**data)
-    except TypeError:
-        raise InputError(
-            f"`bars` must hold Bars (ends, EA, EI, rest) or pairs of joints; got {given!r}."
-        ) from None
+    return built(Bar, given, "bars")
 
 
 Strain = Literal["engineering", "green"]

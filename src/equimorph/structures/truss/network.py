@@ -1,23 +1,23 @@
 """The network of a truss: joints, bars and supports, and what can move."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.errors import InputError
 from equimorph.structures.network import (
+    Joints,
     Network,
     ends_of_edges,
-    items,
-    numbers,
     places_of_joints,
     supported_joints,
+    vector,
 )
-from equimorph.structures.truss.bar import Bar, bar_of
+from equimorph.structures.truss.bar import Bar, BarSpec, bar_of
 from equimorph.structures.unit_system import UnitSystem
 
 AXES = "xyz"
@@ -73,25 +73,27 @@ class TrussNetwork(Network):
             ]
         )
 
-    def bar(self, name: Any) -> int:
+    def bar(self, name: str) -> int:
         """Place of a bar in the list, whichever end is named first."""
         return self.place_of_edge(name)[0]
 
-    def move(self, joint: Any, axis: Any) -> int:
+    def move(self, joint: str, axis: str) -> int:
         """Number of the unknown of a joint along an axis."""
         axes = AXES[: self.space]
-        if not (isinstance(axis, str) and len(axis) == 1 and axis in axes):
+        if not (len(axis) == 1 and axis in axes):
             raise InputError(f"`axis` must be one of {', '.join(axes)}; got {axis!r}.")
         unknown = int(self.unknowns[self.joint(joint), axes.index(axis)])
         if unknown < 0:
             raise InputError(f"`{joint}.{axis}` must be free to move; it is held by a support.")
         return unknown
 
-    def vector(self, forces: Any, what: str) -> Float[np.ndarray, " unknowns"]:
+    def vector(
+        self, forces: Mapping[str, Sequence[float]], what: str
+    ) -> Float[np.ndarray, " unknowns"]:
         """Nodal vectors by joint as one vector of the unknowns."""
         total = np.zeros(self.held.shape)
-        for joint, given in items(forces, what, "joint"):
-            total[self.joint(joint)] = numbers(given, [self.space], f"{what} on {joint}")
+        for joint, given in forces.items():
+            total[self.joint(joint)] = vector(given, [self.space], f"{what} on {joint}")
         free = total[~self.held]
         if not free.any():
             raise InputError(f"`{what}` must act on a joint that is free to move; got {forces!r}.")
@@ -99,7 +101,7 @@ class TrussNetwork(Network):
 
 
 def truss_network(
-    joints: Any, bars: Iterable[Any], supports: Any, system: UnitSystem
+    joints: Joints, bars: Iterable[BarSpec], supports: Mapping[str, str], system: UnitSystem
 ) -> TrussNetwork:
     """Network from what a user gives, checked.
 
@@ -121,10 +123,9 @@ def truss_network(
     return result
 
 
-def _held_axes(joint: str, axes: Any, space: int) -> list[int]:
+def _held_axes(joint: str, axes: str, space: int) -> list[int]:
     known = AXES[:space]
-    fine = isinstance(axes, str) and axes and set(axes) <= set(known)
-    if not fine or len(set(axes)) < len(axes):
+    if not axes or not set(axes) <= set(known) or len(set(axes)) < len(axes):
         raise InputError(
             f"`supports.{joint}` must hold axes among {known}, each once; got {axes!r}."
         )

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, get_args
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -15,18 +15,28 @@ from equimorph.model import Constraint, Descriptor, Parameter
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.network import (
+    Joints,
     check_parameter_names,
     direction_of_mechanism,
     length_limits,
 )
 from equimorph.structures.truss import descriptors
-from equimorph.structures.truss.bar import Energies, Strain
+from equimorph.structures.truss.bar import BarSpec, Energies, Strain
 from equimorph.structures.truss.mechanics import COLLAPSED, TrussMechanics, symmetries
 from equimorph.structures.truss.network import AXES, TrussNetwork, truss_network
-from equimorph.structures.unit_system import Quantity, unit_system
+from equimorph.structures.unit_system import Units, unit_system
 from equimorph.tolerances import SINGULAR
 
-Patterns = Mapping[str, Mapping[str, Any]]
+Forces = Annotated[
+    Mapping[str, Mapping[str, Sequence[float]]],
+    "forces of finite numbers by joint, by the name of the load, like `{'F': {'B': (0, -1)}}`",
+]
+Rates = Annotated[
+    Mapping[str, Mapping[str, float]],
+    "finite rates by bar, by the name of the actuator, like `{'a': {'A-B': 1.0}}`",
+]
+
+AXES_BY_JOINT = "held axes by joint, like `{'A': 'xy'}`"
 
 TINY = 1e-300
 """In place of zero in denominators."""
@@ -74,29 +84,24 @@ class Truss(TrussMechanics):
     Examples
     --------
     >>> from equimorph import Truss
-    >>> arch = Truss({"A": (-1, 0), "B": (0, 0.1), "C": (1, 0)}, ["AB", "BC"],
-    ...     {"A": "xy", "C": "xy"}, {"F": {"B": (0, -1)}})
-    Traceback (most recent call last):
-    equimorph.errors.InputError: `ends` of a bar must be the names of two joints; got 'AB'.
     >>> arch = Truss({"A": (-1, 0), "B": (0, 0.1), "C": (1, 0)}, [("A", "B"), ("B", "C")],
     ...     {"A": "xy", "C": "xy"}, {"F": {"B": (0, -1)}})
     >>> arch.natural_state()
     State(truss: F=0; index 0)
     """
 
+    @check_arguments
     def __init__(
         self,
-        joints: Mapping[str, Sequence[Quantity]],
-        bars: Iterable[Any],
-        supports: Mapping[str, str],
-        loads: Patterns | None = None,
-        actuators: Patterns | None = None,
+        joints: Joints,
+        bars: Iterable[BarSpec],
+        supports: Annotated[Mapping[str, str], AXES_BY_JOINT],
+        loads: Forces | None = None,
+        actuators: Rates | None = None,
         strain: Strain = "engineering",
         *,
-        units: Mapping[str, Any] | None = None,
+        units: Units | None = None,
     ) -> None:
-        if strain not in get_args(Strain):
-            raise InputError(f"`strain` must be engineering or green; got {strain!r}.")
         system = unit_system(units)
         made = truss_network(joints, bars, supports, system)
         self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
@@ -252,21 +257,17 @@ class Truss(TrussMechanics):
         """The travel of the first load, or the first displacement."""
         return descriptors.elevation(self)
 
+    @check_arguments
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written like ``force(A-B)`` or ``displacement(B, y)``."""
         return descriptors.descriptor_from_text(self, text)
 
 
-def _rates(made: TrussNetwork, actuators: Patterns) -> Float[np.ndarray, "bars actuators"]:
+def _rates(made: TrussNetwork, actuators: Rates) -> Float[np.ndarray, "bars actuators"]:
     rates = np.zeros((len(made.bars), len(actuators)))
     for k, (name, given) in enumerate(actuators.items()):
-        fine = isinstance(given, Mapping) and all(
-            isinstance(rate, int | float) and np.isfinite(rate) and rate for rate in given.values()
-        )
-        if not (fine and given):
-            raise InputError(
-                f"`actuators.{name}` must give rates by bar, finite and not 0; got {given!r}."
-            )
+        if not (given and all(given.values())):
+            raise InputError(f"`actuators.{name}` must give rates by bar, not 0; got {given!r}.")
         for bar, rate in given.items():
             rates[made.bar(bar), k] = rate
     return rates
