@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
-from equimorph.argument_vocabulary import CLASSES, FINITE, LARGEST, RANGES, WHOLE, Range
+from equimorph.argument_vocabulary import CLASSES, FINITE, RANGES, WHOLE, Range
 
 SHOWN = 80
 """Characters of a refused value that a message shows."""
@@ -137,7 +137,7 @@ def number_kind(annotation: Any, name: str, limits: Range | None = None) -> Kind
     def fits(value: Any) -> bool:
         if not is_number(value) or (whole and not isinstance(value, Integral)):
             return False
-        small = whole or isinstance(value, float) or abs(value) <= LARGEST
+        small = whole or isinstance(value, float) or FINITE.holds(value)
         return small and allowed.holds(value)
 
     def convert(value: Any) -> float:

@@ -333,3 +333,27 @@ def test_a_check_shows_what_would_be_computed(shell: Shell):
     assert shell("check", "spring.toml") == 0
     extent = "x_l from 0.5 to 1.3 in 11 intervals, F from -0.2 to 0.2 in 11 intervals; k = 1."
     assert extent in shell.out
+
+
+def test_warnings_of_libraries_do_not_reach_the_user(tmp_path: Path):
+    """A font that does not exist, no place for caches: neither in the output nor on stderr."""
+    (tmp_path / "matplotlibrc").write_text("font.family: No Such Font\n")
+    code = (
+        "import matplotlib.pyplot as plt, sys, warnings\n"
+        "from equimorph.cli.app import main\n"
+        "sys.argv = ['equimorph', '--version']\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "figure, ax = plt.subplots()\n"
+        "ax.set_title('words')\n"
+        "warnings.warn('of a library')\n"
+        "figure.savefig('words.png')\n"
+    )
+    places = {"MPLCONFIGDIR": str(tmp_path / "none" / "where"), "MATPLOTLIBRC": str(tmp_path)}
+    (tmp_path / "none").write_text("a file, so that no folder can be made in it")
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path,
+        env={**os.environ, **places},
+    )  # fmt: skip
+    assert (tmp_path / "words.png").exists()
+    told = done.stderr.splitlines()
+    assert [line for line in told if "findfont" in line or "library" in line] == []

@@ -3,7 +3,9 @@
 Everything heavy is imported inside the command that needs it, so that ``--help`` answers at once.
 """
 
+import logging
 import sys
+import warnings
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,6 +21,8 @@ LONGEST_LINE = 450
 """Characters of an error message on the command line, beyond which it is cut."""
 INTERRUPTED = 130
 """What shells say of a program that was ended by Ctrl-C."""
+LIBRARIES = ("matplotlib", "numba", "PIL", "h5py")
+"""Names of the loggers of libraries."""
 WrongUsage: Any = typer.BadParameter.__base__
 """Class of all complaints about words on the command line; typer does not name it."""
 
@@ -51,9 +55,21 @@ class Kind(StrEnum):
     truss = "truss"
 
 
+def quiet_libraries() -> None:
+    """Keep to itself what libraries warn of, like a font that is missing: users cannot act on it.
+
+    Warnings that are asked for, by ``python -W`` or ``PYTHONWARNINGS``, are shown.
+    """
+    for name in LIBRARIES:
+        logging.getLogger(name).setLevel(logging.ERROR)
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+
+
 def main() -> None:
     """Run the command line: what cannot be done is one line on stderr and exit code 2."""
     words = sys.argv[1:]
+    quiet_libraries()
     try:
         code = app(words or ["--help"], prog_name=PROGRAM, standalone_mode=False)
     except WrongUsage as error:
