@@ -28,7 +28,7 @@ DIRECTION = Kind(
     lambda value: _are_numbers(value, 2) and any(value),
 )
 LOAD_DIRECTION = Kind(
-    "two numbers (x, y), not all 0, or for a rod in space three (x, y, z)",
+    "two numbers (x, y), not both 0, or for a rod in space three (x, y, z)",
     "directions (x, y) or (x, y, z)",
     lambda value: (_are_numbers(value, 2) or _are_numbers(value, 3)) and any(value),
 )
