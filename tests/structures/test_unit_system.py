@@ -224,9 +224,9 @@ def test_a_study_may_name_units():
             "must be in units such as kN or N mm^2, of m, mm",
         ),
         (lambda: portal(METRIC, 1.0, "2 N m2 + 1", 1.0, 1.0), "must be in units such as kN"),
-        (lambda: portal(METRIC, 1.0, "stiff", 1.0, 1.0), "`EI` of member A-B must be positive"),
-        (lambda: portal(METRIC, 1.0, "-2 N m^2", 1.0, 1.0), "`EI` of member A-B must be positive"),
-        (lambda: portal(METRIC, 1.0, "2", 1.0, 1.0), "with or without its unit; got '2'"),
+        (lambda: portal(METRIC, 1.0, "stiff", 1.0, 1.0), "`EI` must be positive and finite, or a text with its unit"),
+        (lambda: portal(METRIC, 1.0, "-2 N m^2", 1.0, 1.0), "`EI` must be positive and finite, or a text with its unit"),
+        (lambda: portal(METRIC, 1.0, "2", 1.0, 1.0), "or a text with its unit, like '2.5 mm'; got '2'"),
         (
             lambda: portal(None, 1.0, "2 N m^2", 1.0, 1.0),
             "`units` must be given where a quantity has a unit; got EI of member A-B = '2 N m^2'",
@@ -237,7 +237,7 @@ def test_a_study_may_name_units():
             lambda: portal({"force": "mm", "length": "m"}, 1.0, 1.0, 1.0, 1.0),
             "`units.force` must be one of N, mN, uN, kN, MN, lbf, kip, kgf; got 'mm'",
         ),
-        (lambda: portal({"force": "N", "length": None}, 1.0, 1.0, 1.0, 1.0), "`units.length` must"),
+        (lambda: portal({"force": "N", "length": None}, 1.0, 1.0, 1.0, 1.0), "got length = None"),
         (lambda: em.Rod(EI="0.2 N m", length=0.1), "`EI` must be in units of force·length²"),
         (lambda: em.Rod(span="0.2 m"), "`units` must be given where a quantity has a unit"),
         (lambda: em.Rod(units=METRIC), "`units` must come with EI and length; got"),
@@ -266,3 +266,22 @@ def test_a_length_without_a_unit_beside_one_with_units_is_refused():
     named = em.Rod(load="uniform", EI="2 N m^2", length=0.1, units=units)
     written = em.Rod(load="uniform", EI="2 N m^2", length="100 mm", units=units)
     assert named.units.value("length") == pytest.approx(written.units.value("length"), rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: em.Strip("20 mm", 0.5, E="210 GPa", nu=0.3).properties(), "`thickness` must have"),
+        (
+            lambda: em.Rod(section=em.Round("2 mm", E="70 GPa", nu=0.3), length=0.3),
+            "`length` must have a unit, as diameter = '2 mm' has one",
+        ),
+        (
+            lambda: em.Rod(section=em.Round(2.0, E=7e10, nu=0.3), length="0.3 m"),
+            "`diameter` must have a unit, as length = '0.3 m' has one",
+        ),
+    ],
+)
+def test_sections_have_units_on_all_lengths_or_on_none(make, said):
+    with pytest.raises(em.InputError, match=said):
+        make()

@@ -186,7 +186,9 @@ class Rod(Described):
         made = None if section is None else cross_section(section)
         self._space = SpaceOptions(torsion, lateral, made).check(EI, length)
         self.units = rod_units(self._space.bending_stiffness(EI, system), length, system)
-        system.check_all_have_units({"EI": EI, "length": length, "span": span, "rise": rise})
+        system.check_all_have_units(
+            self._space.quantities | {"EI": EI, "length": length, "span": span, "rise": rise}
+        )
         self.lateral_stiffness = self._space.stiffness(self.units, kinks)
         breaks = [] if self.lateral_stiffness is None else self.lateral_stiffness.breaks
         number = self.units.number

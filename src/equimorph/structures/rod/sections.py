@@ -76,7 +76,14 @@ class CrossSection(ABC):
 
     def in_system(self, system: UnitSystem) -> SectionProperties:
         """`properties` in a system of units; SI if it names none."""
+        system.check_all_have_units(self.quantities)
         return self._in(SI if system.plain else system)
+
+    @property
+    def quantities(self) -> dict[str, Any]:
+        """Those whose plain numbers are in the units of the rod, by name."""
+        names = [each.name for each in fields(self)]  # type: ignore[arg-type]  # as below
+        return {name: getattr(self, name) for name in names if name not in ("nu", "density")}
 
     @abstractmethod
     def _in(self, system: UnitSystem) -> SectionProperties:

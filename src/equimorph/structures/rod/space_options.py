@@ -46,6 +46,11 @@ class SpaceOptions:
                 )
         return self
 
+    @property
+    def quantities(self) -> dict[str, Any]:
+        """Quantities of the section, by name."""
+        return {} if self.section is None else self.section.quantities
+
     def bending_stiffness(self, EI: Any, system: UnitSystem) -> Any:
         """EI of the section, if there is one."""
         if self.section is None:

@@ -158,7 +158,8 @@ class SpatialRod(DescribedInSpace):
         self._space = SpaceOptions(torsion, lateral, made).check(EI, length)
         self.units = rod_units(self._space.bending_stiffness(EI, system), length, system)
         system.check_all_have_units(
-            {"EI": EI, "length": length, "span": span, "rise": rise, "sideways": sideways}
+            self._space.quantities
+            | {"EI": EI, "length": length, "span": span, "rise": rise, "sideways": sideways}
         )
         number = self.units.number
         shape = "uniform" if load is None and loads is None else load
