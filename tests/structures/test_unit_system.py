@@ -224,9 +224,9 @@ def test_a_study_may_name_units():
             "must be in units such as kN or N mm^2, of m, mm",
         ),
         (lambda: portal(METRIC, 1.0, "2 N m2 + 1", 1.0, 1.0), "must be in units such as kN"),
-        (lambda: portal(METRIC, 1.0, "stiff", 1.0, 1.0), "`EI` must be positive and finite, or a text with its unit"),
-        (lambda: portal(METRIC, 1.0, "-2 N m^2", 1.0, 1.0), "`EI` must be positive and finite, or a text with its unit"),
-        (lambda: portal(METRIC, 1.0, "2", 1.0, 1.0), "or a text with its unit, like '2.5 mm'; got '2'"),
+        (lambda: portal(METRIC, 1.0, "stiff", 1.0, 1.0), "`EI` must be positive and finite"),
+        (lambda: portal(METRIC, 1.0, "-2 N m^2", 1.0, 1.0), "`EI` must be positive and finite"),
+        (lambda: portal(METRIC, 1.0, "2", 1.0, 1.0), "with its unit, like '2.5 mm'; got '2'"),
         (
             lambda: portal(None, 1.0, "2 N m^2", 1.0, 1.0),
             "`units` must be given where a quantity has a unit; got EI of member A-B = '2 N m^2'",
