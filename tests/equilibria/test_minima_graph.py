@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.equilibria import arguments, random_search
 from equimorph.equilibria.minima_graph import MinimaGraph
 from equimorph.equilibria.random_search import Ground
 from oracles.close_states import close_roots, close_sheets, truss_row
@@ -46,6 +47,15 @@ def test_rows_of_bistable_trusses_have_all_their_stable_states(count, seed):
 def test_no_row_lacks_a_stable_state(count, seed):
     found = em.find_equilibria(truss_row(count, seed), {"F": 0.0})
     assert int((found.index == 0).sum()) == 2**count
+
+
+def test_arguments_say_where_pushes_were_left_out(monkeypatch):
+    """Over points with very many states, like an unloaded dome with 1644, they take too long."""
+    for module in (arguments, random_search):
+        monkeypatch.setattr(module, "PUSHED", 3)
+    found = em.find_equilibria(close_sheets(0.1), AT)
+    (told,) = (each for each in found.arguments if each.name == "pushes")
+    assert str(told) == "pushes: open (left out: 4 states are more than 3; others may be missing)"
 
 
 def graph_of(structure, z, p):

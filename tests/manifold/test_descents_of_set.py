@@ -68,7 +68,7 @@ def test_closed_pieces_far_smaller_than_a_cell_are_found(radius):
     assert eset.audit.clean
     assert [each.euler_characteristic for each in eset.components] == [1, 2]
     assert dict(eset.audit.rows())["closed pieces, necks"].startswith(
-        "may be missed or joined wrongly below p 0.043, r 0.025"
+        "may be missed below p 0.043, r 0.025"
     )
 
 

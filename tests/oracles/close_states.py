@@ -49,3 +49,38 @@ def truss_row(count: int, seed: int | None = None) -> em.Truss:
             bars.append(em.Bar((f"T{i - 1}", top), EA=0.05 * (1.0 + vary[1, i])))
     loads = {"F": {f"T{i}": (0.0, -1.0) for i in range(count)}}
     return em.Truss(joints, bars, supports, loads, strain="green")
+
+
+def quadric(
+    form: np.ndarray, centre: tuple[float, float, float], level: float
+) -> em.EnergyStructure:
+    """E' = (x − 3) (yᵀ form y − level), y = (x, p, r) − centre: a quadric beside a sheet x = 3.
+
+    With the natural state x = 3 far off: necks, gaps, cones and spheres of any size and direction.
+    """
+    a = [[float(entry) for entry in row] for row in form]
+    y, p, r = (f"({name} - ({float(at)!r}))" for name, at in zip("xpr", centre, strict=True))
+    linear = f"({2.0 * a[0][1]!r}*{p} + {2.0 * a[0][2]!r}*{r})"
+    rest = f"({a[1][1]!r}*{p}**2 + {2.0 * a[1][2]!r}*{p}*{r} + {a[2][2]!r}*{r}**2 - {level!r})"
+    far = 3.0 - float(centre[0])
+    energy = (
+        f"{a[0][0]!r}*{y}**4/4 + ({linear} - {far * a[0][0]!r})*{y}**3/3"
+        f" + ({rest} - {far!r}*{linear})*{y}**2/2 - {far!r}*{rest}*{y}"
+    )
+    unknown = em.Unknown("x", "3", guesses=(-2.5, 3.5))
+    parameters = [
+        em.Parameter("p", "1", 1.0, "actuator", 0.0),
+        em.Parameter("r", "1", 1.0, "load", 0.0),
+    ]
+    return em.EnergyStructure(energy, [unknown], parameters)
+
+
+def hyperboloid(tilt: float, azimuth: float, slope: float) -> np.ndarray:
+    """Form of the cone with a right angle at its tip about an axis, flattened along x by `slope`.
+
+    The axis leaves that of x by `tilt`. Its sheets are yᵀ form y = ±e²: + joined by a neck of
+    radius e, − two apart.
+    """
+    axis = np.array([np.cos(tilt), *(np.sin(tilt) * np.array([np.cos(azimuth), np.sin(azimuth)]))])
+    stretch = np.diag([1.0 / slope, 1.0, 1.0])
+    return stretch @ (np.eye(3) - 2.0 * np.outer(axis, axis)) @ stretch

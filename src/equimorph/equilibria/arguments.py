@@ -11,6 +11,7 @@ import numpy as np
 
 from equimorph.equilibria.gradient_flow import Ending
 from equimorph.equilibria.minima_graph import NONE, MinimaGraph
+from equimorph.equilibria.random_search import PUSHED
 from equimorph.structures import Growth
 
 
@@ -30,7 +31,7 @@ class Argument:
     Parameters
     ----------
     name
-        "descents", "graph of minima" or "sum of indices".
+        "descents", "graph of minima", "sum of indices", or "pushes" where these were left out.
     standing
         Whether it holds, is left open, or does not apply.
     detail
@@ -48,7 +49,12 @@ class Argument:
 
 def arguments_of(graph: MinimaGraph, group: int) -> tuple[Argument, ...]:
     """All arguments for the states over one point."""
-    return (_descents(graph, group), _graph(graph, group), _sum(graph, group))
+    arguments = (_descents(graph, group), _graph(graph, group), _sum(graph, group))
+    states = int((graph.group == group).sum())
+    if states <= PUSHED:
+        return arguments
+    detail = f"left out: {states} states are more than {PUSHED}; others may be missing"
+    return (*arguments, Argument("pushes", Standing.OPEN, detail))
 
 
 def contradicts(graph: MinimaGraph, group: int) -> bool:

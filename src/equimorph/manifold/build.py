@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import short
@@ -23,6 +23,7 @@ from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import Lines, bisect, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
+from equimorph.manifold.lifting.unseen import UnseenFinder
 from equimorph.manifold.refining.refine import refine_cells
 from equimorph.model import (
     Box,
@@ -182,10 +183,10 @@ def _of_grid(
     pairing.points.over_vertices(*_spread(pairing, lines, effort.seed, progress))
     generator = np.random.default_rng([effort.seed, 1])
     recovered = 0
-    finder = CellFinder()
+    finder, unseen = CellFinder(), UnseenFinder()
     for number in range(SEARCHES):
         pairing.fit()
-        cells, bisected = _lift_grid(pairing, finder, progress)
+        cells, bisected = _lift_grid(pairing, finder, unseen, progress)
         frame = Frame(setting, pairing.mesh, box, fixed, intervals)
         eset = account(pairing, cells, frame, bisected)
         found = check(eset, generator, _checks(effort.checks, setting), progress)
@@ -206,14 +207,19 @@ def _of_grid(
         descents=found.descents,
         stopped=stopped,
         cell_size=_cell_size(box, intervals),
+        touching=tuple(_named(box, place) for place in cells.touching),
     )
     return replace(eset, audit=audit)
 
 
 def _cell_size(box: Box, intervals: tuple[int, ...]) -> tuple[tuple[str, float], ...]:
     """Widths of the cells of the grid by parameter."""
-    widths = ((box.upper - box.lower) / np.array(intervals)).tolist()
-    return tuple(zip(box.names, widths, strict=True))
+    return _named(box, (box.upper - box.lower) / np.array(intervals))
+
+
+def _named(box: Box, values: Float[np.ndarray, " d"]) -> tuple[tuple[str, float], ...]:
+    """Values of the free parameters with their names."""
+    return tuple(zip(box.names, values.tolist(), strict=True))
 
 
 def _checks(checks: int, setting: Setting) -> int:
@@ -273,7 +279,9 @@ def _off_zero(setting: Setting) -> tuple[bool, ...]:
     return (True,) * len(setting.free)
 
 
-def _lift_grid(pairing: Pairing, finder: CellFinder, progress: Progress) -> tuple[Cells, int]:
+def _lift_grid(
+    pairing: Pairing, finder: CellFinder, unseen: UnseenFinder, progress: Progress
+) -> tuple[Cells, int]:
     """Flood, close, assemble; bisect what is not certain and go on."""
     bisected = first = 0
     rounds = BISECTIONS[pairing.mesh.dimension]
@@ -285,9 +293,12 @@ def _lift_grid(pairing: Pairing, finder: CellFinder, progress: Progress) -> tupl
         first = doubtful if number == 0 else first
         # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
         hopeless = doubtful > max(HOPELESS, 4 * first)
-        if doubtful == 0 or hopeless or pairing.is_full or number == rounds - 1:
+        last = hopeless or pairing.is_full or number == rounds - 1
+        if doubtful == 0 or last:
+            cells = unseen.look(pairing, cells)
+        if cells.doubtful == 0 or last:
             break
-        bisected += doubtful
+        bisected += cells.doubtful
         longest = _longest_edges(pairing, cells)
         pairing.use_mesh(bisect(pairing.mesh, longest, _off_zero(pairing.setting)))
     return cells, bisected

@@ -9,6 +9,11 @@ from scipy.special import betaincinv
 
 SMALL_RESIDUAL = 1e-9
 """Largest residual of a clean set."""
+NECKS = (
+    "necks are found where two sheets approach each other over a whole cell, and may be joined "
+    "wrongly where another fold is in the same cell"
+)
+"""What the check of approaching sheets means, and where it does not apply."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +32,11 @@ class Audit:
     been added; in the last round, `missing` of `checked` were, which must be zero too.
 
     `descents` counts how descents from vertices of the strata of index one, and from folds, ended;
-    what they landed on and the set lacked has been added, too. Closed pieces and necks narrower
-    than `cell_size`, the widths of the grid's cells by parameter, may escape all of this.
+    what they landed on and the set lacked has been added, too. Closed pieces narrower than
+    `cell_size`, the widths of the grid's cells by parameter, may escape all of this. Where two
+    sheets approach each other inside a cell they are followed to where they are nearest, and cells
+    with a neck inside are bisected; `touching`, of which there must be none, are the points at
+    which they touch, like the tip of a cone, or are nearer than states can be told apart.
 
     `stopped`, which must be zero, is the number of equilibria at which lifting stopped because it
     exceeded the limit; much is unpaired and undecided then.
@@ -72,6 +80,7 @@ class Audit:
     descents: tuple[tuple[str, int], ...] = ()
     stopped: int = 0
     cell_size: tuple[tuple[str, float], ...] = ()
+    touching: tuple[tuple[tuple[str, float], ...], ...] = ()
 
     @property
     def missing_at_most(self) -> float:
@@ -106,7 +115,8 @@ class Audit:
             "changed",
             "stopped",
         )
-        return {name: getattr(self, name) for name in names if getattr(self, name)}
+        counts = {name: getattr(self, name) for name in names} | {"touching": len(self.touching)}
+        return {name: count for name, count in counts.items() if count}
 
     def rows(self) -> list[tuple[str, str]]:
         """Lines to print: each quantity with its value."""
@@ -146,19 +156,27 @@ class Audit:
                 f"{self.recovered} added before; with 95 % confidence fewer than "
                 f"{_percent(self.missing_at_most)} of those that it can find are missing"
                 if self.checked
-                else "not made",
+                else "not made: pieces that the seeds do not reach may be missing",
             ),
             ("descents from unstable strata", self._descents),
+            *([("sheets touch", self._touching)] if self.touching else []),
             *([("closed pieces, necks", self._unseen)] if self.cell_size else []),
             *(refined if self.accuracy else []),
         ]
+
+    @property
+    def _touching(self) -> str:
+        """Where sheets touch: one line."""
+        places = (", ".join(f"{name} = {value:.6g}" for name, value in at) for at in self.touching)
+        return f"in one point (cone point) at {'; '.join(places)}"
 
     @property
     def _unseen(self) -> str:
         """Below which size pieces may be missing: one line."""
         size = ", ".join(f"{name} {width:.2g}" for name, width in self.cell_size)
         searched = ", but for those that Newton's method met from random guesses"
-        return f"may be missed or joined wrongly below {size}" + (searched if self.checked else "")
+        found = searched if self.checked else ""
+        return f"may be missed below {size}{found}; {NECKS}"
 
     @property
     def _descents(self) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Frames, Lanes, Parameters, Rows
+from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import free_directions
 from equimorph.manifold.geometry.setting import Setting
@@ -31,7 +31,7 @@ class Reduction:
     """Reduced equation at points: tangent vectors of the reduction, gradient and Hessian of r.
 
     along_z, along_p: changes of z and p with ξ, and with each of the k directions of the span;
-    remainder: the Newton step of z that leaves the residual parallel to b.
+    remainder: the Newton step of z that leaves the residual parallel to b; value: r after it.
     """
 
     along_z: Float[np.ndarray, "lanes k1 size"]
@@ -39,6 +39,7 @@ class Reduction:
     remainder: Lanes
     gradient: Float[np.ndarray, "lanes k1"]
     hessian: Float[np.ndarray, "lanes k1 k1"]
+    value: Values
 
     @property
     def crosses(self) -> np.ndarray:
@@ -75,7 +76,7 @@ def reduction(
         twice = structure.second_derivative(z, p, one, (remainder, still))
         gradient[:, i] += np.einsum("li,li->l", v, twice)
     along_z, along_p = (np.stack([each[i] for each in tangents], axis=1) for i in range(2))
-    return Reduction(along_z, along_p, remainder, gradient, hessian)
+    return Reduction(along_z, along_p, remainder, gradient, hessian, -x[:, -1, -1])
 
 
 def crossing_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> tuple[Frames, Slopes]:

@@ -19,6 +19,28 @@ from equimorph.structures import States
 
 
 @dataclass(frozen=True)
+class Seen:
+    """Grid triangles with the curves and points around them: what hangs on these, is kept."""
+
+    triangles: Int[np.ndarray, "T 3"]
+    around: Float[np.ndarray, "T 6"]
+
+    @classmethod
+    def of(cls, pairing: Pairing) -> "Seen":
+        """All triangles of the mesh."""
+        return cls(pairing.mesh.triangles, _around(pairing))
+
+    def same(self, known: "Seen | None") -> Bool[np.ndarray, " T"]:
+        """Which triangles have not changed since then."""
+        same = np.zeros(len(self.triangles), bool)
+        if known is not None:
+            count = len(known.triangles)
+            same[:count] = (self.triangles[:count] == known.triangles).all(axis=1)
+            same[:count] &= (self.around[:count] == known.around).all(axis=1)
+        return same
+
+
+@dataclass(frozen=True)
 class Volumes:
     """Discs and balls, with what they depend on.
 
@@ -26,26 +48,17 @@ class Volumes:
     folds and constraints is not kept: balls say it of their facets.
     """
 
-    triangles: Int[np.ndarray, "T 3"]
+    seen: Seen
     tetrahedra: Int[np.ndarray, "N 4"]
     faces: Int[np.ndarray, "N 4"]
-    around: Float[np.ndarray, "T 6"]
     discs: Discs
     balls: Balls
 
 
 def volumes_over(pairing: Pairing, known: Volumes | None) -> Volumes:
     """Balls over all grid tetrahedra; those that are known stay where nothing changed."""
-    mesh, around = pairing.mesh, _around(pairing)
-    same = np.zeros(len(mesh.triangles), bool)
-    if known is not None:
-        count = len(known.triangles)
-        same[:count] = (mesh.triangles[:count] == known.triangles).all(axis=1)
-        same[:count] &= (around[:count] == known.around).all(axis=1)
-        same[known.discs.doubtful] = False
-    discs = assemble(pairing, find_loops(pairing, ~same))
-    discs = discs if known is None else _with_discs(discs, known.discs, same)
-    same[discs.doubtful] = False
+    mesh, seen = pairing.mesh, Seen.of(pairing)
+    discs, same = _discs_over(pairing, seen, known)
     kept = np.zeros(len(mesh.tetrahedra), bool)
     if known is not None:
         count = len(known.tetrahedra)
@@ -55,7 +68,20 @@ def volumes_over(pairing: Pairing, known: Volumes | None) -> Volumes:
         kept[known.balls.doubtful] = False
     balls = fill(pairing, discs, ~kept)
     balls = balls if known is None else _with_balls(balls, known.balls, kept)
-    return Volumes(mesh.triangles, mesh.tetrahedra, mesh.faces, around, discs, balls)
+    return Volumes(seen, mesh.tetrahedra, mesh.faces, discs, balls)
+
+
+def _discs_over(
+    pairing: Pairing, seen: Seen, known: Volumes | None
+) -> tuple[Discs, Bool[np.ndarray, " T"]]:
+    """Discs over all grid triangles, and which of these are certain, and the same as before."""
+    same = seen.same(None if known is None else known.seen)
+    if known is not None:
+        same[known.discs.doubtful] = False
+    discs = assemble(pairing, find_loops(pairing, ~same))
+    discs = discs if known is None else _with_discs(discs, known.discs, same)
+    same[discs.doubtful] = False
+    return discs, same
 
 
 def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
@@ -112,7 +138,8 @@ class Cells:
     """Segments, triangles or tetrahedra of points with their index, and facets of three kinds.
 
     corners (C, d + 1), index (C,); folds, caps, crossings: facets on folds, on constraints and
-    where sheets cross; doubtful: grid cells over which the set is undecided.
+    where sheets cross; doubtful: grid cells over which the set is undecided; touching: free
+    parameters of points at which sheets touch (see `approaches`).
     """
 
     corners: Int[np.ndarray, "C corners"]
@@ -122,6 +149,7 @@ class Cells:
     crossings: Int[np.ndarray, "x d"]
     doubtful_triangles: Int[np.ndarray, " t"] = field(default_factory=_nothing)
     doubtful_tetrahedra: Int[np.ndarray, " n"] = field(default_factory=_nothing)
+    touching: Float[np.ndarray, "t d"] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def doubtful(self) -> int:

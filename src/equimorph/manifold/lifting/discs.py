@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria.critical import null_border
 from equimorph.manifold.geometry.exact_points import pin
-from equimorph.manifold.geometry.points import Points, VertexKind
-from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import flags_of
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.crossing_discs import (
@@ -19,6 +18,7 @@ from equimorph.manifold.lifting.crossing_discs import (
     put_hubs,
     split_crossings,
 )
+from equimorph.manifold.lifting.fold_forms import fold_forms
 from equimorph.manifold.lifting.loops import Loops, Polygon
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import (
@@ -224,7 +224,8 @@ def _continuous(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> lis
     ]
     if not at:
         return choices
-    normals = existence_normals(pairing.setting, pairing.points, np.array([fold for _, fold in at]))
+    folds = np.array([fold for _, fold in at])
+    normals = fold_forms(pairing.setting, pairing.points, folds).existence
     flat = _along_sides(pairing, [plans[number].polygon.triangle for number, _ in at], normals)
     flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
     normal = dict(zip(at, flat, strict=True))
@@ -367,24 +368,3 @@ def _triangulate(pairing: Pairing, pieces: list[_PlanPiece], found: _Found) -> N
         found.index.extend([piece.index] * len(own))
         found.owner.extend([piece.plan.polygon.triangle] * len(own))
         found.sheet.extend([piece.plan.sheet] * len(own))
-
-
-def existence_normals(
-    setting: Setting, points: Points, folds: Int[np.ndarray, " n"]
-) -> Float[np.ndarray, "n d"]:
-    """Vectors, in scaled free parameters, towards the side of a fold where sheets exist.
-
-    Near a fold with null vector φ the set is ``φᵀF_p δp + ½ φᵀF_zz[φ, φ] ξ² = 0``. The vector is
-    continuous along a fold and turns round only at a cusp.
-    """
-    structure, free = setting.structure, setting.free
-    z, p = points.z[folds], points.p[folds]
-    phi = null_border(structure, z, p)
-    none = np.zeros_like(p)
-    bend = np.einsum("li,li->l", phi, structure.second_derivative(z, p, (phi, none), (phi, none)))
-    slope = np.empty((len(folds), len(free)))
-    for k in range(len(free)):
-        dp = np.zeros_like(p)
-        dp[:, free[k]] = setting.scales[k]
-        slope[:, k] = np.einsum("li,li->l", phi, structure.parameter_derivative(z, p, dp))
-    return np.asarray(-slope * np.sign(bend)[:, None])

@@ -1,0 +1,157 @@
+"""Whether the straight folds in grid triangles show all that the curved ones do.
+
+A fold through a grid triangle is drawn as the chord between its points on two sides. Two things
+may be hidden behind it: the fold leaves through the third side and comes back, which parts what
+hangs together beyond it; and folds over one triangle, drawn apart, may belong to parts of the set
+that are joined between them, by a neck that is smaller than the triangle.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from equimorph.arrays import Flags, Some, Values
+from equimorph.manifold.geometry.exact_points import pin
+from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.lifting.balls import depths
+from equimorph.manifold.lifting.cells import Cells
+from equimorph.manifold.lifting.fold_forms import fold_forms
+from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.polygon_cuts import planes
+from equimorph.manifold.lifting.stationary_points import Starts
+
+SHARP = 0.5
+"""Cosine of the angle between the sides of a fold at both ends below which it turns sharply."""
+BENT = 0.97
+"""The same cosine below which the set may go on where the fold turns: at a neck."""
+NEAR = -0.5
+"""Barycentric coordinate above which a guess is tried."""
+BEYOND = -0.05
+"""Barycentric coordinate below which the middle of a fold lies beyond its triangle."""
+
+
+@dataclass(frozen=True)
+class FoldChords:
+    """Chords of folds from side to side of grid triangles.
+
+    ends (n, 2): points; triangle: below them; normals: of unit length towards the existing sheets,
+    in scaled free parameters; cusped: whether there is a cusp between the ends.
+    """
+
+    ends: Int[np.ndarray, "n 2"]
+    triangle: Some
+    normals: Float[np.ndarray, "n 2 d"]
+    cusped: Flags
+
+    def take(self, some: Some | Flags) -> "FoldChords":
+        """Return some of the chords."""
+        return FoldChords(*(column[some] for column in vars(self).values()))
+
+    @property
+    def cosines(self) -> Values:
+        """Cosines of the angles between the sides of the folds at both ends; 1 at cusps."""
+        turn = (self.normals[:, 0] * self.normals[:, 1]).sum(axis=1)
+        return np.where(self.cusped, 1.0, turn)
+
+
+def fold_chords(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> FoldChords:
+    """Chords between folds on two sides of one grid triangle, of the flagged ones."""
+    points, mesh = pairing.points, pairing.mesh
+    edge = points.edge[cells.folds]
+    own = (edge >= 0).all(axis=1) & (edge[:, 0] != edge[:, 1])
+    ends, edge = cells.folds[own], edge[own]
+    owner = np.flatnonzero(wanted)
+    sides, base = np.sort(mesh.sides[owner], axis=1), len(mesh.edges)
+    keys = np.concatenate([sides[:, a] * base + sides[:, b] for a, b in ((0, 1), (1, 2), (0, 2))])
+    order = np.argsort(keys)
+    sought = edge.min(axis=1) * base + edge.max(axis=1)
+    at = order[np.minimum(np.searchsorted(keys[order], sought), len(order) - 1)]
+    good = keys[at] == sought
+    ends, triangle = ends[good], np.tile(owner, 3)[at[good]]
+    used, place = np.unique(ends, return_inverse=True)
+    forms, place = fold_forms(pairing.setting, points, used), place.reshape(ends.shape)
+    length = np.linalg.norm(forms.existence, axis=1, keepdims=True)
+    normals = forms.existence / np.maximum(length, 1e-300)
+    null, bend = forms.null[place], forms.bend[place]
+    sense = (null[:, 0] * null[:, 1]).sum(axis=1) * bend[:, 0] * bend[:, 1]
+    return FoldChords(ends, triangle, normals[place], sense < 0.0)
+
+
+def unseen_turns(pairing: Pairing, chords: FoldChords) -> Some:
+    """Triangles in which a fold turns sharply, and its middle is beyond a side or unknown."""
+    mesh, setting = pairing.mesh, pairing.setting
+    sharp = chords.take(chords.cosines < SHARP)
+    if len(sharp.ends) == 0:
+        return sharp.triangle
+    span = planes(pairing, sharp.triangle.tolist())
+    found = pin(setting, pairing.points, sharp.ends.tolist(), VertexKind.FOLD, span)
+    corners = mesh.vertices[mesh.triangles[sharp.triangle]]
+    return sharp.triangle[~(found.found & (depths(corners, found.p[:, setting.free]) > BEYOND))]
+
+
+@dataclass(frozen=True)
+class Facing:
+    """Folds over one triangle between which the set may hang together: one that turns, or two.
+
+    one, other: numbers of the chords, the same if there is one; starts: where they face each other.
+    """
+
+    one: Some
+    other: Some
+    starts: Starts
+
+
+def facing_folds(pairing: Pairing, chords: FoldChords) -> Facing:
+    """Folds that turn in their triangle, and pairs of folds with the same lower index."""
+    points, mesh, free = pairing.points, pairing.mesh, pairing.setting.free
+    bent = np.flatnonzero(chords.cosines < BENT)
+    ones, others = [bent], [bent]
+    order = np.argsort(chords.triangle, kind="stable")
+    triangle, index = chords.triangle[order], points.index[chords.ends[order, 0]]
+    for shift in range(1, int(np.bincount(triangle, minlength=1).max())):
+        same = triangle[shift:] == triangle[:-shift]
+        same &= index[shift:] == index[:-shift]
+        ones.append(order[:-shift][same])
+        others.append(order[shift:][same])
+    one, other = np.concatenate(ones), np.concatenate(others)
+    ends = np.concatenate([chords.ends[one], chords.ends[other]], axis=1)
+    corners = mesh.vertices[mesh.triangles[chords.triangle[one]]]
+    place = points.p[ends][:, :, free].mean(axis=1)
+    place[: len(bent)] = _meetings(pairing, chords.take(bent))
+    shares = _shares(corners, place)
+    starts = Starts(chords.triangle[one], corners, shares, points.z[ends].mean(axis=1))
+    near = np.asarray((shares > NEAR).all(axis=1))
+    return Facing(one[near], other[near], starts.take(near))
+
+
+def beyond_folds(
+    pairing: Pairing, chords: FoldChords, facing: Facing, place: Float[np.ndarray, "n d"]
+) -> Flags:
+    """Whether places lie on those sides of the chords on which the set has no sheets."""
+    scales, points = pairing.setting.scales, pairing.points
+    pairs = np.stack([facing.one, facing.other], axis=1)
+    ends = points.p[chords.ends[pairs]][..., pairing.setting.free] / scales
+    along = ends[:, :, 1] - ends[:, :, 0]
+    across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    normals = chords.normals[pairs].sum(axis=2)
+    across *= np.sign((across * normals).sum(axis=-1, keepdims=True))
+    off = ((place / scales)[:, None] - ends.mean(axis=2)) * across
+    return np.asarray((off.sum(axis=-1) < 0.0).all(axis=1))
+
+
+def _meetings(pairing: Pairing, chords: FoldChords) -> Float[np.ndarray, "n d"]:
+    """Free parameters where the tangents of folds at both ends meet."""
+    scales = pairing.setting.scales
+    ends = pairing.points.p[chords.ends][:, :, pairing.setting.free] / scales
+    level = (chords.normals * ends).sum(axis=2)
+    return np.asarray((np.linalg.pinv(chords.normals) @ level[:, :, None])[:, :, 0] * scales)
+
+
+def _shares(
+    corners: Float[np.ndarray, "n corners d"], places: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n corners"]:
+    """Barycentric coordinates, each place in its own simplex."""
+    sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    inner = np.linalg.solve(sides, (places - corners[:, 0])[:, :, None])[:, :, 0]
+    return np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)
