@@ -58,7 +58,7 @@ class Change:
 
 
 CHANGES: Mapping[str, Change] = {
-    "Audit": Change(version=4),
+    "Audit": Change(version=5),
     "LeastSnap": Change(version=2),
     "Proof": Change(version=2, removed=("status",)),  # it follows from `why` and `bounds`
     "Shapes": Change(version=2, renamed={"wanted": "targets"}),
