@@ -5,7 +5,8 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria.critical import Critical
-from equimorph.equilibria.newton_kernels import (
+from equimorph.equilibria.newton_kernels import amount_lanes, judge_lanes, move_lanes, null_lanes
+from equimorph.structures.newton_kernels import (
     FOUND,
     NEAR,
     NOT_SHRINKING,
@@ -13,10 +14,6 @@ from equimorph.equilibria.newton_kernels import (
     SINGULAR,
     TOO_LONG,
     UNFINISHED,
-    amount_lanes,
-    judge_lanes,
-    move_lanes,
-    null_lanes,
 )
 
 LANES = 11
@@ -95,9 +92,11 @@ def test_steps_are_judged_by_their_lengths(generator, free, last):
     change *= (wanted / np.sqrt(change**2 @ weights))[:, None]
     change[7] = np.nan
     factor = np.where(np.arange(200) % 3 == 0, -1.5, 1.0)
-    limits = (converged, following, contraction, too_long, longest) = 1e-9, 1e-13, 0.5, 5.0, 0.3
+    limits, too_long, longest = (1e-9, 1e-13, 0.5), np.full(200, 5.0), 0.3
+    converged, following, contraction = limits
     size, share, status = np.empty(200), np.empty(200), np.empty(200, int)
-    judge_lanes(change, weights, factor, before, limits, free, last, size, status, share)
+    given = (change, weights, factor, before, limits, too_long, longest, (free, last))
+    judge_lanes(*given, size, status, share)
     length = np.sqrt(change**2 @ weights)
     np.testing.assert_allclose(size, length, rtol=ROUND_OFF)
     small = (length < converged) | ((length < NEAR) & (length**3 < following * before**2))

@@ -5,6 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria.critical_tests import cubic, gap, quadratic
+from equimorph.equilibria.newton_step import Problem
 from equimorph.equilibria.point_conditions import Crossing, Fold, Plane, Values, Vanishing
 from equimorph.equilibria.settle import (
     Guards,
@@ -12,6 +13,7 @@ from equimorph.equilibria.settle import (
     Planes,
     Status,
     Tangents,
+    _by_steps,
     free_directions,
     lower_index,
     settle,
@@ -81,6 +83,44 @@ def test_fixed_parameters_equal_held_ones(frame):
     assert np.abs(plain.z - general.z).max() < 1e-9
     assert np.abs(plain.p - general.p).max() < 1e-13
     assert np.array_equal(plain.index, general.index)
+
+
+@pytest.mark.parametrize("kind", ["fixed", "held", "plane"])
+def test_one_plane_by_fused_steps_equals_the_general_corrector(kind):
+    """The compiled iteration against the general one, from guesses of which some fail."""
+    arch, lanes = em.Rod(load="uniform"), 40
+    end = em.lift(arch.natural_state(Theta=0.9, Delta=0.1), to={"q": 2.0}).end.state
+    generator = np.random.default_rng(2)
+    off = np.geomspace(1e-3, 30.0, lanes)[:, None]
+    z = end.z + off * generator.uniform(-1.0, 1.0, (lanes, arch.size))
+    p = np.tile(end.p, (lanes, 1))
+    directions = np.zeros((lanes, 0 if kind == "fixed" else 1, 4))
+    directions[:, :, 2] = 0.3
+    frame = Held()
+    if kind == "plane":
+        by_z, by_p = generator.normal(size=(lanes, 1, arch.size)), np.ones((lanes, 1, 4))
+        frame = Planes(by_z, by_p)
+    guards = Guards(iterations=12, longest=0.6, too_long=np.linspace(4.0, 8.0, lanes),
+                    contraction=0.9, free=3, following=1e-13)  # fmt: skip
+    free = None if kind == "fixed" else directions
+    fused = settle(arch, z, p, free, guards=guards, frame=frame)
+    general = _by_steps(Problem(arch, directions, (), frame), z, p, guards)
+    assert 0 < fused.found.sum() < lanes
+    assert np.array_equal(fused.status, general.status)
+    good = fused.found
+    assert np.array_equal(fused.index[good], general.index[good])
+    for name in ("z", "p", "size", "first", "frames"):
+        one, other = (getattr(each, name)[good] for each in (fused, general))
+        assert np.allclose(one, other, rtol=1e-6, atol=1e-9), name
+
+
+def test_steps_in_lanes_that_seek_a_sheet_need_not_contract_on_it():
+    """Newton for x² = a begins with steps that grow: lanes of the index sought go on."""
+    z, p = np.array([[0.3], [0.3]]), np.full((2, 1), 4.0)
+    guards = Guards(longest=np.inf, contraction=0.0, free=1, exempt=np.array([0, 1]))
+    found = settle(fold_form(), z, p, guards=guards)
+    assert found.status.tolist() == [Status.FOUND, Status.NOT_SHRINKING]
+    assert abs(found.z[0, 0] - 2.0) < ROUND_OFF
 
 
 def test_folds_of_the_cusp_form_have_no_discriminant():

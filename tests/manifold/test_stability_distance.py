@@ -51,6 +51,34 @@ def test_distances_in_two_parameters(spring_set, x, force):
     assert nearest["x_l"] == pytest.approx(np.cos(nearest.z[0]) ** 3, abs=1e-8)
 
 
+@pytest.mark.parametrize("stiffness", [1e-3, 1.0, 4.0])
+@pytest.mark.parametrize(("x", "force"), [(0.7, 0.0), (0.6, -0.15), (0.75, -0.05)])
+def test_folds_of_the_other_branch_do_not_count_in_any_unit(stiffness, x, force):
+    """Least distance from F = k sin³ δ, δ > 0; F = −k sin³ δ is nearer, but the lower branch's.
+
+    Both branches belong to one stratum, and all margins are proportional to k.
+    """
+    with unchecked():
+        eset = equilibrium_set(
+            Spring(),
+            Box(x_l=(0.3, 1.3), F=(-0.5 * stiffness, 0.5 * stiffness)),
+            fixed={"k": stiffness},
+            intervals=(12, 13),
+            checks=0,
+        )
+        state = upper(eset, x_l=x, F=force * stiffness)
+        distance = stability_distance(eset, state)
+
+    def least(sign: float) -> float:
+        t = np.linspace(0.0, 1.3, 2_000_001)
+        return np.hypot(np.cos(t) ** 3 - x, stiffness * (sign * np.sin(t) ** 3 - force)).min()
+
+    # by the spacing of t, along which the gap is nearly stationary in one direction only
+    assert distance.in_parameters == pytest.approx(least(1.0), abs=2e-6)
+    assert force == 0.0 or least(-1.0) < 0.999 * least(1.0)
+    assert distance.nearest.z[0] > 0.0
+
+
 def geodesic_length(delta: float, x: float, bearing: float) -> float:
     """Length from (δ, x_l) to x_l = cos³ δ along a geodesic of (δ, x_l, F(δ, x_l)), by its ODE.
 

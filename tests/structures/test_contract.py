@@ -17,8 +17,8 @@ from equimorph.structures import (
     from_identity,
     natural_state,
 )
-from equimorph.structures.contract import advance_by
 from equimorph.structures.discrete import DiscreteStructure
+from equimorph.structures.equations import advance_by
 from oracles.specimens import (
     SPECIMENS,
     arch_truss,

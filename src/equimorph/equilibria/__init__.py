@@ -8,7 +8,7 @@ from equimorph.equilibria.critical_curves import (
     fold_curve,
     grazing_curve,
 )
-from equimorph.equilibria.curves import NewtonHomotopy, ParameterLine
+from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.legs import Leg, Waypoint
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
 from equimorph.equilibria.limit_load import LimitLoad, LimitLoads, limit_load
@@ -36,7 +36,6 @@ __all__ = [
     "Lifts",
     "LimitLoad",
     "LimitLoads",
-    "NewtonHomotopy",
     "ParameterLine",
     "Path",
     "Settled",

@@ -1,6 +1,7 @@
 """Curves that the tracer follows: a path in parameter space, or a homotopy."""
 
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -9,8 +10,8 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT, squared_lengths
 from equimorph.linalg import Border, BorderedSolution
-from equimorph.structures import Advance, LinearSystem, Structure, bordered_advance
-from equimorph.structures.contract import Direction
+from equimorph.structures import Advance, Direction, Equations, LinearSystem, Structure
+from equimorph.structures.equations import advance_by
 
 
 @runtime_checkable
@@ -65,15 +66,58 @@ class Curve(Protocol):
     def bend(self, t: Values) -> Parameters:
         """d²p/dt²."""
 
+    def force(self, t: Values) -> tuple[Lanes, Lanes] | None:
+        """What F is on the curve at t, and its rate; None if it is zero."""
+
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent; see `Advance`."""
 
 
 @dataclass(frozen=True)
-class ParameterLine:
-    """Straight line p(t) = start + t·velocity in parameter space."""
+class PlainCurve(ABC):
+    """Curves whose unknowns are those of the structure.
+
+    Subclasses give `weight` and `take`, and `parameters`, `rate` and `bend` where parameters vary.
+    """
 
     structure: Structure
+
+    @property
+    def metric(self) -> Metric:
+        """The structure's own."""
+        return self.structure
+
+    @property
+    def folds_change_index(self) -> bool:
+        """Whether the index changes where dt/ds vanishes, and only there."""
+        return True
+
+    @abstractmethod
+    def parameters(self, t: Values) -> Parameters:
+        """p(t)."""
+
+    @abstractmethod
+    def rate(self, t: Values) -> Parameters:
+        """dp/dt."""
+
+    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
+        """Return z and p(t)."""
+        return z, self.parameters(t)
+
+    def force(self, t: Values) -> tuple[Lanes, Lanes] | None:
+        """None: F = 0."""
+        del t
+        return None
+
+    def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
+        """Newton step and tangent; see `Advance`."""
+        return self.structure.advance(z, self.parameters(t), self.rate(t), row, corner, defect)
+
+
+@dataclass(frozen=True)
+class ParameterLine(PlainCurve):
+    """Straight line p(t) = start + t·velocity in parameter space."""
+
     start: Parameters
     velocity: Parameters
 
@@ -95,20 +139,6 @@ class ParameterLine:
         along += self.start
         return along
 
-    @property
-    def metric(self) -> Metric:
-        """The structure's own."""
-        return self.structure
-
-    @property
-    def folds_change_index(self) -> bool:
-        """Whether the index changes where dt/ds vanishes, and only there."""
-        return True
-
-    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
-        """Return z and p(t)."""
-        return z, self.parameters(t)
-
     def rate(self, t: Values) -> Parameters:
         """Velocity, the same for all t."""
         return self.velocity
@@ -117,46 +147,31 @@ class ParameterLine:
         """Zero."""
         return np.zeros_like(self.velocity)
 
-    def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
-        """Newton step and tangent; see `Advance`."""
-        return self.structure.advance(z, self.parameters(t), self.velocity, row, corner, defect)
-
 
 @dataclass(frozen=True)
-class NewtonHomotopy:
-    """F(z, p) = (1 − t) F(z₀, p): from any guess z₀ at t = 0 to equilibria at t = 1."""
+class ForceLine(PlainCurve):
+    """F(z, p) = offset + t·growth at fixed parameters: equilibria under a force that changes."""
 
-    structure: Structure
     p: Parameters
-    defect: Lanes
-    """F(z₀, p)."""
+    offset: Lanes
+    """Force on the unknowns at t = 0."""
+    growth: Lanes
+    """Its change from t = 0 to t = 1."""
+    weight: Values
+    """Length of the curve's own part of the metric."""
+
+    def take(self, lanes: Int[np.ndarray, " some"]) -> "ForceLine":
+        """Return some of the lanes."""
+        return ForceLine(self.structure, *(column[lanes] for column in self._columns))
 
     @property
-    def weight(self) -> Values:
-        """One unit of length from guess to goal."""
-        return np.ones(len(self.p))
-
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "NewtonHomotopy":
-        """Return some of the lanes."""
-        return NewtonHomotopy(self.structure, self.p[lanes], self.defect[lanes])
+    def _columns(self) -> tuple[np.ndarray, ...]:
+        return self.p, self.offset, self.growth, self.weight
 
     def parameters(self, t: Values) -> Parameters:
         """Parameters, the same for all t."""
-        return self.p + 0.0 * t[:, None]
-
-    @property
-    def metric(self) -> Metric:
-        """The structure's own."""
-        return self.structure
-
-    @property
-    def folds_change_index(self) -> bool:
-        """Whether the index changes where dt/ds vanishes, and only there."""
-        return True
-
-    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
-        """Return z and p."""
-        return z, self.parameters(t)
+        del t
+        return self.p.copy()
 
     def rate(self, t: Values) -> Parameters:
         """Zero."""
@@ -166,41 +181,40 @@ class NewtonHomotopy:
         """Zero."""
         return np.zeros_like(self.p)
 
+    def force(self, t: Values) -> tuple[Lanes, Lanes]:
+        """Force at t, and its rate."""
+        return self.offset + t[:, None] * self.growth, self.growth
+
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent by the general bordered solve."""
-        residual = self.structure.residual(z, self.p) - (1.0 - t)[:, None] * self.defect
-        given = (self.structure, z, self.p, residual, self.defect)
-        return bordered_advance(*given, row, corner, defect)
+        structure, p = self.structure, self.p
+        force, growth = self.force(t)
+        here = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1])))
+        system = LinearSystem(here.residual - force, -growth[:, None], here.solve)
+        return advance_by(system, row, corner, defect, structure.constraints)
 
 
-@dataclass(frozen=True)
-class AlongCurve:
+def growing_force(structure: Structure, p: Parameters, force: Lanes, lengths: Values) -> ForceLine:
+    """Curves from equilibria at t = 0 under a force on the unknowns that grows to `force`."""
+    return ForceLine(structure, p, np.zeros_like(force), force, lengths)
+
+
+def newton_homotopy(structure: Structure, guess: Lanes, p: Parameters) -> ForceLine:
+    """Curves ``F(z, p) = (1 − t) F(guess, p)`` from any guesses at t = 0 to equilibria at t = 1."""
+    defect = structure.residual(guess, p)
+    return ForceLine(structure, p, defect, -defect, np.ones(len(p)))
+
+
+class AlongCurve(Equations):
     """The equations of curves in z and t, in which `settle` finds points of these curves.
 
     Parameters are t and the number of the curve, see `along_parameters`.
     """
 
-    curve: Curve
-
-    @property
-    def unknowns(self) -> int:
-        """Entries of z that the metric measures."""
-        return self.curve.metric.unknowns
-
-    @property
-    def constraints(self) -> int:
-        """The other entries of z."""
-        return self.size - self.unknowns
-
-    @property
-    def size(self) -> int:
-        """Length of z."""
-        return self.curve.metric.size
-
-    @property
-    def mass(self) -> Float[np.ndarray, " unknowns"]:
-        """Diagonal of the mass matrix."""
-        return self.curve.metric.mass
+    def __init__(self, curve: Curve) -> None:
+        metric = curve.metric
+        self.curve, self.mass, self.unknowns = curve, metric.mass, metric.unknowns
+        self.constraints = metric.size - metric.unknowns
 
     @property
     def scales(self) -> Float[np.ndarray, " parameters"]:
@@ -212,14 +226,17 @@ class AlongCurve:
         return self.curve.take(p[:, 1].astype(int)), np.ascontiguousarray(p[:, 0])
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z, p(t))."""
+        """F(z, p(t)), less the force of the curve."""
         here, t = self._at(p)
-        return here.structure.residual(*here.states(z, t))
+        residual, force = here.structure.residual(*here.states(z, t)), here.force(t)
+        return residual if force is None else residual - force[0]
 
     def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p p' dt."""
+        """F_p p' dt, less the change of the force."""
         (here, t), dt = self._at(p), dp[:, :1]
-        return here.structure.parameter_derivative(*here.states(z, t), dt * here.rate(t))
+        column = here.structure.parameter_derivative(*here.states(z, t), dt * here.rate(t))
+        force = here.force(t)
+        return column if force is None else column - dt * force[1]
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F along (dz, p' dt) for both directions, and F_p p'' times both dt."""
@@ -246,10 +263,14 @@ class AlongCurve:
     def linear_system(
         self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
     ) -> LinearSystem:
-        """F, F_p p' along changes of t, and solves with F_z."""
-        here, t = self._at(p)
-        changes = directions[:, :, :1] * here.rate(t)[:, None]
-        return here.structure.linear_system(*here.states(z, t), changes)
+        """F, F_t along changes of t, and solves with F_z."""
+        (here, t), dt = self._at(p), directions[:, :, :1]
+        system = here.structure.linear_system(*here.states(z, t), dt * here.rate(t)[:, None])
+        force = here.force(t)
+        if force is None:
+            return system
+        columns = system.columns - dt * force[1][:, None]
+        return LinearSystem(system.residual - force[0], columns, system.solve)
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian."""
@@ -259,68 +280,15 @@ class AlongCurve:
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
-        """Newton step of the curves; the tangent is that for one unit of t."""
-        del dp
-        here, t = self._at(p)
-        return here.advance(z, t, row, corner, defect)
+        """Newton step of the curves, in units of the change of t."""
+        (here, t), unit = self._at(p), np.where(dp[:, 0] == 0.0, 1.0, dp[:, 0])
+        step = here.advance(z, t, row, corner / unit, defect)
+        return replace(step, dt=step.dt / unit, tangent_t=step.tangent_t / unit)
 
 
 def along_parameters(t: Values) -> Parameters:
     """Parameters of `AlongCurve` at t, one lane a curve."""
     return np.column_stack([t, np.arange(len(t))])
-
-
-@dataclass(frozen=True)
-class ForceLine:
-    """F(z, p) = t·force at fixed parameters: from an equilibrium at t = 0 under a growing force."""
-
-    structure: Structure
-    p: Parameters
-    force: Lanes
-    """Force on the unknowns at t = 1."""
-    lengths: Values
-    """Length of the curve's own part of the metric."""
-
-    @property
-    def weight(self) -> Values:
-        """As given."""
-        return self.lengths
-
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "ForceLine":
-        """Return some of the lanes."""
-        return ForceLine(self.structure, self.p[lanes], self.force[lanes], self.lengths[lanes])
-
-    def parameters(self, t: Values) -> Parameters:
-        """Parameters, the same for all t."""
-        return self.p + 0.0 * t[:, None]
-
-    @property
-    def metric(self) -> Metric:
-        """The structure's own."""
-        return self.structure
-
-    @property
-    def folds_change_index(self) -> bool:
-        """Whether the index changes where dt/ds vanishes, and only there."""
-        return True
-
-    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
-        """Return z and p."""
-        return z, self.parameters(t)
-
-    def rate(self, t: Values) -> Parameters:
-        """Zero."""
-        return np.zeros_like(self.p)
-
-    def bend(self, t: Values) -> Parameters:
-        """Zero."""
-        return np.zeros_like(self.p)
-
-    def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
-        """Newton step and tangent by the general bordered solve."""
-        residual = self.structure.residual(z, self.p) - t[:, None] * self.force
-        given = (self.structure, z, self.p, residual, -self.force)
-        return bordered_advance(*given, row, corner, defect)
 
 
 def squared_length(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> Values:

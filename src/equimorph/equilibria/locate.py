@@ -16,7 +16,7 @@ from jaxtyping import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria import event_kernels as roots
 from equimorph.equilibria import kernels
-from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.critical import Critical, normal_form, null_border
 from equimorph.equilibria.curves import (
     AlongCurve,
     Curve,
@@ -27,14 +27,14 @@ from equimorph.equilibria.curves import (
 from equimorph.equilibria.kernels import cubic_shares
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Crossing
-from equimorph.equilibria.settle import Guards, settle
+from equimorph.equilibria.settle import Guards, Settled, settle
 from equimorph.equilibria.steps import Bracket, Front, new_scalars
 from equimorph.structures import Advance
 
 AT_ROUND_OFF = Guards(iterations=24, converged=1e-9)
 """A point is exact after a correction below 1e-9 in the metric: Newton squares the error."""
 UNFOLDED = 1e-9
-"""Unfolding β, a residual, from which on a branch point does not exist."""
+"""Square of the distance, in the metric, at which curves pass each other that count as crossing."""
 TINY = 1e-300
 """Least length of a curve in the metric: curves without length have no branch points."""
 
@@ -127,20 +127,35 @@ def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
     equations, p = AlongCurve(curve), along_parameters(t)
     directions = np.zeros((len(t), 1, 2))
     directions[:, 0, 0] = 1.0 / np.maximum(curve.weight, TINY)
-    crossing, frame = (Crossing(directions),), _across(curve, z, p)
+    b = null_border(equations, z, p)
+    crossing, frame = (Crossing(directions),), _across(curve, b)
     found = settle(equations, z, p, directions, crossing, AT_ROUND_OFF, frame, frames=False)
     z, t = found.z, found.p[:, 0].copy()
-    exists = found.found & (np.abs(found.unfolding) < UNFOLDED)
+    exists = found.found & _crosses(equations, found, directions[:, 0], b)
     good = np.asarray(exists & _inside(curve, bracket, z, t))
     return Located(z, t, _arclength(curve, bracket, z, t, share), good)
 
 
-def _across(curve: Curve, z: Lanes, p: Parameters) -> Planes:
-    """Coordinates of all paths near branch points: the share of the null vector, and t."""
-    b = null_border(AlongCurve(curve), z, p)
-    by_z, by_p = np.zeros((len(z), 2, z.shape[1])), np.zeros((len(z), 2, 2))
+def _crosses(equations: AlongCurve, found: Settled, step: Parameters, b: Lanes) -> Flags:
+    """Whether curves cross at points where F + βb = 0, or pass each other at a distance.
+
+    By the reduced equation ``β (φ·b) + ½ (Aξ² + 2Bξτ + Cτ²) = 0``, so that neither the unit of the
+    energy nor the number of unknowns counts.
+    """
+    crosses, at = found.found.copy(), np.flatnonzero(found.found)
+    form = normal_form(equations, found.z[at], found.p[at], step[at])
+    rise = np.abs(found.unfolding[at] * np.einsum("li,li->l", form.phi, b[at]))
+    bend = np.max(np.abs([form.quadratic, form.mixed, form.path]), axis=0)
+    crosses[at] = rise < UNFOLDED * bend
+    return crosses
+
+
+def _across(curve: Curve, b: Lanes) -> Planes:
+    """Coordinates of all paths near branch points: the share of the null vector b, and t."""
+    lanes, size = b.shape
+    by_z, by_p = np.zeros((lanes, 2, size)), np.zeros((lanes, 2, 2))
     by_z[:, 0], by_p[:, 1, 0] = b, curve.weight
-    return Planes(by_z, by_p, np.zeros((len(z), 2)), b)
+    return Planes(by_z, by_p, np.zeros((lanes, 2)), b)
 
 
 def _arclength(curve: Curve, bracket: Bracket, z: Lanes, t: Values, share: Values) -> Values:

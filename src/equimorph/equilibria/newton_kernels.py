@@ -4,39 +4,31 @@ import numpy as np
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER
+from equimorph.structures.newton_kernels import SINGULAR, UNFINISHED, stand_after
 
-OPEN, FOUND, UNFINISHED, SINGULAR, TOO_LONG, NOT_SHRINKING = range(-1, 5)
-"""How a lane stands after a step; `Status` of `equilibria.settle` says what these mean."""
-NEAR = 1e-5
-"""Last correction at whose start tangent space and index are those of its end."""
 DEPENDENT = 1e-14
 """Determinant of a small matrix, relative to its entries, that counts as zero."""
 
 
 @njit(**FLAGS)
-def judge_lanes(change, weights, factor, before, limits, free, last, size, status, share):
+def judge_lanes(
+    change, weights, factor, before, limits, too_long, longest, rule, size, status, share
+):
     """Lengths of steps, how each lane stands after its step, and the share of the step to take.
 
     change (lanes, n) with weights (n) of the squares; factor: by which steps are lengthened;
-    before: lengths of the steps before; limits: converged, following, contraction, too long,
-    longest; free: whether lengths need not shrink yet; last: whether no more steps are taken.
+    before: lengths of the steps before; limits and too_long, for each lane: see `stand_after`;
+    longest: to which steps are shortened; rule: whether lengths need not shrink yet, and whether no
+    more steps are taken.
     """
-    converged, following, contraction, too_long, longest = limits
+    free, last = rule
     for lane in range(change.shape[0]):
         squared = 0.0
         for i in range(change.shape[1]):
             squared += weights[i] * change[lane, i] * change[lane, i]
         length = np.sqrt(squared)
-        old = before[lane]
-        small = length < converged
-        if following > 0.0 and length < NEAR and old < np.inf:
-            small = small or length * length * length < following * old * old
-        state = FOUND if small else (UNFINISHED if last else OPEN)
-        if not (small or free or length <= contraction * old):
-            state = NOT_SHRINKING
-        if too_long < np.inf and not length < too_long:
-            state = TOO_LONG
         taken, long = factor[lane], abs(factor[lane]) * length
+        state = stand_after(length, before[lane], limits, too_long[lane], free, last)
         if not long < np.inf:
             state = SINGULAR
         elif long > longest:

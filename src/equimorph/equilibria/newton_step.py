@@ -125,6 +125,12 @@ class Problem:
         return int(self.directions.shape[1]) + self.unfolded
 
     @property
+    def in_one_plane(self) -> bool:
+        """Whether F = 0 is all, with one direction free in planes, or held."""
+        alone = self.directions.shape[1] == 1 and not self.conditions
+        return alone and not (self.unfolded or isinstance(self.frame, Tangents))
+
+    @property
     def critical(self) -> bool:
         """Whether a border of F_z is needed."""
         return self.unfolded or any(each.critical for each in self.conditions)

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Lanes, Parameters, Scalars
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.model.descriptor import Evaluate
-from equimorph.structures.contract import Direction
+from equimorph.structures.equations import Direction
 
 Directions = Float[np.ndarray, "lanes k parameters"]
 Some = Int[np.ndarray, " some"]

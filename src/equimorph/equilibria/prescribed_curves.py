@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical
-from equimorph.equilibria.curves import Metric
+from equimorph.equilibria.curves import PlainCurve
 from equimorph.equilibria.point_conditions import Linear, Move
 from equimorph.equilibria.point_conditions import Values as DescriptorValues
 from equimorph.errors import InputError
@@ -145,22 +145,11 @@ def approximate(function: Function, lanes: int, scales: Float[np.ndarray, " colu
 
 
 @dataclass(frozen=True)
-class SmoothCurve:
+class SmoothCurve(PlainCurve):
     """Curves p(t) given by polynomials in pieces; `weight` is the scaled length of each."""
 
-    structure: Structure
     pieces: Pieces
     weight: Values
-
-    @property
-    def metric(self) -> Metric:
-        """The structure's own."""
-        return self.structure
-
-    @property
-    def folds_change_index(self) -> bool:
-        """Whether the index changes where dt/ds vanishes, and only there."""
-        return True
 
     def take(self, lanes: Int[np.ndarray, " some"]) -> "SmoothCurve":
         """Return a selection of the lanes."""
@@ -170,10 +159,6 @@ class SmoothCurve:
         """p(t)."""
         return self.pieces.value(t)
 
-    def states(self, z: Lanes, t: Values) -> tuple[Lanes, Parameters]:
-        """Return z and p(t)."""
-        return z, self.parameters(t)
-
     def rate(self, t: Values) -> Parameters:
         """dp/dt."""
         return self.pieces.rate(t)
@@ -181,10 +166,6 @@ class SmoothCurve:
     def bend(self, t: Values) -> Parameters:
         """d²p/dt²."""
         return self.pieces.bend(t)
-
-    def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
-        """Newton step and tangent; see `Advance`."""
-        return self.structure.advance(z, self.parameters(t), self.rate(t), row, corner, defect)
 
 
 Extended = Float[np.ndarray, "lanes extended"]
@@ -271,6 +252,11 @@ class TrackedCurve:
         bend = self.prescribed.bend(t)[:, : len(self.structure.parameters)]
         bend[:, self.free] = 0.0
         return bend
+
+    def force(self, t: Values) -> tuple[Lanes, Lanes] | None:
+        """None: F = 0."""
+        del t
+        return None
 
     def advance(
         self, z: Extended, t: Values, row: Extended, corner: Values, defect: Values

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.equilibria.curves import ForceLine, NewtonHomotopy, ParameterLine
+from equimorph.equilibria.curves import ParameterLine, growing_force, newton_homotopy
 from equimorph.equilibria.saddles import Pairs, strongest_pushes
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace
@@ -140,7 +140,7 @@ class Pools:
             return
         force = self._forces(pairs.take(apart))
         both, ways = np.concatenate([force, -force]), pairs.take(np.tile(apart, 2))
-        line = ForceLine(structure, ways.p, both, ways.distance(structure))
+        line = growing_force(structure, ways.p, both, ways.distance(structure))
         outcome = trace(line, ways.start, (), WIDE_STEPS)
         returned = outcome.code == EventCode.RETURNED
         self._polish(outcome.z[returned], np.tile(group[apart], 2)[returned])
@@ -158,7 +158,7 @@ class Pools:
         if len(guess) == 0:
             return
         structure, p = self.ground.structure, self.ground.p[group]
-        curve = NewtonHomotopy(structure, p, structure.residual(guess, p))
+        curve = newton_homotopy(structure, guess, p)
         outcome = trace(curve, guess, (), WIDE_STEPS)
         arrived = outcome.code == EventCode.ARRIVED
         self.failures.append(("the Newton homotopy did not arrive", group[~arrived]))

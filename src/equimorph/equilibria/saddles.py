@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.arrays import Lanes, Parameters, Some, Values
-from equimorph.equilibria.curves import ForceLine
+from equimorph.equilibria.curves import growing_force
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace import trace
@@ -72,7 +72,7 @@ def states_between(structure: Structure, pairs: Pairs) -> Met:
     options = _options(float(distance.min()))
     met, pair = [np.zeros((0, structure.size))], [np.zeros(0, int)]
     for _ in range(LEGS):
-        line = ForceLine(structure, ways.p[lanes], push[lanes], distance[lanes])
+        line = growing_force(structure, ways.p[lanes], push[lanes], distance[lanes])
         led = trace(line, z, (), options)
         back = np.flatnonzero(led.code == EventCode.RETURNED)
         exact = settle(structure, led.z[back], ways.p[lanes[back]], guards=Guards(iterations=12))

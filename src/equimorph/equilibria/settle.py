@@ -16,8 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Rows, Values
-from equimorph.equilibria import newton_kernels
-from equimorph.equilibria.newton_kernels import FOUND, NEAR, OPEN, judge_lanes
+from equimorph.equilibria.newton_kernels import judge_lanes
 from equimorph.equilibria.newton_step import (
     Frame,
     Held,
@@ -34,8 +33,9 @@ from equimorph.equilibria.newton_step import (
 )
 from equimorph.equilibria.point_conditions import Condition, Directions, Some
 from equimorph.model import Constraint
-from equimorph.structures import Equations, Structure
-from equimorph.tolerances import CONVERGED
+from equimorph.structures import Equations, Structure, newton_kernels
+from equimorph.structures.newton import Limits, Newton, Through, newton
+from equimorph.structures.newton_kernels import FOUND, NEAR, OPEN
 
 __all__ = [
     "Guards",
@@ -80,25 +80,11 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True)
-class Guards:
+class Guards(Limits):
     """When corrections are shortened, when a lane ends, and which points are believed.
 
     Parameters
     ----------
-    iterations
-        Most steps.
-    longest
-        Length in the metric to which steps are shortened.
-    too_long
-        Length of a step at which a lane is given up: the guess was not near.
-    converged
-        A shorter step is the last; Newton squares what is left.
-    following
-        Estimate of the next step, from the last two, below which it is not taken.
-    contraction, free
-        Each step must be at most so much of the one before, after so many steps that need not.
-    multipliers
-        Weight of squared multipliers in the length of steps.
     known
         Known solutions u of each lane to be pushed away from (deflation); rows of NaN where a lane
         has fewer than others.
@@ -114,14 +100,6 @@ class Guards:
         Constraints that the point must obey.
     """
 
-    iterations: int = 60
-    longest: float = 0.7
-    too_long: float = np.inf
-    converged: float = CONVERGED
-    following: float = 0.0
-    contraction: float = np.inf
-    free: int = 0
-    multipliers: float = 0.0
     known: Float[np.ndarray, "lanes roots unknowns"] | None = None
     trust: Values | None = None
     middle: tuple[Lanes, Parameters] | None = None
@@ -208,17 +186,56 @@ def settle(
     The points and a status for each lane: one that fails leaves the others as they are.
     """
     guards = Guards() if guards is None else guards
+    if directions is None and not conditions and guards.known is None:
+        return _believed(structure, _at_parameters(structure, z, p, guards), (z, p), guards)
     frame = Tangents() if frame is None else frame
     if directions is None:
         directions = np.zeros((len(z), 0, p.shape[1]))
-    here = start_at(Problem(structure, directions, tuple(conditions), frame), z, p)
+    problem = Problem(structure, directions, tuple(conditions), frame)
+    if problem.in_one_plane and guards.known is None:
+        return _believed(structure, _in_one_plane(problem, z, p, guards), (z, p), guards)
+    return _believed(structure, _by_steps(problem, z, p, guards, frames=frames), (z, p), guards)
+
+
+def _at_parameters(structure: Equations, z: Lanes, p: Parameters, guards: Guards) -> Settled:
+    """Newton's method by the fused step of the structure."""
+    return _settled(newton(structure, z, p, guards))
+
+
+def _in_one_plane(problem: Problem, z: Lanes, p: Parameters, guards: Guards) -> Settled:
+    """The same where parameters move along one direction, or are held."""
+    dp, frame = np.ascontiguousarray(problem.directions[:, 0]), problem.frame
+    row, corner = np.zeros_like(z), np.ones(len(z))
+    if isinstance(frame, Planes):
+        row = np.ascontiguousarray(frame.by_z[:, 0])
+        corner = np.einsum("li,li->l", frame.by_p[:, 0], dp)
+    found = newton(problem.structure, z, p, guards, Through(dp, row, corner))
+    if isinstance(frame, Planes):  # directions along the set are orthonormal
+        weights = weights_of(problem.structure, z.shape[1] + 1)
+        length = np.sqrt(found.tangents**2 @ weights)
+        np.divide(found.tangents, length[:, :, None], found.tangents)
+    return _settled(found)
+
+
+def _settled(found: Newton) -> Settled:
+    lanes, k = found.tangents.shape[:2]
+    sure, slopes = np.ones(lanes, bool), np.zeros((lanes, 0, k))
+    told = (found.status, found.size, found.first, found.index, sure, found.tangents, slopes)
+    return Settled(found.z, found.p, *told, np.zeros(lanes))
+
+
+def _by_steps(
+    problem: Problem, z: Lanes, p: Parameters, guards: Guards, *, frames: bool = True
+) -> Settled:
+    """Newton's method for any directions and conditions."""
+    here = start_at(problem, z, p)
     run = _Run(here, guards, frames=frames)
     while len(run.lanes):
         step = here.step()  # onto the set, and along it to the conditions
         status, share = run.judge(here, step)
         there = here.moved(step, share)
         here = there.renewed(step, run.record(there, step, status))
-    return _believed(structure, run.settled(), (z, p), guards)
+    return run.settled()
 
 
 def embedded_planes(structure: Structure, free: Int[np.ndarray, " d"], rows: Rows) -> Planes:
@@ -242,8 +259,7 @@ class _Run:
         self.known = guards.known
         structure, bordered = here.problem.structure, here.z.shape[1] + width
         self.weights = weights_of(structure, bordered, guards.multipliers)
-        self.limits = (guards.converged, guards.following, guards.contraction, guards.too_long,
-                       guards.longest)  # fmt: skip
+        self.too_long = guards.too_long_of(count)
         self.z, self.p, self.beta = here.z.copy(), here.p.copy(), here.beta.copy()
         self.status = np.full(count, OPEN)
         self.index, self.sure = np.full(count, -1), np.zeros(count, bool)
@@ -257,8 +273,9 @@ class _Run:
         factor = _lengthening(here, step, self.known)
         self.number += 1
         free = guards.contraction == np.inf or self.number <= guards.free
-        last = self.number >= guards.iterations
-        given = (step.change, self.weights, factor, self.size[lanes], self.limits, free, last)
+        rule = (free, self.number >= guards.iterations)
+        limits = (guards.lengths, self.too_long[lanes], float(guards.longest))
+        given = (step.change, self.weights, factor, self.size[lanes], *limits, rule)
         judge_lanes(*given, size, status, share)
         self.size[lanes] = size
         if self.number == 1:
@@ -313,8 +330,9 @@ def _believed(
 ) -> Settled:
     """The points, those that are not believed marked in place."""
     z, p, status, index = settled.z, settled.p, settled.status, settled.index
-    doubtful = (status == FOUND) & ~(settled.sure & (settled.size < NEAR))
-    if doubtful.any():
+    sure = settled.sure if guards.converged <= NEAR else settled.sure & (settled.size < NEAR)
+    if not sure.all():
+        doubtful = (status == FOUND) & ~sure
         index[doubtful] = structure.index(z[doubtful], p[doubtful])
 
     def refuse(bad: Flags, why: Status) -> None:

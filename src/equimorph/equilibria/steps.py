@@ -7,7 +7,9 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes, Values
 from equimorph.equilibria import event_kernels, kernels
-from equimorph.equilibria.curves import Curve, dual, squared_length
+from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length
+from equimorph.equilibria.newton_step import Planes
+from equimorph.equilibria.settle import Guards, settle
 
 
 @dataclass(frozen=True)
@@ -84,42 +86,36 @@ def _unit(curve: Curve, front: Front) -> Front:
     )
 
 
+ON_CURVE = Guards(
+    iterations=kernels.MOST_ITERATIONS,
+    longest=np.inf,
+    converged=kernels.EXACT,
+    contraction=0.5,
+    multipliers=kernels.MULTIPLIER_WEIGHT,
+)
+"""Corrections of steps to events, as on the march: they shrink by half."""
+
+
 def step_along(curve: Curve, front: Front, length: Values) -> tuple[Front, Flags]:
-    """Go `length` along each curve, predicted by the tangent; see `onto_curve`."""
-    z = front.z + length[:, None] * front.tangent_z
-    return onto_curve(curve, front, z, front.t + length * front.tangent_t, length)
+    """Points at pseudo-arclength `length` from `front`, and the success.
 
-
-def onto_curve(
-    curve: Curve, front: Front, z: Lanes, t: Values, length: Values
-) -> tuple[Front, Flags]:
-    """Points at pseudo-arclength `length` from `front`, corrected from guesses, and the success.
-
-    The corrector is Newton on the curve and the pseudo-arclength condition. A point counts only if
+    They are predicted by the tangent and corrected in the plane across it. A point counts only if
     the first correction is below a quarter of the length and its tangent within acos 0.9 of that of
     `front`.
     """
-    metric, lanes = curve.metric, len(length)
-    numbers, counts = new_scalars(lanes)
-    trial = np.ascontiguousarray(z).copy()
-    row, corner = dual(metric, curve.weight, front.tangent_z, front.tangent_t)
-    numbers[kernels.TRIAL], numbers[kernels.CORNER] = t, corner
-    numbers[kernels.DEFECT] = kernels.row_sums(row, trial - front.z) - length
-    numbers[kernels.DEFECT] += corner * (t - front.t)
-    numbers[kernels.LENGTH], numbers[kernels.WEIGHT] = length, curve.weight**2
-    out = replace(front, tangent_z=np.zeros_like(trial), index=np.zeros(lanes, int))
-    closing = (numbers[kernels.CORNER], numbers[kernels.DEFECT])
-    while (counts[kernels.STAGE] == kernels.CORRECTING).any():
-        open_lanes = counts[kernels.STAGE] == kernels.CORRECTING
-        move = curve.advance(trial, numbers[kernels.TRIAL], row, *closing)
-        state = (trial, numbers, counts, lanes, kernels.EXACT, 0.0)
-        kernels.correct(move.dz, move.dt, move.tangent_z, move.tangent_t, metric.mass, *state)
-        new = open_lanes & (counts[kernels.STAGE] == kernels.CONVERGED)
-        out.tangent_z[new] = move.tangent_z[new] / numbers[kernels.NORM, new, None]
-        out.index[new] = move.index[new]
-    good = counts[kernels.STAGE] == kernels.CONVERGED
-    t, slope = numbers[kernels.TRIAL].copy(), np.where(good, numbers[kernels.NEW_SLOPE], 0.0)
-    return replace(out, z=trial, t=t, tangent_t=slope), good
+    z = front.z + length[:, None] * front.tangent_z
+    p = along_parameters(front.t + length * front.tangent_t)
+    row, corner = dual(curve.metric, curve.weight, front.tangent_z, front.tangent_t)
+    unit = 1.0 / np.where(curve.weight > 0.0, curve.weight, 1.0)
+    directions, across = np.zeros((len(z), 1, 2)), np.zeros((len(z), 1, 2))
+    directions[:, 0, 0], across[:, 0, 0] = unit, corner
+    guards = replace(ON_CURVE, too_long=np.maximum(kernels.FIRST_SHARE * length, kernels.EXACT))
+    plane = Planes(row[:, None], across)
+    found = settle(AlongCurve(curve), z, p, directions, (), guards, plane)
+    tangent_z, tangent_t = np.ascontiguousarray(found.frames[:, 0, :-1]), found.frames[:, 0, -1]
+    there = Front(found.z, found.p[:, 0].copy(), tangent_z, tangent_t * unit, found.index)
+    cosine = kernels.row_sums(row, there.tangent_z) + corner * there.tangent_t
+    return there, found.found & (cosine >= kernels.LEAST_COSINE)
 
 
 def new_scalars(

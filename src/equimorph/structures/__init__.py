@@ -5,18 +5,9 @@ from typing import Any
 
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
-from equimorph.structures.contract import (
-    Advance,
-    Direction,
-    Equations,
-    Growth,
-    LinearSystem,
-    Majorant,
-    Structure,
-    Symmetry,
-    bordered_advance,
-)
+from equimorph.structures.contract import Growth, Structure, Symmetry
 from equimorph.structures.energy import EnergyStructure, Unknown
+from equimorph.structures.equations import Advance, Direction, Equations, LinearSystem, Majorant
 from equimorph.structures.frame import Frame, Member
 from equimorph.structures.margin import stability_margin
 from equimorph.structures.quantities import (
@@ -91,7 +82,6 @@ __all__ = [
     "Truss",
     "Tube",
     "Unknown",
-    "bordered_advance",
     "distance_to",
     "effort_of",
     "from_identity",

@@ -1,18 +1,20 @@
-"""The contract of structures: the methods by which the rest of the package uses them."""
+"""The contract of structures: the methods by which the rest of the package uses them.
+
+Those that Newton's method needs are in `structures.equations`.
+"""
 
 import json
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.linalg import Border, BorderedSolution
 from equimorph.model import (
     Constraint,
     Descriptor,
@@ -22,43 +24,7 @@ from equimorph.model import (
     parameter_vector,
 )
 from equimorph.structures.approach import straight_arcs
-
-Direction = tuple[Lanes, Parameters]
-Majorant = Callable[[Direction, Direction], Lanes]
-
-
-@dataclass(frozen=True)
-class Advance:
-    """One Newton step on a curve through the equilibrium set, with the tangent.
-
-    The bordered system is ``[F_z F_t; row corner] [dz; dt] = −[F; defect]`` with
-    ``F_t = F_p·dp``; the tangent solves it for the right-hand side ``[0; 1]``.
-
-    determinant: that of F_z where it costs nothing, else nan.
-    """
-
-    dz: Lanes
-    dt: Values
-    tangent_z: Lanes
-    tangent_t: Values
-    residual: Values
-    index: Int[np.ndarray, " lanes"]
-    determinant: Values
-
-
-Solver = Callable[[Float[np.ndarray, "lanes sides bordered"], Border | None], BorderedSolution]
-
-
-@dataclass(frozen=True)
-class LinearSystem:
-    """F and its derivatives at points, computed together.
-
-    residual: F; columns: F_p·d for each of k directions; solve: with F_z, bordered or not.
-    """
-
-    residual: Lanes
-    columns: Float[np.ndarray, "lanes k size"]
-    solve: Solver
+from equimorph.structures.equations import Equations
 
 
 @dataclass(frozen=True)
@@ -79,63 +45,6 @@ class Symmetry:
         return np.asarray(self.signs * (p if self.order is None else p[..., self.order]))
 
 
-@runtime_checkable
-class Equations(Protocol):
-    """F(z; p) = 0 with its derivatives: the part of a structure's contract that Newton uses."""
-
-    @property
-    def unknowns(self) -> int:
-        """Entries of z that the metric measures."""
-
-    @property
-    def constraints(self) -> int:
-        """The other entries of z."""
-
-    @property
-    def size(self) -> int:
-        """Length of z."""
-
-    @property
-    def mass(self) -> Float[np.ndarray, " unknowns"]:
-        """Diagonal of the mass matrix."""
-
-    @property
-    def scales(self) -> Float[np.ndarray, " parameters"]:
-        """Change of each parameter that counts as one unit of length."""
-
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z; p)."""
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-
-    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
-        """D²F[v, w], second derivative of F along two directions (dz, dp)."""
-
-    def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
-    ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered; see `Structure.solve`."""
-
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z."""
-
-    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
-        """Negative eigenvalues of the constrained Hessian."""
-
-    def advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
-
-
 @dataclass(frozen=True)
 class Growth:
     """Whether the energy is smooth on all of Rⁿ and grows there at infinity.
@@ -150,21 +59,17 @@ class Growth:
     promised: bool = False
 
 
-class Structure(ABC):
+class Structure(Equations):
     """A structure with energy E(u; p), constraints c(u; p) = 0 and L = E + λ·c.
 
-    All methods take and return batches, lanes first. ``z = (u, λ)`` has `unknowns` + `constraints`
-    entries and F = (∂L/∂u, c). A subclass gives the attributes without a value below and all
+    All methods take and return batches, lanes first. F = (∂L/∂u, c), with the derivatives and
+    solves of `Equations`. A subclass gives the attributes without a value here and there and all
     abstract methods, and `drawing` if there are loads; its `kind` is registered in
     `equimorph.structures.KINDS`.
     """
 
     kind: ClassVar[str]
     parameters: tuple[Parameter, ...]
-    unknowns: int
-    constraints: int
-    mass: Float[np.ndarray, " unknowns"]
-    """Diagonal of the mass matrix: the metric of margins, distances and lengths."""
     length_unit: str = "1"
     """Unit of the coordinates to draw."""
     endless_in: ClassVar[str] = ""
@@ -173,11 +78,6 @@ class Structure(ABC):
     """Axis, y or z, that is upward in pictures of a structure in space."""
     energy_scale: float = 1.0
     """Value of one unit of `energy` in the units of the parameters, in joules for example."""
-
-    @property
-    def size(self) -> int:
-        """Length of z."""
-        return self.unknowns + self.constraints
 
     @cached_property
     def scales(self) -> Float[np.ndarray, " parameters"]:
@@ -205,44 +105,8 @@ class Structure(ABC):
         """Potential energy E."""
 
     @abstractmethod
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z; p)."""
-
-    @abstractmethod
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-
-    @abstractmethod
-    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
-        """D²F[v, w], second derivative of F along two directions (dz, dp)."""
-
-    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
-        """Bound of D²F over boxes around (z, p) that reach so far in each entry; None if unknown.
-
-        The bound is a function of two directions v, w with entries ≥ 0: entry i is at least
-        |D²F[v', w']ᵢ| for all states in the box and all |v'| ≤ v, |w'| ≤ w, entry by entry.
-        """
-        del z, p, reach
-        return None
-
-    @abstractmethod
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p: work-conjugates of the parameters (actuator efforts, the loads' displacements)."""
-
-    @abstractmethod
-    def solve(  # the bordered system has this many parts
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
-    ) -> BorderedSolution:
-        """Solve with the KKT matrix F_z − shift·mass, bordered by (columns, rows, corner).
-
-        The shift acts on the unknowns, not on the multipliers. `equimorph.linalg.solve_bordered`
-        does it for a dense matrix, `DiscreteStructure` for a sparse one.
-        """
 
     @abstractmethod
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
@@ -345,11 +209,6 @@ class Structure(ABC):
         """Discretisation error of the unknowns; zero for discrete structures."""
         return np.zeros(len(z))
 
-    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
-        """Negative eigenvalues of the constrained Hessian."""
-        nothing = np.zeros((len(z), 0, self.size))
-        return self.solve(z, p, nothing).negative - self.constraints
-
     @property
     def watched(self) -> tuple[Descriptor, ...]:
         """Descriptors whose zeros are events on the lift of one state; see `Vanishing`."""
@@ -359,83 +218,3 @@ class Structure(ABC):
         """Independent movements out of the plane that lower the energy; None: not judged."""
         del z, p
         return None
-
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z, for several solves at the same points.
-
-        Here each part is computed by its own method; a structure that computes parts together says
-        so by its own `linear_system`.
-        """
-        (lanes, k), size = directions.shape[:2], self.size
-        changes = directions.reshape(lanes * k, directions.shape[2])
-        many = (z.repeat(k, axis=0), p.repeat(k, axis=0), changes)
-        columns = self.parameter_derivative(*many) if k else np.zeros((0, size))
-        solve = partial(self.solve, z, p)
-        return LinearSystem(self.residual(z, p), columns.reshape(lanes, k, size), solve)
-
-    def advance(  # the fused step of the hot path
-        self,
-        z: Lanes,
-        p: Parameters,
-        dp: Parameters,
-        row: Lanes,
-        corner: Values,
-        defect: Values,
-    ) -> Advance:
-        """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
-        system = self.linear_system(z, p, dp[:, None])
-        return advance_by(system, row, corner, defect, self.constraints)
-
-
-def joint_system(
-    linearised: Callable[[Lanes, Parameters, Parameters], tuple[np.ndarray, ...]],
-    solve: Callable[..., BorderedSolution],
-    z: Lanes,
-    p: Parameters,
-    directions: Float[np.ndarray, "lanes k parameters"],
-) -> LinearSystem:
-    """`LinearSystem` by a function that computes F, F_p·dp and the parts of F_z together.
-
-    `solve` takes z, p and these parts of F_z before the right-hand sides and the border.
-    """
-    changes = [np.ascontiguousarray(each) for each in directions.transpose(1, 0, 2)]
-    residual, column, *parts = linearised(z, p, changes[0] if changes else np.zeros_like(p))
-    others = [linearised(z, p, dp)[1] for dp in changes[1:]]
-    columns = np.stack([column, *others], axis=1)[:, : len(changes)]
-    return LinearSystem(residual, columns, partial(solve, z, p, *parts))
-
-
-def bordered_advance(
-    structure: Structure,
-    z: Lanes,
-    p: Parameters,
-    residual: Lanes,
-    column: Lanes,
-    row: Lanes,
-    corner: Values,
-    defect: Values,
-) -> Advance:
-    """`Advance` for any residual and column, by the structure's general bordered solve."""
-    system = LinearSystem(residual, column[:, None], partial(structure.solve, z, p))
-    return advance_by(system, row, corner, defect, structure.constraints)
-
-
-def advance_by(
-    system: LinearSystem, row: Lanes, corner: Values, defect: Values, constraints: int
-) -> Advance:
-    """`Advance` by the general bordered solve of a linear system with one column."""
-    rhs = np.zeros((len(row), 2, row.shape[1] + 1))
-    rhs[:, 0, :-1], rhs[:, 0, -1], rhs[:, 1, -1] = -system.residual, -defect, 1.0
-    solution = system.solve(rhs, (system.columns, row[:, None], corner[:, None, None]))
-    step, tangent = solution.x[:, 0], solution.x[:, 1]
-    return Advance(
-        np.ascontiguousarray(step[:, :-1]),
-        step[:, -1].copy(),
-        np.ascontiguousarray(tangent[:, :-1]),
-        tangent[:, -1].copy(),
-        np.abs(system.residual).max(axis=1),
-        solution.negative - constraints,
-        solution.determinant,
-    )

@@ -13,20 +13,15 @@ from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.contract import (
-    Advance,
-    LinearSystem,
-    Structure,
-    joint_system,
-)
+from equimorph.structures.contract import Structure
+from equimorph.structures.equations import Advance, JointEquations
+from equimorph.structures.newton import Limits, newton
 from equimorph.structures.states import State, natural_state
 
 STEPS = 12
 """Steps of the continuation from the parameters where the natural state is given."""
-ITERATIONS = 12
-"""Newton iterations at each of them."""
-SETTLED = 1e-9
-"""Newton correction, relative to the unknowns, at which the iteration ends."""
+SURE = Limits(iterations=12, longest=np.inf)
+"""Newton's method at each of them."""
 BALANCED = 1e-13
 """Largest residual of a guess that is an equilibrium already: round-off."""
 
@@ -55,19 +50,10 @@ def continue_equilibria(
 
 def correct_at_parameters(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
     """Newton at fixed parameters, and whether it settled; balanced guesses stay as they are."""
-    z = z.copy()
-    settled = np.zeros(len(z), bool)
-    for _ in range(ITERATIONS):
-        residual = structure.residual(z, p)
-        settled |= np.abs(residual).max(axis=1) <= BALANCED
-        if settled.all():
-            break
-        step = structure.solve(z, p, -residual[:, None]).x[:, 0]
-        usable = ~settled & np.isfinite(step).all(axis=1)
-        z[usable] += step[usable]
-        small = np.abs(step).max(axis=1) <= SETTLED * (1.0 + np.abs(z).max(axis=1))
-        settled |= usable & small
-    return z, settled & np.isfinite(z).all(axis=1)
+    balanced = np.abs(structure.residual(z, p)).max(axis=1, initial=0.0) <= BALANCED
+    found = newton(structure, z, p, SURE)
+    good = balanced | found.found
+    return np.where(balanced[:, None], z, found.z), good & np.isfinite(z).all(axis=1)
 
 
 BLOCK = 512
@@ -76,7 +62,7 @@ NEAR = 0.1
 """Largest correction of a natural state, relative to the unknowns: given values may be rounded."""
 
 
-class DiscreteStructure(Structure):
+class DiscreteStructure(JointEquations, Structure):
     """Structure with a sparse KKT matrix and a natural state known at the default parameters.
 
     Subclasses give `layout`, `entries`, `linearised` and `natural_guess`, and the rest of the
@@ -127,23 +113,17 @@ class DiscreteStructure(Structure):
         names = [field.name for field in fields(Advance)]
         return Advance(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z; computed together."""
-        return joint_system(self.linearised, self._solve, z, p, directions)
-
-    def _solve(
+    def solve_with(
         self,
+        parts: tuple[np.ndarray, ...],
         z: Lanes,
         p: Parameters,
-        entries: Entries,
         rhs: Float[np.ndarray, "lanes sides bordered"],
         border: Border | None,
     ) -> BorderedSolution:
         """Solve with F_z, given by its entries, bordered."""
         del z, p
-        return self.layout.solve(entries, border, rhs)
+        return self.layout.solve(parts[0], border, rhs)
 
     # --- the natural state ----------------------------------------------------------------------
 

@@ -20,6 +20,8 @@ NEAR = 1e-3
 """Distance of a shift below the eigenvalue, as a share of the second one, once that is known."""
 HALVINGS = (4, 4, 8)
 """Bisections between a number below all eigenvalues and zero, before each try to go on in pairs."""
+FIRST_HALVINGS, POLISHING, ALL_HALVINGS = 12, 40, 60
+"""Bisections before inverse iteration begins, its most steps, and bisections where it fails."""
 SWEEPS, CHUNK, SHARE = 8, 256, 1024
 """Most solves; lanes at a time; least lanes that are worth a further thread."""
 
@@ -130,10 +132,8 @@ def _above(
         at = np.flatnonzero(~proved)
         if len(at) == 0:
             break
-        for _ in range(halvings):
-            middle = 0.5 * (low[at] + high[at])
-            below = _count_below(structure, z[at], p[at], middle) > 0
-            high[at], low[at] = np.where(below, middle, high[at]), np.where(below, low[at], middle)
+        bounds = low[at], high[at]
+        low[at], high[at] = _halved(structure, z[at], p[at], *bounds, halvings)
         value[at], proved[at] = _by_pairs(structure, z[at], p[at], error, low[at])
     return value, proved
 
@@ -199,13 +199,31 @@ def _by_bisection(
     z: Lanes,
     p: Parameters,
 ) -> Values:
-    """Margins of any states: bisection, then inverse iteration with the Rayleigh quotient."""
+    """Margins of any states: bisection, then inverse iteration with the Rayleigh quotient.
+
+    Where that does not converge, bisection goes on to round-off; not a number where no bounds hold.
+    """
     low, high = _bracket(structure, z, p)
-    for _ in range(12):
+    low, high = _halved(structure, z, p, low, high, FIRST_HALVINGS)
+    value, good = _polish(structure, z, p, low, high)
+    rest = np.flatnonzero(~good)
+    if len(rest):
+        low, high = (each[rest] for each in (low, high))
+        low, high = _halved(structure, z[rest], p[rest], low, high, ALL_HALVINGS)
+        below, above = (_count_below(structure, z[rest], p[rest], each) for each in (low, high))
+        value[rest] = np.where((below == 0) & (above > 0), 0.5 * (low + high), np.nan)
+    return value
+
+
+def _halved(
+    structure: Pencil, z: Lanes, p: Parameters, low: Values, high: Values, times: int
+) -> tuple[Values, Values]:
+    """Bounds of the smallest eigenvalue after bisections on the count of those below."""
+    for _ in range(times):
         middle = 0.5 * (low + high)
         below = _count_below(structure, z, p, middle) > 0
         high, low = np.where(below, middle, high), np.where(below, low, middle)
-    return _polish(structure, z, p, low, high)
+    return low, high
 
 
 def _count_below(
@@ -244,14 +262,15 @@ def _polish(
     p: Parameters,
     low: Values,
     high: Values,
-) -> Values:
-    """Inverse iteration from a shift just below the smallest eigenvalue."""
+) -> tuple[Values, Flags]:
+    """Inverse iteration from a shift just below the smallest eigenvalue; where it converged."""
     n, mass = structure.unknowns, structure.mass
     vector = np.tile(np.cos(1.7 * np.arange(n)) + 1.3, (len(z), 1))
     # an eigenvalue of zero lies on the bracket's end, where the matrix is singular
     bottom = low - 0.5 * (high - low)
     value, shift = 0.5 * (low + high), bottom.copy()
-    for sweep in range(40):
+    good = np.zeros(len(z), bool)
+    for sweep in range(POLISHING):
         rhs = np.zeros((len(z), 1, structure.size))
         rhs[:, 0, :n] = mass * vector
         solved = structure.solve(z, p, rhs, shift=shift).x[:, 0, :n]
@@ -260,13 +279,15 @@ def _polish(
         quotient = shift + np.einsum("li,i,li->l", solved, mass, vector) / norm**2
         previous, value = value, np.where(norm > 0, quotient, value)
         vector = solved / norm[:, None]
-        if sweep > 1 and _has_converged(value, previous).all():
-            break
+        if sweep > 1:
+            good = _has_converged(value, previous) & (value >= low) & (value <= high)
+            if good.all():
+                break
         # a shift equal to the eigenvalue would be singular: stay a little below
         near = (value > bottom) & (value < high + 0.5 * (high - low))
         closer = value - 1e-3 * (high - low)
         shift = np.where(near & (sweep > 2), np.maximum(closer, bottom), bottom)
-    return np.asarray(value)
+    return np.asarray(value), good
 
 
 def _has_converged(value: Values, previous: Values) -> Flags:

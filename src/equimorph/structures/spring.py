@@ -20,7 +20,8 @@ from equimorph.model import (
     Support,
     SupportKind,
 )
-from equimorph.structures.contract import Direction, Majorant, Structure, Symmetry
+from equimorph.structures.contract import Structure, Symmetry
+from equimorph.structures.equations import Direction, Majorant
 from equimorph.structures.states import State, natural_state
 
 Term = tuple[float, dict[str, int]]

@@ -9,8 +9,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes
-from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.curves import correction_size, squared_length
+from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
+from equimorph.equilibria.curves import squared_length
+from equimorph.equilibria.kernels import FIRST_SHARE, LEAST_COSINE, MULTIPLIER_WEIGHT
+from equimorph.equilibria.settle import Held
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
@@ -21,14 +23,17 @@ from equimorph.model import Constraint
 
 LONGEST = 0.5
 """Step in the metric above which the cheap way is not tried."""
+SAFE = Guards(
+    iterations=7, longest=np.inf, converged=1e-8, contraction=0.5, multipliers=MULTIPLIER_WEIGHT
+)
+"""Corrections that shrink by half; applying the last one squares it."""
 
 
 @dataclass(frozen=True)
 class Direct:
-    """Points over the other ends, their index, and which of them can be trusted."""
+    """Points over the other ends, and which of them can be trusted."""
 
     z: Lanes
-    index: Int[np.ndarray, " lanes"]
     good: Flags
 
 
@@ -56,7 +61,7 @@ def lift_directly(
         lanes = lanes[direct.good]
         out[lanes] = direct.z[direct.good]
     good[lanes] = True
-    return Direct(out, index, good)
+    return Direct(out, good)
 
 
 def _step(
@@ -73,33 +78,20 @@ def _step(
     tangent = first.tangent_z
     length = np.sqrt(squared_length(structure, weight, tangent, one))
     out, good = z + tangent, (length < LONGEST) & (first.index == index)
-    size, last = np.full(lanes, np.inf), 0.25 * length
-    end_tangent, end_index = np.zeros_like(z), np.full(lanes, -1)
     todo = np.flatnonzero(good)
-    for _ in range(7):
-        here = line.take(todo)
-        count = len(todo)
-        step = here.advance(out[todo], one[:count], still[:count], one[:count], none[:count])
-        size[todo] = correction_size(structure, here.weight, step.dz, none[:count])
-        alive = size[todo] <= np.maximum(last[todo], 1e-11)
-        out[todo[alive]] += step.dz[alive]
-        good[todo[~alive]] = False
-        last[todo] = 0.5 * size[todo]
-        end_tangent[todo], end_index[todo] = step.tangent_z, step.index
-        # the last correction of a quadratic iteration is squared by applying it
-        todo = todo[alive & (size[todo] > 1e-8)]
-        if len(todo) == 0:
-            break
-    good &= (size <= 1e-8) & (end_index == index)
-    n = structure.unknowns
-    product = (tangent[:, :n] * end_tangent[:, :n]) @ structure.mass + weight**2
-    end_length = np.sqrt(squared_length(structure, weight, end_tangent, one))
-    good &= product >= 0.9 * length * end_length
-    lanes_good = np.flatnonzero(good)
-    p = line.take(lanes_good).parameters(one[: len(lanes_good)])
+    there, p = line.take(todo), line.take(todo).parameters(one[: len(todo)])
+    longest = np.maximum(FIRST_SHARE * length[todo], SAFE.converged)
+    guards = replace(SAFE, too_long=longest, index=index[todo])
+    end = settle(structure, out[todo], p, there.velocity[:, None], (), guards, Held())
+    out[todo] = end.z
+    end_tangent, n = np.ascontiguousarray(end.frames[:, 0, :-1]), structure.unknowns
+    product = (tangent[todo, :n] * end_tangent[:, :n]) @ structure.mass + there.weight**2
+    end_length = np.sqrt(squared_length(structure, there.weight, end_tangent, one[: len(todo)]))
+    good[todo] = end.found & (product >= LEAST_COSINE * length[todo] * end_length)
     for constraint in constraints:
-        good[lanes_good] &= constraint.excess(out[lanes_good], p) <= 0.0
-    return Direct(out, end_index, good)
+        own = good[todo]
+        good[todo[own]] = constraint.excess(end.z[own], p[own]) <= 0.0
+    return Direct(out, good)
 
 
 EFFORTS = 4

@@ -3,12 +3,12 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.equilibria import ParameterLine, TraceOptions, search_points
+from equimorph.equilibria import Guards, ParameterLine, TraceOptions, search_points, settle
+from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.lifting.edges import lift_directly
 from equimorph.model import position
 
 COARSE = 5
@@ -21,6 +21,8 @@ MORE = 12
 connected."""
 STARTS = 100
 """Random guesses over each of them."""
+EXACT = Guards(iterations=1, longest=np.inf, converged=1e-8, multipliers=MULTIPLIER_WEIGHT)
+"""Equilibria need one correction at most, which squares what is left."""
 
 Seeds = tuple[
     Int[np.ndarray, " n"],
@@ -55,12 +57,11 @@ def polish(
     Curves of the set lead to them: so they belong to it, whether or not they are resolved.
     """
     p = setting.parameters(mesh.vertices[vertices])
-    # a line of no length polishes the points and counts their index
-    still = ParameterLine(setting.structure, p, np.zeros_like(p))
-    index = setting.structure.index(z, p)
-    direct = lift_directly(still, z, index, setting.constraints)
-    good = direct.good
-    return (vertices[good], direct.z[good], p[good], index[good]), good
+    settled = settle(setting.structure, z, p, guards=EXACT)
+    good = settled.found
+    for constraint in setting.constraints:
+        good[good] = constraint.excess(settled.z[good], p[good]) <= 0.0
+    return (vertices[good], settled.z[good], p[good], settled.index[good]), good
 
 
 def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n d"]]:

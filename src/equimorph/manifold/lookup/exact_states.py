@@ -7,17 +7,15 @@ from equimorph.arrays import Flags, Lanes
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.linalg.simd import LANES
-from equimorph.manifold.lookup.kernels import root_shares, settle
+from equimorph.manifold.lookup.kernels import root_shares
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
+from equimorph.structures.newton import Limits, newton
 
-ITERATIONS = 40
-"""Largest number of Newton iterations from a cell to the state over a point."""
 ROUND_OFF = 1e-14
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
-SETTLED = 2
-"""Corrections after which a lane with another index than the requested one is abandoned."""
+NEARER = 0.5
+"""Largest correction, relative to the one before, of lanes that get nearer."""
 CLOSEST = 1e-3
 """Least share of a cell between its fold and a guess: at the fold Newton's matrix is singular."""
 NEAREST = 6
@@ -30,32 +28,18 @@ Points = Float[np.ndarray, "points P"]
 def exact_states(
     structure: Structure, z: Lanes, p: Points, wanted: Int[np.ndarray, " lanes"] | None = None
 ) -> tuple[Lanes, Flags, Int[np.ndarray, " lanes"]]:
-    """Newton at fixed parameters until the next correction would be round-off; and the index.
+    """States at fixed parameters, exact to round-off; which were found; and their index.
 
-    Corrections shrink quadratically: the one after sizes a and b is about b (b/a)². Where there is
-    no state beyond a fold, Newton leaps over the fold again and again: lanes that do not get nearer
-    and do not have the `wanted` index, if one is given, are given up.
+    Where there is no state beyond a fold, Newton leaps over the fold again and again: lanes that do
+    not get nearer and do not have the `wanted` index, if one is given, are given up.
     """
-    count, mass = len(z), structure.mass
-    out, good, index = z.copy(), np.zeros(count, bool), np.full(count, -1)
-    # structures compute whole blocks of lanes: the rest of one goes with the first lane
-    rows = max(count, LANES) if count else 0
-    lane = np.arange(rows)
-    z, p = z[lane % count], p[lane % count]
-    before, goal = np.zeros(rows), index if wanted is None else wanted
-    still, fixed = np.zeros((rows, structure.size)), np.zeros((rows, p.shape[1]))
-    none, one = np.zeros(rows), np.ones(rows)
-    left = count
-    for number in range(ITERATIONS):
-        if left == 0:
-            break
-        m = max(left, LANES)
-        step = structure.advance(z[:m], p[:m], fixed[:m], still[:m], one[:m], none[:m])
-        rule = left, wanted is not None and number >= SETTLED, ROUND_OFF
-        left = settle(
-            (step.dz, step.index), (lane, z, p, before), (out, good, index), goal, mass, rule
-        )
-    return out, good, index
+    contraction = np.inf if wanted is None else NEARER
+    limits = Limits(
+        40, np.inf, 1.0, ROUND_OFF, following=ROUND_OFF, contraction=contraction, free=2,
+        exempt=wanted,
+    )  # fmt: skip
+    found = newton(structure, z, p, limits)
+    return found.z, found.found, found.index
 
 
 STRAIGHT_ON = TraceOptions(

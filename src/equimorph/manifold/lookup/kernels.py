@@ -1,4 +1,4 @@
-"""Compiled kernels of queries: cells near points, guesses on them, Newton, and what was found."""
+"""Compiled kernels of queries: cells near points, guesses on them, and what was found."""
 
 import numpy as np
 
@@ -122,47 +122,6 @@ def worth_trying(hits, inside, brims, maps, nudge):
             out[count] = i
             count += 1
     return out[:count]
-
-
-@njit(**ACCURATE)
-def settle(step, work, result, wanted, mass, rule):
-    """Apply Newton corrections; return how many lanes go on, which move to the front.
-
-    step: dz, index; work, one row a lane at work: number, z, p, size of the correction before;
-    result, one row a lane: z, whether it is exact, index. rule: number of lanes, whether their
-    index has to be the wanted one, round-off.
-    """
-    dz, index = step
-    lane, z, p, before = work
-    out, good, found = result
-    count, strict, round_off = rule
-    left = 0
-    for i in range(count):
-        total = 0.0
-        for j in range(mass.shape[0]):
-            total += mass[j] * dz[i, j] * dz[i, j]
-        size, own = np.sqrt(total), lane[i]
-        if not size < 1.0:  # nor if it is not a number
-            continue
-        if strict and index[i] != wanted[own] and not size < 0.5 * before[i]:
-            continue
-        share = size / max(before[i], size, 1e-300)
-        if size * share * share < round_off:
-            for j in range(z.shape[1]):
-                out[own, j] = z[i, j] + dz[i, j]
-            good[own], found[own] = True, index[i]
-            continue
-        for j in range(z.shape[1]):
-            z[left, j] = z[i, j] + dz[i, j]
-        for j in range(p.shape[1]):
-            p[left, j] = p[i, j]
-        lane[left], before[left] = own, size
-        left += 1
-    if left:
-        # structures compute eight lanes at once: the rows behind the last one go on with the first
-        for i in range(left, min(len(z), 8)):
-            z[i], p[i] = z[0], p[0]
-    return left
 
 
 @njit(**ACCURATE)

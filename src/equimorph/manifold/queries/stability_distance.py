@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import lift
+from equimorph.equilibria.critical import Critical, null_border
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
@@ -28,8 +29,15 @@ from equimorph.structures import State, States
 
 CANDIDATES = 12
 """Places of the boundary from which the nearest one is searched."""
+BEYOND = 1.001
+"""How far a straight move to the boundary is lifted, relative to the way there."""
 SHORT_OF = 1e-7
-"""Part of the way to the boundary that is left out when a straight move to it is lifted."""
+"""Part of the way to a cusp that is left out."""
+APART = 2.0
+"""Distance from a cusp, relative to that of its reduced equation, within which a state belongs to
+it."""
+ROUND_OFF = 1e-9
+"""Part of the way to the limit of a parameter that is left out, as the limit itself may be."""
 LONGER = 1.1
 """Ways along edges of the complex are up to a tenth too long: so much longer ones are tried."""
 LINKS = (8, 16)
@@ -123,10 +131,12 @@ def _in_parameters(
     for lane in np.argsort(length, kind="stable"):
         if length[lane] >= best:
             break
-        share = _reach(eset, state, found.p[lane])
-        if share is not None and share * length[lane] < best:
-            best = float(share * length[lane])
-            nearest = State(eset.structure, found.z[lane], found.p[lane])
+        end = _reached(eset, state, State(eset.structure, found.z[lane], found.p[lane]))
+        if end is None:
+            continue
+        gone = float(np.linalg.norm(change(end.z[None], end.p[None])))
+        if gone < best:
+            best, nearest = gone, end
     return best, nearest
 
 
@@ -141,17 +151,43 @@ def _nearest_of_each_part(
     return np.asarray(minima[:CANDIDATES])
 
 
-def _reach(eset: EquilibriumSet, state: State, p: Float[np.ndarray, " P"]) -> float | None:
-    """Share of a straight change after which stability is lost; None if it is not."""
-    goal = state.p + (1.0 - SHORT_OF) * (p - state.p)
-    to = {name: float(goal[k]) for name, k in zip(eset.names, eset.setting.free, strict=True)}
-    path = lift(state, to=to)
-    if path.end.kind in {"fold", "branch point"}:
-        return float(path.end.at)
-    # next to a fold the softest mode is about as stiff as the root of the way that is left
-    end = path.end.state
-    soft = end.margin < 1e-2 * max(1.0, abs(state.margin))
-    return 1.0 if path.end.kind == "arrived" and end.stable and soft else None
+def _reached(eset: EquilibriumSet, state: State, fold: State) -> State | None:
+    """State in which a straight change towards and just beyond a fold loses stability, if it does.
+
+    A change that goes on is on another sheet than the fold, or leads through a cusp.
+    """
+    end = lift(state, to=_towards(eset, state, fold.p, BEYOND)).end
+    if end.kind in {"fold", "branch point"}:
+        return end.state
+    near = lift(state, to=_towards(eset, state, fold.p, 1.0 - SHORT_OF)).end
+    return fold if near.kind == "arrived" and _is_beside_cusp(near.state, fold) else None
+
+
+def _towards(
+    eset: EquilibriumSet, state: State, p: Float[np.ndarray, " P"], share: float
+) -> dict[str, float]:
+    """Values of the free parameters at a share of a change, within the limits of all."""
+    change = p - state.p
+    for k in eset.setting.free.tolist():
+        one = eset.structure.parameters[k]
+        limit = one.upper if change[k] > 0.0 else one.lower
+        if change[k] != 0.0 and np.isfinite(limit):
+            share = min(share, (1.0 - ROUND_OFF) * (limit - state.p[k]) / change[k])
+    goal = state.p + share * change
+    return {name: float(goal[k]) for name, k in zip(eset.names, eset.setting.free, strict=True)}
+
+
+def _is_beside_cusp(near: State, cusp: State) -> bool:
+    """Whether a state is as near to a singular one as the reduced equation of cusps says.
+
+    ``c ξ³/6 = vᵀF_p dp`` for a change dp of the parameters, ξv that of the state.
+    """
+    structure, z, p = cusp.structure, cusp.z[None], cusp.p[None]
+    at = Critical(structure, z, p, null_border(structure, z, p))
+    share = np.cbrt(6.0 * np.abs(at.along(near.p[None] - p)) / np.abs(at.cubic))
+    reach, gap = ((each[:, : structure.unknowns] ** 2) @ structure.mass for each in (
+        share[:, None] * at.v, near.z[None] - z))  # fmt: skip
+    return bool(gap[0] <= APART**2 * reach[0])
 
 
 def _along_the_set(

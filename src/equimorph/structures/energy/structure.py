@@ -13,7 +13,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Constraint, Descriptor, Drawing, position
-from equimorph.structures.contract import Direction, Growth, Majorant
+from equimorph.structures.contract import Growth
 from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.energy.declared import (
     Formula,
@@ -37,6 +37,7 @@ from equimorph.structures.energy.expressions import POINT
 from equimorph.structures.energy.independence import DEPENDENT, SAMPLES, Independence
 from equimorph.structures.energy.leading_form import grows
 from equimorph.structures.energy.tape import Derivatives, Tape, casadi, tape
+from equimorph.structures.equations import Direction, Majorant
 
 INDEPENDENCE = "constraint_independence"
 """Descriptor of structures with constraints; see `Independence`."""

@@ -10,8 +10,8 @@ from equimorph.arrays import Entries, Flags, Lanes, Nodal, Parameters, Scalars, 
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.contract import Direction
 from equimorph.structures.discrete import DiscreteStructure
+from equimorph.structures.equations import Direction
 from equimorph.structures.frame.kernels import linearise_lanes
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.tables import Tables

@@ -9,13 +9,8 @@ from jaxtyping import Float
 from equimorph.arrays import Lanes, Nodal, Parameters, Values
 from equimorph.linalg import Border, BorderedSolution, CondensedLayout, multiply, no_border
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.contract import (
-    Advance,
-    Direction,
-    LinearSystem,
-    Majorant,
-    Symmetry,
-)
+from equimorph.structures.contract import Symmetry
+from equimorph.structures.equations import Advance, Direction, LinearSystem, Majorant
 from equimorph.structures.rod.clamped_derivative_kernels import (
     linearise_lanes,
     matrix_lanes,
@@ -190,13 +185,7 @@ class ClampedMechanics(Mechanics):
         return self.layout.solve(diagonal, gradients, *around, rhs)
 
     def advance(
-        self,
-        z: Lanes,
-        p: Parameters,
-        dp: Parameters,
-        row: Lanes,
-        corner: Values,
-        defect: Values,
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
         """One fused kernel."""
         given = (z, p, dp, row, corner, defect)

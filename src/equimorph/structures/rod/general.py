@@ -9,13 +9,8 @@ from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Values
 from equimorph.linalg import Border, BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.contract import (
-    Advance,
-    Direction,
-    LinearSystem,
-    Symmetry,
-    joint_system,
-)
+from equimorph.structures.contract import Symmetry
+from equimorph.structures.equations import Advance, Direction, JointEquations
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
@@ -35,7 +30,7 @@ FORCES = 8.0
 """Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
 
 
-class GeneralMechanics(Mechanics):
+class GeneralMechanics(JointEquations, Mechanics):
     """A rod whose Lagrangian is a `RodModel`."""
 
     def __init__(self, model: RodModel) -> None:
@@ -267,25 +262,18 @@ class GeneralMechanics(Mechanics):
         diagonal, gradients, trailing = self.linearised(z, p, np.zeros_like(p))[2:]
         if shift is not None:
             diagonal -= shift[:, None] * self.mesh.weights
-        return self._solve(z, p, diagonal, gradients, trailing, rhs, border)
+        return self.solve_with((diagonal, gradients, trailing), z, p, rhs, border)
 
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z; computed together."""
-        return joint_system(self.linearised, self._solve, z, p, directions)
-
-    def _solve(
+    def solve_with(
         self,
+        parts: tuple[np.ndarray, ...],
         z: Lanes,
         p: Parameters,
-        diagonal: Nodal,
-        gradients: Float[np.ndarray, "lanes m nodes"],
-        trailing: Float[np.ndarray, "lanes m m"],
         rhs: Float[np.ndarray, "lanes sides bordered"],
         border: Border | None,
     ) -> BorderedSolution:
         """Solve with F_z, given by its parts; under pressure every angle works on every other."""
+        diagonal, gradients, trailing = parts
         if self._area is not None:
             entries = self._pressed_entries(self._area, z, p, diagonal, gradients, trailing)
             return self._full_layout.solve(entries, border, rhs)
@@ -318,7 +306,7 @@ class GeneralMechanics(Mechanics):
     ) -> Advance:
         """One fused kernel; rods under pressure, whose matrix is full, solve in general."""
         if self._area is not None:
-            return self.plain_advance(z, p, dp, row, corner, defect)
+            return super().advance(z, p, dp, row, corner, defect)
         shared = (self.layout.ends, *self._step_data)
         return self.fused_advance(advance_lanes, shared, z, p, dp, row, corner, defect)
 

@@ -6,14 +6,8 @@ from jaxtyping import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.structures.approach import smooth_arcs
-from equimorph.structures.contract import (
-    Advance,
-    Direction,
-    LinearSystem,
-    Majorant,
-    Structure,
-    Symmetry,
-)
+from equimorph.structures.contract import Structure, Symmetry
+from equimorph.structures.equations import Advance, Direction, LinearSystem, Majorant
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.mechanics import Mechanics
 from equimorph.structures.rod.units import Units

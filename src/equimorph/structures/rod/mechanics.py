@@ -1,6 +1,6 @@
 """Interface of a rod's mechanics; `Rod` adds names, natural states and descriptors."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 
 import numpy as np
@@ -8,42 +8,32 @@ from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.contract import (
-    Advance,
-    Direction,
-    LinearSystem,
-    Majorant,
-    Symmetry,
-    advance_by,
-)
+from equimorph.structures.contract import Symmetry
+from equimorph.structures.equations import Advance, Direction, Equations
 from equimorph.structures.rod.discretisation import Mesh
 
 LARGEST_TAIL = 1e-3
 """Highest Legendre coefficients of θ, in radians, of an element that represents its part."""
 
 
-class Mechanics(ABC):
+class Mechanics(Equations):
     """Energy, residual, derivatives and solves of a discretised rod in batches of lanes.
 
     z = (angles at the unknown nodes, multipliers); methods as in `structures.contract.Structure`.
     """
 
     mesh: Mesh
-    unknowns: int
-    constraints: int
-    mass: Float[np.ndarray, " unknowns"]
     parameters: int
     """Number of parameters."""
     held: tuple[bool, bool]
     """Whether the angles of the ends are prescribed."""
 
     @property
-    def size(self) -> int:
-        """Length of z."""
-        return self.unknowns + self.constraints
+    def scales(self) -> Float[np.ndarray, " parameters"]:
+        """One, as nothing here has a unit."""
+        return np.ones(self.parameters)
 
     def check_widths(self, *pairs: Direction) -> list[np.ndarray]:
         """States and directions (z, p) as contiguous arrays of the right widths, for the kernels.
@@ -85,48 +75,8 @@ class Mechanics(ABC):
         """Potential energy E."""
 
     @abstractmethod
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z; p)."""
-
-    @abstractmethod
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-
-    @abstractmethod
-    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
-        """D²F[v, w]."""
-
-    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
-        """Bound of D²F over boxes; unknown unless the mechanics say so."""
-        del z, p, reach
-        return None
-
-    @abstractmethod
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p."""
-
-    @abstractmethod
-    def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
-    ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered."""
-
-    @abstractmethod
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z."""
-
-    @abstractmethod
-    def advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        """One Newton step along the curve with parameter velocity `dp`."""
 
     def fused_advance(  # a kernel, its tables, and what `advance` takes
         self,
@@ -152,7 +102,7 @@ class Mechanics(ABC):
         out = Advance(*outputs[:-1])
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             unsafe = ~(ratio >= PIVOT_GUARD)
-            again = self.plain_advance(*(x[unsafe] for x in inputs))
+            again = super().advance(*(x[unsafe] for x in inputs))
             for name, column in vars(again).items():
                 getattr(out, name)[unsafe] = column
         return out
@@ -164,13 +114,6 @@ class Mechanics(ABC):
     @abstractmethod
     def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
         """Couples of the supports, or actuators, on both ends of the rod."""
-
-    def plain_advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        """`advance` by the general bordered solve."""
-        system = self.linear_system(z, p, dp[:, None])
-        return advance_by(system, row, corner, defect, self.constraints)
 
     @abstractmethod
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:

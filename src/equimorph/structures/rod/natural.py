@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from numpy.polynomial import legendre
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.structures.contract import Advance
+from equimorph.structures.newton import Limits, Steps, Through, newton
 from equimorph.structures.rod.discretisation import reference_element
 from equimorph.structures.rod.general import GeneralMechanics
 from equimorph.structures.rod.mechanics import Mechanics
@@ -19,10 +19,14 @@ FIRST_STEP = 0.25
 """First step of the continuation, as a share of the whole way."""
 SMALLEST_STEP = 1e-8
 """Smallest step: below it the continuation has met a fold."""
-ITERATIONS = 7
-"""Newton iterations of one step."""
-CONVERGED = 1e-6
-"""Newton correction after which the error is below 1e-11, on the way."""
+FIRST = Limits(iterations=1, longest=np.inf, converged=1e-6, multipliers=1.0)
+SHRINKING = Limits(
+    iterations=6, longest=np.inf, converged=1e-6, contraction=0.5, free=1, multipliers=1.0
+)
+"""Newton's method in one step: the first correction, and the others, which tell whether it leads
+to the branch; the last one leaves an error below 1e-11."""
+SMALL = 1e-6
+"""First correction from which on the second one tells nothing."""
 BEND = 0.5
 """Largest second Newton correction relative to the first: beyond, the step may change branches."""
 
@@ -61,17 +65,12 @@ class Point:
 
 
 @runtime_checkable
-class Continued(Protocol):
+class Continued(Steps, Protocol):
     """Mechanics that can be continued."""
 
     @property
     def size(self) -> int:
         """Length of z."""
-
-    def advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        """One Newton step along the curve with parameter velocity `dp`."""
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the discretisation represents states."""
@@ -81,7 +80,7 @@ def follow(
     rod: Continued, part: Part, x: Float[np.ndarray, "lanes extended"]
 ) -> tuple[Values, Float[np.ndarray, "lanes extended"]]:
     """Move x = (z, span) along a part: the share of it that was reached, 1 if all, and x there."""
-    here = newton(rod, part, np.arange(len(x)), np.zeros(len(x)), x)[0]
+    here = corrected(rod, part, np.arange(len(x)), np.zeros(len(x)), x)[0]
     before = Point(here.t.copy(), here.x.copy(), here.slope.copy())
     step = np.full(len(x), FIRST_STEP)
     for _ in range(400):
@@ -91,7 +90,7 @@ def follow(
         old = here[active]
         target = np.minimum(old.t + step[active], 1.0)
         guess = old.x if part.free else _predict(before[active], old, target)
-        new, bend = newton(rod, part, active, target, guess)
+        new, bend = corrected(rod, part, active, target, guess)
         if not part.free:
             way, off = (np.abs(new.x - x).max(axis=1) for x in (old.x, guess))
             bend = np.maximum(bend, off / np.maximum(way, 1e-6))
@@ -114,7 +113,7 @@ def _predict(before: Point, here: Point, t: Values) -> Float[np.ndarray, "lanes 
     return np.asarray(np.where(alone[:, None], line, cubic))
 
 
-def newton(
+def corrected(
     rod: Continued,
     part: Part,
     lanes: Int[np.ndarray, " lanes"],
@@ -127,34 +126,27 @@ def newton(
     dν/dλ < 0), or the elements no longer resolve it.
     """
     change = part.stop[lanes] - part.start[lanes]
-    at = part.start[lanes] + t[:, None] * change
-    z, nu = np.ascontiguousarray(guess[:, :-1]), at[:, part.span].copy()
-    velocity, row, corner = change, np.zeros_like(z), np.ones(len(z))
-    if part.free:
-        nu, velocity, corner = guess[:, -1].copy(), np.zeros_like(at), np.zeros(len(z))
+    p, z = part.start[lanes] + t[:, None] * change, np.ascontiguousarray(guess[:, :-1])
+    through = Through(change, np.zeros_like(z), np.ones(len(z)))
+    if part.free:  # λ stays zero
+        p[:, part.span], velocity = guess[:, -1], np.zeros_like(p)
+        row = np.zeros_like(z)
         velocity[:, part.span], row[:, part.multiplier] = 1.0, 1.0
-    first, worst = np.zeros(len(z)), np.zeros(len(z))
-    for k in range(ITERATIONS):
-        at[:, part.span] = nu
-        defect = z[:, part.multiplier] if part.free else np.zeros(len(z))
-        step = rod.advance(z, at, velocity, row, corner, defect)
-        z = z + step.dz
-        nu = nu + step.dt if part.free else nu
-        size = np.abs(step.dz).max(axis=1)
-        first = size if k == 0 else first
-        worst = worst if k == 0 else np.maximum(worst, size)
-        if not (size > CONVERGED).any():
-            break
-    stable = (step.index == 0) & ((step.tangent_t < 0.0) if part.free else True)
-    good = stable & (size <= CONVERGED)
+        through = Through(velocity, row, np.zeros(len(z)))
+    once = newton(rod, z, p, FIRST, through)
+    more = once if once.found.all() else newton(rod, once.z, once.p, SHRINKING, through)
+    good = more.found & (more.index == 0)
+    if part.free:
+        good &= more.tangents[:, 0, -1] < 0.0
     if part.sharpening[lanes].any():
-        good &= rod.resolved(z, at) | ~part.sharpening[lanes]
-    bend = np.where(good, worst / np.maximum(first, 1e-6), np.inf)
+        good &= rod.resolved(more.z, more.p) | ~part.sharpening[lanes]
+    bend = np.full(len(z), np.inf)
+    bend[good] = np.where(once.found, 0.0, more.first)[good] / np.maximum(once.first, SMALL)[good]
     slope = np.zeros_like(guess)
-    if not part.free:  # the last matrix is that of the point, but for a correction below 1e-6
-        slope[:, :-1] = step.tangent_z
+    if not part.free:  # the last matrix is that of the point, but for a small correction
+        slope[:, :-1] = more.tangents[:, 0, :-1]
         slope[:, -1] = change[:, part.span]
-    return Point(t, np.concatenate([z, nu[:, None]], axis=1), slope), bend
+    return Point(t, np.concatenate([more.z, more.p[:, [part.span]]], axis=1), slope), bend
 
 
 SMALLEST = 1e-3
@@ -234,7 +226,7 @@ def _continue(rod: Mechanics, p: Parameters, lanes: Int[np.ndarray, " some"], ou
         out.outcome[lanes[small[t < 1.0]]] = Outcome.SPAN_FOLD
     last = Part(start, goal, free=False, sharpening=sharpening)
     reached = np.flatnonzero(there)
-    exact = newton(rod, last, reached, np.ones(len(reached)), x[reached])[0].x[:, :-1]
+    exact = corrected(rod, last, reached, np.ones(len(reached)), x[reached])[0].x[:, :-1]
     out.z[lanes[reached]] = exact
 
 
@@ -274,7 +266,7 @@ def natural_rod(rod: GeneralMechanics, p: Parameters) -> Natural:
     out.span[here] = x[:, -1]
     out.outcome[here[share < 1.0]] = Outcome.SPAN_FOLD
     there = np.flatnonzero(share >= 1.0)
-    exact = newton(rod, last, there, np.ones(len(there)), x[there])[0].x[:, :-1]
+    exact = corrected(rod, last, there, np.ones(len(there)), x[there])[0].x[:, :-1]
     out.z[:] = np.nan
     out.z[here[there]] = exact
     return out

@@ -7,13 +7,8 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.linalg import Border, BorderedSolution
-from equimorph.structures.contract import (
-    Advance,
-    Direction,
-    LinearSystem,
-    Structure,
-    Symmetry,
-)
+from equimorph.structures.contract import Structure, Symmetry
+from equimorph.structures.equations import Advance, Direction, LinearSystem
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.units import Units
 from equimorph.structures.spatial.fields import Fields, SpatialFields

@@ -10,19 +10,14 @@ from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.contract import (
-    Advance,
-    LinearSystem,
-    advance_by,
-    joint_system,
-)
+from equimorph.structures.equations import Advance, JointEquations
 from equimorph.structures.spatial.lagrangian import Nodes, SpatialLagrangian, blocks_of
 from equimorph.structures.spatial.quaternions import FRAME, RIGHT, normalised
 from equimorph.structures.spatial.step_kernels import advance_lanes
 from equimorph.structures.spatial.tables import step_tables
 
 
-class SpatialMechanics(SpatialLagrangian):
+class SpatialMechanics(SpatialLagrangian, JointEquations):
     """Mechanics of the Lagrangian of a `SpatialModel`; methods as in `structures.contract`."""
 
     @cached_property
@@ -180,27 +175,27 @@ class SpatialMechanics(SpatialLagrangian):
         """Solve with F_z − shift·mass, bordered."""
         return self.layout.solve(self.entries(z, p, shift), border, rhs)
 
-    def _linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
+    @property
+    def scales(self) -> Float[np.ndarray, " parameters"]:
+        """One, as nothing here has a unit."""
+        return np.ones(self.parameters)
+
+    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
+        """F, F_p·dp and the entries of F_z."""
         residual, column = self.equations(z, p, (np.zeros_like(z), dp))
         return residual, column, self.entries(z, p)
 
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z; computed together."""
-        return joint_system(self._linearised, self._solve, z, p, directions)
-
-    def _solve(
+    def solve_with(
         self,
+        parts: tuple[np.ndarray, ...],
         z: Lanes,
         p: Parameters,
-        entries: Entries,
         rhs: Float[np.ndarray, "lanes sides bordered"],
         border: Border | None,
     ) -> BorderedSolution:
         """Solve with F_z, given by its entries, bordered."""
         del z, p
-        return self.layout.solve(entries, border, rhs)
+        return self.layout.solve(parts[0], border, rhs)
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian, from the pivots of the fused step."""
@@ -220,7 +215,7 @@ class SpatialMechanics(SpatialLagrangian):
         general solve.
         """
         if self.model.soft:
-            return self._plain_advance(z, p, dp, row, corner, defect)
+            return super().advance(z, p, dp, row, corner, defect)
         self.check((z, p), (row, dp))
         lanes = len(z)
         inputs = [np.ascontiguousarray(each) for each in (z, p, dp, row, corner, defect)]
@@ -234,14 +229,7 @@ class SpatialMechanics(SpatialLagrangian):
             determinant *= -1.0
         unsafe = ~(ratio >= PIVOT_GUARD)
         if unsafe.any():
-            again = self._plain_advance(*(each[unsafe] for each in inputs))
+            again = super().advance(*(each[unsafe] for each in inputs))
             for name, column in vars(again).items():
                 getattr(out, name)[unsafe] = column
         return out
-
-    def _plain_advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        """`advance` by the general bordered solve."""
-        system = self.linear_system(z, p, dp[:, None])
-        return advance_by(system, row, corner, defect, self.constraints)

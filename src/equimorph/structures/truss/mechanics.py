@@ -12,8 +12,9 @@ from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
 from equimorph.model.drawing import supports_of_point
-from equimorph.structures.contract import Direction, Growth, Symmetry
+from equimorph.structures.contract import Growth, Symmetry
 from equimorph.structures.discrete import DiscreteStructure, along_corners
+from equimorph.structures.equations import Direction
 from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.truss.bar import Energies
 from equimorph.structures.truss.kernels import linearise_lanes

@@ -1,0 +1,186 @@
+"""F(z; p) = 0 with its derivatives and solves: what Newton's method asks of a structure."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.linalg import Border, BorderedSolution
+
+Direction = tuple[Lanes, Parameters]
+Majorant = Callable[[Direction, Direction], Lanes]
+
+
+@dataclass(frozen=True)
+class Advance:
+    """One Newton step on a curve through the equilibrium set, with the tangent.
+
+    The bordered system is ``[F_z F_t; row corner] [dz; dt] = −[F; defect]`` with
+    ``F_t = F_p·dp``; the tangent solves it for the right-hand side ``[0; 1]``.
+
+    determinant: that of F_z where it costs nothing, else nan.
+    """
+
+    dz: Lanes
+    dt: Values
+    tangent_z: Lanes
+    tangent_t: Values
+    residual: Values
+    index: Int[np.ndarray, " lanes"]
+    determinant: Values
+
+
+Solver = Callable[[Float[np.ndarray, "lanes sides bordered"], Border | None], BorderedSolution]
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """F and its derivatives at points, computed together.
+
+    residual: F; columns: F_p·d for each of k directions; solve: with F_z, bordered or not.
+    """
+
+    residual: Lanes
+    columns: Float[np.ndarray, "lanes k size"]
+    solve: Solver
+
+
+class Equations(ABC):
+    """F(z; p) = 0 with its derivatives, in batches, lanes first.
+
+    ``z = (u, λ)`` has `unknowns` + `constraints` entries.
+    """
+
+    unknowns: int
+    """Entries of z that the metric measures."""
+    constraints: int
+    """The other entries of z."""
+    mass: Float[np.ndarray, " unknowns"]
+    """Diagonal of the mass matrix: the metric of margins, distances and lengths."""
+
+    @property
+    def size(self) -> int:
+        """Length of z."""
+        return self.unknowns + self.constraints
+
+    @property
+    @abstractmethod
+    def scales(self) -> Float[np.ndarray, " parameters"]:
+        """Change of each parameter that counts as one unit of length."""
+
+    @abstractmethod
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+
+    @abstractmethod
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+
+    @abstractmethod
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w], second derivative of F along two directions (dz, dp)."""
+
+    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
+        """Bound of D²F over boxes around (z, p) that reach so far in each entry; None if unknown.
+
+        The bound is a function of two directions v, w with entries ≥ 0: entry i is at least
+        |D²F[v', w']ᵢ| for all states in the box and all |v'| ≤ v, |w'| ≤ w, entry by entry.
+        """
+        del z, p, reach
+        return None
+
+    @abstractmethod
+    def solve(  # the bordered system has this many parts
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with the KKT matrix F_z − shift·mass, bordered by (columns, rows, corner).
+
+        The shift acts on the unknowns, not on the multipliers. `equimorph.linalg.solve_bordered`
+        does it for a dense matrix, `DiscreteStructure` for a sparse one.
+        """
+
+    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian."""
+        nothing = np.zeros((len(z), 0, self.size))
+        return self.solve(z, p, nothing).negative - self.constraints
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z, for several solves at the same points.
+
+        Here each part is computed by its own method; a structure that computes parts together says
+        so by its own `linear_system`.
+        """
+        (lanes, k), size = directions.shape[:2], self.size
+        changes = directions.reshape(lanes * k, directions.shape[2])
+        many = (z.repeat(k, axis=0), p.repeat(k, axis=0), changes)
+        columns = self.parameter_derivative(*many) if k else np.zeros((0, size))
+        solve = partial(self.solve, z, p)
+        return LinearSystem(self.residual(z, p), columns.reshape(lanes, k, size), solve)
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
+        system = self.linear_system(z, p, dp[:, None])
+        return advance_by(system, row, corner, defect, self.constraints)
+
+
+class JointEquations(Equations):
+    """Equations whose F, F_p·dp and F_z are computed together."""
+
+    @abstractmethod
+    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
+        """F, F_p·dp and the parts of F_z."""
+
+    @abstractmethod
+    def solve_with(
+        self,
+        parts: tuple[np.ndarray, ...],
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None,
+    ) -> BorderedSolution:
+        """Solve with F_z, given by its parts, bordered."""
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z; computed together."""
+        changes = [np.ascontiguousarray(each) for each in directions.transpose(1, 0, 2)]
+        residual, column, *parts = self.linearised(
+            z, p, changes[0] if changes else np.zeros_like(p)
+        )
+        others = [self.linearised(z, p, dp)[1] for dp in changes[1:]]
+        columns = np.stack([column, *others], axis=1)[:, : len(changes)]
+        return LinearSystem(residual, columns, partial(self.solve_with, tuple(parts), z, p))
+
+
+def advance_by(
+    system: LinearSystem, row: Lanes, corner: Values, defect: Values, constraints: int
+) -> Advance:
+    """`Advance` by the general bordered solve of a linear system with one column."""
+    rhs = np.zeros((len(row), 2, row.shape[1] + 1))
+    rhs[:, 0, :-1], rhs[:, 0, -1], rhs[:, 1, -1] = -system.residual, -defect, 1.0
+    solution = system.solve(rhs, (system.columns, row[:, None], corner[:, None, None]))
+    step, tangent = solution.x[:, 0], solution.x[:, 1]
+    return Advance(
+        np.ascontiguousarray(step[:, :-1]),
+        step[:, -1].copy(),
+        np.ascontiguousarray(tangent[:, :-1]),
+        tangent[:, -1].copy(),
+        np.abs(system.residual).max(axis=1),
+        solution.negative - constraints,
+        solution.determinant,
+    )
