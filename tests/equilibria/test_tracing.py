@@ -6,13 +6,14 @@ import pytest
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.curves import AlongCurve, along_parameters, dual
+from equimorph.equilibria.locate import locate_branch_point
 from equimorph.equilibria.point_conditions import Plane
 from equimorph.equilibria.settle import settle
-from equimorph.equilibria.steps import initial_front, step_along
+from equimorph.equilibria.steps import Bracket, initial_front, step_along
 from equimorph.equilibria.trace import Batching
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.structures import States
-from oracles.polynomial import fold_form, pitchfork_form
+from oracles.polynomial import Polynomial, fold_form, pitchfork_form
 
 
 def lines(structure, z, start, stop):
@@ -204,3 +205,18 @@ def test_points_at_a_length_are_those_of_the_corrector_for_points_with_condition
     assert found.found.all()
     assert np.abs(found.z - there.z).max() < 1e-13
     assert np.abs(found.p[:, 0] - there.t).max() < 1e-13
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("offset", [0.0, 1e-4])
+def test_branch_points_exist_or_not_in_any_unit_of_energy(scale, offset):
+    """s (x³ − a x) = s b: curves cross at the origin for b = 0, else pass at a distance of √2b."""
+    form = Polynomial(lambda x, a, b: (x**4 * 0.25 - a * x**2 * 0.5 - b * x) * scale, 1, ("a", "b"))
+    line = ParameterLine(form, np.array([[-0.1, offset]]), np.array([[0.2, 0.0]]))
+    ends = [initial_front(line, np.array([[x]]), np.array([t]))
+            for x, t in ((10.0 * offset, 0.0), (-10.0 * offset, 1.0))]  # fmt: skip
+    length, lane = np.array([0.2]), np.array([0])
+    found = locate_branch_point(line, Bracket(lane, *ends, length, length * 0.0, lane))
+    assert found.found.tolist() == [offset == 0.0]
+    if offset == 0.0:
+        assert abs(found.t[0] - 0.5) < 1e-9

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import eigh, null_space
 
 import equimorph as em
-from equimorph.structures import States, stability_margin
+from equimorph.structures import States, margin, stability_margin
 
 
 def dense_margin(structure, z, p):
@@ -60,3 +60,18 @@ def test_margin_of_structures_with_few_unknowns():
     state = spring.natural_state(x_l=1.5)
     wanted = dense_margin(spring, state.z, state.p)
     assert state.margin == pytest.approx(wanted, rel=1e-10)
+
+
+def test_margins_are_bisected_where_inverse_iteration_does_not_converge(states, monkeypatch):
+    """After one step nothing has converged: the count of eigenvalues alone gives the margin."""
+    monkeypatch.setattr(margin, "POLISHING", 1)
+    z, p = states.z[:12], states.p[:12]
+    found = margin._by_bisection(states.structure, z, p)
+    np.testing.assert_allclose(found, states.margin[:12], rtol=1e-9, atol=1e-9)
+
+
+def test_no_margin_is_told_where_there_is_none(states):
+    """Points that are no states: no bounds of an eigenvalue hold."""
+    with np.errstate(all="ignore"):
+        found = stability_margin(states.structure, np.full_like(states.z[:2], np.nan), states.p[:2])
+    assert np.isnan(found).all()

@@ -150,13 +150,13 @@ class ParameterLine(PlainCurve):
 
 @dataclass(frozen=True)
 class ForceLine(PlainCurve):
-    """F(z, p) = offset + t·growth at fixed parameters: equilibria under a force that changes."""
+    """F(z, p) = (1 − t) first + t last at fixed parameters: equilibria under a changing force."""
 
     p: Parameters
-    offset: Lanes
+    first: Lanes
     """Force on the unknowns at t = 0."""
-    growth: Lanes
-    """Its change from t = 0 to t = 1."""
+    last: Lanes
+    """Force at t = 1."""
     weight: Values
     """Length of the curve's own part of the metric."""
 
@@ -166,7 +166,7 @@ class ForceLine(PlainCurve):
 
     @property
     def _columns(self) -> tuple[np.ndarray, ...]:
-        return self.p, self.offset, self.growth, self.weight
+        return self.p, self.first, self.last, self.weight
 
     def parameters(self, t: Values) -> Parameters:
         """Parameters, the same for all t."""
@@ -183,7 +183,9 @@ class ForceLine(PlainCurve):
 
     def force(self, t: Values) -> tuple[Lanes, Lanes]:
         """Force at t, and its rate."""
-        return self.offset + t[:, None] * self.growth, self.growth
+        # exact where either force is none, also close to that end
+        now = (1.0 - t)[:, None] * self.first + t[:, None] * self.last
+        return now, self.last - self.first
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
         """Newton step and tangent by the general bordered solve."""
@@ -202,7 +204,7 @@ def growing_force(structure: Structure, p: Parameters, force: Lanes, lengths: Va
 def newton_homotopy(structure: Structure, guess: Lanes, p: Parameters) -> ForceLine:
     """Curves ``F(z, p) = (1 − t) F(guess, p)`` from any guesses at t = 0 to equilibria at t = 1."""
     defect = structure.residual(guess, p)
-    return ForceLine(structure, p, defect, -defect, np.ones(len(p)))
+    return ForceLine(structure, p, defect, np.zeros_like(defect), np.ones(len(p)))
 
 
 class AlongCurve(Equations):

@@ -50,10 +50,16 @@ def continue_equilibria(
 
 def correct_at_parameters(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
     """Newton at fixed parameters, and whether it settled; balanced guesses stay as they are."""
-    balanced = np.abs(structure.residual(z, p)).max(axis=1, initial=0.0) <= BALANCED
+    balanced = _is_balanced(structure, z, p)
     found = newton(structure, z, p, SURE)
+    z = np.where(balanced[:, None], z, found.z)
     good = balanced | found.found
-    return np.where(balanced[:, None], z, found.z), good & np.isfinite(z).all(axis=1)
+    good[~good] = _is_balanced(structure, z[~good], p[~good])
+    return z, good & np.isfinite(z).all(axis=1)
+
+
+def _is_balanced(structure: Structure, z: Lanes, p: Parameters) -> Flags:
+    return np.asarray(np.abs(structure.residual(z, p)).max(axis=1, initial=0.0) <= BALANCED)
 
 
 BLOCK = 512

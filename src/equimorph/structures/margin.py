@@ -280,7 +280,8 @@ def _polish(
         previous, value = value, np.where(norm > 0, quotient, value)
         vector = solved / norm[:, None]
         if sweep > 1:
-            good = _has_converged(value, previous) & (value >= low) & (value <= high)
+            inside = (value >= low) & (value <= high) & np.isfinite(norm)
+            good = _has_converged(value, previous) & inside
             if good.all():
                 break
         # a shift equal to the eigenvalue would be singular: stay a little below

@@ -22,11 +22,11 @@ from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.model import Progress
 
 DISTANCES = (0.03, 0.003, 0.0003)
-"""Lengths of the first step from a crossing, in the metric, tried one after the other: of 104
-curves two needed the second."""
-TURNS = 4
-"""How often a new curve is followed until it turns back: of 104 curves 96 reached a vertex at once,
-4 after one turn, and none after more."""
+"""Lengths of the first step from a crossing, in the metric, tried one after the other: of
+1852 half-branches 1346 began with the first, 290 with the second, 160 with the third."""
+TURNS = 2
+"""How often a new curve is followed until it turns back: of 1796 half-branches 1438 reached a
+vertex at once, 33 after one turn, and none of six after more."""
 CURVES = 2
 """Through each crossing."""
 CROSSING_OF_ARC = 1

@@ -95,8 +95,8 @@ def _step(
 
 
 EFFORTS = 4
-"""Attempts to trace a ray, each with smaller steps than the one before: of 10⁵ rays 71 needed the
-second, 59 the third."""
+"""Attempts to trace a ray, each with smaller steps than the one before: of 86 927 rays 6130
+needed the second, 1395 the third and 348 the fourth, with which 215 ended."""
 NOISE = 1e-6
 """Distance in the metric below which two crossings are one, and by which folds may be misplaced."""
 

@@ -176,9 +176,6 @@ PLANS = (
     (_as_it_is, *(3 * (_curves_cut, _all_cut))),
     MERGING,
     tuple(_finer(share) for share in (0.5, 0.25, 0.12, 0.06, 0.03, 0.015)),
-    MERGING,
-    6 * (_all_cut,),
-    MERGING,
 )
-"""Steps, one after the other, until nothing is bad; another plan if one fails. Of 51 patches the
-first plan mended 3, the second 44, the third and fourth 2 each."""
+"""Steps, one after the other, until nothing is bad; another plan if one fails. Of 102 patches the
+first plan mended 11, the second 85, the third 2, the fourth 3; further plans never began."""

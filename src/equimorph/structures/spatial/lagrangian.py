@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Scalars, Values
 from equimorph.errors import InputError
-from equimorph.structures.contract import Direction
+from equimorph.structures.equations import Direction
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import (
     FRAME,
