@@ -49,8 +49,8 @@ CHEAP = 4
 """Multiplier for the number of completeness checks in 1-D sets and symmetric slices."""
 SEARCHES = 10
 """Rounds of independent checks; what one round finds missing is lifted before the next. Of 301 sets
-30 needed a second round, 15 a third, three a fourth, one six; trusses and chains with hundreds of
-sheets need up to ten."""
+30 needed a second round, 15 a third, three a fourth, one six; one truss with hundreds of sheets
+needed seven."""
 RECOVERED = 200
 """Missing states, spread over all that were found, whose surroundings are lifted at once."""
 HIDDEN = 12
