@@ -10,6 +10,7 @@ GRID = {"Theta": (0.3, 1.6, 40), "Delta": (-1.2, 1.2, 40)}
 RATIOS = (1.25, 1.5, 3.0)
 """Widths of the strips by their thicknesses."""
 POISSON = 0.3
+"""Poisson's ratio of all sections."""
 SETTINGS = ((0.6, 0.0), (0.9, 0.0), (0.9, 0.02), (1.2, 0.0), (1.5, 0.0), (0.94, 0.6))
 """Supports (Θ, Δ) in rad at which the load is quoted at which a round rod leaves its plane."""
 
