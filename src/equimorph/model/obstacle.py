@@ -1,4 +1,4 @@
-"""Obstacles for the shape of a structure: half-planes and discs."""
+"""Obstacles for a shape: half-planes and discs, in space extended along z."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,8 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import DIRECTION, PAIR
 
 Pair = Annotated[Sequence[float], PAIR]
-Places = Float[np.ndarray, "*points 2"]
+Places = Float[np.ndarray, "*points axes"]
+"""(x, y), or (x, y, z) of which obstacles do not depend on z."""
 Values = Float[np.ndarray, "*points"]
 
 
@@ -19,6 +20,8 @@ Values = Float[np.ndarray, "*points"]
 @dataclass(frozen=True)
 class HalfPlane:
     """Forbidden side of a line: places behind `point`, seen along `normal`.
+
+    For a structure in space it is the forbidden side of a plane that contains the z-axis.
 
     Parameters
     ----------
@@ -45,18 +48,20 @@ class HalfPlane:
 
     def distance(self, places: Places) -> Values:
         """Signed distance of places: negative behind the line."""
-        return np.asarray((places - np.array(self.point)) @ np.array(self.normal))
+        return np.asarray((places[..., :2] - np.array(self.point)) @ np.array(self.normal))
 
     def derivatives(self, place: Places, rate: Places, bend: Places) -> tuple[Values, Values]:
         """First and second derivative of a growing function of the distance along curves."""
         normal = np.array(self.normal)
-        return np.asarray(rate @ normal), np.asarray(bend @ normal)
+        return np.asarray(rate[..., :2] @ normal), np.asarray(bend[..., :2] @ normal)
 
 
 @check_arguments
 @dataclass(frozen=True)
 class Disc:
     """A forbidden disc, or with `inside` a round room that must not be left.
+
+    For a structure in space it is a cylinder without end along the z-axis.
 
     Parameters
     ----------
@@ -85,14 +90,14 @@ class Disc:
 
     def distance(self, places: Places) -> Values:
         """Signed distance of places from the circle: negative where it is forbidden."""
-        gap = np.linalg.norm(places - np.array(self.centre), axis=-1)
+        gap = np.linalg.norm(places[..., :2] - np.array(self.centre), axis=-1)
         return np.asarray(self._sign * (gap - self.radius))
 
     def derivatives(self, place: Places, rate: Places, bend: Places) -> tuple[Values, Values]:
         """First and second derivative of a growing function of the distance along curves."""
-        gap = place - np.array(self.centre)
-        first = (gap * rate).sum(axis=-1)
-        second = (rate * rate).sum(axis=-1) + (gap * bend).sum(axis=-1)
+        gap, velocity = place[..., :2] - np.array(self.centre), rate[..., :2]
+        first = (gap * velocity).sum(axis=-1)
+        second = (velocity * velocity).sum(axis=-1) + (gap * bend[..., :2]).sum(axis=-1)
         return self._sign * first, self._sign * second
 
 

@@ -62,7 +62,7 @@ def _starts(arcs: Arcs, obstacle: Obstacle) -> Float[np.ndarray, "lanes arcs sta
 
 
 def _points(
-    arcs: Float[np.ndarray, "*some 4 2"], share: Float[np.ndarray, "*shares"]
+    arcs: Float[np.ndarray, "*some 4 axes"], share: Float[np.ndarray, "*shares"]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places on cubic arcs, with first and second derivatives."""
     t = share[..., None]
@@ -73,7 +73,7 @@ def _points(
 
 
 def _polish(
-    arcs: Float[np.ndarray, "lanes 4 2"], obstacle: Obstacle, start: Values
+    arcs: Float[np.ndarray, "lanes 4 axes"], obstacle: Obstacle, start: Values
 ) -> tuple[Values, Values]:
     """Least distance on one arc a lane, and where."""
     share, best = start, start

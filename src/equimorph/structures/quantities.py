@@ -91,7 +91,8 @@ def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
     """Signed distance of the shape from an obstacle: negative where it enters what is forbidden.
 
     Its `place` is the share of the shape's way where it comes nearest. Rods are followed along
-    their exact positions and angles, other structures along what `shape` draws.
+    their exact positions and angles, other structures along what `shape` draws. In space,
+    obstacles extend along the z-axis without end.
 
     Raises
     ------
