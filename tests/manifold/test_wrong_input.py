@@ -142,7 +142,10 @@ def test_what_is_no_constraint_is_refused(within):
 
 
 def test_reversed_bounds_are_refused_by_name():
-    with pytest.raises(InputError, match=r"^`F` must have finite lower < upper; got \(1, -1\)\.$"):
+    with pytest.raises(
+        InputError,
+        match=r"^`F` must be two finite numbers \(lower, upper\), lower < upper; got \(1, -1\)\.$",
+    ):
         Box(F=(1, -1), x_l=(0.5, 1))
 
 

@@ -371,7 +371,7 @@ def test_a_study_file_describes_the_same_rod():
         ({"span": 0.8, "rise": 0.5, "sideways": 0.5}, "must place end B nearer to A"),
         ({"ends": ("pinned", "pinned")}, "`ends` must hold the rotation of one end at least"),
         ({"ends": (em.SpatialEnd(x="free"), em.SpatialEnd(x="free"))}, "must hold x at one end"),
-        ({"ends": ({"x": -1.0}, "clamped")}, "`x` of an end must be 'held', 'free' or"),
+        ({"ends": ({"x": -1.0}, "clamped")}, "`x` must be 'held', 'free' or"),
         ({"ends": ("hinged", "clamped")}, r"`ends\[0\]` must be one of 'clamped'"),
         (
             {"loads": {"P": {"term": "point force", "s": 0.5, "direction": (1, 2, 3, 4)}}},
@@ -379,10 +379,10 @@ def test_a_study_file_describes_the_same_rod():
         ),
         (
             {"actuators": {"k": {"term": "curvature", "about": "x"}}},
-            "`about` must be 't', 'n' or 'b'",
+            "`about` must be t or n or b; got 'x'",
         ),
         ({"axial": -1.0}, "`axial` must be positive everywhere"),
-        ({"elements": 1}, "`elements` must be a whole number >= 2"),
+        ({"elements": 1}, "`elements` must be a whole number from 2"),
     ],
 )
 def test_what_makes_no_rod_is_refused(options, text):

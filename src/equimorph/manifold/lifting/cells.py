@@ -94,7 +94,7 @@ def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
     edge = np.array(curves.edge, int)[live]
     # sums of irrational shares differ for different sets of curves
     share = np.modf((live + 1) * np.sqrt(2.0))[0]
-    of_edge = np.bincount(edge, share, len(mesh.edges))
+    of_edge = np.bincount(edge, share, len(mesh.edges)).astype(float)
     vertex = points.vertex[: points.count]
     of_vertex = np.bincount(vertex[vertex >= 0], minlength=len(mesh.vertices))
     return np.concatenate([of_edge[mesh.sides], of_vertex[mesh.triangles]], axis=1)
@@ -149,7 +149,7 @@ class Cells:
     crossings: Int[np.ndarray, "x d"]
     doubtful_triangles: Int[np.ndarray, " t"] = field(default_factory=_nothing)
     doubtful_tetrahedra: Int[np.ndarray, " n"] = field(default_factory=_nothing)
-    touching: Float[np.ndarray, "t d"] = field(default_factory=lambda: np.zeros((0, 0)))
+    touching: Float[np.ndarray, "places axes"] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def doubtful(self) -> int:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -228,7 +228,7 @@ class Curvature(Term):
     start: float = 0.0
     stop: float = 1.0
     kinks: Sequence[float] = ()
-    about: str = "b"
+    about: Literal["t", "n", "b"] = "b"
     word: ClassVar[str] = "curvature"
     measure: ClassVar[str] = "curvature"
 
