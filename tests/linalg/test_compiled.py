@@ -50,9 +50,9 @@ def test_compiled_code_is_kept(fresh):
     assert _hits(again) == 1
 
 
-def test_a_change_of_any_kernel_makes_all_new(fresh, monkeypatch: pytest.MonkeyPatch):
+def test_a_change_of_sources_makes_kernels_new(fresh, monkeypatch: pytest.MonkeyPatch):
     assert fresh().double(2.0) == 4.0
-    monkeypatch.setattr(compiled, "DIGEST", "of changed sources")
+    monkeypatch.setattr(compiled, "digest", lambda _: "of changed sources")
     changed = fresh().double
     assert not compiled.is_kept(changed)
     assert changed(2.0) == 4.0
@@ -75,17 +75,34 @@ def test_code_for_several_types_is_kept_side_by_side(fresh):
     assert _hits(third) == 2
 
 
-def test_kernels_are_made_of_sources_that_are_watched():
+def test_what_a_kernel_calls_in_other_files_belongs_to_its_sources():
     package = Path(equimorph.__file__).parent
-    watched = {source.resolve() for source in compiled.SOURCES}
+    kernels = package / "structures" / "rod" / "clamped_kernels.py"
+    watched = {path.name for path in compiled.sources(kernels)}
+    assert {"clamped_kernels.py", "condensed_kernels.py", "simd.py", "compiled.py"} <= watched
+    assert "chain_kernels.py" not in watched
+
+
+def test_kernels_import_in_the_way_that_is_watched():
+    """Every import of ours in a file of kernels is one that `sources` follows to a file."""
+    package = Path(equimorph.__file__).resolve().parent
     for path in package.rglob("*.py"):
         tree = ast.parse(path.read_text())
-        froms = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+        nodes = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        froms = {node.module for node in nodes if node.module}
+        is_shared = path in compiled.SHARED
         if "equimorph.linalg.compiled" in froms and "njit" in path.read_text():
-            assert path.resolve() in watched
-            ours = {name for name in froms if name and name.startswith("equimorph")}
+            ours = {name for name in froms if name.startswith("equimorph")}
             assert all(name.endswith(("kernels", "simd", "compiled")) for name in ours), path
-        assert "numba" not in froms or path.resolve() in watched
+            watched = {str(each.relative_to(package.parent)) for each in compiled.sources(path)}
+            assert {name.replace(".", "/") + ".py" for name in ours} <= watched
+            assert not any(
+                alias.name.startswith("equimorph")
+                for node in ast.walk(tree)
+                if isinstance(node, ast.Import)
+                for alias in node.names
+            )
+        assert "numba" not in froms or is_shared
 
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])

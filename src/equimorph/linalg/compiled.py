@@ -2,8 +2,8 @@
 
 numba's own cache looks only at the file that a kernel stands in, so that after a change a kernel
 would go on with old copies of those that it calls; and processes that compile the same kernel at
-the same time can mix up its files. Here a change of any kernel's source makes all of them new, and
-processes wait for each other.
+the same time can mix up its files. Here a kernel is compiled anew when its file or one that this
+file imports kernels from has changed, and processes wait for each other.
 
 See docs/decisions.md, "Compiled kernels are cached by content".
 """
@@ -11,8 +11,10 @@ See docs/decisions.md, "Compiled kernels are cached by content".
 import fcntl
 import hashlib
 import pickle
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +22,12 @@ import numba
 from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-_HERE = Path(__file__)
-SOURCES = sorted([_HERE, _HERE.with_name("simd.py"), *_HERE.parents[1].rglob("*kernels.py")])
-"""Every file with code that goes into kernels."""
-DIGEST = hashlib.sha256(b"".join(each.read_bytes() for each in SOURCES)).hexdigest()
+_HERE = Path(__file__).resolve()
+_ROOT = _HERE.parents[2]
+SHARED = (_HERE, _HERE.with_name("simd.py"))
+"""Files with code that goes into every kernel."""
+IMPORTED = re.compile(r"^from (equimorph(?:\.\w+)+) import", re.MULTILINE)
+"""How a file of kernels names one whose kernels it calls."""
 CHECK = 32
 """Bytes of the checksum before compiled code: damaged code would crash the process."""
 
@@ -61,12 +65,50 @@ def is_kept(kernel: Any) -> bool:
     return bool(kernel._cache.has_code())
 
 
+def sources(path: Path) -> set[Path]:
+    """Every file with code that goes into the kernels of one file.
+
+    Parameters
+    ----------
+    path
+        The file that the kernels stand in.
+    """
+    found: set[Path] = set()
+    open_ends = [path.resolve(), *SHARED]
+    while open_ends:
+        each = open_ends.pop()
+        if each not in found:
+            found.add(each)
+            open_ends += _imports(each)
+    return found
+
+
+@cache
+def _imports(path: Path) -> list[Path]:
+    names = IMPORTED.findall(path.read_text())
+    return [_ROOT.joinpath(*name.split(".")).with_suffix(".py") for name in names]
+
+
+@cache
+def digest(path: Path) -> str:
+    """Digest of all code that goes into the kernels of one file.
+
+    Parameters
+    ----------
+    path
+        The file that the kernels stand in.
+    """
+    contents = [each.read_bytes() for each in sorted(sources(path))]
+    return hashlib.sha256(b"".join(contents)).hexdigest()
+
+
 class _KernelCache(FunctionCache):
-    """Compiled code of one kernel, valid as long as the sources of all kernels stay as they are."""
+    """Compiled code of one kernel, valid while the sources that go into it stay as they are."""
 
     def __init__(self, function: Any) -> None:
         super().__init__(function)
-        self._cache_file = _LockedFiles(self.cache_path, self._impl.filename_base, DIGEST)
+        stamp = digest(Path(function.__code__.co_filename))
+        self._cache_file = _LockedFiles(self.cache_path, self._impl.filename_base, stamp)
 
     def has_code(self) -> bool:
         """Whether there is code for any types."""
