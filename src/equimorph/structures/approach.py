@@ -10,22 +10,20 @@ STEPS = 8
 """Newton steps towards the nearest point of an arc."""
 STARTS = np.array([0.0, 1.0])
 
+Vectors = Float[np.ndarray, "lanes points space"]
 Arcs = Float[np.ndarray, "lanes arcs 4 space"]
 """Cubic arcs: both ends, and the derivatives there with respect to the share of the arc."""
 
 
-def straight_arcs(corners: Float[np.ndarray, "lanes points space"]) -> Arcs:
+def straight_arcs(corners: Vectors) -> Arcs:
     """Arcs of a polygon."""
     side = np.diff(corners, axis=1)
     return np.stack([corners[:, :-1], corners[:, 1:], side, side], axis=2)
 
 
-def smooth_arcs(
-    places: Float[np.ndarray, "lanes points 2"], angles: Float[np.ndarray, "lanes points"],
-    spacing: float,
-) -> Arcs:  # fmt: skip
+def smooth_arcs(places: Vectors, tangents: Vectors, spacing: float) -> Arcs:
     """Arcs through equidistant points of curves whose tangents are known: of fourth order."""
-    rate = spacing * np.stack([np.cos(angles), np.sin(angles)], axis=2)
+    rate = spacing * tangents
     return np.stack([places[:, :-1], places[:, 1:], rate[:, :-1], rate[:, 1:]], axis=2)
 
 

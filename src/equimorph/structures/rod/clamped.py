@@ -1,4 +1,4 @@
-"""Mechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
+"""PlanarMechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
 
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -21,7 +21,7 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
 from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.fields import ClampedFields
-from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.profiles import LoadShape
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
@@ -31,8 +31,8 @@ MORE = 1.0 + 1e-12
 """Covers the round-off of the bounds of second derivatives."""
 
 
-class ClampedMechanics(Mechanics):
-    """Mechanics of the uniform rod between two clamps under one vertical line load.
+class ClampedMechanics(PlanarMechanics):
+    """PlanarMechanics of the uniform rod between two clamps under one vertical line load.
 
     L = Σ ½ θᵀKθ + Σᵢ (μ mᵢ − q Rᵢ) sin θᵢ + λ mᵢ cos θᵢ − λν with quadrature weights m, load
     weights R = m ρ and K the stiffness over 4π². Parameters (Θ, Δ, q, ν), multipliers (λ, μ).

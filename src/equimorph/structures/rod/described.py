@@ -2,28 +2,38 @@
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Int
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Lanes, Parameters
-from equimorph.errors import MissingError
+from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.errors import InputError, MissingError
 from equimorph.model import Constraint, Descriptor
-from equimorph.structures.rod import descriptors, space, validity
+from equimorph.structures.rod import space
+from equimorph.structures.rod.any_rod import COORDINATES, Field, Peaks, read_fraction
 from equimorph.structures.rod.ends import End
+from equimorph.structures.rod.extrema import extreme_curvatures, peaks, stations
 from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.space import LateralMode
 from equimorph.structures.rod.space_options import SpaceOptions
-from equimorph.structures.rod.terms import Term
 from equimorph.structures.states import State
+
+FORCES = ("lambda", "mu")
+"""Components of the support's force."""
 
 
 class Described(Measured):
-    """A rod with its descriptors, in the user's units."""
+    """A planar rod with its descriptors, in the user's units."""
+
+    written: ClassVar[tuple[str, ...]] = (
+        *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy"),
+        *("clearance(s)", "lateral_margin", "lateral_index"),
+        *("support_force(lambda)", "support_force(mu)", "end_moment(0)", "end_moment(1)"),
+    )
 
     @property
     @abstractmethod
@@ -39,64 +49,72 @@ class Described(Measured):
         """That of the rod, in its parameters or in these and further ones that are zero."""
 
     @check_arguments
-    def height(self, s: float) -> Descriptor:
-        """y(s), in units of L."""
-        return descriptors.coordinate(self, s, 1)
-
-    @check_arguments
     def position(self, s: float) -> tuple[Descriptor, Descriptor]:
         """(x(s), y(s)), in units of L."""
-        return descriptors.coordinate(self, s, 0), descriptors.coordinate(self, s, 1)
+        return self.coordinate(0, s), self.coordinate(1, s)
 
     @check_arguments
     def angle(self, s: float) -> Descriptor:
         """θ(s) in radians."""
-        return descriptors.angle(self, s)
+        return self.field_at(s, "angle", "θ", "angle", self._field(0))
 
     @check_arguments
     def curvature(self, s: float) -> Descriptor:
         """κ(s) in units of 1/L."""
-        return descriptors.curvature(self, s)
+        return self.field_at(s, "curvature", "κ", "curvature", self._field(1))
+
+    def _field(self, which: int) -> Field:
+        """θ or κ (0, 1)."""
+        return lambda z, p, at: self.fields(z, p, at)[:, 0, which]
 
     @cached_property
     def max_curvature(self) -> Descriptor:
         """max_s |κ(s)| in units of 1/L, ends and interior extrema included."""
-        return descriptors.max_curvature(self)
+        return self.max_curvature_descriptor(self._peaks)
 
-    @cached_property
-    def total_energy(self) -> Descriptor:
-        """Potential energy E, in units of 4π²B/L."""
-        return descriptors.total_energy(self)
+    def _peaks(self, z: Lanes, p: Parameters) -> tuple[Peaks, Peaks]:
+        """Local maxima of |κ|, and the arclengths where they are."""
+        at = stations(self.mesh.breaks)
+        found, places = peaks(np.abs(self.mechanics.fields(z, p, at)[:, :, 1]), at)
+        exact = extreme_curvatures(self.mechanics, z, p, places)
+        unit = self.units.value("curvature")
+        return unit * np.where(np.isfinite(found), exact, found), places
 
     @check_arguments
     def support_force(self, component: str) -> Descriptor:
         """Force of the support at A on the rod: "lambda" (horizontal) or "mu" (vertical)."""
-        return descriptors.support_force(self, component)
+        if component not in FORCES:
+            raise InputError(f"`component` must be 'lambda' or 'mu'; got {component!r}.")
+        return self.support_force_along(FORCES.index(component), component)
 
     @check_arguments
     def end_moment(self, end: int) -> Descriptor:
         """Couple of the actuator at end 0 or 1: ∂L/∂θ(end), in units of 4π²B/L."""
-        return descriptors.end_moment(self, end)
+        if end not in (0, 1):
+            raise InputError(f"`end` must be 0 or 1; got {end!r}.")
+        unit = self.units.value("couple")
 
-    @property
-    def elevation(self) -> Descriptor:
-        """y(½)."""
-        return self.height(0.5)
+        def value(z: Lanes, p: Parameters) -> Values:
+            return unit * self.mechanics.end_moments(z, p)[:, end]
 
-    @check_arguments
-    def clearance(self, apart: float = 0.1) -> Descriptor:
-        """Smallest distance between points whose arclengths differ by `apart` at least.
+        label = self.units.label("couple")
+        return Descriptor(f"end_moment({end})", label, value, f"M({end})", self.signature)
 
-        Contact is not modelled: a rod of thickness h is the planar model's while this exceeds h.
-        """
-        return validity.clearance(self, apart)
+    def own_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
+        """Descriptor of a planar rod by its name and argument."""
+        if name in ("lateral_index", "lateral_margin"):
+            make = self.lateral_index if name == "lateral_index" else self.lateral_margin
+            return make(*space.stiffness_arguments(argument))
+        if argument in ("0", "1") and name == "end_moment":
+            return self.end_moment(int(argument))
+        if argument is None or name not in ("x", "height", "angle", "curvature"):
+            return None
+        s = read_fraction(argument)
+        if name in ("x", "height"):
+            return self.coordinate(COORDINATES.index(name), s)
+        return self.angle(s) if name == "angle" else self.curvature(s)
 
     # --- out of the plane -------------------------------------------------------------------
-
-    @property
-    @abstractmethod
-    def terms(self) -> dict[str, tuple[Term, ...]]:
-        """Loads and actuators that act on the rod, by the name of their amplitude."""
 
     @property
     def has_lateral_stiffness(self) -> bool:
@@ -197,21 +215,9 @@ class Described(Measured):
         Contact with itself, for a rod of some `thickness` in the user's unit of length; buckling
         out of the plane, where the stiffnesses of `lateral_margin` are given here or to the rod.
         """
-        found = []
-        distance = self.clearance()(state)
-        if distance <= max(thickness, 1e-9 * self.units.value("length")):
-            found.append(f"the rod touches itself: points come as near as {distance:.3g}")
+        found = list(self.warn_of_contact(state, thickness))
         if self.has_lateral_stiffness or (torsion is not None and lateral is not None):
             margin = self.lateral_margin(torsion, lateral)(state)
             if margin < 0.0:
                 found.append(f"the rod buckles out of its plane: eigenvalue {margin:.3g}")
         return tuple(found)
-
-    @check_arguments
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
-        found = space.LATERAL.fullmatch(text)
-        if found:
-            make = self.lateral_index if found[1] == "index" else self.lateral_margin
-            return make(*space.stiffness_arguments(found[2]))
-        return descriptors.descriptor_from_text(self, text)

@@ -7,10 +7,10 @@ from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces, Support
-from equimorph.model.drawing import supports_of_point, unit_vectors
+from equimorph.model.drawing import supports_of_point
+from equimorph.structures.rod.any_rod import AnyRod
+from equimorph.structures.rod.centreline import Centreline, Vectors
 from equimorph.structures.rod.ends import FREE, HELD, End, Holding
-from equimorph.structures.rod.measured import Measured
-from equimorph.structures.rod.profiles import profile
 from equimorph.structures.rod.terms import (
     Couple,
     Curvature,
@@ -25,14 +25,16 @@ STATIONS = np.linspace(0.05, 0.95, 13)
 """Arclengths at which line loads are drawn."""
 SEGMENT = 33
 """Points along a tendon or a bending segment."""
+ENDS = np.array([0.0, 1.0])
+"""Arclengths of the supports."""
 
 Amplitudes = Sequence[tuple[Term, Values]]
 
 
 def rod_drawing(
-    rod: Measured, ends: tuple[End, End], amplitudes: Amplitudes, z: Lanes, p: Parameters
+    rod: AnyRod, supports: tuple[Support, ...], amplitudes: Amplitudes, z: Lanes, p: Parameters
 ) -> Drawing:
-    """Supports at the ends, forces and couples where they act, actuators along the rod.
+    """Forces and couples where they act, actuators along the rod, and the supports.
 
     `amplitudes` are all terms of the rod with their values in each state.
     """
@@ -40,31 +42,32 @@ def rod_drawing(
     couples: list[Couples] = []
     lines = [each for each in amplitudes if isinstance(each[0], LineLoad | Pressure)]
     if lines:
-        places, normals = _along(rod, z, p, STATIONS)
-        total = sum((_per_length(*each, normals) for each in lines), np.zeros_like(places))
-        forces.append(Forces(places, total, distributed=True))
+        line = rod.centreline(z, p, STATIONS)
+        total = sum((_per_length(*each, line) for each in lines), np.zeros_like(line.places))
+        forces.append(Forces(line.places, total, distributed=True))
     points = [(term, size) for term, size in amplitudes if isinstance(term, PointForce)]
     if points:
-        places = rod.shape(z, p, np.array([float(term.s) for term, _ in points]))
-        pushes = [size[:, None] * np.array(term.direction)[:2] for term, size in points]
+        places = rod.places(z, p, np.array([float(term.s) for term, _ in points]))
+        axes = places.shape[2]
+        pushes = [size[:, None] * _direction(term, axes) for term, size in points]
         forces.append(Forces(places, np.stack(pushes, axis=1)))
     turns = [(term, size) for term, size in amplitudes if isinstance(term, Couple)]
     if turns:
-        places = rod.shape(z, p, np.array([float(term.s) for term, _ in turns]))
+        places = rod.places(z, p, np.array([float(term.s) for term, _ in turns]))
         couples.append(Couples(places, np.stack([size for _, size in turns], axis=1)))
     actuators = tuple(
         _actuator(rod, term, z, p) for term, _ in amplitudes if isinstance(term, Curvature | Tendon)
     )
-    return Drawing(_supports(rod, ends, z, p), tuple(forces), tuple(couples), actuators)
+    return Drawing(supports, tuple(forces), tuple(couples), actuators)
 
 
-def _supports(rod: Measured, ends: tuple[End, End], z: Lanes, p: Parameters) -> tuple[Support, ...]:
-    fields = rod.fields(z, p, np.array([0.0, 1.0]))
+def planar_supports(ends: tuple[End, End], line: Centreline) -> tuple[Support, ...]:
+    """Supports of both ends; `line` is the centreline at `ENDS`."""
     found: list[Support] = []
     for side, end in enumerate(ends):
         stiffness = np.array([_stiffness(each) for each in (end.x, end.y, end.angle)])
-        inward = (1.0 - 2.0 * side) * unit_vectors(fields[:, side, 0])
-        found += supports_of_point(stiffness, fields[:, side, 2:], inward, end.slide)
+        inward = (1.0 - 2.0 * side) * line.tangents[:, side]
+        found += supports_of_point(stiffness, line.places[:, side], inward, end.slide)
     return tuple(found)
 
 
@@ -72,28 +75,27 @@ def _stiffness(holding: Holding) -> float:
     return {HELD: np.inf, FREE: 0.0}[holding] if isinstance(holding, str) else holding
 
 
-def _along(
-    rod: Measured, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
-) -> tuple[Float[np.ndarray, "lanes points 2"], Float[np.ndarray, "lanes points 2"]]:
-    """Places at arclengths, and unit normals to the left."""
-    fields = rod.fields(z, p, s)
-    angles = fields[:, :, 0]
-    return fields[:, :, 2:], np.stack([-np.sin(angles), np.cos(angles)], axis=2)
+def _direction(term: LineLoad | PointForce, axes: int) -> Float[np.ndarray, " axes"]:
+    """Direction of a load, of two or three numbers, along two or three axes."""
+    given = np.array(term.direction, float)
+    return np.append(given, np.zeros(3 - len(given)))[:axes]
 
 
-def _per_length(
-    term: Term, size: Values, normals: Float[np.ndarray, "lanes points 2"]
-) -> Float[np.ndarray, "lanes points 2"]:
+def _per_length(term: Term, size: Values, line: Centreline) -> Vectors:
     """Force per arclength at the `STATIONS`."""
+    push = line.normals[:, :, 0]
     if isinstance(term, LineLoad):
-        normals = term.density().density(STATIONS)[:, None] * np.array(term.direction)[:2]
-    return np.asarray(size[:, None, None] * normals)
+        density = term.density().density(STATIONS)[:, None]
+        push = np.zeros_like(push) + density * _direction(term, push.shape[2])
+    return np.asarray(size[:, None, None] * push)
 
 
-def _actuator(rod: Measured, term: Curvature | Tendon, z: Lanes, p: Parameters) -> Actuator:
+def _actuator(rod: AnyRod, term: Curvature | Tendon, z: Lanes, p: Parameters) -> Actuator:
     s = np.linspace(term.start, term.stop, SEGMENT)
-    places, normals = _along(rod, z, p, s)
+    line = rod.centreline(z, p, s)
     if isinstance(term, Curvature):
-        return Actuator(ActuatorKind.CURVATURE, places)
-    offset = profile(term.offset, "offset", term.kinks).density(s)
-    return Actuator(ActuatorKind.CABLE, places + offset[:, None] * normals)
+        return Actuator(ActuatorKind.CURVATURE, line.places)
+    cable = line.places
+    for k, offset in enumerate(term.profiles()[: line.normals.shape[2]]):
+        cable = cable + offset.density(s)[:, None] * line.normals[:, :, k]
+    return Actuator(ActuatorKind.CABLE, cable)

@@ -8,7 +8,7 @@ from numpy.polynomial import legendre
 
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.rod.discretisation import Mesh, reference_element
-from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.mechanics import PlanarMechanics
 
 Columns = tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]]
 
@@ -112,7 +112,7 @@ REFINING = 5
 
 
 def extreme_curvatures(
-    mechanics: Mechanics, z: Lanes, p: Parameters, near: Float[np.ndarray, "lanes places"]
+    mechanics: PlanarMechanics, z: Lanes, p: Parameters, near: Float[np.ndarray, "lanes places"]
 ) -> Float[np.ndarray, "lanes places"]:
     """|κ| at its local extrema nearest to some arclengths of each lane, ends included."""
     mesh = Mesh(mechanics.mesh.breaks, reference_element(DEGREE))

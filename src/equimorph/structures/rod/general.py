@@ -1,4 +1,4 @@
-"""Mechanics of general rods: energy, residual, derivatives and solves in batches."""
+"""PlanarMechanics of general rods: energy, residual, derivatives and solves in batches."""
 
 from functools import cached_property
 
@@ -15,7 +15,7 @@ from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
-from equimorph.structures.rod.mechanics import LARGEST_TAIL, Mechanics
+from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
 from equimorph.structures.rod.symmetry import mirrors
@@ -30,7 +30,7 @@ FORCES = 8.0
 """Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
 
 
-class GeneralMechanics(JointEquations, Mechanics):
+class GeneralMechanics(JointEquations, PlanarMechanics):
     """A rod whose Lagrangian is a `RodModel`."""
 
     def __init__(self, model: RodModel) -> None:

@@ -17,7 +17,7 @@ from equimorph.structures.margin import stability_margin
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.ends import FREE, End
 from equimorph.structures.rod.lateral_kernels import lateral_lanes
-from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.profiles import LoadShape, at_nodes, profile
 
@@ -149,7 +149,7 @@ class OutOfPlane:
     """
 
     def __init__(
-        self, rod: Mechanics, model: RodModel, holding: Holding, stiffness: LateralStiffness
+        self, rod: PlanarMechanics, model: RodModel, holding: Holding, stiffness: LateralStiffness
     ) -> None:
         self.rod, self.model, self.holding = rod, model, holding
         self.mesh: Mesh = model.mesh

@@ -1,4 +1,4 @@
-"""Interface of a rod's mechanics; `Rod` adds names, natural states and descriptors."""
+"""Interfaces of the mechanics of rods; rods add units, natural states and descriptors."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -18,22 +18,26 @@ LARGEST_TAIL = 1e-3
 """Highest Legendre coefficients of θ, in radians, of an element that represents its part."""
 
 
-class Mechanics(Equations):
+class RodMechanics(Equations):
     """Energy, residual, derivatives and solves of a discretised rod in batches of lanes.
 
-    z = (angles at the unknown nodes, multipliers); methods as in `structures.contract.Structure`.
+    z = (unknowns at the nodes, multipliers); methods as in `structures.contract.Structure`. All
+    numbers are non-dimensional.
     """
 
     mesh: Mesh
     parameters: int
     """Number of parameters."""
-    held: tuple[bool, bool]
-    """Whether the angles of the ends are prescribed."""
 
     @property
     def scales(self) -> Float[np.ndarray, " parameters"]:
         """One, as nothing here has a unit."""
         return np.ones(self.parameters)
+
+    @property
+    def determinant_sign(self) -> float:
+        """Sign of the determinant of F_z over that which the kernel of `fused_advance` returns."""
+        return 1.0
 
     def check_widths(self, *pairs: Direction) -> list[np.ndarray]:
         """States and directions (z, p) as contiguous arrays of the right widths, for the kernels.
@@ -51,25 +55,6 @@ class Mechanics(Equations):
                 )
         return [np.ascontiguousarray(array) for pair in pairs for array in pair]
 
-    @property
-    @abstractmethod
-    def unknown_nodes(self) -> slice:
-        """Nodes whose angles are unknown."""
-
-    @abstractmethod
-    def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
-        """Angles θ at all nodes, the prescribed ends included."""
-
-    @abstractmethod
-    def fields(
-        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
-    ) -> Float[np.ndarray, "lanes points 4"]:
-        """(θ, κ, x, y) at arclengths."""
-
-    @abstractmethod
-    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
-        """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
-
     @abstractmethod
     def energy(self, z: Lanes, p: Parameters) -> Values:
         """Potential energy E."""
@@ -77,6 +62,22 @@ class Mechanics(Equations):
     @abstractmethod
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p."""
+
+    @abstractmethod
+    def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes axes"]:
+        """Force of the support at A on the rod: multipliers, or what balances the loads."""
+
+    @abstractmethod
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Random guesses."""
+
+    @abstractmethod
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether the highest Legendre coefficients of the rotations are small in every element."""
+
+    @abstractmethod
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Symmetries of the equilibrium set."""
 
     def fused_advance(  # a kernel, its tables, and what `advance` takes
         self,
@@ -99,6 +100,7 @@ class Mechanics(Equations):
         index = np.empty(lanes, dtype=np.int64)
         outputs = (dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio)
         over_lanes(kernel, shared, inputs, outputs)
+        determinant *= self.determinant_sign
         out = Advance(*outputs[:-1])
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             unsafe = ~(ratio >= PIVOT_GUARD)
@@ -107,17 +109,35 @@ class Mechanics(Equations):
                 getattr(out, name)[unsafe] = column
         return out
 
+
+class PlanarMechanics(RodMechanics):
+    """Mechanics of a planar rod: the unknowns are the angles at the `unknown_nodes`."""
+
+    held: tuple[bool, bool]
+    """Whether the angles of the ends are prescribed."""
+
+    @property
     @abstractmethod
-    def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
-        """Force of the support at A on the rod."""
+    def unknown_nodes(self) -> slice:
+        """Nodes whose angles are unknown."""
+
+    @abstractmethod
+    def nodal_angles(self, z: Lanes, p: Parameters) -> Nodal:
+        """Angles θ at all nodes, the prescribed ends included."""
+
+    @abstractmethod
+    def fields(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes points 4"]:
+        """(θ, κ, x, y) at arclengths."""
+
+    @abstractmethod
+    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
+        """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
 
     @abstractmethod
     def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
         """Couples of the supports, or actuators, on both ends of the rod."""
-
-    @abstractmethod
-    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Random guesses."""
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of θ are small in every element."""
@@ -127,7 +147,3 @@ class Mechanics(Equations):
         """Largest of the two highest Legendre coefficients of θ in all elements."""
         tail = self.mesh.highest @ self.nodal_angles(z, p).T
         return np.asarray(np.abs(tail, out=tail).max(axis=0))
-
-    @abstractmethod
-    def symmetries(self) -> tuple[Symmetry, ...]:
-        """Symmetries of the equilibrium set."""

@@ -12,7 +12,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.structures.newton import Limits, Steps, Through, newton
 from equimorph.structures.rod.discretisation import reference_element
 from equimorph.structures.rod.general import GeneralMechanics
-from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.model import RodModel
 
 FIRST_STEP = 0.25
@@ -66,7 +66,7 @@ class Point:
 
 @runtime_checkable
 class Continued(Steps, Protocol):
-    """Mechanics that can be continued."""
+    """PlanarMechanics that can be continued."""
 
     @property
     def size(self) -> int:
@@ -179,7 +179,7 @@ class Natural:
     span: Values
 
 
-def natural_arch(rod: Mechanics, p: Parameters) -> Natural:
+def natural_arch(rod: PlanarMechanics, p: Parameters) -> Natural:
     """State at q = 0 reached from the straight rod, per lane.
 
     First λ = 0 and ν free while (Θ, Δ) grow from 0 to their values; then ν moves to its value with
@@ -198,7 +198,9 @@ def natural_arch(rod: Mechanics, p: Parameters) -> Natural:
     return out
 
 
-def _continue(rod: Mechanics, p: Parameters, lanes: Int[np.ndarray, " some"], out: Natural) -> None:
+def _continue(
+    rod: PlanarMechanics, p: Parameters, lanes: Int[np.ndarray, " some"], out: Natural
+) -> None:
     """Fill in the natural states of some lanes."""
     size, goal = np.hypot(p[lanes, 0], p[lanes, 1]), p[lanes] * [1.0, 1.0, 0.0, 1.0]
     stop = goal.copy()

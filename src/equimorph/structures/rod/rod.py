@@ -12,15 +12,16 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Parameter, names_of
 from equimorph.structures.contract import Growth
-from equimorph.structures.rod import descriptors
+from equimorph.structures.rod.any_rod import AnyRod
 from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.described import Described
 from equimorph.structures.rod.description import Description
 from equimorph.structures.rod.discretisation import ElementCount, mesh_with_kinks
-from equimorph.structures.rod.drawing import Amplitudes, rod_drawing
+from equimorph.structures.rod.drawing import ENDS, Amplitudes, planar_supports, rod_drawing
 from equimorph.structures.rod.ends import End, EndSpec
+from equimorph.structures.rod.errors import discretisation_error
 from equimorph.structures.rod.general import GeneralMechanics
-from equimorph.structures.rod.mechanics import Mechanics
+from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch, natural_rod
 from equimorph.structures.rod.profiles import (
@@ -30,13 +31,11 @@ from equimorph.structures.rod.profiles import (
     ProfileSpec,
     load_shape,
 )
-from equimorph.structures.rod.sections import CrossSection, SectionProperties, cross_section
+from equimorph.structures.rod.sections import CrossSection
 from equimorph.structures.rod.space import check_terms
 from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.rod.terms import LineLoad, Term, Terms
-from equimorph.structures.rod.units import rod_units
-from equimorph.structures.states import State, States
-from equimorph.structures.unit_system import Quantity, Units, unit_system
+from equimorph.structures.unit_system import Quantity, Units
 
 DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")
@@ -156,7 +155,6 @@ class Rod(Described):
     """
 
     kind: ClassVar[str] = "rod"
-    endless_in: ClassVar[str] = "max_curvature"
 
     @check_arguments
     def __init__(  # noqa: PLR0913  # what a rod can have
@@ -182,14 +180,9 @@ class Rod(Described):
         lateral: MeasuredProfile | None = None,
         section: CrossSection | Mapping[str, Any] | None = None,
     ) -> None:
-        system = unit_system(units)
-        made = None if section is None else cross_section(section)
-        self._space = SpaceOptions(torsion, lateral, made).check(EI, length)
-        self.units = rod_units(self._space.bending_stiffness(EI, system), length, system)
-        system.check_all_have_units(
-            self._space.quantities | {"EI": EI, "length": length, "span": span, "rise": rise}
-        )
-        self.lateral_stiffness = self._space.stiffness(self.units, kinks)
+        options = SpaceOptions.read(torsion, lateral, section)
+        self._use_units(options, EI, length, units, {"span": span, "rise": rise})
+        self.lateral_stiffness = self.space_options.stiffness(self.units, kinks)
         breaks = [] if self.lateral_stiffness is None else self.lateral_stiffness.breaks
         number = self.units.number
         stretched: ProfileSpec | None = number(axial, "force", "axial")
@@ -199,9 +192,9 @@ class Rod(Described):
         self._load = None if shape is None else load_shape(shape, kinks)
         self._general: Description | None = None
         given = (stretched, loads, coordinates)
-        options = (*(each is not None for each in given), actuators, rise)
+        others = (*(each is not None for each in given), actuators, rise)
         arch = self._load is not None and tuple(ends) == CLAMPED and self.units.plain
-        if self._load is not None and arch and _all_default(stiffness, curved, *options):
+        if self._load is not None and arch and _all_default(stiffness, curved, *others):
             self._become_arch(
                 self._load, DEFAULT_SPAN if span is None else number(span, "length", "span")
             )
@@ -218,14 +211,11 @@ class Rod(Described):
             self._become_general(self._general)
         if self.has_lateral_stiffness:
             check_terms(self.terms)
-        self.unknowns, self.constraints = self.mechanics.unknowns, self.mechanics.constraints
-        self.mass, self.length_unit = self.mechanics.mass, self.units.label("length")
-        self.energy_scale = self.units.value("couple")
 
     def _become_arch(self, load: LoadShape, span: float) -> None:
         elements, degree = self._resolution
         kinks = np.union1d(load.kinks, self._breaks)
-        self.mechanics: Mechanics = ClampedMechanics(mesh_with_kinks(kinks, elements, degree), load)
+        self._use_mechanics(ClampedMechanics(mesh_with_kinks(kinks, elements, degree), load))
         self.parameters = (
             Parameter("Theta", "rad", 1.0, "actuator"),
             Parameter("Delta", "rad", 1.0, "actuator", 0.0),
@@ -238,7 +228,7 @@ class Rod(Described):
         self._raw = raw
         self.parameters = description.parameters
         names = names_of(self.parameters)
-        self.mechanics = GeneralMechanics(raw.model.map_scalars(names, self._raw_matrix))
+        self._use_mechanics(GeneralMechanics(raw.model.map_scalars(names, self._raw_matrix)))
 
     @staticmethod
     def _checked_span(span: float) -> float:
@@ -252,24 +242,20 @@ class Rod(Described):
 
     def identity(self) -> dict[str, Any]:
         """Kind, resolution, and everything that differs from the default arch."""
-        elements, degree = self._resolution
-        data: dict[str, Any] = {"kind": self.kind}
+        data: dict[str, Any] = {}
         if self._general is not None:
-            data |= self._general.identity()
+            data = self._general.identity()
         elif self._load is not None:
             if self._load.identity is None:
                 raise InputError(
                     "`load` must be a name or a table to be written to a file; got a callable. "
                     "Sample it into a table [[s, Q], ...]."
                 )
-            data |= {"load": self._load.identity, "span": self.parameters[3].default}
-        data |= self._space.data()
-        if self._space.section is not None:  # which gives it
-            data.pop("EI")
-        return {**data, "elements": elements, "degree": degree}
+            data = {"load": self._load.identity, "span": self.parameters[3].default}
+        return self._complete_identity(data, self._resolution)
 
     @cached_property
-    def refined(self) -> Mechanics:
+    def refined(self) -> PlanarMechanics:
         """The same rod with elements of a degree higher by four."""
         elements, degree = self._resolution
         degree = min(degree + 4, 16)
@@ -298,47 +284,20 @@ class Rod(Described):
         """Θ > 0 for the arch: the straight rod has no upright side."""
         return p[:, 0] > 0.0 if self._general is None else np.ones(len(p), bool)
 
-    def unloaded(self) -> Mapping[str, float]:
-        """All loads zero."""
-        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
-
-    @check_arguments
-    def natural_state(self, **values: float) -> State:
-        """Natural state at given actuators: unloaded, continued from the stress-free rod.
-
-        Raises
-        ------
-        InputError
-            For unknown or meaningless parameters, a load that is not 0, Θ ≤ 0 for the arch (the
-            straight rod has no upright side), where the continuation meets a fold, or where the
-            elements do not resolve it.
-        """
-        p = self.natural_parameters(values)
-        natural = self._natural(p[None])
-        if natural.outcome[0] == Outcome.FOUND:
-            return State(self, natural.z[0], p)
-        if self._general is None:
-            raise InputError(
-                f"`Theta`, `Delta` must have a natural state; got Theta={p[0]:g}, Delta={p[1]:g} "
-                f"at nu={float(p[3])!r}. {_why_not(natural)}"
-            )
-        given = ", ".join(
-            f"{each.name}={value:g}" for each, value in zip(self.parameters, p, strict=True)
+    def explain_no_natural_state(self, p: Float[np.ndarray, " parameters"]) -> str:
+        """Error message where there is no natural state, with the reason for the arch."""
+        if self._general is not None:
+            return AnyRod.explain_no_natural_state(self, p)
+        why = _why_not(self._natural(p[None]))
+        return (
+            f"`Theta`, `Delta` must have a natural state; got Theta={p[0]:g}, Delta={p[1]:g} "
+            f"at nu={float(p[3])!r}. {why}"
         )
-        raise InputError(
-            f"`natural_state` must be reached from the stress-free rod; got {given}, and the "
-            "continuation ends before. A straight rod buckles either way: turn an end, give it "
-            "curvature, or choose ends nearer to the stress-free ones."
-        )
-
-    def natural_states(self, p: Parameters) -> tuple[States, Flags]:
-        """Natural states of many settings, and which of them were found."""
-        z, found = self.natural(p)
-        return States(self, z, p), found
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the ends, loads, tendons and segments that bend."""
-        return rod_drawing(self, self.ends, self._amplitudes(p), z, p)
+        supports = planar_supports(self.ends, self.centreline(z, p, ENDS))
+        return rod_drawing(self, supports, self._amplitudes(p), z, p)
 
     def _amplitudes(self, p: Parameters) -> Amplitudes:
         """Every term that acts on the rod, with its amplitude in the user's units."""
@@ -368,14 +327,9 @@ class Rod(Described):
         part is the smallest by far. Infinite where the finer rod has no equilibrium near the
         state, as may happen at a fold.
         """
-        return descriptors.discretisation_error(self.mechanics, self.refined, z, p)
+        return discretisation_error(self.mechanics, self.refined, z, p)
 
     # --- out of the plane -------------------------------------------------------------------
-
-    @property
-    def section(self) -> SectionProperties | None:
-        """Stiffnesses and weight of the section in the rod's units; None if none was given."""
-        return self._space.properties(self.units)
 
     @property
     def terms(self) -> dict[str, tuple[Term, ...]]:

@@ -1,6 +1,5 @@
 """Descriptors of a rod's stability out of its plane."""
 
-import re
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -18,10 +17,6 @@ from equimorph.structures.rod.terms import Couple, Pressure, Term
 
 LATERAL_BRANCH_POINT = "lateral branch point"
 """The event where a planar state begins to leave its plane."""
-
-
-LATERAL = re.compile(r"\s*lateral_(index|margin)\s*(?:\(([^()]*)\))?\s*")
-"""Texts of the descriptors, with stiffnesses of their own or without."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """What a rod is told about its stiffnesses out of the plane, and what follows from it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.structures.rod.lateral import LateralStiffness
-from equimorph.structures.rod.sections import CrossSection, SectionProperties
+from equimorph.structures.rod.sections import CrossSection, SectionProperties, cross_section
 from equimorph.structures.rod.units import Units
 from equimorph.structures.unit_system import UnitSystem
 
@@ -20,6 +20,13 @@ class SpaceOptions:
     torsion: Any
     lateral: Any
     section: CrossSection | None
+
+    @classmethod
+    def read(
+        cls, torsion: Any, lateral: Any, section: CrossSection | Mapping[str, Any] | None
+    ) -> "SpaceOptions":
+        """Options with a section or its data."""
+        return cls(torsion, lateral, None if section is None else cross_section(section))
 
     def check(self, EI: Any, length: Any) -> "SpaceOptions":
         """The same, if it is complete and says nothing twice.

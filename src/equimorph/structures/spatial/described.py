@@ -1,76 +1,110 @@
 """Descriptors of a rod in space as methods."""
 
 from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
 
 from equimorph.argument_checks import check_arguments
+from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.errors import InputError
 from equimorph.model import Descriptor
-from equimorph.structures.spatial import descriptors
+from equimorph.structures.rod.any_rod import COORDINATES, Arclengths, Field, read_fraction
 from equimorph.structures.spatial.measured import MeasuredInSpace
 from equimorph.structures.spatial.orbits import on_orbit
 from equimorph.structures.states import State
+
+STRAINS = {"twist": "κ_t", "side_curvature": "κ_n", "curvature": "κ_b"}
+"""Strains in the order in which fields have them, with their symbols."""
+ANGLES = {"turn": "a", "tilt": "b", "roll": "τ"}
+"""Angles of a cross-section with their symbols."""
+FORCES = {"lambda": 0, "mu": 1, "x": 0, "y": 1, "z": 2}
+"""Components of the support's force; the first two as on a planar rod."""
 
 
 class DescribedInSpace(MeasuredInSpace):
     """A rod in space with its descriptors, in the user's units."""
 
-    @check_arguments
-    def height(self, s: float) -> Descriptor:
-        """y(s), in units of L."""
-        return descriptors.coordinate(self, "height", s)
+    written: ClassVar[tuple[str, ...]] = (
+        *("height(s)", "x(s)", "z(s)", "turn(s)", "tilt(s)", "roll(s)"),
+        *("curvature(s)", "side_curvature(s)", "twist(s)", "bending(s)", "max_curvature"),
+        *("energy", "clearance(s)", "support_force(x)", "end_couple(0, x)"),
+    )
 
     @check_arguments
     def position(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
         """(x(s), y(s), z(s)), in units of L."""
-        x, y, z = (descriptors.coordinate(self, name, s) for name in ("x", "height", "z"))
-        return x, y, z
+        return self.coordinate(0, s), self.coordinate(1, s), self.coordinate(2, s)
 
     @check_arguments
     def angles(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
         """Angles turn, tilt, roll of R = exp(e₃ turn) exp(e₂ tilt) exp(e₁ roll) at s.
 
-        Turn and roll lie between −π and π; all three jump where the tangent is along ±z.
+        The tangent is (cos turn cos tilt, sin turn cos tilt, −sin tilt). Turn and roll lie between
+        −π and π; all three jump where the tangent is along ±z.
         """
-        turn, tilt, roll = (descriptors.angle(self, name, s) for name in descriptors.ANGLES)
+        turn, tilt, roll = (self._angle(name, s) for name in ANGLES)
         return turn, tilt, roll
+
+    def _angle(self, name: str, s: float) -> Descriptor:
+        def value(z: Lanes, p: Parameters, at: Arclengths) -> Values:
+            r = self.frames(z, p, at)[:, 0]
+            if name == "turn":
+                return np.asarray(np.arctan2(r[:, 1, 0], r[:, 0, 0]))
+            if name == "tilt":
+                return np.asarray(-np.arcsin(np.clip(r[:, 2, 0], -1.0, 1.0)))
+            return np.asarray(np.arctan2(r[:, 2, 1], r[:, 2, 2]))
+
+        return self.field_at(s, name, ANGLES[name], "angle", value)
 
     @check_arguments
     def strains(self, s: float) -> tuple[Descriptor, Descriptor, Descriptor]:
         """Twist, and curvatures about n and b, at s, in units of 1/L."""
-        twist, aside, bend = (descriptors.strain(self, name, s) for name in descriptors.STRAINS)
+        twist, aside, bend = (self._strain(name, s) for name in STRAINS)
         return twist, aside, bend
+
+    def _strain(self, name: str, s: float) -> Descriptor:
+        axis = tuple(STRAINS).index(name)
+        field: Field = lambda z, p, at: self.fields(z, p, at).strains[:, 0, axis]  # noqa: E731
+        return self.field_at(s, name, STRAINS[name], "curvature", field)
 
     @check_arguments
     def bending(self, s: float) -> Descriptor:
         """Bending curvature √(κ_n² + κ_b²) at s, in units of 1/L."""
-        return descriptors.bending(self, s)
+
+        def size(z: Lanes, p: Parameters, at: Arclengths) -> Values:
+            strains = self.fields(z, p, at).strains
+            return np.asarray(np.hypot(strains[:, 0, 1], strains[:, 0, 2]))
+
+        return self.field_at(s, "bending", "|κ|", "curvature", size)
 
     @cached_property
     def max_curvature(self) -> Descriptor:
         """Largest bending curvature along the rod, in units of 1/L."""
-        return descriptors.max_curvature(self)
-
-    @cached_property
-    def total_energy(self) -> Descriptor:
-        """Potential energy E, in units of 4π²B/L."""
-        return descriptors.total_energy(self)
+        return self.max_curvature_descriptor()
 
     @check_arguments
     def support_force(self, component: str) -> Descriptor:
         """Force of the support at A on the rod along "x", "y" or "z"."""
-        return descriptors.support_force(self, component)
+        if component not in FORCES:
+            raise InputError(f"`component` must be 'x', 'y' or 'z'; got {component!r}.")
+        axis = FORCES[component]
+        return self.support_force_along(axis, "xyz"[axis])
 
     @check_arguments
     def end_couple(self, end: int, component: str) -> Descriptor:
         """Couple of the support at end 0 or 1 on the rod, about an axis "x", "y" or "z"."""
-        return descriptors.end_couple(self, end, component)
+        if end not in (0, 1):
+            raise InputError(f"`end` must be 0 or 1; got {end!r}.")
+        if component not in ("x", "y", "z"):
+            raise InputError(f"`component` must be 'x', 'y' or 'z'; got {component!r}.")
+        axis, unit = "xyz".index(component), self.units.value("couple")
 
-    @check_arguments
-    def clearance(self, apart: float = 0.1) -> Descriptor:
-        """Smallest distance between points whose arclengths differ by `apart` at least.
+        def value(z: Lanes, p: Parameters) -> Values:
+            return unit * self.mechanics.end_couples(z, p)[:, end, axis]
 
-        Contact is not modelled: a rod of thickness h touches itself where this is below h.
-        """
-        return descriptors.clearance(self, apart)
+        name, label = f"end_couple({end}, {component})", self.units.label("couple")
+        return Descriptor(name, label, value, f"M_{component}({end})", self.signature)
 
     @check_arguments
     def warnings(self, state: State, thickness: float = 0.0) -> tuple[str, ...]:
@@ -80,10 +114,7 @@ class DescribedInSpace(MeasuredInSpace):
         equal bending stiffnesses between coaxial clamps let a state turn about their axis for
         nothing, so that F_z is singular and no event found there is a fold.
         """
-        found = []
-        distance = self.clearance()(state)
-        if distance <= max(thickness, 1e-9 * self.units.value("length")):
-            found.append(f"the rod touches itself: points come as near as {distance:.3g}")
+        found = list(self.warn_of_contact(state, thickness))
         if on_orbit(self.mechanics, state.z[None], state.p[None])[0]:
             found.append(
                 "the state may be turned about the axis of the clamps for nothing: give the rod a "
@@ -91,11 +122,19 @@ class DescribedInSpace(MeasuredInSpace):
             )
         return tuple(found)
 
-    @property
-    def elevation(self) -> Descriptor:
-        """y(½)."""
-        return self.height(0.5)
-
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
-        return descriptors.descriptor_from_text(self, text)
+    def own_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
+        """Descriptor of a rod in space by its name and argument."""
+        if argument is None:
+            return None
+        if name == "end_couple":
+            end, _, component = argument.partition(",")
+            number = int(end) if end.strip() in ("0", "1") else -1
+            return self.end_couple(number, component.strip())
+        if name not in (*COORDINATES, *STRAINS, *ANGLES, "bending"):
+            return None
+        at = read_fraction(argument)
+        if name in COORDINATES:
+            return self.coordinate(COORDINATES.index(name), at)
+        if name in STRAINS:
+            return self._strain(name, at)
+        return self._angle(name, at) if name in ANGLES else self.bending(at)

@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Scalars, Values
-from equimorph.errors import InputError
+from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Direction
+from equimorph.structures.rod.mechanics import RodMechanics
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import (
     FRAME,
@@ -22,6 +23,7 @@ from equimorph.structures.spatial.quaternions import (
     normalised,
     product,
 )
+from equimorph.structures.spatial.symmetry import symmetries
 
 LENGTH_STIFFNESS = 100.0
 """k: lengths of quaternions are the stiffer in the metric, the nearer Newton's steps are to those
@@ -42,7 +44,7 @@ def blocks_of(lanes: int) -> list[slice]:
     return [slice(start, start + BLOCK) for start in range(0, max(lanes, 1), BLOCK)]
 
 
-class SpatialLagrangian:
+class SpatialLagrangian(RodMechanics):
     """The Lagrangian of a `SpatialModel`; methods as in `structures.contract`."""
 
     def __init__(self, model: SpatialModel) -> None:
@@ -55,26 +57,11 @@ class SpatialLagrangian:
         self.mass = np.repeat(4.0 * self.mesh.weights[inner], 4)
         self.unknowns = len(self.mass)
 
-    @property
-    def size(self) -> int:
-        """Length of z."""
-        return self.unknowns + self.constraints
-
-    def check(self, *pairs: Direction) -> None:
-        """Refuse states and directions of other widths."""
-        for pair in pairs:
-            for name, given, width in zip("zp", pair, (self.size, self.parameters), strict=True):
-                if given.shape[1] != width:
-                    raise InputError(
-                        f"`{name}` must have {width} columns; got shape {given.shape}. States "
-                        "belong to the rod, and the resolution, that made them."
-                    )
-
     # --- scalars and rotations ------------------------------------------------------------------
 
     def scalars(self, z: Lanes, p: Parameters) -> Scalars:
         """Multipliers, parameters and 1."""
-        self.check((z, p))
+        self.check_widths((z, p))
         return np.concatenate([z[:, self.unknowns :], p, np.ones((len(z), 1))], axis=1)
 
     def jets(
@@ -312,3 +299,7 @@ class SpatialLagrangian:
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the rotations are smooth in every element."""
         return np.asarray(self.tail(z, p) < LARGEST_TAIL)
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Mirror images and half turns that leave the Lagrangian as it is."""
+        return symmetries(self.model, self.unknowns)

@@ -7,8 +7,6 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Entries, Lanes, Parameters, Values
 from equimorph.linalg import Border, BorderedSolution
-from equimorph.linalg.condensed import PIVOT_GUARD
-from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.equations import Advance, JointEquations
 from equimorph.structures.spatial.lagrangian import Nodes, SpatialLagrangian, blocks_of
@@ -175,11 +173,6 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         """Solve with F_z − shift·mass, bordered."""
         return self.layout.solve(self.entries(z, p, shift), border, rhs)
 
-    @property
-    def scales(self) -> Float[np.ndarray, " parameters"]:
-        """One, as nothing here has a unit."""
-        return np.ones(self.parameters)
-
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp and the entries of F_z."""
         residual, column = self.equations(z, p, (np.zeros_like(z), dp))
@@ -216,20 +209,9 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         """
         if self.model.soft:
             return super().advance(z, p, dp, row, corner, defect)
-        self.check((z, p), (row, dp))
-        lanes = len(z)
-        inputs = [np.ascontiguousarray(each) for each in (z, p, dp, row, corner, defect)]
-        dz, tangent_z = np.empty((2, lanes, self.size))
-        dt, tangent_t, residual, determinant, ratio = np.empty((5, lanes))
-        index = np.empty(lanes, dtype=np.int64)
-        outputs = (dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio)
-        over_lanes(advance_lanes, self._step_tables, inputs, outputs)
-        out = Advance(*outputs[:-1])
-        if (3 - self.constraints) % 2:  # directions without a closure have the pivot −1
-            determinant *= -1.0
-        unsafe = ~(ratio >= PIVOT_GUARD)
-        if unsafe.any():
-            again = super().advance(*(each[unsafe] for each in inputs))
-            for name, column in vars(again).items():
-                getattr(out, name)[unsafe] = column
-        return out
+        return self.fused_advance(advance_lanes, self._step_tables, z, p, dp, row, corner, defect)
+
+    @property
+    def determinant_sign(self) -> float:
+        """Directions without a closure have the pivot −1 in the fused kernel."""
+        return (-1.0) ** (3 - self.constraints)

@@ -12,22 +12,22 @@ from equimorph.errors import InputError
 from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.rod.discretisation import ElementCount
+from equimorph.structures.rod.drawing import ENDS, rod_drawing
 from equimorph.structures.rod.profiles import LoadSpec, MeasuredProfile, ProfileSpec, load_shape
-from equimorph.structures.rod.sections import CrossSection, SectionProperties, cross_section
+from equimorph.structures.rod.sections import CrossSection
 from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.rod.terms import LineLoad, Term, Terms
-from equimorph.structures.rod.units import rod_units
 from equimorph.structures.spatial.described import DescribedInSpace
 from equimorph.structures.spatial.description import SpatialDescription
-from equimorph.structures.spatial.drawing import RodDrawing
+from equimorph.structures.spatial.drawing import spatial_supports
 from equimorph.structures.spatial.ends import Ends
 from equimorph.structures.spatial.errors import discretisation_error
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import raw_model
 from equimorph.structures.spatial.natural import natural_states
 from equimorph.structures.spatial.planar import planar_guess
-from equimorph.structures.states import State, States
-from equimorph.structures.unit_system import Quantity, Units, unit_system
+from equimorph.structures.states import State
+from equimorph.structures.unit_system import Quantity, Units
 
 DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")
@@ -123,7 +123,6 @@ class SpatialRod(DescribedInSpace):
     """
 
     kind: ClassVar[str] = "spatial rod"
-    endless_in: ClassVar[str] = "max_curvature"
 
     @check_arguments
     def __init__(  # noqa: PLR0913  # what a rod can have
@@ -153,14 +152,9 @@ class SpatialRod(DescribedInSpace):
         length: Quantity | None = None,
         units: Units | None = None,
     ) -> None:
-        system = unit_system(units)
-        made = None if section is None else cross_section(section)
-        self._space = SpaceOptions(torsion, lateral, made).check(EI, length)
-        self.units = rod_units(self._space.bending_stiffness(EI, system), length, system)
-        system.check_all_have_units(
-            self._space.quantities
-            | {"EI": EI, "length": length, "span": span, "rise": rise, "sideways": sideways}
-        )
+        options = SpaceOptions.read(torsion, lateral, section)
+        lengths = {"span": span, "rise": rise, "sideways": sideways}
+        self._use_units(options, EI, length, units, lengths)
         number = self.units.number
         shape = "uniform" if load is None and loads is None else load
         own = {} if shape is None else {"q": LineLoad(shape, kinks=kinks)}
@@ -192,28 +186,24 @@ class SpatialRod(DescribedInSpace):
         )
         self.description.check_places()
         self.parameters = self.description.parameters
-        self.mechanics = SpatialMechanics(self.description.model(elements, degree))
-        self.unknowns, self.constraints = self.mechanics.unknowns, self.mechanics.constraints
-        self.mass, self.length_unit = self.mechanics.mass, self.units.label("length")
-        self.energy_scale = self.units.value("couple")
+        self._use_mechanics(SpatialMechanics(self.description.model(elements, degree)))
 
     def _ratios(self) -> dict[str, Any]:
         """Stiffnesses against twist and out of the plane, relative to that in the plane."""
-        made = self._space.properties(self.units)
+        made = self.space_options.properties(self.units)
         if made is not None:
             return {"torsion": made.torsion, "lateral": made.lateral}
-        if self._space.torsion is None:
+        if self.space_options.torsion is None:
             raise InputError(
                 "`torsion`, `lateral` must be given for a rod in space; got neither. Give these, "
                 "like torsion=0.77, lateral=1.0 for a round one, or a section."
             )
         names = ("torsion", "lateral")
-        return {name: self._space.ratio(name, self.units) for name in names}
+        return {name: self.space_options.ratio(name, self.units) for name in names}
 
     def identity(self) -> dict[str, Any]:
         """Kind, resolution, and everything that differs from the default."""
-        elements, degree = self._resolution
-        data: dict[str, Any] = {"kind": self.kind, **self.description.data()}
+        data = self.description.data()
         for name, default in PROFILES.items():
             value = self._given[name]
             if callable(value):
@@ -223,10 +213,7 @@ class SpatialRod(DescribedInSpace):
                 )
             if not (isinstance(value, int | float | None) and value == default):
                 data[name] = value.tolist() if isinstance(value, np.ndarray) else value
-        data |= self.units.data() | self._space.data()
-        if self._space.section is not None:  # which gives it
-            data.pop("EI")
-        return {**data, "elements": elements, "degree": degree}
+        return self._complete_identity(data | self.units.data(), self._resolution)
 
     # --- natural states -------------------------------------------------------------------------
 
@@ -241,38 +228,6 @@ class SpatialRod(DescribedInSpace):
         matrix = self.description.matrix(raw.model)[m:-1, m:]
         given = np.concatenate([p, np.ones((len(p), 1))], axis=1)
         return natural_states(raw, given @ matrix.T)
-
-    def unloaded(self) -> Mapping[str, float]:
-        """All loads zero."""
-        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
-
-    @check_arguments
-    def natural_state(self, **values: float) -> State:
-        """Natural state at given actuators: unloaded, continued from the stress-free rod.
-
-        Raises
-        ------
-        InputError
-            For unknown or meaningless parameters, a load that is not 0, or where the continuation
-            from the stress-free shape meets a fold.
-        """
-        p = self.natural_parameters(values)
-        z, found = self.natural(p[None])
-        if found[0]:
-            return State(self, z[0], p)
-        given = ", ".join(
-            f"{each.name}={value:g}" for each, value in zip(self.parameters, p, strict=True)
-        )
-        raise InputError(
-            f"`natural_state` must be reached from the stress-free rod; got {given}, and the "
-            "continuation ends before. A straight rod buckles any way: turn an end, give it "
-            "curvature, or choose ends nearer to the stress-free ones."
-        )
-
-    def natural_states(self, p: Parameters) -> tuple[States, Flags]:
-        """Natural states of many settings, and which of them were found."""
-        z, found = self.natural(p)
-        return States(self, z, p), found
 
     @check_arguments
     def planar_state(self, state: Any, **values: float) -> State:
@@ -320,8 +275,8 @@ class SpatialRod(DescribedInSpace):
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the ends, loads, tendons and segments that bend."""
-        draw = RodDrawing(self.recovery, self.ends, self.units.value("length"))
-        return draw(self.description.amplitudes(p), z, p)
+        supports = spatial_supports(self.ends, self.centreline(z, p, ENDS))
+        return rod_drawing(self, supports, self.description.amplitudes(p), z, p)
 
     @property
     def ends(self) -> Ends:
@@ -332,8 +287,3 @@ class SpatialRod(DescribedInSpace):
     def terms(self) -> dict[str, tuple[Term, ...]]:
         """Loads and actuators that act on the rod, by the name of their amplitude."""
         return self.description.terms
-
-    @property
-    def section(self) -> SectionProperties | None:
-        """Stiffnesses and weight of the section in the rod's units; None if none was given."""
-        return self._space.properties(self.units)

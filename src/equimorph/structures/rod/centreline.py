@@ -1,23 +1,54 @@
-"""How near a rod in space comes to itself."""
+"""Centrelines of rods, in the plane and in space, and how near they come to themselves."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Values
-from equimorph.structures.spatial.fields import Fields
 
 SAMPLES = 129
 """Arclengths at which distances are compared first."""
 POLISHING = 4
 """Newton iterations towards the closest points."""
+EQUAL_ARCLENGTHS = 1e-12
+"""Round-off of the difference of two arclengths."""
+
+Vectors = Float[np.ndarray, "lanes points axes"]
+Spots = Float[np.ndarray, "lanes axes"]
+
+
+@dataclass(frozen=True, eq=False)
+class Centreline:
+    """Centreline of a rod at arclengths, with the axes of its cross-sections.
+
+    Attributes
+    ----------
+    places
+        Coordinates, in the unit of `length`.
+    tangents
+        Unit vectors.
+    normals
+        The other axes of the cross-sections: in the plane one, on the left; in space n and b.
+    bends
+        Derivatives of the tangents with respect to the arclength, a share of the length.
+    length
+        That of the rod; arclengths are shares of it.
+    """
+
+    places: Vectors
+    tangents: Vectors
+    normals: Float[np.ndarray, "lanes points normals axes"]
+    bends: Vectors
+    length: float
 
 
 def stations() -> Float[np.ndarray, " samples"]:
-    """Arclengths at which `closest_approach` wants the fields."""
+    """Arclengths at which `closest_approach` needs the centreline."""
     return np.linspace(0.0, 1.0, SAMPLES)
 
 
-def closest_approach(fields: Fields, apart: float) -> tuple[Values, Values]:
+def closest_approach(line: Centreline, apart: float) -> tuple[Values, Values]:
     """Smallest distance between points whose arclengths differ by `apart` at least.
 
     The closest pair of samples, improved by Newton on the osculating parabolas of both points;
@@ -25,8 +56,8 @@ def closest_approach(fields: Fields, apart: float) -> tuple[Values, Values]:
 
     Parameters
     ----------
-    fields
-        Fields at `stations`, by lengths of the rod.
+    line
+        Centreline at `stations`.
     apart
         Least distance along the rod, as a share of its length.
 
@@ -34,15 +65,16 @@ def closest_approach(fields: Fields, apart: float) -> tuple[Values, Values]:
     -------
     Distances, and the arclength of the first point of each pair.
     """
-    s, places = stations(), fields.places
-    far = s[None, :] - s[:, None] >= apart - 1e-12
-    square = ((places[:, :, None] - places[:, None]) ** 2).sum(axis=-1)
-    square = np.where(far, square, np.inf).reshape(len(places), len(s) ** 2)
-    first, last = np.divmod(square.argmin(axis=1), len(s))
+    s, places = stations(), line.places
+    far = s[None, :] - s[:, None] >= apart - EQUAL_ARCLENGTHS
+    square = np.zeros((len(places), len(s), len(s)))
+    for x in np.moveaxis(places, 2, 0):
+        square += (x[:, :, None] - x[:, None]) ** 2
+    squares = np.where(far, square, np.inf).reshape(len(places), len(s) ** 2)
+    first, last = np.divmod(squares.argmin(axis=1), len(s))
     lanes, spacing = np.arange(len(places)), s[1]
-    frames, bends = fields.frames, fields.strains
-    normals = frames[..., 1] * bends[..., 2:3] - frames[..., 2] * bends[..., 1:2]
-    curves = np.stack([places, frames[..., 0], normals], axis=-2)
+    length = line.length
+    curves = np.stack([places, length * line.tangents, length * line.bends], axis=-2)
     here, there = curves[lanes, first], curves[lanes, last]
     start, stop = np.zeros((2, len(places)))
     for _ in range(POLISHING):
@@ -60,18 +92,18 @@ def closest_approach(fields: Fields, apart: float) -> tuple[Values, Values]:
         outside = (s[first] + start < 0.0) | (s[last] + stop > 1.0) | near
         start, stop = np.where(outside, 0.0, start), np.where(outside, 0.0, stop)
     gap = _parabola(there, stop)[0] - _parabola(here, start)[0]
-    refined = np.minimum(_dot(gap, gap), square[lanes, first * len(s) + last])
+    refined = np.minimum(_dot(gap, gap), squares[lanes, first * len(s) + last])
     return np.sqrt(refined), np.asarray(s[first] + start)
 
 
-def _dot(a: Float[np.ndarray, "lanes 3"], b: Float[np.ndarray, "lanes 3"]) -> Values:
+def _dot(a: Spots, b: Spots) -> Values:
     return np.asarray((a * b).sum(axis=-1))
 
 
 def _parabola(
-    curve: Float[np.ndarray, "lanes 3 3"], move: Values
+    curve: Float[np.ndarray, "lanes 3 axes"], move: Values
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Place on the osculating parabola, with derivatives."""
-    place, tangent, normal = np.moveaxis(curve, 1, 0)
+    place, tangent, bend = np.moveaxis(curve, 1, 0)
     by = move[:, None]
-    return place + by * tangent + 0.5 * by**2 * normal, tangent + by * normal, normal
+    return place + by * tangent + 0.5 * by**2 * bend, tangent + by * bend, bend

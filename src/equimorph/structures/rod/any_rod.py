@@ -1,0 +1,395 @@
+"""What rods in the plane and in space have in common, in the user's units."""
+
+import re
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.argument_checks import check_arguments
+from equimorph.argument_vocabulary import SHARE
+from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.errors import InputError, suggestion
+from equimorph.linalg import Border, BorderedSolution
+from equimorph.model import Descriptor
+from equimorph.structures.approach import smooth_arcs
+from equimorph.structures.contract import Structure, Symmetry
+from equimorph.structures.equations import Advance, Direction, LinearSystem, Majorant
+from equimorph.structures.rod.centreline import Centreline, closest_approach, stations
+from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.mechanics import RodMechanics
+from equimorph.structures.rod.sections import SectionProperties
+from equimorph.structures.rod.space_options import SpaceOptions
+from equimorph.structures.rod.terms import Term
+from equimorph.structures.rod.units import Units, rod_units
+from equimorph.structures.states import State, States
+from equimorph.structures.unit_system import Quantity, unit_system
+from equimorph.structures.unit_system import Units as SystemSpec
+
+ARCS = 128
+"""Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""
+TOUCHING = 1e-9
+"""Distance, as a share of the length, at which a rod without a thickness touches itself."""
+COORDINATES = ("x", "height", "z")
+"""Names of the descriptors of coordinates."""
+FRACTIONS = (3, 6, 7, 9, 11, 12)
+"""Denominators of arclengths that descriptors write as fractions."""
+CALL = re.compile(r"\s*(\w+)\s*(?:\(\s*([^()]*?)\s*\))?\s*")
+"""Text of a descriptor: its name, and its argument in parentheses if it has one."""
+_SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
+
+Arclengths = Float[np.ndarray, " points"]
+Field = Callable[[Lanes, Parameters, Arclengths], Values]
+"""Values of a field, one a lane, at one arclength."""
+Peaks = Float[np.ndarray, "lanes peaks"]
+Branches = Callable[[Lanes, Parameters], tuple[Peaks, Peaks]]
+"""Local maxima along the rod, and their arclengths."""
+
+
+def read_fraction(text: str) -> float:
+    """Number written like ``0.5`` or ``1/3``."""
+    try:
+        above, _, below = text.partition("/")
+        return float(above) / float(below or 1.0)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f"`s` must be a number or a fraction like 1/3; got {text!r}.") from None
+
+
+def name_at(name: str, s: float) -> str:
+    """Name at an arclength, from which the arclength is read back exactly: ``height(1/3)``."""
+    nice = (f"{s:.6g}", *(f"{round(s * below)}/{below}" for below in FRACTIONS))
+    exact = (text for text in nice if read_fraction(text) == s)
+    return f"{name}({next(exact, repr(s))})"
+
+
+def arclengths(s: Arclengths | None) -> Arclengths:
+    """The given arclengths, by default 101 equidistant ones."""
+    return np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
+
+
+class AnyRod(Structure):
+    """A rod: mechanics in non-dimensional numbers inside, the user's units outside.
+
+    Unknowns, multipliers, residuals and energies are non-dimensional; parameters, shapes and
+    descriptors are in the user's units.
+    """
+
+    endless_in: ClassVar[str] = "max_curvature"
+    written: ClassVar[tuple[str, ...]]
+    """Descriptors as texts, for error messages."""
+    mechanics: RodMechanics
+    units: Units
+    space_options: SpaceOptions
+    """The cross-section, or the stiffnesses out of the plane, as given."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """Elements along the rod."""
+        return self.mechanics.mesh
+
+    @property
+    def section(self) -> SectionProperties | None:
+        """Stiffnesses and weight of the section in the rod's units; None if none was given."""
+        return self.space_options.properties(self.units)
+
+    @property
+    @abstractmethod
+    def terms(self) -> dict[str, tuple[Term, ...]]:
+        """Loads and actuators that act on the rod, by the name of their amplitude."""
+
+    def _use_units(
+        self,
+        options: SpaceOptions,
+        EI: Quantity | None,
+        length: Quantity | None,
+        units: SystemSpec | None,
+        lengths: Mapping[str, Any],
+    ) -> None:
+        """Set the units by the stiffness, or by the section; check the `lengths` given by name."""
+        system = unit_system(units)
+        self.space_options = options.check(EI, length)
+        self.units = rod_units(options.bending_stiffness(EI, system), length, system)
+        given = {"EI": EI, "length": length, **lengths}
+        system.check_all_have_units(options.quantities | given)
+
+    def _use_mechanics(self, mechanics: RodMechanics) -> None:
+        """Set the mechanics, and what the contract of structures asks of them."""
+        self.mechanics = mechanics
+        self.unknowns, self.constraints = mechanics.unknowns, mechanics.constraints
+        self.mass, self.length_unit = mechanics.mass, self.units.label("length")
+        self.energy_scale = self.units.value("couple")
+
+    def _complete_identity(
+        self, data: dict[str, Any], resolution: tuple[int, int]
+    ) -> dict[str, Any]:
+        """Identity from what differs from the default, with section and resolution."""
+        data = {"kind": self.kind, **data, **self.space_options.data()}
+        if self.space_options.section is not None:  # which gives it
+            data.pop("EI")
+        return {**data, "elements": resolution[0], "degree": resolution[1]}
+
+    # --- the contract, by the mechanics ---------------------------------------------------------
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """Potential energy E, in units of 4π²B/L."""
+        return self.mechanics.energy(z, p)
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+        return self.mechanics.residual(z, p)
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return self.mechanics.parameter_derivative(z, p, dp)
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        return self.mechanics.second_derivative(z, p, v, w)
+
+    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
+        """Bound of D²F over boxes, where the mechanics know one."""
+        return self.mechanics.second_derivative_bound(z, p, reach)
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p: couples and forces of actuators, displacements of loads."""
+        return self.mechanics.effort(z, p)
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with F_z − shift·mass, bordered."""
+        return self.mechanics.solve(z, p, rhs, border, shift)
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z; computed together."""
+        return self.mechanics.linear_system(z, p, directions)
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step, with tangent and inertia."""
+        return self.mechanics.advance(z, p, dp, row, corner, defect)
+
+    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian."""
+        return self.mechanics.index(z, p)
+
+    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
+        """Random guesses."""
+        return self.mechanics.sample(p, generator)
+
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether the highest Legendre coefficients of the rotations are small in every element."""
+        return self.mechanics.resolved(z, p)
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Mirror images and half turns of equilibria that are equilibria."""
+        return self._symmetries
+
+    @cached_property
+    def _symmetries(self) -> tuple[Symmetry, ...]:
+        return self.mechanics.symmetries()
+
+    # --- shapes ---------------------------------------------------------------------------------
+
+    @abstractmethod
+    def places(
+        self, z: Lanes, p: Parameters, s: Arclengths
+    ) -> Float[np.ndarray, "lanes points axes"]:
+        """Coordinates at arclengths."""
+
+    @abstractmethod
+    def centreline(self, z: Lanes, p: Parameters, s: Arclengths) -> Centreline:
+        """Places, tangents, normals and curvature at arclengths."""
+
+    @abstractmethod
+    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
+        """Largest bending curvature along the rod, and the arclength where it occurs."""
+
+    def shape(
+        self, z: Lanes, p: Parameters, s: Arclengths | None = None
+    ) -> Float[np.ndarray, "lanes points axes"]:
+        """Coordinates at arclengths `s` (default: 101 equidistant ones)."""
+        return self.places(z, p, arclengths(s))
+
+    def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 axes"]:
+        """Shape as cubic arcs with the rod's positions and tangents at their ends."""
+        line = self.centreline(z, p, np.linspace(0.0, 1.0, ARCS + 1))
+        return smooth_arcs(line.places, line.tangents, line.length / ARCS)
+
+    # --- natural states -------------------------------------------------------------------------
+
+    def unloaded(self) -> Mapping[str, float]:
+        """All loads zero."""
+        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
+
+    @check_arguments
+    def natural_state(self, **values: float) -> State:
+        """Natural state at given actuators: unloaded, continued from the stress-free rod.
+
+        Raises
+        ------
+        InputError
+            For unknown or meaningless parameters, a load that is not 0, Θ ≤ 0 for the clamped arch
+            (the straight rod has no upright side), where the continuation from the stress-free
+            shape meets a fold, or where the elements do not resolve it.
+        """
+        p = self.natural_parameters(values)
+        z, found = self.natural(p[None])
+        if found[0]:
+            return State(self, z[0], p)
+        raise InputError(self.explain_no_natural_state(p))
+
+    def natural_states(self, p: Parameters) -> tuple[States, Flags]:
+        """Natural states of many settings, and which of them were found."""
+        z, found = self.natural(p)
+        return States(self, z, p), found
+
+    def explain_no_natural_state(self, p: Float[np.ndarray, " parameters"]) -> str:
+        """Error message where the continuation from the stress-free rod ends before `p`."""
+        given = ", ".join(
+            f"{each.name}={value:g}" for each, value in zip(self.parameters, p, strict=True)
+        )
+        return (
+            f"`natural_state` must be reached from the stress-free rod; got {given}, and the "
+            "continuation ends before. A straight rod buckles either way: turn an end, give it "
+            "curvature, or choose ends nearer to the stress-free ones."
+        )
+
+    # --- descriptors ----------------------------------------------------------------------------
+
+    @check_arguments
+    def height(self, s: float) -> Descriptor:
+        """y(s), in units of L."""
+        return self.coordinate(1, s)
+
+    def coordinate(self, axis: int, s: float) -> Descriptor:
+        """x(s), y(s) or z(s) (axis 0, 1, 2), in units of L."""
+
+        def value(z: Lanes, p: Parameters, at: Arclengths) -> Values:
+            return self.places(z, p, at)[:, 0, axis]
+
+        return self.field_at(s, COORDINATES[axis], "xyz"[axis], "length", value)
+
+    def field_at(self, s: float, name: str, symbol: str, quantity: str, field: Field) -> Descriptor:
+        """Descriptor of a field along the rod at one arclength."""
+        if not 0.0 <= s <= 1.0:  # in texts: numbers are checked before
+            raise InputError(f"`s` must be {SHARE.words}; got {s!r}.")
+        at = np.array([s], float)
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return field(z, p, at)
+
+        label, symbol = self.units.label(quantity), f"{symbol}({_SYMBOLS.get(s, f'{s:g}')})"
+        return Descriptor(name_at(name, float(s)), label, value, symbol, self.signature)
+
+    @property
+    def elevation(self) -> Descriptor:
+        """y(½)."""
+        return self.height(0.5)
+
+    @cached_property
+    def total_energy(self) -> Descriptor:
+        """Potential energy E, in units of 4π²B/L."""
+        unit = self.units.value("couple")
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return unit * self.mechanics.energy(z, p)
+
+        return Descriptor("energy", self.units.energy_label, value, "E", self.signature)
+
+    def max_curvature_descriptor(self, branches: Branches | None = None) -> Descriptor:
+        """Largest bending curvature; `branches` are its local maxima, where they are known."""
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return self.largest_curvature(z, p)[0]
+
+        def place(z: Lanes, p: Parameters) -> Values:
+            return self.largest_curvature(z, p)[1]
+
+        label = self.units.label("curvature")
+        return Descriptor("max_curvature", label, value, "max |κ|", self.signature, place, branches)
+
+    @property
+    @abstractmethod
+    def max_curvature(self) -> Descriptor:
+        """max_s |κ(s)| in units of 1/L, ends and interior extrema included."""
+
+    @abstractmethod
+    def support_force(self, component: str) -> Descriptor:
+        """Component of the force of the support at A on the rod."""
+
+    def support_force_along(self, axis: int, component: str) -> Descriptor:
+        """Component of the force of the support at A along an axis."""
+        unit = self.units.value("force")
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return unit * self.mechanics.support_forces(z, p)[:, axis]
+
+        name, label = f"support_force({component})", self.units.label("force")
+        return Descriptor(name, label, value, "λμν"[axis], self.signature)
+
+    @check_arguments
+    def clearance(self, apart: float = 0.1) -> Descriptor:
+        """Smallest distance between points whose arclengths differ by `apart` at least.
+
+        Contact is not modelled: a rod of thickness h touches itself where this is below h.
+        """
+        if not 0.0 < apart < 1.0:  # in texts, too
+            raise InputError(
+                f"`apart` must be a share of the rod's length between 0 and 1; got {apart!r}."
+            )
+
+        def found(z: Lanes, p: Parameters) -> tuple[Values, Values]:
+            return closest_approach(self.centreline(z, p, stations()), apart)
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return found(z, p)[0]
+
+        def place(z: Lanes, p: Parameters) -> Values:
+            return found(z, p)[1]
+
+        name, label = f"clearance({apart:.9g})", self.units.label("length")
+        return Descriptor(name, label, value, "clearance", self.signature, place)
+
+    def warn_of_contact(self, state: State, thickness: float) -> tuple[str, ...]:
+        """One line where a rod of some thickness touches itself in a state."""
+        distance = self.clearance()(state)
+        if distance > max(thickness, TOUCHING * self.units.value("length")):
+            return ()
+        return (f"the rod touches itself: points come as near as {distance:.3g}",)
+
+    @check_arguments
+    def descriptor(self, text: str) -> Descriptor:
+        """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
+        call = CALL.fullmatch(text)
+        made = None if call is None else self._descriptor_of_name(call[1], call[2])
+        if made is None:
+            raise InputError(
+                f"`descriptor` must be one of {', '.join(self.written)}; got {text!r}."
+                f"{suggestion(text, self.written)}"
+            )
+        return made
+
+    def _descriptor_of_name(self, name: str, argument: str | None) -> Descriptor | None:
+        if argument is None and name in ("max_curvature", "energy"):
+            return self.max_curvature if name == "max_curvature" else self.total_energy
+        if argument is not None and name == "support_force":
+            return self.support_force(argument)
+        if argument is not None and name == "clearance":
+            return self.clearance(read_fraction(argument))
+        return self.own_descriptor(name, argument)
+
+    @abstractmethod
+    def own_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
+        """Descriptor that only this kind of rod has; None for an unknown name."""
