@@ -1,14 +1,18 @@
 """Schedules of actuators, and the rates at which they may move."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
+from scipy.interpolate import BPoly
 
 from equimorph.argument_checks import check_arguments
-from equimorph.errors import InputError
+from equimorph.errors import InputError, MissingError
+
+Instants = float | Float[np.ndarray, "*instants"]
 
 
 @check_arguments
@@ -33,6 +37,13 @@ class Schedule:
         determine it. The identity is None for a structure that no file can hold (a callable load).
     way_points
         Steps at the corners of the route.
+    times
+        Time of each step, from 0 on; None: a schedule without times says nothing of speed.
+    velocities, accelerations
+        Of all parameters at each step, for schedules that are smooth in time.
+    time_unit
+        "s" for structures with units; for rods without, T = √(m L/λ_cr) with their mass m, length
+        L and λ_cr = 4π²B/L².
     """
 
     names: tuple[str, ...]
@@ -44,13 +55,146 @@ class Schedule:
     descriptors: dict[str, Float[np.ndarray, " steps"]]
     start: dict[str, Any]
     way_points: Int[np.ndarray, " corners"] = field(default_factory=lambda: np.zeros(0, int))
+    times: Float[np.ndarray, " steps"] | None = None
+    velocities: Float[np.ndarray, "steps parameters"] | None = None
+    accelerations: Float[np.ndarray, "steps parameters"] | None = None
+    time_unit: str = "T"
+
+    def __post_init__(self) -> None:
+        """Check the times."""
+        if self.times is None:
+            if self.velocities is not None or self.accelerations is not None:
+                raise InputError("`times` must be given with velocities; got none.")
+            return
+        if self.velocities is None and self.accelerations is not None:
+            raise InputError("`velocities` must be given with accelerations; got none.")
+        if self.times[0] != 0.0 or not (np.diff(self.times) > 0.0).all():
+            raise InputError(
+                f"`times` must begin with 0 and increase; got {self.times[:3].tolist()} …."
+            )
+
+    @property
+    def parameters(self) -> dict[str, Float[np.ndarray, " steps"]]:
+        """Values of all parameters by name, one at each step."""
+        return dict(zip(self.names, self.values.T, strict=True))
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Names of the parameters that change."""
+        moves = np.ptp(self.values, axis=0) > 0.0
+        return tuple(name for name, moved in zip(self.names, moves, strict=True) if moved)
+
+    @property
+    def duration(self) -> float:
+        """Time of the last step, in `time_unit`.
+
+        Raises
+        ------
+        InputError
+            If the schedule has no times.
+        """
+        return float(self._timed()[-1])
+
+    @check_arguments
+    def in_time(self, rates: "Rates | None" = None, *, duration: float | None = None) -> "Schedule":
+        """The same steps with times, between which the parameters change at constant rates.
+
+        Parameters
+        ----------
+        rates
+            Largest rates; at every instant one of the parameters moves at its own.
+        duration
+            Time of the whole schedule instead; the way in the scaled parameters of `progress` is
+            then travelled at one speed.
+
+        Raises
+        ------
+        InputError
+            If neither or both are given, or `rates` does not limit a parameter that moves.
+        """
+        if (rates is None) == (duration is None):
+            raise InputError("`rates` or `duration` must be given, one of them; got both or none.")
+        if rates is not None:
+            rates.check_covers(self)
+        times = self.progress * duration if rates is None else rates.times(self)
+        keep = np.concatenate([[True], np.diff(times) > 0.0])
+        return replace(self._steps(keep), times=times[keep], velocities=None, accelerations=None)
+
+    def _steps(self, keep: Bool[np.ndarray, " steps"]) -> "Schedule":
+        """Some steps of the schedule."""
+        number = np.cumsum(keep) - 1
+        return replace(
+            self,
+            values=self.values[keep],
+            progress=self.progress[keep],
+            margins=self.margins[keep],
+            descriptors={name: each[keep] for name, each in self.descriptors.items()},
+            way_points=np.unique(number[self.way_points]),
+        )
+
+    def _timed(self) -> Float[np.ndarray, " steps"]:
+        if self.times is None:
+            raise MissingError(
+                "`schedule` must have times; got one without. Give it a duration, like "
+                "schedule.in_time(Rates({...})), schedule.in_time(duration=10.0) or "
+                "schedule.in_time(speed_limit(schedule, tolerance=0.01))."
+            )
+        return self.times
+
+    @check_arguments
+    def at(self, t: Instants) -> Float[np.ndarray, "*instants parameters"]:
+        """All parameters at instants, in the order of `names`; at rest before 0 and after the end.
+
+        Between the steps they change at constant rates or, if the schedule has velocities, as the
+        cubic polynomials with these, or with accelerations the quintic ones: the interpolation that
+        controllers of the ROS 2 message JointTrajectory do.
+
+        Parameters
+        ----------
+        t
+            One instant or many, in `time_unit`.
+
+        Raises
+        ------
+        InputError
+            If the schedule has no times.
+        """
+        return np.asarray(self._curve(np.clip(t, 0.0, self.duration)))
+
+    @check_arguments
+    def velocity(self, t: Instants) -> Float[np.ndarray, "*instants parameters"]:
+        """Rates of all parameters at instants, as for `at`; after a corner those that follow it.
+
+        Raises
+        ------
+        InputError
+            If the schedule has no times.
+        """
+        moving = (np.asarray(t) >= 0.0) & (np.asarray(t) < self.duration)
+        return np.asarray(self._velocity(np.clip(t, 0.0, self.duration)) * moving[..., None])
+
+    @cached_property
+    def _curve(self) -> BPoly:
+        """Parameters as a piecewise polynomial of time."""
+        orders = (self.values, self.velocities, self.accelerations)
+        given = np.stack([each for each in orders if each is not None], axis=1)
+        times = self._timed()
+        if len(times) == 1:  # a schedule at rest
+            times, given = np.array([0.0, 1.0]), np.concatenate([given, given])
+        return BPoly.from_derivatives(times, given)
+
+    @cached_property
+    def _velocity(self) -> BPoly:
+        return self._curve.derivative()
 
     def __repr__(self) -> str:
         """Parameters that change, number of steps and smallest margin."""
-        moving = np.ptp(self.values, axis=0) > 0
-        names = ", ".join(name for name, moves in zip(self.names, moving, strict=True) if moves)
         smallest = self.margins.min(initial=np.inf)
-        return f"Schedule({names or 'at rest'}: {len(self.values)} steps; margin {smallest:.4g})"
+        time = "" if self.times is None else f" in {self.duration:.4g} {self.time_unit}"
+        return (
+            f"Schedule({', '.join(self.moving) or 'at rest'}: {len(self.values)} steps{time}; "
+            f"margin {smallest:.4g})"
+        )
 
 
 @check_arguments
@@ -89,6 +233,20 @@ class Rates:
         at = [names.index(name) for name in self.limits]
         bounds = np.array(list(self.limits.values()), dtype=float)
         return np.asarray((np.abs(np.diff(values[:, at], axis=0)) / bounds).max(axis=1))
+
+    def check_covers(self, schedule: Schedule) -> None:
+        """Refuse a schedule that moves a parameter without a limit: it would jump.
+
+        Raises
+        ------
+        InputError
+            With its name.
+        """
+        for name in schedule.moving:
+            if name not in self.limits:
+                raise InputError(
+                    f"`rates` must limit every parameter that moves; got none for {name}."
+                )
 
     @check_arguments
     def times(self, schedule: Schedule) -> Float[np.ndarray, " steps"]:

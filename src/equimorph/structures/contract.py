@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.errors import InputError
+from equimorph.errors import InputError, MissingError
 from equimorph.model import (
     Constraint,
     Descriptor,
@@ -78,6 +78,8 @@ class Structure(Equations):
     """Axis, y or z, that is upward in pictures of a structure in space."""
     energy_scale: float = 1.0
     """Value of one unit of `energy` in the units of the parameters, in joules for example."""
+    time_unit: str = "time"
+    """Unit of time that `inertia` goes with."""
 
     @cached_property
     def scales(self) -> Float[np.ndarray, " parameters"]:
@@ -107,6 +109,32 @@ class Structure(Equations):
     @abstractmethod
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p: work-conjugates of the parameters (actuator efforts, the loads' displacements)."""
+
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """Physical mass matrix M = JᵀWJ: kinetic energy ½ u̇ᵀMu̇ while the parameters rest.
+
+        J is the derivative of the places of all material points by the unknowns, W their mass. M
+        is in units of `energy` times `time_unit` squared; it may be singular where unknowns move no
+        mass. It is not the metric `mass`.
+
+        Raises
+        ------
+        MissingError
+            If the structure has no mass.
+        """
+        del z, p
+        raise MissingError(f"`structure` must have a mass; a {self.kind} has none. {self.massless}")
+
+    @property
+    def massless(self) -> str:
+        """How this kind of structure is given its mass, in one sentence; empty if it cannot be."""
+        return ""
+
+    def inertia_product(
+        self, z: Lanes, p: Parameters, v: Float[np.ndarray, "lanes k unknowns"]
+    ) -> Float[np.ndarray, "lanes k unknowns"]:
+        """M·v for k velocities v of the unknowns each; see `inertia`."""
+        return np.asarray(v @ self.inertia(z, p))
 
     @abstractmethod
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:

@@ -15,6 +15,7 @@ from equimorph.errors import InputError, MissingError
 from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
+from equimorph.structures.vibration import vibrations
 
 
 class SpaceStability(StrEnum):
@@ -106,6 +107,20 @@ class States:
     def margin(self) -> Values:
         """Smallest eigenvalue of the constrained Hessian with respect to the mass matrix."""
         return stability_margin(self.structure, self.z, self.p)
+
+    @check_arguments
+    def natural_frequencies(self, count: int = 1) -> Float[np.ndarray, "lanes count"]:
+        """Lowest angular frequencies of small free vibrations, in radians per unit of time.
+
+        The unit of time is the structure's `time_unit`: seconds where it has units, and
+        T = √(m L/λ_cr) for rods without. Parameters rest.
+
+        Raises
+        ------
+        InputError
+            If a state is not stable, the structure has no mass, or it has fewer free movements.
+        """
+        return vibrations(self.structure, self.z, self.p, count).frequencies
 
     @cached_property
     def energy(self) -> Values:
@@ -209,6 +224,21 @@ class State:
     def margin(self) -> float:
         """Smallest eigenvalue of the constrained Hessian with respect to the mass matrix."""
         return float(self.batch.margin[0])
+
+    @check_arguments
+    def natural_frequencies(self, count: int = 1) -> Float[np.ndarray, " count"]:
+        """Lowest angular frequencies of small free vibrations; see `States.natural_frequencies`.
+
+        Examples
+        --------
+        A cantilever without load, 1.8751²/(2π) and 4.6941²/(2π) per T:
+
+        >>> from equimorph import PointForce, Rod
+        >>> rod = Rod(ends=("clamped", "free"), loads={"P": PointForce(1.0)})
+        >>> rod.natural_state().natural_frequencies(2).round(4).tolist()
+        [0.5596, 3.5069]
+        """
+        return np.asarray(self.batch.natural_frequencies(count)[0])
 
     @property
     def energy(self) -> float:

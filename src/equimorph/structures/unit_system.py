@@ -134,6 +134,10 @@ class UnitSystem:
             "1": UNITS["1"],
         }
 
+    def si(self, quantity: str) -> float:
+        """SI value of one unit of a quantity written in the words force and length; SI if plain."""
+        return read_unit(quantity, self._own, quantity)[0]
+
     def label(self, quantity: str) -> str:
         """Label of a quantity written in the words force and length: "force·length" is N m."""
         if self.plain:
@@ -225,6 +229,28 @@ class UnitSystem:
         """Return what it is made from; empty if plain."""
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         return {} if self.plain else given
+
+
+def kilograms(given: Any, what: str) -> float | None:
+    """Mass in kilograms of a number of these, or of a text with a unit of mass.
+
+    Raises
+    ------
+    InputError
+        For a text with other units.
+
+    Examples
+    --------
+    >>> kilograms("250 g", "mass")
+    0.25
+    """
+    if not isinstance(given, str):
+        return None if given is None else float(given)
+    found = QUANTITY.fullmatch(given)
+    value, dimension = read_unit(found.group(2).strip(), UNITS, what) if found else (0.0, LENGTH)
+    if found is None or dimension != MASS:
+        raise InputError(f"`{what}` must be a mass in kg, or with its unit; got {given!r}.")
+    return float(found.group(1)) * value
 
 
 def unit_system(given: Units | None) -> UnitSystem:

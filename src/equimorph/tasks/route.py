@@ -152,4 +152,5 @@ def schedule_of(
         descriptors={d.name: d(states) for d in descriptors},
         start={"structure": _identity(structure), "unknowns": states.z[0].tolist()},
         way_points=corners,
+        time_unit=structure.time_unit,
     )

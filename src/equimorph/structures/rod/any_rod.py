@@ -24,7 +24,7 @@ from equimorph.structures.rod.mechanics import RodMechanics
 from equimorph.structures.rod.sections import SectionProperties
 from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.rod.terms import Term
-from equimorph.structures.rod.units import Units, rod_units
+from equimorph.structures.rod.units import Units
 from equimorph.structures.states import State, States
 from equimorph.structures.unit_system import Quantity, unit_system
 from equimorph.structures.unit_system import Units as SystemSpec
@@ -107,11 +107,12 @@ class AnyRod(Structure):
         length: Quantity | None,
         units: SystemSpec | None,
         lengths: Mapping[str, Any],
+        mass: Quantity | None = None,
     ) -> None:
-        """Set the units by the stiffness, or by the section; check the `lengths` given by name."""
+        """Set the units by stiffness and mass, or the section; check the `lengths` given by name."""
         system = unit_system(units)
         self.space_options = options.check(EI, length)
-        self.units = rod_units(options.bending_stiffness(EI, system), length, system)
+        self.units = options.units(EI, length, system, mass)
         given = {"EI": EI, "length": length, **lengths}
         system.check_all_have_units(options.quantities | given)
 

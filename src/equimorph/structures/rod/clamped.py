@@ -21,6 +21,7 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
 from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.fields import ClampedFields
+from equimorph.structures.rod.inertia import inextensible_inertia
 from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.profiles import LoadShape
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
@@ -148,6 +149,10 @@ class ClampedMechanics(PlanarMechanics):
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""
         first, last, lift = self._residual(z, p)[1].T
         return np.stack([first - last, first + last, lift, -z[:, -2]], axis=1)
+
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """JᵀWJ of the inner nodes' angles."""
+        return inextensible_inertia(self.mesh, self.nodal_angles(z, p))[:, 1:-1, 1:-1]
 
     def solve(
         self,

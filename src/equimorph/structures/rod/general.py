@@ -15,6 +15,7 @@ from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
+from equimorph.structures.rod.inertia import kinetic_matrix, place_derivatives
 from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
@@ -188,6 +189,13 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         theta, y = self.nodal_angles(z, p), self.scalars(z, p)
         out = self._gradient(theta, y) + self._end_moments(theta, y) @ self.model.turned
         return np.ascontiguousarray(out[:, self.constraints : -1])
+
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """JᵀWJ of the unknown angles."""
+        columns = place_derivatives(self.model, self.nodal_angles(z, p), self.scalars(z, p))
+        _, gradients, trailing = self.linearised(z, p, np.zeros_like(p))[2:]
+        inner = self.unknown_nodes
+        return kinetic_matrix(self.model, columns, gradients[:, :, inner], trailing, inner)
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp, and the parts of F_z: diagonal, border, trailing block."""

@@ -116,6 +116,10 @@ class PlanarMechanics(RodMechanics):
     held: tuple[bool, bool]
     """Whether the angles of the ends are prescribed."""
 
+    @abstractmethod
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """Physical mass matrix JᵀWJ of a rod of total mass 1, in units of L and of its mass."""
+
     @property
     @abstractmethod
     def unknown_nodes(self) -> slice:

@@ -130,6 +130,9 @@ class Rod(Described):
     section
         A `Strip`, `Round`, `Tube` or `OwnSection` in place of EI, torsion and lateral. The rod is
         inextensible all the same, unless `axial` is given.
+    mass
+        Of the whole rod, in kg or as a text, for what happens in time: with EI and length, if no
+        section gives it. Without these it is the unit.
 
     Raises
     ------
@@ -179,9 +182,10 @@ class Rod(Described):
         torsion: MeasuredProfile | None = None,
         lateral: MeasuredProfile | None = None,
         section: CrossSection | Mapping[str, Any] | None = None,
+        mass: Quantity | None = None,
     ) -> None:
         options = SpaceOptions.read(torsion, lateral, section)
-        self._use_units(options, EI, length, units, {"span": span, "rise": rise})
+        self._use_units(options, EI, length, units, {"span": span, "rise": rise}, mass)
         self.lateral_stiffness = self.space_options.stiffness(self.units, kinks)
         breaks = [] if self.lateral_stiffness is None else self.lateral_stiffness.breaks
         number = self.units.number

@@ -9,7 +9,7 @@ import numpy as np
 from equimorph.errors import InputError
 from equimorph.structures.rod.lateral import LateralStiffness
 from equimorph.structures.rod.sections import CrossSection, SectionProperties, cross_section
-from equimorph.structures.rod.units import Units
+from equimorph.structures.rod.units import Units, rod_units
 from equimorph.structures.unit_system import UnitSystem
 
 
@@ -58,11 +58,12 @@ class SpaceOptions:
         """Quantities of the section, by name."""
         return {} if self.section is None else self.section.quantities
 
-    def bending_stiffness(self, EI: Any, system: UnitSystem) -> Any:
-        """EI of the section, if there is one."""
+    def units(self, EI: Any, length: Any, system: UnitSystem, mass: Any) -> Units:
+        """Units of the rod, whose bending stiffness and weight are those of the section, if any."""
         if self.section is None:
-            return EI
-        return self.section.in_system(system).EI
+            return rod_units(EI, length, system, mass)
+        made = self.section.in_system(system)
+        return rod_units(made.EI, length, system, mass, made.weight)
 
     def properties(self, units: Units) -> SectionProperties | None:
         """Those of the section, in the rod's units."""

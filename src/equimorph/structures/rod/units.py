@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.errors import InputError
-from equimorph.structures.unit_system import UnitSystem
+from equimorph.structures.unit_system import STANDARD_GRAVITY, UnitSystem, kilograms
 
 FOUR_PI_SQUARED = 4.0 * np.pi**2
 SI = UnitSystem("N", "m")
@@ -39,11 +39,18 @@ class Units:
         L.
     system
         Units of the user's numbers; SI if none are named.
+    mass
+        Of the whole rod, in kilograms, if it is given.
+    weight
+        Of a section, in units of force per length, if it is known; mass and weight exclude each
+        other.
     """
 
     bending_stiffness: float | None = None
     length: float | None = None
     system: UnitSystem = field(default_factory=UnitSystem)
+    mass: float | None = None
+    weight: float | None = None
 
     def __post_init__(self) -> None:
         """Check that both or none are given, and positive."""
@@ -61,6 +68,23 @@ class Units:
     def plain(self) -> bool:
         """Whether numbers are non-dimensional."""
         return self.length is None
+
+    @property
+    def time_label(self) -> str:
+        """Unit of time."""
+        return "T" if self.plain else "s"
+
+    def time(self) -> float | None:
+        """T = √(mL³/(4π²B)) in `time_label`: 1 in units of itself; None if the mass is unknown."""
+        if self.length is None or self.bending_stiffness is None:
+            return 1.0
+        long, force = self._labelled.si("length"), self._labelled.si("force")
+        mass = self.mass
+        if mass is None and self.weight is not None:
+            mass = self.weight * self.length * force / STANDARD_GRAVITY
+        if mass is None:
+            return None
+        return float(np.sqrt(mass * self.length * long / (self.value("force") * force)))
 
     def value(self, quantity: str) -> float:
         """Value of one non-dimensional unit of a quantity named in `LABELS`."""
@@ -105,22 +129,39 @@ class Units:
         if self.plain:
             return {}
         given = {"EI": self.bending_stiffness, "length": self.length}
+        if self.mass is not None:
+            given["mass"] = self.mass
         return given if self.system.plain else {**given, "units": self.system.data()}
 
 
-def rod_units(EI: Any, length: Any, system: UnitSystem) -> Units:
-    """Units of a rod from its bending stiffness and length, which may be texts with units.
+def rod_units(
+    EI: Any, length: Any, system: UnitSystem, mass: Any = None, weight: float | None = None
+) -> Units:
+    """Units of a rod from its bending stiffness, length and mass, which may be texts with units.
+
+    `weight` is that of its section, if it has one of known density.
 
     Raises
     ------
     InputError
-        If one of them is missing or not positive, or units are named without them.
+        If one of them is missing or not positive, units or a mass are named without them, or a mass
+        beside a section that gives it.
     """
     if EI is None and length is None and not system.plain:
         raise InputError(
             f"`units` must come with EI and length; got {system.data()} alone. Without these two a "
             "rod is non-dimensional."
         )
+    if mass is not None and (EI is None or length is None):
+        raise InputError(
+            f"`mass` must come with EI and length; got {mass!r} alone. Without these two a rod is "
+            "non-dimensional, and its mass is the unit."
+        )
+    if mass is not None and weight is not None:
+        raise InputError(
+            f"`mass` must be left out for a rod whose section gives it; got {mass!r}. Leave it "
+            "out, or the density of the section."
+        )
     own = SI if system.plain else system
     stiff, long = own.number(EI, "force·length²", "EI"), own.number(length, "length", "length")
-    return Units(stiff, long, system)
+    return Units(stiff, long, system, kilograms(mass, "mass"), weight)

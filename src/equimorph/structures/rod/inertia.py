@@ -1,0 +1,96 @@
+"""Physical mass matrices of planar rods: JᵀWJ with the places of all nodes as functions of z.
+
+A point of the rod lies at ``x = ∫₀ˢ (1 + ε) cos θ``, ``y = ∫₀ˢ (1 + ε) sin θ`` from end A, or by
+the same integral from end B. The mass lies at the nodes with the weights of the quadrature.
+Cross-sections have no rotary inertia, as is right for slender rods.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.arrays import Nodal, Scalars
+from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.model import RodModel
+
+Masses = Float[np.ndarray, "lanes unknowns unknowns"]
+Turns = Float[np.ndarray, "lanes nodes 2 angles"]
+Pulls = Float[np.ndarray, "lanes nodes 2 multipliers"]
+RANK = 1e-10
+"""Relative size below which a compliance counts as none: such supports do not give way."""
+
+
+@lru_cache(maxsize=32)
+def _moments(mesh: Mesh) -> Float[np.ndarray, "nodes nodes"]:
+    """IᵀWI of the matrix I that integrates nodal values from end A to each node."""
+    integral = mesh.integration(mesh.nodes)
+    return np.asarray(integral.T @ (mesh.weights[:, None] * integral))
+
+
+def inextensible_inertia(mesh: Mesh, theta: Nodal) -> Float[np.ndarray, "lanes nodes nodes"]:
+    """Mass matrix of all nodal angles of an inextensible rod whose end A rests, total mass 1.
+
+    ``M_jk = (IᵀWI)_jk cos(θ_j − θ_k)``.
+    """
+    return np.asarray(_moments(mesh) * np.cos(theta[:, :, None] - theta[:, None, :]))
+
+
+@lru_cache(maxsize=32)
+def _integration(mesh: Mesh) -> Float[np.ndarray, "nodes points"]:
+    """Integrals to each node of values at the nodes of every element, which may jump between."""
+    elements, order = mesh.elements, mesh.degree + 1
+    out = np.zeros((elements * mesh.degree + 1, elements, order))
+    for e, nodes in enumerate(mesh.element_nodes):
+        out[nodes, e] = mesh.lengths[e] * mesh.reference.integral
+        out[nodes[-1] + 1 :, e] = mesh.element_weights[e]
+    return out.reshape(len(out), -1)
+
+
+def place_derivatives(model: RodModel, theta: Nodal, y: Scalars) -> tuple[Turns, Pulls]:
+    """Derivatives of the places of all nodes by the nodal angles, and by the multipliers."""
+    mesh, m = model.mesh, model.multipliers
+    at = mesh.element_nodes.ravel()
+    angles = theta[:, at]
+    sine, cosine = np.sin(angles), np.cos(angles)
+    across, along = y @ model.sine, y @ model.cosine
+    normal = across * sine + along * cosine + y @ model.tension
+    stretch = 1.0 - model.softness * normal
+    turned = -model.softness * (across * cosine - along * sine)
+    by_angle = (turned * cosine - stretch * sine, turned * sine + stretch * cosine)
+    pulled = -model.softness * (model.sine[:m] * sine[:, None] + model.cosine[:m] * cosine[:, None])
+    by_force = (pulled * cosine[:, None], pulled * sine[:, None])
+    spread = np.zeros((len(at), len(mesh.nodes)))
+    spread[np.arange(len(at)), at] = 1.0
+    angular = np.empty((len(theta), len(mesh.nodes), 2, len(mesh.nodes)))
+    forced = np.empty((len(theta), len(mesh.nodes), 2, m))
+    for axis in range(2):
+        integral = _integration(mesh)
+        if not model.from_start[axis]:
+            integral = integral - integral[-1]
+        angular[:, :, axis] = (integral * by_angle[axis][:, None]) @ spread
+        moved = np.einsum("ij,lcj->lic", integral, by_force[axis])
+        forced[:, :, axis] = moved + model.origin[axis, :m]
+    return angular, forced
+
+
+def kinetic_matrix(
+    model: RodModel,
+    columns: tuple[Turns, Pulls],
+    gradients: Float[np.ndarray, "lanes m unknowns"],
+    trailing: Float[np.ndarray, "lanes m m"],
+    unknown: slice,
+) -> Masses:
+    """Mass matrix of the unknown angles, total mass 1.
+
+    Where supports or the rod give way, its multipliers follow from the angles by the constraints
+    ``C δθ + D δλ = 0``, with C the `gradients` and D the `trailing` block of F_z.
+    """
+    angular, forced = columns
+    moved = angular[:, :, :, unknown]
+    if trailing.any():
+        follow = -np.linalg.pinv(trailing, rcond=RANK, hermitian=True) @ gradients
+        moved = moved + np.einsum("lnac,lcu->lnau", forced, follow)
+    flat = moved.reshape(len(moved), -1, moved.shape[3])
+    weights = np.repeat(model.mesh.weights, 2)
+    return np.asarray(flat.transpose(0, 2, 1) @ (weights[:, None] * flat))

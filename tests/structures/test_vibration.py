@@ -1,0 +1,217 @@
+"""Physical mass matrices and natural frequencies against closed forms and a chain of links."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.errors import InputError
+from equimorph.structures import from_identity
+
+CANTILEVER = np.array([1.8751040687, 4.6940911330, 7.8547574382])
+"""Roots of cos β cosh β = −1: ω = β² √(B/(ρA L⁴))."""
+LOADED = {"P": em.PointForce(1.0)}
+
+
+def chain_frequencies(state, links):
+    """Angular frequencies of N hinged links with stiffness N B, half a link at each clamp.
+
+    Second variation ``½ Σ k_i δ(θ_{i+1} − θ_i)²`` plus load and support forces, lumped masses at
+    the middle of links; an independent model of second order.
+    """
+    h, stiff = 1.0 / links, links / (4.0 * np.pi**2)
+    s = (np.arange(links) + 0.5) * h
+    theta = np.array([state.structure.angle(x)(state) for x in s])
+    (lam, mu), q = state.multipliers, state["q"]
+    springs = np.full(links + 1, stiff)
+    springs[[0, -1]] *= 2.0
+    bend = np.diag(springs[:-1] + springs[1:])
+    bend -= np.diag(springs[1:-1], 1) + np.diag(springs[1:-1], -1)
+    weight = q * s * h
+    bend += np.diag((weight - mu * h) * np.sin(theta) - lam * h * np.cos(theta))
+    closing = h * np.stack([-np.sin(theta), np.cos(theta)])
+    lower = np.tril(np.full((links, links), h), -1) + np.diag(np.full(links, 0.5 * h))
+    places = np.concatenate([lower * -np.sin(theta), lower * np.cos(theta)])
+    free = np.linalg.svd(closing)[2][2:].T
+    stiffness, mass = free.T @ bend @ free, h * (places @ free).T @ (places @ free)
+    half = np.linalg.inv(np.linalg.cholesky(mass))
+    return np.sqrt(np.linalg.eigvalsh(half @ stiffness @ half.T))
+
+
+@pytest.fixture(scope="module")
+def upright():
+    """The arch at (1, 0), q = 2.5."""
+    rest = em.Rod(load="uniform").natural_state(Theta=1.0, Delta=0.0)
+    return em.lift(rest, {"q": 2.5}).end.state
+
+
+def test_frequencies_of_a_cantilever_are_those_of_the_closed_form():
+    """[Blevins] T = L² √(ρA/B)/(2π), so ω T = β²/(2π). 1e-7: six elements of degree 9."""
+    rod = em.Rod(ends=("clamped", "free"), loads=LOADED)
+    exact = CANTILEVER**2 / (2.0 * np.pi)
+    found = rod.natural_state().natural_frequencies(3)
+    np.testing.assert_allclose(found, exact, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"EI": 2.0, "length": 3.0, "mass": "600 g"},
+        {"EI": 2.0e9, "length": 3000.0, "mass": 0.6, "units": {"force": "mN", "length": "mm"}},
+        {"EI": "2 N m^2", "length": "3 m", "mass": 0.6, "units": {"force": "kN", "length": "cm"}},
+        {
+            "section": em.OwnSection("2 N m^2", "2 N m^2", "2 N m^2", weight="0.2 kg/m"),
+            "length": "3 m",
+            "units": {"force": "N", "length": "m"},
+        },
+    ],
+    ids=["SI", "mN and mm", "kN and cm", "section"],
+)
+def test_frequencies_with_units_are_in_radians_per_second(given):
+    """The same cantilever with B = 2 N m², L = 3 m, 0.6 kg in several systems of units."""
+    rod = em.Rod(ends=("clamped", "free"), loads=LOADED, **given)
+    exact = CANTILEVER[:2] ** 2 * np.sqrt(2.0 / (0.2 * 3.0**4))
+    np.testing.assert_allclose(rod.natural_state().natural_frequencies(2), exact, rtol=1e-6)
+    assert rod.time_unit == "s"
+    again = from_identity(rod.identity())
+    np.testing.assert_allclose(again.natural_state().natural_frequencies(2), exact, rtol=1e-6)
+
+
+def test_an_axially_loaded_column_softens_until_it_buckles():
+    """Sliding cantilever ends: clamped-guided column, ω² = ω₀² (1 − P/P_cr), P_cr = π²B/L².
+
+    The guided end keeps angle and y, moves in x: modes are those of a clamped–clamped column whose
+    first frequency falls to zero at λ = 1 (units of 4π²B/L²). Galerkin's mode is not exact: 2 %.
+    """
+    push = {"P": em.PointForce(1.0, direction=(-1.0, 0.0))}
+    rod = em.Rod(ends=("clamped", "sliding"), loads=push)
+    rest = rod.natural_state()
+    squares = []
+    for load in (0.0, 0.5, 0.9, 0.99):
+        state = rest if load == 0.0 else em.lift(rest, {"P": load}).end.state
+        squares.append(float(state.natural_frequencies()[0] ** 2))
+    exact = (4.7300407449**2 / (2.0 * np.pi)) ** 2
+    assert squares[0] == pytest.approx(exact, rel=1e-7)
+    np.testing.assert_allclose(np.array(squares) / exact, [1.0, 0.5, 0.1, 0.01], atol=0.02)
+
+
+def test_arch_vibrates_like_a_chain_of_links(upright):
+    """An independent chain of N links, extrapolated in N⁻²; 5.49/T was measured in a simulator."""
+    coarse, fine = (chain_frequencies(upright, n)[:3] for n in (60, 120))
+    found = upright.natural_frequencies(3)
+    np.testing.assert_allclose(found, (4.0 * fine - coarse) / 3.0, rtol=2e-5)
+    assert found[0] == pytest.approx(5.49, abs=0.005)
+
+
+def test_general_rod_equals_the_arch(upright):
+    """The same rod by general mechanics; with EA = 1e6 nearly so, by 1/EA."""
+    exact = upright.natural_frequencies(3)
+    for axial, near in ((None, 1e-9), (1e6, 2e-5)):
+        rod = em.Rod(load="uniform", coordinates={}, axial=axial)
+        rest = rod.natural_state(theta_A=1.0, theta_B=-1.0)
+        state = em.lift(rest, {"q": 2.5}).end.state
+        np.testing.assert_allclose(state.natural_frequencies(3), exact, rtol=near)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"ends": ("clamped", em.End(x=30.0, y=20.0))},
+        {"ends": (em.End(x=5.0, angle=3.0), "clamped")},
+        {"ends": (em.End("free", slide=0.3), "clamped")},
+        {"ends": ("pinned", em.End(angle=2.0, x="free"))},
+    ],
+    ids=["sprung B", "sprung A", "inclined", "pinned"],
+)
+def test_mass_matrix_is_that_of_the_places(options):
+    """Kinetic energy of the places, differenced along a path of equilibria under a small load.
+
+    Along the path all equations hold, so that J u̇ is the change of `shape`, which integrates the
+    rod's equations by itself. 1e-4: central differences, and elements between the nodes.
+    """
+    rod = em.Rod(loads={"q": em.LineLoad("uniform")}, coordinates={}, elements=8, **options)
+    q = [each.name for each in rod.parameters].index("q")
+    rest = rod.natural_state(
+        **{each.name: 0.4 for each in rod.parameters if each.name in ("theta_A",)}
+    )
+    state = em.lift(rest, {"q": 0.3}).end.state
+    z, p = state.z[None], state.p[None]
+    dp = np.zeros_like(p)
+    dp[0, q] = 1.0
+    dz = rod.solve(z, p, -rod.parameter_derivative(z, p, dp)[:, None]).x[:, 0]
+    velocity = dz[:, : rod.unknowns]
+    kinetic = velocity @ rod.inertia(z, p)[0] @ velocity[0]
+    h, s = 1e-4, rod.mesh.nodes
+    ends = []
+    for sign in (1.0, -1.0):
+        moved = em.lift(state, {"q": state["q"] + sign * h}).end.state
+        ends.append(moved.shape(s))
+    rate = (ends[0] - ends[1]) / (2.0 * h)
+    exact = (rod.mesh.weights[:, None] * rate**2).sum()
+    assert float(kinetic[0]) == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.parametrize("ends", [("clamped", "clamped"), ("pinned", "clamped")])
+def test_mass_matrix_of_a_stretched_rod_is_that_of_its_places(ends):
+    """Places ``∫ (1 − N/EA)(cos θ, sin θ)`` with N = λ cos θ + (μ − q s) sin θ.
+
+    Angles move at random and the forces follow by the closing conditions. 1e-6: differences.
+    """
+    stiff = 40.0
+    rod = em.Rod(load="uniform", coordinates={}, axial=stiff, elements=3, degree=6, ends=ends)
+    state = em.lift(rod.natural_state(theta_B=-0.5), {"q": 0.8}).end.state
+    (z,), n, s = state.batch.z, rod.unknowns, rod.mesh.nodes
+    integral = rod.mesh.integration(s)
+
+    def places(z):
+        theta = rod.nodal_angles(z[None], state.p[None])[0]
+        (lam, mu), sine, cosine = z[n:], np.sin(theta), np.cos(theta)
+        stretch = 1.0 - (lam * cosine + (mu - state["q"] * s) * sine) / stiff
+        return integral @ np.stack([stretch * cosine, stretch * sine], axis=1)
+
+    def closed(z):
+        for _ in range(8):
+            gap = places(z)[-1] - [state["nu"], state["rise"]]
+            slope = [(places(z + 1e-6 * e) - places(z - 1e-6 * e))[-1] for e in np.eye(n + 2)[n:]]
+            z = z - np.concatenate([np.zeros(n), np.linalg.solve(np.array(slope).T / 2e-6, gap)])
+        return z
+
+    assert places(z)[-1] == pytest.approx([state["nu"], state["rise"]], abs=1e-12)
+    move = np.concatenate([np.random.default_rng(0).normal(size=n), np.zeros(2)])
+    h = 1e-5
+    rate = (places(closed(z + h * move)) - places(closed(z - h * move))) / (2.0 * h)
+    exact = (rod.mesh.weights[:, None] * rate**2).sum()
+    mass = rod.inertia(state.z[None], state.p[None])[0]
+    assert move[:n] @ mass @ move[:n] == pytest.approx(exact, rel=1e-6)
+
+
+def test_what_cannot_vibrate_is_refused(upright):
+    """Unstable states, structures without mass, too many modes: one line each."""
+    with pytest.raises(InputError, match=r"must have a mass; a rod has none\. Give it one, like"):
+        em.Rod(EI=1.0, length=1.0).natural_state(Theta=1.0).natural_frequencies()
+    with pytest.raises(InputError, match="`count` must be from 1 to 51"):
+        upright.natural_frequencies(52)
+    search = em.find_equilibria(upright.structure, upright.parameters, seed=1)
+    unstable = search[search.index > 0][0]
+    with pytest.raises(InputError, match="`state` must be stable to vibrate"):
+        unstable.natural_frequencies()
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"mass": 1.0}, "`mass` must come with EI and length"),
+        ({"mass": "1 m", "EI": 1.0, "length": 1.0}, "`mass` must be a mass in kg"),
+        (
+            {
+                "mass": 1.0,
+                "length": 1.0,
+                "section": em.Round("2 mm", E="70 GPa", nu=0.33, density=2700),
+            },
+            "`mass` must be left out for a rod whose section gives it",
+        ),
+    ],
+)
+def test_wrong_masses_are_refused(given, why):
+    """One line each."""
+    with pytest.raises(InputError, match=why):
+        em.Rod(**given)
