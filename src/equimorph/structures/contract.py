@@ -78,8 +78,6 @@ class Structure(Equations):
     """Axis, y or z, that is upward in pictures of a structure in space."""
     energy_scale: float = 1.0
     """Value of one unit of `energy` in the units of the parameters, in joules for example."""
-    time_unit: str = "time"
-    """Unit of time that `inertia` goes with."""
 
     @cached_property
     def scales(self) -> Float[np.ndarray, " parameters"]:
@@ -109,6 +107,11 @@ class Structure(Equations):
     @abstractmethod
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p: work-conjugates of the parameters (actuator efforts, the loads' displacements)."""
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of time that `inertia` goes with; "time" where the structure's units are any."""
+        return "time"
 
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """Physical mass matrix M = JᵀWJ: kinetic energy ½ u̇ᵀMu̇ while the parameters rest.
