@@ -109,7 +109,7 @@ class AnyRod(Structure):
         lengths: Mapping[str, Any],
         mass: Quantity | None = None,
     ) -> None:
-        """Set the units by stiffness and mass, or the section; check the `lengths` given by name."""
+        """Set the units by stiffness and mass, or by the section; check the `lengths` by name."""
         system = unit_system(units)
         self.space_options = options.check(EI, length)
         self.units = options.units(EI, length, system, mass)
