@@ -1,5 +1,6 @@
 """How the ends of a rod are supported."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
@@ -24,9 +25,22 @@ WORDS: dict[str, tuple[Holding, Holding, Holding]] = {
 }
 
 
+class Support(ABC):
+    """Support of one end of a rod, in the plane or in space."""
+
+    @property
+    @abstractmethod
+    def holds_rotation(self) -> bool:
+        """Whether the rotation of the end is prescribed."""
+
+    @abstractmethod
+    def data(self) -> str | dict[str, Any]:
+        """A word if there is one for it, else its parts."""
+
+
 @check_arguments
 @dataclass(frozen=True)
-class End:
+class End(Support):
     """Support of one end of a rod: what happens to its angle and its two coordinates.
 
     Each is "held" (at the value of a parameter), "free", or held by a spring: a number, its
@@ -55,6 +69,11 @@ class End:
                 "`slide` must be given to an end whose x and y are 'held': it says along which "
                 f"line they are not; got x = {self.x!r}, y = {self.y!r}."
             )
+
+    @property
+    def holds_rotation(self) -> bool:
+        """Whether the angle is prescribed."""
+        return self.angle == HELD
 
     def scaled(self, angle: float, force: float) -> "End":
         """The same end with its stiffnesses divided by units of moment and of force per length."""

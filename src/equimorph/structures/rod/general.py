@@ -19,7 +19,7 @@ from equimorph.structures.rod.inertia import kinetic_matrix, place_derivatives
 from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
-from equimorph.structures.rod.symmetry import mirrors
+from equimorph.structures.rod.symmetry import symmetries
 
 Points = Float[np.ndarray, "lanes points"]
 
@@ -340,4 +340,4 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns that leave the Lagrangian as it is."""
-        return mirrors(self.model, self.unknowns)
+        return symmetries(self.model, self.unknowns)

@@ -8,9 +8,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.structures.rod.discretisation import Mesh, reference_element
-from equimorph.structures.rod.ends import FREE, HELD, Axis, End, compliance, support_axes
+from equimorph.structures.rod.ends import FREE, HELD, Axis, End, support_axes
+from equimorph.structures.rod.lagrangian import RodLagrangian
 from equimorph.structures.rod.pressure import closing
 from equimorph.structures.rod.profiles import LoadShape, at_nodes
+from equimorph.structures.rod.support_energy import SupportEnergy, support_energy
 from equimorph.structures.rod.terms import Effects, Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
@@ -59,7 +61,7 @@ class Densities:
 
 
 @dataclass(frozen=True, eq=False)
-class RodModel:
+class RodModel(RodLagrangian):
     """The Lagrangian of a rod in its nodal angles θ and *scalars* y = (multipliers, parameters, 1).
 
     ``L = ½ θᵀKθ − θ·(slope y) + Σ (N − ½ γ (N + T)²) + ½ yᵀ Q y − p V`` with the sum over the nodes
@@ -70,52 +72,29 @@ class RodModel:
 
     Parameters
     ----------
-    names
-        Parameters.
-    multipliers
-        Number of multipliers: supports that act against each other in x, in y.
-    held
-        Whether the angles of the ends are prescribed.
     stiffness
         Element matrices, with springs at the ends; `bending_stiffness` without.
     slope
         Coefficients of the angles, couples included; `element_slope` without, by element.
     springs, rest
         Stiffness of springs at the ends' angles, and where they are at rest.
-    reaction
-        Force of the support at A.
-    origin
-        Coordinates of end A (`from_start`) or B. Like all rows, they combine the scalars.
     pressure
         p, on the enclosed area V.
     closing
         Q of V, see `pressure.closing`.
     """
 
-    mesh: Mesh
-    names: tuple[str, ...]
-    multipliers: int
-    held: tuple[bool, bool]
     stiffness: Float[np.ndarray, "elements order order"]
     bending_stiffness: Float[np.ndarray, "elements order order"]
     nodal: Densities
     fine: Densities
     slope: Float[np.ndarray, "scalars nodes"]
     element_slope: Rows
-    quadratic: Float[np.ndarray, "scalars scalars"]
     turned: Float[np.ndarray, "2 scalars"]
     springs: Float[np.ndarray, "2"]
     rest: Float[np.ndarray, "2 scalars"]
-    reaction: Float[np.ndarray, "2 scalars"]
-    origin: Float[np.ndarray, "2 scalars"]
-    from_start: tuple[bool, bool]
     pressure: Float[np.ndarray, " scalars"]
     closing: Float[np.ndarray, "2 2"]
-
-    @property
-    def scalars(self) -> int:
-        """Number of multipliers and parameters, and 1 for the constant."""
-        return self.multipliers + len(self.names) + 1
 
     @cached_property
     def sine(self) -> Float[np.ndarray, "scalars points"]:
@@ -160,23 +139,20 @@ class RodModel:
         )
 
 
-def raw_names(build: Build) -> tuple[str, ...]:
+def raw_names(ends: tuple[End, End], terms: Mapping[str, Sequence[Term]]) -> tuple[str, ...]:
     """Parameters of a rod before coordinates are chosen: angles, amplitudes, span, rise."""
-    angles = [
-        name
-        for name, end in zip(("theta_A", "theta_B"), build.ends, strict=True)
-        if end.angle != FREE
-    ]
-    places = [axis.name for axis in support_axes(build.ends) if axis.opposed]
-    return (*angles, *build.terms, *places)
+    sides = zip(("theta_A", "theta_B"), ends, strict=True)
+    angles = [name for name, end in sides if end.angle != FREE]
+    places = [axis.name for axis in support_axes(ends) if axis.opposed]
+    return (*angles, *terms, *places)
 
 
 def raw_model(build: Build) -> RodModel:
     """Arrays of a rod in the parameters of `raw_names`."""
-    names, mesh, ends = raw_names(build), build.mesh, build.ends
+    mesh, ends = build.mesh, build.ends
+    names = raw_names(ends, build.terms)
     axes = support_axes(ends)
-    opposed = [axis for axis in axes if axis.opposed]
-    m = len(opposed)
+    m = sum(axis.opposed for axis in axes)
     place = {name: m + i for i, name in enumerate(names)}
     count = m + len(names) + 1
     fine = Mesh(mesh.breaks, reference_element(max(20, 2 * mesh.degree)))
@@ -191,8 +167,8 @@ def raw_model(build: Build) -> RodModel:
         slope[:, nodes] += element_slope[:, e]
     _add_couples(build, place, slope)
     quadratic = _curvature_energy(build, place, count)
-    reaction, origin, from_start = _supports(build, opposed, place, quadratic)
-    pressure = _pressure(build, place, count)
+    supports = _supports(build, axes, place, count)
+    quadratic += supports.quadratic
     stiffness, springs = bending.copy(), np.zeros(2)
     turned, rest = np.zeros((2, 2, count))
     for side, (name, node) in enumerate((("theta_A", 0), ("theta_B", -1))):
@@ -205,25 +181,25 @@ def raw_model(build: Build) -> RodModel:
             slope[place[name], node] += float(angle)
             quadratic[place[name], place[name]] += float(angle)
     return RodModel(
-        mesh,
-        names,
-        m,
-        (ends[0].angle == HELD, ends[1].angle == HELD),
-        stiffness,
-        bending,
-        nodal,
-        finer,
-        slope,
-        element_slope,
-        quadratic,
-        turned,
-        springs,
-        rest,
-        reaction,
-        origin,
-        from_start,
-        pressure,
-        closing(
+        mesh=mesh,
+        names=names,
+        multipliers=m,
+        held=(ends[0].angle == HELD, ends[1].angle == HELD),
+        quadratic=quadratic,
+        reaction=supports.reaction,
+        origin=supports.origin,
+        from_start=supports.from_start,
+        stiffness=stiffness,
+        bending_stiffness=bending,
+        nodal=nodal,
+        fine=finer,
+        slope=slope,
+        element_slope=element_slope,
+        turned=turned,
+        springs=springs,
+        rest=rest,
+        pressure=_pressure(build, place, count),
+        closing=closing(
             (_moves(axes, 0), _moves(axes, 1)), float(np.arctan2(axes[0].unit[1], axes[0].unit[0]))
         ),
     )
@@ -309,46 +285,18 @@ def _curvature_energy(
 
 
 def _supports(
-    build: Build,
-    opposed: Sequence[Axis],
-    place: Mapping[str, int],
-    quadratic: Float[np.ndarray, "scalars scalars"],
-) -> tuple[Float[np.ndarray, "2 scalars"], Float[np.ndarray, "2 scalars"], tuple[bool, bool]]:
-    """Add the energy of the supports; A's reaction; where the rod begins, or ends if A is free.
-
-    With λ the force of the support at A, F that of all loads, x the place of B's support, and
-    compliances c: ``−(λ + F) x − ½ c_A λ² − ½ c_B (λ + F)²``, end A at ``−c_A λ``, end B at
-    ``x + c_B (λ + F)``. Without opposed supports λ is −F or 0.
-    """
-    count = len(quadratic)
-    reactions, origin = np.zeros((2, 2, count))
-    from_start = [True, True]
+    build: Build, axes: Sequence[Axis], place: Mapping[str, int], count: int
+) -> SupportEnergy:
+    """Energy of the supports; the rod begins at the end that does not slide."""
     forces = np.zeros((count, 2))
     for name, terms in build.terms.items():
         forces[place[name]] = _sum_effects(terms, build.mesh).force
-    for i, axis in enumerate(support_axes(build.ends)):
-        unit = np.array(axis.unit)
-        total = forces @ unit
-        reaction, site = np.zeros(count), np.zeros(count)
-        if axis.opposed:
-            reaction[opposed.index(axis)] = 1.0
-            site[place[axis.name]] = 1.0
-        else:
-            reaction = -total if axis.last == FREE else reaction
-        rest = reaction + total
-        reactions += np.outer(unit, reaction)
-        quadratic -= np.outer(rest, site) + np.outer(site, rest)
-        if axis.first != FREE:
-            quadratic -= compliance(axis.first) * np.outer(reaction, reaction)
-            origin -= compliance(axis.first) * np.outer(unit, reaction)
-        if axis.last != FREE:
-            quadratic -= compliance(axis.last) * np.outer(rest, rest)
-        if axis.first == FREE:
-            origin += compliance(axis.last) * np.outer(unit, rest)
-            from_start[i] = False
-    if build.ends[0].slide is not None:  # from end B, whose place across the line is given
-        origin[:], from_start = np.outer(unit, site), [False, False]
-    return reactions, origin, (from_start[0], from_start[1])
+    out = support_energy(axes, forces, place)
+    if build.ends[0].slide is None:
+        return out
+    site = np.zeros(count)  # end B, whose place across the line is given
+    site[place[axes[1].name]] = 1.0
+    return replace(out, origin=np.outer(axes[1].unit, site), from_start=(False, False))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,12 +10,12 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Drawing, Parameter, names_of
+from equimorph.model import Drawing, Parameter
 from equimorph.structures.contract import Growth
 from equimorph.structures.rod.any_rod import AnyRod
 from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.described import Described
-from equimorph.structures.rod.description import Description
+from equimorph.structures.rod.description import PlanarDescription
 from equimorph.structures.rod.discretisation import ElementCount, mesh_with_kinks
 from equimorph.structures.rod.drawing import ENDS, Amplitudes, planar_supports, rod_drawing
 from equimorph.structures.rod.ends import End, EndSpec
@@ -194,7 +194,7 @@ class Rod(Described):
         self._resolution, self._breaks = (elements, degree), breaks
         shape = "uniform" if load is None and loads is None else load
         self._load = None if shape is None else load_shape(shape, kinks)
-        self._general: Description | None = None
+        self._general: PlanarDescription | None = None
         given = (stretched, loads, coordinates)
         others = (*(each is not None for each in given), actuators, rise)
         arch = self._load is not None and tuple(ends) == CLAMPED and self.units.plain
@@ -204,15 +204,20 @@ class Rod(Described):
             )
         else:
             own = {} if shape is None else {"q": LineLoad(shape, kinks=kinks)}
-            written = (span, length)
-            span = DEFAULT_SPAN * self.units.value("length") if span is None else span
-            self._general = Description(
-                ends, stiffness, curved, stretched, {**own, **(loads or {})}, actuators or {},
-                coordinates, number(span, "length", "span"), number(rise, "length", "rise"),
+            reach = DEFAULT_SPAN * self.units.value("length")
+            places = {
+                "nu": reach if span is None else number(span, "length", "span"),
+                "rise": number(rise, "length", "rise"),
+            }
+            profiles = {"stiffness": stiffness, "curvature": curved, "axial": stretched}
+            self._general = PlanarDescription(
+                ends, profiles, {**own, **(loads or {})}, actuators or {}, coordinates, places,
                 kinks, self.units, breaks,
             )  # fmt: skip
-            self._general.check_span(*written)
-            self._become_general(self._general)
+            self._general.check_span(span, length)
+            self.parameters = self._general.parameters
+            made = self._general.in_own_parameters(self._raw.model)
+            self._use_mechanics(GeneralMechanics(made))
         if self.has_lateral_stiffness:
             check_terms(self.terms)
 
@@ -226,13 +231,6 @@ class Rod(Described):
             Parameter("q", "4π²B/L²", 1.0, "load", 0.0),
             Parameter("nu", "L", 1.0, "fixed", self._checked_span(span), 0.0, 1.0),
         )
-
-    def _become_general(self, description: Description) -> None:
-        raw, self._raw_matrix = description.mechanics(*self._resolution)
-        self._raw = raw
-        self.parameters = description.parameters
-        names = names_of(self.parameters)
-        self._use_mechanics(GeneralMechanics(raw.model.map_scalars(names, self._raw_matrix)))
 
     @staticmethod
     def _checked_span(span: float) -> float:
@@ -248,7 +246,7 @@ class Rod(Described):
         """Kind, resolution, and everything that differs from the default arch."""
         data: dict[str, Any] = {}
         if self._general is not None:
-            data = self._general.identity()
+            data = self._general.data()
         elif self._load is not None:
             if self._load.identity is None:
                 raise InputError(
@@ -264,8 +262,8 @@ class Rod(Described):
         elements, degree = self._resolution
         degree = min(degree + 4, 16)
         if self._general is not None:
-            raw, matrix = self._general.mechanics(elements, degree)
-            return GeneralMechanics(raw.model.map_scalars(names_of(self.parameters), matrix))
+            raw = self._general.raw_model(elements, degree)
+            return GeneralMechanics(self._general.in_own_parameters(raw))
         assert self._load is not None
         kinks = np.union1d(self._load.kinks, self._breaks)
         return ClampedMechanics(mesh_with_kinks(kinks, elements, degree), self._load)
@@ -274,10 +272,13 @@ class Rod(Described):
         """Natural states and how each was met."""
         if self._general is None:
             return natural_arch(self.mechanics, p)
-        m = self.constraints
-        y = np.concatenate([p, np.ones((len(p), 1))], axis=1)
-        raw = np.einsum("ij,lj->li", self._raw_matrix[m:-1, m:], y)
-        return natural_rod(self._raw, raw)
+        return natural_rod(self._raw, self._general.raw_parameters(self._raw.model, p))
+
+    @cached_property
+    def _raw(self) -> GeneralMechanics:
+        """Mechanics of a general rod in the raw parameters."""
+        assert self._general is not None
+        return GeneralMechanics(self._general.raw_model(*self._resolution))
 
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded rod, continued from its stress-free shape."""
@@ -306,7 +307,7 @@ class Rod(Described):
     def _amplitudes(self, p: Parameters) -> Amplitudes:
         """Every term that acts on the rod, with its amplitude in the user's units."""
         if self._general is not None:
-            return self._general.amplitudes(p, self._raw_matrix[self.constraints :])
+            return self._general.amplitudes(p)
         return [(self._arch_load, p[:, 2])]
 
     @property
@@ -345,9 +346,8 @@ class Rod(Described):
         """Its Lagrangian; that of the arch as of a general rod with a rise."""
         if isinstance(self.mechanics, GeneralMechanics):
             return self.mechanics.model
-        twin = Description(
-            CLAMPED, 1.0, 0.0, None, {"q": self._arch_load}, {}, None, DEFAULT_SPAN, 0.0, (),
-            self.units, self._breaks,
+        twin = PlanarDescription(
+            CLAMPED, PlanarDescription.defaults, {"q": self._arch_load}, {}, None,
+            {"nu": DEFAULT_SPAN, "rise": 0.0}, (), self.units, self._breaks,
         )  # fmt: skip
-        raw, matrix = twin.mechanics(*self._resolution)
-        return raw.model.map_scalars(names_of(twin.parameters), matrix)
+        return twin.in_own_parameters(twin.raw_model(*self._resolution))

@@ -8,7 +8,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
-from equimorph.structures.rod.ends import FREE, HELD, Axis, Holding
+from equimorph.structures.rod.ends import FREE, HELD, Axis, Holding, Support
 
 AXES = ("x", "y", "z")
 PLACES = ("nu", "rise", "sideways")
@@ -23,7 +23,7 @@ WORDS: dict[str, tuple[Holding, Holding, Holding, Holding]] = {
 
 @check_arguments
 @dataclass(frozen=True)
-class SpatialEnd:
+class SpatialEnd(Support):
     """Support of one end of a rod in space: what happens to its rotation and its coordinates.
 
     "clamped" holds all; "pinned" is a ball joint: it holds the place; "free" holds nothing;
@@ -67,6 +67,11 @@ class SpatialEnd:
     def turns(self) -> bool:
         """Whether the rotation is free."""
         return self.rotation == FREE
+
+    @property
+    def holds_rotation(self) -> bool:
+        """Whether the rotation is prescribed."""
+        return self.rotation == HELD
 
     def along(self, axis: str) -> Holding:
         """What happens to a coordinate."""

@@ -8,8 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.ends import FREE, Axis, compliance
+from equimorph.structures.rod.ends import FREE
+from equimorph.structures.rod.lagrangian import RodLagrangian
 from equimorph.structures.rod.profiles import LoadShape, at_nodes
+from equimorph.structures.rod.support_energy import support_energy
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 from equimorph.structures.spatial.effects import SpatialEffects, effects
@@ -51,7 +53,7 @@ class Build:
 
 
 @dataclass(frozen=True, eq=False)
-class SpatialModel:
+class SpatialModel(RodLagrangian):
     """The Lagrangian of a rod in its rotations q and *scalars* y = (multipliers, parameters, 1).
 
     ``L = Σ m (½ u·(K + τ e₁e₁ᵀ) u − u·b + a₁ − ½ γ₁ (a₁ + T)² − ½ γ₂ a₂² − ½ γ₃ a₃²) + ½ yᵀ Q y``
@@ -62,44 +64,21 @@ class SpatialModel:
 
     Attributes
     ----------
-    names
-        Parameters.
-    multipliers
-        Number of supports that act against each other along x, y, z.
     stiffness
         K: diagonal, against twist and bending about n and b.
     softness
         γ.
     turned
         Angles (a, b, τ) of clamps A and B as combinations of the scalars.
-    held
-        Whether the rotations of the ends are prescribed.
-    reaction
-        Force of the support at A.
-    origin
-        Coordinates of end A (`from_start`) or B. Like all rows, they combine the scalars.
     """
 
-    mesh: Mesh
-    names: tuple[str, ...]
-    multipliers: int
-    held: tuple[bool, bool]
     stiffness: Float[np.ndarray, "elements order 3"]
     softness: Float[np.ndarray, "elements order 3"]
     force: Rows
     moment: Rows
     tension: Row
     torsion: Row
-    quadratic: Float[np.ndarray, "scalars scalars"]
     turned: Float[np.ndarray, "2 3 scalars"]
-    reaction: Float[np.ndarray, "3 scalars"]
-    origin: Float[np.ndarray, "3 scalars"]
-    from_start: tuple[bool, bool, bool]
-
-    @property
-    def scalars(self) -> int:
-        """Number of multipliers and parameters, and 1 for the constant."""
-        return self.multipliers + len(self.names) + 1
 
     @cached_property
     def soft(self) -> bool:
@@ -174,16 +153,32 @@ def raw_model(build: Build) -> SpatialModel:
     moment += stiffness * natural
     weights = mesh.element_weights[..., None] * stiffness
     quadratic = np.einsum("jeik,eik,leik->jl", natural, weights, natural)
-    reaction, origin, from_start = _supports(axes, total, place, quadratic)
+    loads = np.zeros((count, 3))
+    for name, each in total.items():
+        loads[place[name]] = each.total
+    supports = support_energy(axes, loads, place)
     turned = np.zeros((2, 3, count))
     for side, end in enumerate(ends):
         if not end.turns:
             for k, angle in enumerate(ANGLES):
                 turned[side, k, place[f"{angle}_{'AB'[side]}"]] = 1.0
     return SpatialModel(
-        mesh, names, m, (not ends[0].turns, not ends[1].turns), stiffness, softness,
-        force, moment, tension, torsion, quadratic, turned, reaction, origin, from_start,
-    )  # fmt: skip
+        mesh=mesh,
+        names=names,
+        multipliers=m,
+        held=(not ends[0].turns, not ends[1].turns),
+        quadratic=quadratic + supports.quadratic,
+        reaction=supports.reaction,
+        origin=supports.origin,
+        from_start=supports.from_start,
+        stiffness=stiffness,
+        softness=softness,
+        force=force,
+        moment=moment,
+        tension=tension,
+        torsion=torsion,
+        turned=turned,
+    )
 
 
 def _stiffnesses(
@@ -209,41 +204,3 @@ def _sum_effects(terms: Sequence[Term], mesh: Mesh) -> SpatialEffects:
         for name, part in vars(effects(term, mesh)).items():
             getattr(out, name)[:] += part
     return out
-
-
-def _supports(
-    axes: Sequence[Axis],
-    total: Mapping[str, SpatialEffects],
-    place: Mapping[str, int],
-    quadratic: Float[np.ndarray, "scalars scalars"],
-) -> tuple[Float[np.ndarray, "3 scalars"], Float[np.ndarray, "3 scalars"], tuple[bool, bool, bool]]:
-    """Add the energy of the supports; A's reaction; where the rod begins, or ends if A is free.
-
-    Along each axis as in the plane, see `structures.rod.model`: with λ the force of the support at
-    A, F that of all loads, x the place of B's support, and compliances c:
-    ``−(λ + F) x − ½ c_A λ² − ½ c_B (λ + F)²``, end A at ``−c_A λ``, end B at ``x + c_B (λ + F)``.
-    """
-    count, multiplier = len(quadratic), 0
-    reactions, origin, from_start = np.zeros((3, count)), np.zeros((3, count)), [True] * 3
-    for i, axis in enumerate(axes):
-        loads, reaction, site = np.zeros((3, count))
-        for name, each in total.items():
-            loads[place[name]] = each.total[i]
-        if axis.opposed:
-            reaction[multiplier] = 1.0
-            site[place[axis.name]] = 1.0
-            multiplier += 1
-        elif axis.last == FREE:
-            reaction = -loads
-        rest = reaction + loads
-        reactions[i] = reaction
-        quadratic -= np.outer(rest, site) + np.outer(site, rest)
-        if axis.first != FREE:
-            quadratic -= compliance(axis.first) * np.outer(reaction, reaction)
-            origin[i] -= compliance(axis.first) * reaction
-        if axis.last != FREE:
-            quadratic -= compliance(axis.last) * np.outer(rest, rest)
-        if axis.first == FREE:
-            origin[i] += compliance(axis.last) * rest
-            from_start[i] = False
-    return reactions, origin, (from_start[0], from_start[1], from_start[2])

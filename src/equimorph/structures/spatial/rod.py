@@ -23,7 +23,6 @@ from equimorph.structures.spatial.drawing import spatial_supports
 from equimorph.structures.spatial.ends import Ends
 from equimorph.structures.spatial.errors import discretisation_error
 from equimorph.structures.spatial.mechanics import SpatialMechanics
-from equimorph.structures.spatial.model import raw_model
 from equimorph.structures.spatial.natural import natural_states
 from equimorph.structures.spatial.planar import planar_guess
 from equimorph.structures.states import State
@@ -33,11 +32,6 @@ DEFAULT_SPAN = float(np.sin(1.0))
 CLAMPED = ("clamped", "clamped")
 NEAR = 1e-6
 """By how much quaternions may be longer than 1 at a corrected state."""
-PROFILES: Mapping[str, Any] = {
-    **{"stiffness": 1.0, "curvature": 0.0, "side_curvature": 0.0, "natural_twist": 0.0},
-    **{"axial": None, "shear": None},
-}
-"""Profiles along the rod with their defaults."""
 
 
 class SpatialRod(DescribedInSpace):
@@ -162,7 +156,7 @@ class SpatialRod(DescribedInSpace):
             load_shape(shape, kinks)
         reach = DEFAULT_SPAN * self.units.value("length")
         self._resolution = (elements, degree)
-        self._given = {
+        profiles = {
             "stiffness": stiffness,
             "curvature": number(curvature, "1/length", "curvature"),
             "side_curvature": number(side_curvature, "1/length", "side_curvature"),
@@ -172,7 +166,7 @@ class SpatialRod(DescribedInSpace):
         }
         self.description = SpatialDescription(
             ends,
-            {**self._given, **self._ratios()},
+            profiles | self._ratios(),
             {**own, **(loads or {})},
             actuators or {},
             coordinates,
@@ -186,7 +180,8 @@ class SpatialRod(DescribedInSpace):
         )
         self.description.check_places()
         self.parameters = self.description.parameters
-        self._use_mechanics(SpatialMechanics(self.description.model(elements, degree)))
+        made = self.description.in_own_parameters(self._raw.model)
+        self._use_mechanics(SpatialMechanics(made))
 
     def _ratios(self) -> dict[str, Any]:
         """Stiffnesses against twist and out of the plane, relative to that in the plane."""
@@ -203,31 +198,18 @@ class SpatialRod(DescribedInSpace):
 
     def identity(self) -> dict[str, Any]:
         """Kind, resolution, and everything that differs from the default."""
-        data = self.description.data()
-        for name, default in PROFILES.items():
-            value = self._given[name]
-            if callable(value):
-                raise InputError(
-                    f"`{name}` must be a number or a table to be written to a file; got a "
-                    "callable. Sample it into a table [[s, f], ...]."
-                )
-            if not (isinstance(value, int | float | None) and value == default):
-                data[name] = value.tolist() if isinstance(value, np.ndarray) else value
-        return self._complete_identity(data | self.units.data(), self._resolution)
+        return self._complete_identity(self.description.data(), self._resolution)
 
     # --- natural states -------------------------------------------------------------------------
 
     @cached_property
     def _raw(self) -> SpatialMechanics:
-        """Mechanics in the parameters of `model.raw_names`."""
-        return SpatialMechanics(raw_model(self.description.build(*self._resolution)))
+        """Mechanics in the raw parameters."""
+        return SpatialMechanics(self.description.raw_model(*self._resolution))
 
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded rod, continued from its stress-free shape."""
-        raw, m = self._raw, self.constraints
-        matrix = self.description.matrix(raw.model)[m:-1, m:]
-        given = np.concatenate([p, np.ones((len(p), 1))], axis=1)
-        return natural_states(raw, given @ matrix.T)
+        return natural_states(self._raw, self.description.raw_parameters(self._raw.model, p))
 
     @check_arguments
     def planar_state(self, state: Any, **values: float) -> State:
@@ -271,7 +253,8 @@ class SpatialRod(DescribedInSpace):
     @cached_property
     def _refined(self) -> SpatialMechanics:
         elements, degree = self._resolution
-        return SpatialMechanics(self.description.model(elements, min(degree + 4, 16)))
+        raw = self.description.raw_model(elements, min(degree + 4, 16))
+        return SpatialMechanics(self.description.in_own_parameters(raw))
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the ends, loads, tendons and segments that bend."""
