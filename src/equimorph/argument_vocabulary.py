@@ -60,7 +60,7 @@ RANGES: Mapping[str, Range] = {
     **dict.fromkeys(("first_step", "largest_step", "smallest_step", "turning"), POSITIVE),
     **dict.fromkeys(("lower", "upper"), EXTENDED),
     **dict.fromkeys(("EI", "EI_out", "GJ", "EA", "E", "rest", "length"), POSITIVE),
-    **dict.fromkeys(("mass", "duration"), POSITIVE),
+    **dict.fromkeys(("mass", "masses", "duration"), POSITIVE),
     **dict.fromkeys(("width", "thickness", "diameter", "wall", "density", "weight"), POSITIVE),
     **dict.fromkeys(("s", "start", "stop"), SHARE),
     "kinks": BETWEEN,

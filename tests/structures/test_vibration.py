@@ -9,6 +9,8 @@ from equimorph.structures import from_identity
 
 CANTILEVER = np.array([1.8751040687, 4.6940911330, 7.8547574382])
 """Roots of cos β cosh β = −1: ω = β² √(B/(ρA L⁴))."""
+FORCE = [em.Parameter("F", "", 1.0, "load")]
+PAIRS = (("A", "B"), ("B", "C"))
 LOADED = {"P": em.PointForce(1.0)}
 
 
@@ -184,9 +186,126 @@ def test_mass_matrix_of_a_stretched_rod_is_that_of_its_places(ends):
     assert move[:n] @ mass @ move[:n] == pytest.approx(exact, rel=1e-6)
 
 
+def test_a_rod_in_space_vibrates_in_the_plane_and_out_of_it():
+    """A round cantilever has each frequency twice; a state in the plane has those of the plane."""
+    wire = {"torsion": 0.77, "lateral": 1.0}
+    cantilever = em.SpatialRod(ends=("clamped", "free"), loads=LOADED, **wire)
+    exact = (CANTILEVER[:2] ** 2 / (2.0 * np.pi)).repeat(2)
+    found = cantilever.natural_state().natural_frequencies(4)
+    np.testing.assert_allclose(found, exact, rtol=1e-6)
+    flat = em.lift(em.Rod(load="uniform").natural_state(Theta=1.0), {"q": 1.0}).end.state
+    state = em.SpatialRod(load="uniform", **wire).planar_state(flat)
+    both, plane = state.natural_frequencies(6), flat.natural_frequencies(2)
+    assert np.abs(both[:, None] / plane - 1.0).min(axis=0) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_frequencies_of_a_truss_are_those_of_its_joint():
+    """Two bars at a joint: ω² = 2 EA cos²/(l m) along, 2 EA sin²/(l m) across; in kN, mm, kg."""
+    joints = {"A": (-1000, 0), "B": (0, 100), "C": (1000, 0)}
+    bars = [em.Bar(end, EA="20 N", mass="1 kg") for end in (("A", "B"), ("B", "C"))]
+    truss = em.Truss(
+        joints, bars, {"A": "xy", "C": "xy"}, {"F": {"B": (0, -1)}},
+        masses={"B": "2000 g"}, units={"force": "kN", "length": "mm"},
+    )  # fmt: skip
+    length, mass = np.sqrt(1.01), 3.0
+    exact = np.sqrt(2.0 * 20.0 / length**3 / mass * np.array([0.01, 1.0]))
+    np.testing.assert_allclose(em.natural_state(truss).natural_frequencies(2), exact, rtol=1e-12)
+    assert truss.time_unit == "s"
+    again = from_identity(truss.identity())
+    np.testing.assert_allclose(em.natural_state(again).natural_frequencies(2), exact, rtol=1e-12)
+
+
+def test_frequencies_of_a_frame_are_those_of_the_beam_that_it_is():
+    """A cantilever and a clamped–pinned beam of two members: β = 3.9266. SI from kN and mm."""
+    joints = {"A": (0, 0), "B": (500, 0), "C": (1000, 0)}
+    members = [em.Member(ends, EI="2 N m^2", weight="0.6 kg/m") for ends in PAIRS]
+    given = {"loads": {"P": {"B": (0, -1)}}, "units": {"force": "kN", "length": "mm"}}
+    free = em.Frame(joints, members, {"A": "fixed"}, **given)
+    found = em.natural_state(free).natural_frequencies(2)
+    np.testing.assert_allclose(found, CANTILEVER[:2] ** 2 * np.sqrt(2.0 / 0.6), rtol=1e-5)
+    held = em.Frame(joints, members, {"A": "fixed", "C": "y"}, **given)
+    found = em.natural_state(held).natural_frequencies()
+    np.testing.assert_allclose(found, 3.9266023120**2 * np.sqrt(2.0 / 0.6), rtol=1e-5)
+    plain = [em.Member(ends, EI=2.0, mass=0.3) for ends in PAIRS]
+    other = em.Frame(
+        {"A": (0, 0), "B": (0.5, 0), "C": (1, 0)}, plain, {"A": "fixed"}, given["loads"]
+    )
+    found = em.natural_state(other).natural_frequencies()
+    np.testing.assert_allclose(found, CANTILEVER[:1] ** 2 * np.sqrt(2.0 / 0.6), rtol=1e-5)
+
+
+def test_portal_with_stretchable_legs_vibrates_as_stiffer_ones_do():
+    """Multipliers follow from the turns where members stretch: EA → ∞ is the inextensible limit."""
+
+    def sway(axial):
+        ends = (("A", "B"), ("B", "C"), ("C", "D"))
+        members = [em.Member(each, EA=axial, mass=1.0) for each in ends]
+        joints = {"A": (0, 0), "B": (0, 1), "C": (1, 1), "D": (1, 0)}
+        supports = {"A": "fixed", "D": "fixed"}
+        frame = em.Frame(joints, members, supports, {"H": {"B": (1, 0)}}, elements=1)
+        return em.natural_state(frame).natural_frequencies(2)
+
+    rigid, stiff, stiffer = sway(None), sway(1e4), sway(1e5)
+    np.testing.assert_allclose(stiffer, rigid, rtol=3e-4)
+    np.testing.assert_allclose((rigid - stiff) / (rigid - stiffer), 10.0, rtol=0.02)
+
+
+def test_energies_vibrate_with_the_masses_of_their_author():
+    """Pendulum ω = √(g/l); double pendulum of equal links ω² = (2 ∓ √2) g/l; spring by hand."""
+    gravity = [em.Parameter("M", "", 1.0, "load", 0.0)]
+    one = em.EnergyStructure("19.62*0.5*(1 - cos(a)) - M*a", ["a"], gravity, mass=["2*0.5**2"])
+    assert em.natural_state(one).natural_frequencies() == pytest.approx(np.sqrt(9.81 / 0.5))
+    energy = "-2*cos(a) - cos(b) - M*b"
+    rows = [[2.0, "cos(a - b)"], ["cos(a - b)", 1.0]]
+    two = em.EnergyStructure(energy, ["a", "b"], gravity, mass=rows)
+    exact = np.sqrt(2.0 + np.sqrt(2.0) * np.array([-1.0, 1.0]))
+    for made in (two, from_identity(two.identity())):
+        np.testing.assert_allclose(em.natural_state(made).natural_frequencies(2), exact, rtol=1e-12)
+    spring = em.Spring(mass=2.0)
+    slack = spring.natural_state(x_l=1.5)
+    assert slack.natural_frequencies() == pytest.approx(np.sqrt(1.5 * 0.5 / (2.0 * 1.5**2)))
+
+
+@pytest.mark.parametrize(
+    ("make", "why"),
+    [
+        (
+            lambda: em.Truss({"A": (0, 0), "B": (1, 0)}, [("A", "B")], {"A": "xy", "B": "y"},
+                             {"F": {"B": (1, 0)}}),
+            r"must have a mass; this truss has none\. Give its joints or bars some",
+        ),
+        (
+            lambda: em.Frame({"A": (0, 0), "B": (1, 0)}, [("A", "B")], {"A": "fixed"},
+                             {"F": {"B": (1, 0)}}),
+            r"must have a mass; this frame has none\. Give every member one",
+        ),
+        (
+            lambda: em.EnergyStructure("x**2 - F*x", ["x"], FORCE),
+            r"must have a mass; this energy has none\. Give each unknown one",
+        ),
+    ],
+)  # fmt: skip
+def test_structures_without_mass_say_how_to_give_it(make, why):
+    """One line each."""
+    with pytest.raises(InputError, match=why):
+        em.natural_state(make()).natural_frequencies()
+
+
+def test_masses_that_are_no_mass_matrix_are_refused():
+    """One line each."""
+    with pytest.raises(InputError, match="`mass` must have one formula for each of the 2 unknowns"):
+        em.EnergyStructure("x**2 + y**2 - F*x", ["x", "y"], FORCE, mass=["1"])
+    joints = {"A": (0, 0), "B": (1, 0), "C": (2, 0)}
+    with pytest.raises(InputError, match="`masses` must leave no joint that moves without mass"):
+        em.Truss(joints, [("A", "B"), ("B", "C")], {"A": "xy", "B": "y", "C": "y"},
+                 {"F": {"B": (1, 0)}}, masses={"B": 1.0})  # fmt: skip
+
+
 def test_what_cannot_vibrate_is_refused(upright):
     """Unstable states, structures without mass, too many modes: one line each."""
-    with pytest.raises(InputError, match=r"must have a mass; a rod has none\. Give it one, like"):
+    with pytest.raises(
+        InputError, match=r"must have a mass; this rod has none\. Give it one, like"
+    ):
         em.Rod(EI=1.0, length=1.0).natural_state(Theta=1.0).natural_frequencies()
     with pytest.raises(InputError, match="`count` must be from 1 to 51"):
         upright.natural_frequencies(52)

@@ -45,6 +45,10 @@ class Symmetry:
         return np.asarray(self.signs * (p if self.order is None else p[..., self.order]))
 
 
+Velocities = Float[np.ndarray, "lanes k unknowns"]
+Product = Callable[[Velocities], Velocities]
+
+
 @dataclass(frozen=True)
 class Growth:
     """Whether the energy is smooth on all of Rⁿ and grows there at infinity.
@@ -126,18 +130,19 @@ class Structure(Equations):
             If the structure has no mass.
         """
         del z, p
-        raise MissingError(f"`structure` must have a mass; a {self.kind} has none. {self.massless}")
+        raise MissingError(
+            f"`structure` must have a mass; this {self.kind} has none. {self.massless}".rstrip()
+        )
 
     @property
     def massless(self) -> str:
         """How this kind of structure is given its mass, in one sentence; empty if it cannot be."""
         return ""
 
-    def inertia_product(
-        self, z: Lanes, p: Parameters, v: Float[np.ndarray, "lanes k unknowns"]
-    ) -> Float[np.ndarray, "lanes k unknowns"]:
-        """M·v for k velocities v of the unknowns each; see `inertia`."""
-        return np.asarray(v @ self.inertia(z, p))
+    def inertia_product(self, z: Lanes, p: Parameters) -> Product:
+        """Function that multiplies k velocities in each lane by M; see `inertia`."""
+        mass = self.inertia(z, p)
+        return lambda v: np.asarray(v @ mass)
 
     @abstractmethod
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:

@@ -62,6 +62,8 @@ class Spring(Structure):
     ----------
     stiffness
         Default of the parameter k, force per natural length; positive.
+    mass
+        Mass at B, in units of force·time²/natural length.
 
     References
     ----------
@@ -73,7 +75,8 @@ class Spring(Structure):
     constraints = 0
     length_unit = "natural length"
 
-    def __init__(self, stiffness: float = 1.0) -> None:
+    def __init__(self, stiffness: float = 1.0, mass: float = 1.0) -> None:
+        self._mass = mass
         self.mass = np.ones(1)
         self.parameters = (
             Parameter("x_l", "natural length", 1.0, "actuator", 1.0, 0.0),
@@ -87,8 +90,14 @@ class Spring(Structure):
         )
 
     def identity(self) -> dict[str, Any]:
-        """Kind and stiffness."""
-        return {"kind": self.kind, "stiffness": self.parameters[2].default}
+        """Kind, stiffness, and a mass that is not 1."""
+        heavy = {} if self._mass == 1.0 else {"mass": self._mass}
+        return {"kind": self.kind, "stiffness": self.parameters[2].default, **heavy}
+
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 1 1"]:
+        """m (x_l/cos²δ)²: the mass moves along y = x_l tan δ."""
+        delta, x, _, _ = self._split(z, p)
+        return np.asarray(self._mass * (x / np.cos(delta) ** 2) ** 2)[:, None, None]
 
     def _split(self, z: Lanes, p: Parameters) -> tuple[Values, Values, Values, Values]:
         return z[:, 0], p[:, 0], p[:, 1], p[:, 2]

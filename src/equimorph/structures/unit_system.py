@@ -138,6 +138,17 @@ class UnitSystem:
         """SI value of one unit of a quantity written in the words force and length; SI if plain."""
         return read_unit(quantity, self._own, quantity)[0]
 
+    @property
+    def time_unit(self) -> str:
+        """Seconds, or any unit of time that goes with the others."""
+        return "time" if self.plain else "s"
+
+    def mass(self, given: Any, what: str) -> float:
+        """Mass in units of force·time²/length; given in kilograms or as a text, or plain."""
+        if not self.plain:
+            return kilograms(given, what) * self.si("length") / self.si("force")
+        return float(self.number(given, "force/length", what))
+
     def label(self, quantity: str) -> str:
         """Label of a quantity written in the words force and length: "force·length" is N m."""
         if self.plain:
@@ -231,7 +242,7 @@ class UnitSystem:
         return {} if self.plain else given
 
 
-def kilograms(given: Any, what: str) -> float | None:
+def kilograms(given: Any, what: str) -> float:
     """Mass in kilograms of a number of these, or of a text with a unit of mass.
 
     Raises
@@ -245,7 +256,7 @@ def kilograms(given: Any, what: str) -> float | None:
     0.25
     """
     if not isinstance(given, str):
-        return None if given is None else float(given)
+        return float(given)
     found = QUANTITY.fullmatch(given)
     value, dimension = read_unit(found.group(2).strip(), UNITS, what) if found else (0.0, LENGTH)
     if found is None or dimension != MASS:

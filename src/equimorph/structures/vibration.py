@@ -5,7 +5,6 @@ matrix M of `Structure.inertia`.
 """
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -58,7 +57,7 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
     free = structure.unknowns - structure.constraints
     if not 1 <= count <= free:
         raise InputError(f"`count` must be from 1 to {free}, the free movements; got {count!r}.")
-    product = partial(structure.inertia_product, z, p)
+    product = structure.inertia_product(z, p)
     width = min(count + GUARD, structure.unknowns)
     vectors = np.random.default_rng(0).normal(size=(len(z), width, structure.unknowns))
     solve = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1]))).solve

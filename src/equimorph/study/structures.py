@@ -135,6 +135,7 @@ class RodSection(StructureSection):
     torsion: Profile | None = None
     lateral: Profile | None = None
     section: CrossSection | None = None
+    mass: Stiffness | None = None
     span: Stiffness | None = None
     elements: int | None = Field(default=None, ge=2, le=1000)
     degree: int | None = Field(default=None, ge=3, le=16)
@@ -173,6 +174,7 @@ class SpatialRodSection(StructureSection):
     EI: Quantity | None = None
     length: Quantity | None = None
     units: UnitSystem | None = None
+    mass: Stiffness | None = None
     elements: int | None = Field(default=None, ge=2, le=1000)
     degree: int | None = Field(default=None, ge=3, le=16)
 
@@ -182,6 +184,7 @@ class SpringSection(StructureSection):
 
     kind: Literal["spring"]
     stiffness: float = Field(default=1.0, gt=0, le=LARGEST)
+    mass: float = Field(default=1.0, gt=0, le=LARGEST)
 
 
 class UnknownSection(Section):
@@ -236,6 +239,7 @@ class EnergySection(StructureSection):
     draw: list[Annotated[list[Formula], Field(min_length=2, max_length=2)]] = Field(
         default_factory=list
     )
+    mass: list[Formula | list[Formula]] = Field(default_factory=list)
     supports: list[DrawnSupportSection] = Field(default_factory=list)
     forces: list[DrawnForceSection] = Field(default_factory=list)
 
@@ -247,6 +251,7 @@ class BarSection(Section):
     EA: Stiffness = 1.0
     EI: Stiffness | None = None
     rest: Stiffness | None = None
+    mass: Stiffness | None = None
 
 
 Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
@@ -263,6 +268,7 @@ class TrussSection(StructureSection):
     loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
     actuators: dict[str, dict[str, Number]] = Field(default_factory=dict)
     strain: Literal["engineering", "green"] = "engineering"
+    masses: dict[str, Stiffness] = Field(default_factory=dict)
     units: UnitSystem | None = None
 
 
@@ -286,6 +292,7 @@ class MemberSection(Section):
     curvature: Quantity = 0.0
     hinges: list[str] = Field(default_factory=list)
     weight: Stiffness | None = None
+    mass: Stiffness | None = None
 
 
 Plane = Annotated[list[Number], Field(min_length=2, max_length=2)]

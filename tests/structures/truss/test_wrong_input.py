@@ -44,7 +44,7 @@ def made(joints=JOINTS, bars=BARS, supports=HELD, loads=LOADS, **more):
         ({"bars": [*BARS, ("C", "B")]}, "must join each pair of joints once; got C-B again"),
         ({"bars": [*BARS, ("B", "B")]}, "different joints, or data of bars; got ('B', 'B')"),
         ({"bars": ["AB", "BC"]}, "pairs of different joints, or data of bars; got 'AB'"),
-        ({"bars": [{"ends": ("A", "B"), "E": 1}]}, "`bars` must hold Bars (ends, EA, EI, rest)"),
+        ({"bars": [{"ends": ("A", "B"), "E": 1}]}, "Bars (ends, EA, EI, rest, mass)"),
         # supports
         ({"supports": {**HELD, "D": "x"}}, "`supports` must be at joints (A, B, C); got D"),
         ({"supports": {**HELD, "B": "xy"}}, "`supports` must leave a joint free to move; got all"),

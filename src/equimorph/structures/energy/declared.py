@@ -84,11 +84,13 @@ class Formulas:
     draw: tuple[tuple[Any, Any], ...]
     forces: tuple[tuple[Any, Any], ...]
     descriptors: Mapping[str, Any]
+    inertia: tuple[tuple[Any, ...], ...] = ()
 
     def flat(self) -> list[Any]:
         """All of them, one after the other."""
         points = [component for pair in (*self.draw, *self.forces) for component in pair]
-        rest = (*self.natural, *points, *self.descriptors.values())
+        heavy = [entry for row in self.inertia for entry in row]
+        rest = (*self.natural, *points, *self.descriptors.values(), *heavy)
         return [self.energy, *self.constraints, *rest]
 
     def fill(self, flat: Sequence[Any]) -> "Formulas":
@@ -101,6 +103,7 @@ class Formulas:
             tuple((next(each), next(each)) for _ in self.draw),
             tuple((next(each), next(each)) for _ in self.forces),
             {name: next(each) for name in self.descriptors},
+            tuple(tuple(next(each) for _ in row) for row in self.inertia),
         )
 
     def labels(self, unknowns: Sequence[Unknown]) -> list[str]:
@@ -110,7 +113,8 @@ class Formulas:
         named = [f"natural of {unknown.name}" for unknown in unknowns]
         constraints = [f"constraints[{i}]" for i in range(len(self.constraints))]
         described = [f"descriptors.{name}" for name in self.descriptors]
-        return ["energy", *constraints, *named, *points, *described]
+        heavy = [f"mass[{i}][{j}]" for i, row in enumerate(self.inertia) for j in range(len(row))]
+        return ["energy", *constraints, *named, *points, *described, *heavy]
 
 
 UnknownSpec = Annotated[
@@ -273,3 +277,41 @@ def _check_names(names: Sequence[str]) -> None:
         if name in taken:
             raise InputError(f"`name` must be given once, and be no function; got {name} again.")
         taken.add(name)
+
+
+def mass_rows(given: Sequence[Any], unknowns: int) -> tuple[tuple[Any, ...], ...]:
+    """Rows of a mass matrix from its diagonal or its rows; none where nothing is given.
+
+    Raises
+    ------
+    InputError
+        For another number of rows, or of entries in one.
+    """
+    if not len(given):
+        return ()
+    listed = [is_listed(row) for row in given]
+    sizes = [len(row) if lined else 1 for row, lined in zip(given, listed, strict=True)]
+    if len(given) != unknowns or (any(listed) and sizes != [unknowns] * unknowns):
+        raise InputError(
+            f"`mass` must have one formula for each of the {unknowns} unknowns, or as many rows of "
+            f"as many; got {short(given)}."
+        )
+    if all(listed):
+        return tuple(tuple(row) for row in given)
+    diagonal = enumerate(given)
+    return tuple(tuple(each if i == j else 0.0 for j in range(unknowns)) for i, each in diagonal)
+
+
+def points_of(draw: Sequence[Sequence[Any]]) -> tuple[tuple[Any, Any], ...]:
+    """Points to draw: none, or at least two, of two coordinates each."""
+    if len(draw) == 1:
+        raise InputError("`draw` must have at least two points; got one.")
+    return tuple((point[0], point[1]) for point in draw)
+
+
+def check_promise(coercive: bool, constraints: int) -> None:
+    """Refuse the promise of growth beside constraints."""
+    if coercive and constraints:
+        raise InputError(
+            f"`coercive` must be False for energies with constraints; got {constraints} of them."
+        )

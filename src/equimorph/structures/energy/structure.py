@@ -21,8 +21,11 @@ from equimorph.structures.energy.declared import (
     ParameterSpec,
     Symbols,
     UnknownSpec,
+    check_promise,
     data_of,
+    mass_rows,
     parameters_of,
+    points_of,
     unknowns_of,
 )
 from equimorph.structures.energy.drawing import (
@@ -73,6 +76,9 @@ class EnergyStructure(DiscreteStructure):
         the height of figures of the set.
     definitions
         Parts of formulas by name, each in terms of the ones before.
+    mass
+        Physical masses, which say nothing of the metric: one formula per unknown, the diagonal of
+        the mass matrix, or its rows. The unit of time is what the numbers make it.
     coercive
         The author's promise that the energy is smooth for all values of the unknowns and grows to
         infinity in all directions; then the sum of (−1)^index over all equilibria is 1, which tells
@@ -124,20 +130,22 @@ class EnergyStructure(DiscreteStructure):
         forces: Sequence[DrawnForce] = (),
         descriptors: Mapping[str, Formula] | None = None,
         definitions: Mapping[str, Formula] | None = None,
+        mass: Sequence[Formula | Sequence[Formula]] = (),
         coercive: bool = False,
     ) -> None:
         self._unknowns, self.parameters = unknowns_of(unknowns), parameters_of(parameters)
         self.unknowns, self.constraints = len(self._unknowns), len(constraints)
         self.mass = np.array([float(unknown.mass) for unknown in self._unknowns])
         natural = tuple(unknown.natural for unknown in self._unknowns)
-        points = _points(draw)
-        _check_promise(coercive, self.constraints)
+        points = points_of(draw)
+        check_promise(coercive, self.constraints)
         self._coercive = coercive
         self._marks = marks_of(supports, len(points))
         self._loaded, pushes = forces_of(forces, len(points))
         given = Formulas(
-            energy, tuple(constraints), natural, points, pushes, dict(descriptors or {})
-        )
+            energy, tuple(constraints), natural, points, pushes, dict(descriptors or {}),
+            mass_rows(mass, self.unknowns),
+        )  # fmt: skip
         self._given, self._definitions = given, dict(definitions or {})
         self._symbols = Symbols(self._unknowns, self.parameters, self._definitions, given)
         formulas = self._symbols.formulas
@@ -169,7 +177,25 @@ class EnergyStructure(DiscreteStructure):
             **({"coercive": True} if self._coercive else {}),
             "descriptors": dict(formulas.descriptors),
             "definitions": dict(definitions),
+            **({"mass": [list(row) for row in formulas.inertia]} if formulas.inertia else {}),
         }
+
+    @property
+    def massless(self) -> str:
+        """How an energy is given its mass."""
+        return 'Give each unknown one, like EnergyStructure(..., mass=["m*l**2"]).'
+
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """The author's mass matrix."""
+        if not self._given.inertia:
+            return super().inertia(z, p)
+        full = self._inertia(z, p).reshape(len(z), self.unknowns, self.unknowns)
+        return np.asarray(0.5 * (full + full.transpose(0, 2, 1)))
+
+    @cached_property
+    def _inertia(self) -> Tape:
+        entries = [each for row in self._symbols.formulas.inertia for each in row]
+        return self._graphs.tape(casadi().vertcat(*entries))
 
     # --- derivatives ----------------------------------------------------------------------------
 
@@ -365,18 +391,3 @@ class EnergyStructure(DiscreteStructure):
 
     def _make_descriptor(self, name: str, unit: str, function: Any) -> Descriptor:
         return Descriptor(name, unit, function, name, self.signature)
-
-
-def _points(draw: Sequence[Sequence[Any]]) -> tuple[tuple[Any, Any], ...]:
-    """Points to draw: none, or at least two, of two coordinates each."""
-    if len(draw) == 1:
-        raise InputError("`draw` must have at least two points; got one.")
-    return tuple((point[0], point[1]) for point in draw)
-
-
-def _check_promise(coercive: bool, constraints: int) -> None:
-    """Refuse the promise of growth beside constraints."""
-    if coercive and constraints:
-        raise InputError(
-            f"`coercive` must be False for energies with constraints; got {constraints} of them."
-        )

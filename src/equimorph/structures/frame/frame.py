@@ -17,6 +17,7 @@ from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame import descriptors
 from equimorph.structures.frame.drawing import frame_drawing
 from equimorph.structures.frame.fields import FrameFields
+from equimorph.structures.frame.inertia import frame_inertia, member_masses
 from equimorph.structures.frame.member import MemberSpec, SupportSpec, support_data
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import FrameNetwork, frame_network
@@ -211,6 +212,23 @@ class Frame(FrameFields):
             at = share[here] if forward else 1.0 - share[here]
             out[:, here] = self.outline(z, p, at)[:, member]
         return np.asarray(out * self.model.length)
+
+    # --- in time --------------------------------------------------------------------------------
+
+    @property
+    def time_unit(self) -> str:
+        """Seconds in a frame with units, else that of its numbers."""
+        return self.model.system.time_unit
+
+    @property
+    def massless(self) -> str:
+        """How a frame is given its mass."""
+        return 'Give every member one, like Member(("A", "B"), mass=0.2).'
+
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """Mass matrix of the members, each as heavy everywhere."""
+        masses = member_masses(self.model)
+        return super().inertia(z, p) if masses is None else frame_inertia(self, masses, z, p)
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the joints, loads on joints and members, members that bend or lengthen."""

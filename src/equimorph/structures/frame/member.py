@@ -47,6 +47,9 @@ class Member:
         Names of those of its ends that transmit no moment.
     weight
         Weight per length, for loads on "weight", or a text like "0.1 kg/m"; None: without.
+    mass
+        In kg, or as a text; None: that of its weight in a frame with units. In a frame without
+        units it is a number in any system to which the units of force, length and time belong.
     """
 
     ends: Annotated[Sequence[str], TWO_NAMES]
@@ -55,6 +58,7 @@ class Member:
     curvature: Quantity = 0.0
     hinges: Sequence[str] = ()
     weight: Quantity | None = None
+    mass: Quantity | None = None
 
     def __post_init__(self) -> None:
         """Check the hinges."""

@@ -16,10 +16,11 @@ from equimorph.errors import InputError, suggestion
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.model import Descriptor
 from equimorph.structures.approach import smooth_arcs
-from equimorph.structures.contract import Structure, Symmetry
+from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, Direction, LinearSystem, Majorant
 from equimorph.structures.rod.centreline import Centreline, closest_approach, stations
 from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.heavy_rod import HeavyRod
 from equimorph.structures.rod.mechanics import RodMechanics
 from equimorph.structures.rod.sections import SectionProperties
 from equimorph.structures.rod.space_options import SpaceOptions
@@ -70,7 +71,7 @@ def arclengths(s: Arclengths | None) -> Arclengths:
     return np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
 
 
-class AnyRod(Structure):
+class AnyRod(HeavyRod):
     """A rod: mechanics in non-dimensional numbers inside, the user's units outside.
 
     Unknowns, multipliers, residuals and energies are non-dimensional; parameters, shapes and

@@ -36,26 +36,11 @@ class Measured(AnyRod):
         left = np.stack([-tangents[:, :, 1], tangents[:, :, 0]], axis=2)
         return Centreline(fields[:, :, 2:], tangents, left[:, :, None], bending * left, length)
 
-    @property
-    def time_unit(self) -> str:
-        """T, or s of a rod with EI and length."""
-        return self.units.time_label
-
-    @property
-    def massless(self) -> str:
-        """How a rod with EI and length is given its mass."""
-        return 'Give it one, like Rod(..., mass="0.2 kg"), or a section with a density.'
-
-    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
-        """Physical mass matrix of the rod, which is as heavy everywhere, in units of energy·time².
-
-        Without EI and length the unit of time is T = √(m L/λ_cr) with the mass m of the rod and
-        λ_cr = 4π²B/L². Where the load is its own weight, m g = q λ_cr and T = √(q L/g).
-        """
-        unit = self.units.time()
-        if unit is None:
-            return super().inertia(z, p)
-        return unit**2 * self.mechanics.inertia(z, p)
+    def inertia_in_lengths(
+        self, z: Lanes, p: Parameters
+    ) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """Mass matrix of a rod of mass 1."""
+        return self.mechanics.inertia(z, p)
 
     def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""

@@ -164,4 +164,4 @@ def rod_units(
         )
     own = SI if system.plain else system
     stiff, long = own.number(EI, "force·length²", "EI"), own.number(length, "length", "length")
-    return Units(stiff, long, system, kilograms(mass, "mass"), weight)
+    return Units(stiff, long, system, None if mass is None else kilograms(mass, "mass"), weight)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.structures.places_inertia import inertia_of_places
 from equimorph.structures.rod.any_rod import AnyRod, Arclengths, arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.spatial.fields import Fields, SpatialFields
@@ -44,6 +45,17 @@ class MeasuredInSpace(AnyRod):
         """Largest bending curvature along the rod, and the arclength where it occurs."""
         value, place = self.recovery.largest_curvature(z, p)
         return np.asarray(value * self.units.value("curvature")), place
+
+    def inertia_in_lengths(
+        self, z: Lanes, p: Parameters
+    ) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """Mass matrix of a rod of mass 1: masses at the nodes of the elements."""
+
+        def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points 3"]:
+            return self.recovery.nodal(z, p)[1].reshape(len(z), -1, 3)
+
+        weights = self.mesh.element_weights.ravel()
+        return inertia_of_places(self.mechanics, places, weights, z, p)
 
     def frames(
         self, z: Lanes, p: Parameters, s: Arclengths | None = None

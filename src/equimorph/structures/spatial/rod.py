@@ -90,8 +90,8 @@ class SpatialRod(DescribedInSpace):
         Arclengths at which a callable is not smooth.
     elements, degree
         Resolution: the default, six elements of degree 6, gives critical loads of the arch to 3e-9.
-    EI, length, units
-        As of `Rod`.
+    EI, length, units, mass
+        As of `Rod`. The mass lies on the centre line: cross-sections have no rotary inertia.
 
     Raises
     ------
@@ -145,10 +145,11 @@ class SpatialRod(DescribedInSpace):
         EI: Quantity | None = None,
         length: Quantity | None = None,
         units: Units | None = None,
+        mass: Quantity | None = None,
     ) -> None:
         options = SpaceOptions.read(torsion, lateral, section)
         lengths = {"span": span, "rise": rise, "sideways": sideways}
-        self._use_units(options, EI, length, units, lengths)
+        self._use_units(options, EI, length, units, lengths, mass)
         number = self.units.number
         shape = "uniform" if load is None and loads is None else load
         own = {} if shape is None else {"q": LineLoad(shape, kinks=kinks)}

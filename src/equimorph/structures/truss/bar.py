@@ -33,12 +33,16 @@ class Bar:
         Bending stiffness, for the Euler load of the bar; None if its buckling is of no interest.
     rest
         Length at which it is free of stress; None for the distance of its joints.
+    mass
+        In kg, or as a text, half of it at each joint; None: without. In a truss without units it is
+        a number in any system to which the units of force, length and time belong.
     """
 
     ends: Annotated[Sequence[str], TWO_NAMES]
     EA: Quantity = 1.0
     EI: Quantity | None = None
     rest: Quantity | None = None
+    mass: Quantity | None = None
 
     @property
     def name(self) -> str:

@@ -12,7 +12,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Parameter
-from equimorph.structures.contract import Symmetry
+from equimorph.structures.contract import Product, Symmetry
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.network import (
     Joints,
@@ -24,7 +24,7 @@ from equimorph.structures.truss import descriptors
 from equimorph.structures.truss.bar import BarSpec, Energies, Strain
 from equimorph.structures.truss.mechanics import COLLAPSED, TrussMechanics, symmetries
 from equimorph.structures.truss.network import AXES, TrussNetwork, truss_network
-from equimorph.structures.unit_system import Units, unit_system
+from equimorph.structures.unit_system import Quantity, Units, unit_system
 from equimorph.tolerances import SINGULAR
 
 Forces = Annotated[
@@ -35,6 +35,8 @@ Rates = Annotated[
     Mapping[str, Mapping[str, float]],
     "finite rates by bar, by the name of the actuator, like `{'a': {'A-B': 1.0}}`",
 ]
+
+NodalMasses = Annotated[Mapping[str, Quantity], "masses by joint, like `{'B': '0.2 kg'}`"]
 
 AXES_BY_JOINT = "held axes by joint, like `{'A': 'xy'}`"
 
@@ -70,6 +72,9 @@ class Truss(TrussMechanics):
         parameter: ``{"a": {"A-B": 1.0}}``.
     strain
         "engineering" or "green".
+    masses
+        Masses at joints by name, like ``{"B": "0.2 kg"}``, beside those of bars: in kg or as texts,
+        as of `Bar`. Where anything has a mass, every joint that moves must get some.
     units
         Units of force and length of all numbers, like ``{"force": "kN", "length": "mm"}``; places,
         lengths and stiffnesses may then be texts with units. None: any one system.
@@ -91,7 +96,7 @@ class Truss(TrussMechanics):
     """
 
     @check_arguments
-    def __init__(
+    def __init__(  # what a truss can have
         self,
         joints: Joints,
         bars: Iterable[BarSpec],
@@ -100,6 +105,7 @@ class Truss(TrussMechanics):
         actuators: Rates | None = None,
         strain: Strain = "engineering",
         *,
+        masses: NodalMasses | None = None,
         units: Units | None = None,
     ) -> None:
         system = unit_system(units)
@@ -124,8 +130,49 @@ class Truss(TrussMechanics):
             ),
             *(Parameter(name, system.label("force"), 1.0, "load", 0.0) for name in self._loads),
         )
+        self._masses = dict(masses or {})
+        self._set_masses()
         self._start = self._equilibrium()
         self._set_scales()
+
+    def _set_masses(self) -> None:
+        """Sum the masses of joints and bars at the unknowns."""
+        made, total = self.network, np.zeros(len(self.network.joints))
+        for joint, mass in self._masses.items():
+            total[made.joint(joint)] += self.system.mass(mass, f"masses.{joint}")
+        for bar, ends in zip(made.bars, made.ends, strict=True):
+            if bar.mass is not None:
+                total[ends] += 0.5 * self.system.mass(bar.mass, f"mass of bar {bar.name}")
+        free = ~made.held
+        bare = np.flatnonzero(free.any(axis=1) & (total == 0.0))
+        if total.any() and len(bare):
+            raise InputError(
+                f"`masses` must leave no joint that moves without mass; got none at "
+                f"{made.joints[bare[0]]}."
+            )
+        self._nodal_masses = np.repeat(total[:, None], made.space, axis=1)[free]
+
+    @property
+    def time_unit(self) -> str:
+        """Seconds in a truss with units, else that of its numbers."""
+        return self.system.time_unit
+
+    @property
+    def massless(self) -> str:
+        """How a truss is given its mass."""
+        return 'Give its joints or bars some, like Truss(..., masses={"B": 0.2}).'
+
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """Diagonal mass matrix of the joints."""
+        if not self._nodal_masses.any():
+            return super().inertia(z, p)
+        return np.repeat(np.diag(self._nodal_masses)[None], len(z), axis=0)
+
+    def inertia_product(self, z: Lanes, p: Parameters) -> Product:
+        """Function that multiplies by the nodal masses, without a matrix."""
+        if not self._nodal_masses.any():
+            return super().inertia_product(z, p)
+        return lambda v: np.asarray(self._nodal_masses * v)
 
     @property
     def _rest_load(self) -> Float[np.ndarray, "1 parameters"]:
@@ -202,6 +249,7 @@ class Truss(TrussMechanics):
                 for name, rates in self._actuators.items()
             },
             "strain": "green" if self.energies.green else "engineering",
+            **({"masses": dict(self._masses)} if self._masses else {}),
             **({} if self.system.plain else {"units": self.system.data()}),
         }
 
