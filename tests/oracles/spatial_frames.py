@@ -45,7 +45,9 @@ class SpaceTwin:
                 i, j = self.joints.index(a), self.joints.index(b)
                 chord = np.linalg.norm(self.places[j] - self.places[i])
                 half = member.curvature * chord / 2.0
-                self.pieces.append((member, i, j, chord if half == 0 else chord * np.arcsin(half) / half))
+                self.pieces.append(
+                    (member, i, j, chord if half == 0 else chord * np.arcsin(half) / half)
+                )
         plane = [1.0 if each.EI is None else each.EI for each in self.members]
         self.unit = np.mean([each[3] for each in self.pieces]), np.mean(plane)
         self.force = self.unit[1] / self.unit[0] ** 2
@@ -85,59 +87,62 @@ class SpaceTwin:
                 w[:, k] = self.held(p, joint)
         for h, node in enumerate(model.hinged):
             angle = z[:, 4 * count + h]
-            w[:, node] = product(
-                w[:, model.parents[h]], rotation((model.hinge_axes[h], angle))
-            )
+            w[:, node] = product(w[:, model.parents[h]], rotation((model.hinge_axes[h], angle)))
         lengths = 4000.0 * frame.mass[: 4 * count : 4]
         return w, 0.125 * ((square - 1.0) ** 2) @ lengths
 
+    def stiffness(self, member):
+        """K and the axial compliance of a member."""
+        plane = 1.0 if member.EI is None else member.EI
+        aside = plane if member.EI_out is None else member.EI_out
+        twist = plane / 1.3 if member.GJ is None else member.GJ
+        soft = 0.0 if member.EA is None else self.force / member.EA
+        return np.array([twist, aside, plane]) / self.unit[1], soft
+
+    def free(self, p, k):
+        """Strains of a piece that are free of stress: of the cross-sections, and along."""
+        member, i, j, size = self.pieces[k]
+        name, length = "-".join((self.joints[i], self.joints[j])), self.unit[0]
+        share = sum(each[3] for each in self.pieces if each[0] is member)
+        along = 0.0 if member.length is None else member.length / share - 1.0
+        for of, wide in {member.name: share, name: size}.items():
+            along = along + self.sum_of(p, "actuators", "length", (of,)) / wide
+        turned = self.sum_of(p, "actuators", "curvature", (name, member.name)) * length
+        return np.zeros((len(p), 3)) + np.array(member.strains) * length + turned, along
+
+    def line(self, p, k):
+        """Load per length of a piece."""
+        member, i, j, _ = self.pieces[k]
+        names = ("-".join((self.joints[i], self.joints[j])), member.name)
+        heavy = (member.weight or 0.0) * self.sum_of(p, "loads", None, ("weight",))
+        total = self.sum_of(p, "loads", None, names) + heavy
+        return np.zeros((len(p), 3)) + total * self.unit[0] / self.force
+
     def lagrangian(self, z, p):
         """L in turns, angles of hinges and multipliers."""
-        model, (length, bending) = self.frame.model, self.unit
+        model, length = self.frame.model, self.unit[0]
         y = np.concatenate([z[:, self.frame.unknowns :], p, np.ones((len(z), 1))], axis=1)
         w, total = self.turns(z, p)
         x, weights, slopes = rule(self.data["degree"])
         elements = self.data["elements"]
         for k, (member, i, j, size) in enumerate(self.pieces):
-            name = "-".join((self.joints[i], self.joints[j]))
-            names = (name, member.name)
-            plane = 1.0 if member.EI is None else member.EI
-            aside = plane if member.EI_out is None else member.EI_out
-            twist = plane / 1.3 if member.GJ is None else member.GJ
-            stiff = np.array([twist, aside, plane]) / bending
+            stiff, soft = self.stiffness(member)
+            (strain, along), line = self.free(p, k), self.line(p, k)
             whole, step = size / length, size / length / elements
-            share = sum(each[3] for each in self.pieces if each[0] is member)
-            rest = 0.0 if member.length is None else member.length / share - 1.0
-            for of, wide in ((name, size), (member.name, share)):
-                if of == name or member.name != name:
-                    rest = rest + self.sum_of(p, "actuators", "length", (of,)) / wide
-            free = np.array(member.strains) * length
-            free = free + self.sum_of(p, "actuators", "curvature", names) * length
             axes = member.axes(self.places[j] - self.places[i])
             start = y @ model.forces.members[:, k]
-            heavy = (member.weight or 0.0) * self.sum_of(p, "loads", None, ("weight",))
-            line = (self.sum_of(p, "loads", None, names) + heavy) * length / self.force
-            line = np.broadcast_to(line, start.shape)
-            soft = 0.0 if member.EA is None else self.force / member.EA
             for e in range(elements):
-                nodes = model.nodes[k * elements + e]
-                s = (e + x) * step
-                local = w[:, nodes]
+                local, s = w[:, model.nodes[k * elements + e]], (e + x) * step
                 moved = np.einsum("ij,lja->lia", slopes / step, local)
-                back = local * np.array([1.0, -1.0, -1.0, -1.0])
-                v = 2.0 * product(back, moved)[..., 1:]
+                v = 2.0 * product(local * np.array([1.0, -1.0, -1.0, -1.0]), moved)[..., 1:]
                 bend = member.curvature * length * (s - whole / 2.0)
                 drawn = np.einsum("ab,ibc->iac", axes, matrix(rotation(((0, 0, 1), bend))))
-                u = np.einsum("lia,iab->lib", v, drawn)
-                if np.ndim(free) == 2:
-                    u = u - free[:, None]
-                else:
-                    u = u - free
+                u = np.einsum("lia,iab->lib", v, drawn) - strain[:, None]
                 total = total + np.einsum("i,k,lik->l", 0.5 * step * weights, stiff, u * u)
                 tangent = np.einsum("liab,ib->lia", matrix(local), drawn[..., 0])
                 force = start[:, None] - line[:, None] * s[:, None]
                 pull = (force * tangent).sum(axis=-1)
-                stored = (1.0 + np.reshape(rest, (-1, 1))) * pull + 0.5 * soft * pull**2
+                stored = (1.0 + np.reshape(along, (-1, 1))) * pull + 0.5 * soft * pull**2
                 total = total - (stored - (force * drawn[..., 0]).sum(axis=-1)) @ (step * weights)
         return total + self.supports(y, p)
 

@@ -42,7 +42,8 @@ from equimorph.structures.states import SpaceStability, State, States, natural_s
 from equimorph.structures.truss import Bar, Truss
 
 KINDS: dict[str, Callable[..., Structure]] = {
-    each.kind: each for each in (Rod, SpatialRod, Spring, EnergyStructure, Truss, Frame, SpatialFrame)
+    each.kind: each
+    for each in (Rod, SpatialRod, Spring, EnergyStructure, Truss, Frame, SpatialFrame)
 }
 """Classes of structures by their words in files."""
 

@@ -26,9 +26,7 @@ def spatial_frame_drawing(frame: SpatialFrameFields, z: Lanes, p: Parameters) ->
         along = length * frame.outline(z, p, STATIONS)[:, lines]
         density = np.einsum("lk,kma->lma", p, given.lines[:, lines]) * force / length
         vectors = np.repeat(density[:, :, None], len(STATIONS), axis=2)
-        forces += [
-            Forces(along[:, m], vectors[:, m], distributed=True) for m in range(len(lines))
-        ]
+        forces += [Forces(along[:, m], vectors[:, m], distributed=True) for m in range(len(lines))]
     if len(loaded):
         vectors = force * np.einsum("lk,kja->lja", p, given.forces[:, loaded])
         forces.append(Forces(places[:, loaded], vectors))

@@ -7,6 +7,8 @@ from jaxtyping import Float
 from numpy.polynomial import legendre
 
 from equimorph.arrays import Lanes, Parameters
+from equimorph.structures.discrete import DiscreteStructure
+from equimorph.structures.space_frame.lagrangian import gathered
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.network import Turning
 from equimorph.structures.space_frame.statics import SpaceFlows
@@ -25,7 +27,7 @@ POLISHING = 5
 Vectors = Float[np.ndarray, "lanes elements order 3"]
 
 
-class SpatialFrameFields(SpatialFrameMechanics):
+class SpatialFrameFields(SpatialFrameMechanics, DiscreteStructure):
     """A frame in space with the fields that descriptors and figures show, in units of its model."""
 
     # --- joints ---------------------------------------------------------------------------------
@@ -41,27 +43,24 @@ class SpatialFrameFields(SpatialFrameMechanics):
     @cached_property
     def _drawn_chords(self) -> Float[np.ndarray, "pieces 3"]:
         """Vectors from start to end of the pieces as drawn, by the quadrature of the model."""
-        found = np.zeros((self.model.pieces, 3))
         pull = (self.model.weights[..., None] * self.model.tangents).sum(axis=1)
-        np.add.at(found, self.model.owner, pull)
-        return found
+        return gathered(pull, self.model.owner, self.model.pieces)
 
     def displacements(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
         """Moves of the joints: what a load of size 1 on each would travel."""
         model = self.model
         _, w, _, y = self.jets(z, p)
-        chords = np.zeros((len(z), model.pieces, 3))
-        np.add.at(chords, np.s_[:, model.owner], self.chords(w, y)[0].sum(axis=2))
+        chords = gathered(self.chords(w, y)[0].sum(axis=2), model.owner, model.pieces)
         flow, supports = self._unit_loads
         moves = np.einsum("fka,lka->lf", flow, chords - self._drawn_chords)
         given = np.einsum("ls,sja->lja", y[0], model.moved)
         given -= np.einsum("jab,ljb->lja", model.yielding, self.reactions(z, p))
         moves -= np.einsum("fja,lja->lf", supports, given)
-        return moves.reshape(len(z), len(model.network.joints), 3)
+        return np.asarray(moves.reshape(len(z), len(model.network.joints), 3))
 
     def reactions(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
         """Forces of the supports on the joints."""
-        return np.einsum("ls,sja->lja", self.scalars(z, p), self.model.forces.supports)
+        return np.asarray(np.einsum("ls,sja->lja", self.scalars(z, p), self.model.forces.supports))
 
     def couples(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
         """Couples of the supports on the joints; 0 where rotations are free."""
@@ -88,7 +87,7 @@ class SpatialFrameFields(SpatialFrameMechanics):
     def cross_sections(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes e n 3 3"]:
         """Axes t, n, b at the points, in the columns."""
         turned = matrices(self.turns(z, p)[:, self.model.nodes])
-        return np.einsum("leiab,eibc->leiac", turned, self.model.drawn)
+        return np.asarray(np.einsum("leiab,eibc->leiac", turned, self.model.drawn))
 
     def end_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes pieces 2 3"]:
         """Forces in the cross-sections at start and end, of what lies beyond, toward the end."""
@@ -124,7 +123,9 @@ class SpatialFrameFields(SpatialFrameMechanics):
 
     def section_moments(self, z: Lanes, p: Parameters) -> Vectors:
         """Moments on the axes t, n, b of the cross-sections at the points."""
-        return np.einsum("leica,leic->leia", self.cross_sections(z, p), self.moments(z, p))
+        return np.asarray(
+            np.einsum("leica,leic->leia", self.cross_sections(z, p), self.moments(z, p))
+        )
 
     def section_strains(self, z: Lanes, p: Parameters) -> Vectors:
         """Twist and curvatures about n and b at the points, per length as drawn."""
@@ -189,10 +190,12 @@ class SpatialFrameFields(SpatialFrameMechanics):
     ) -> Float[np.ndarray, "lanes pieces points 3 3"]:
         """Axes t, n, b of the cross-sections, in the columns, at shares of the pieces' lengths."""
         model = self.model
-        w = np.einsum("ij,lkja->lkia", model.mesh.interpolation(s), self.turns(z, p)[:, model.piece_nodes])
+        w = np.einsum(
+            "ij,lkja->lkia", model.mesh.interpolation(s), self.turns(z, p)[:, model.piece_nodes]
+        )
         w = w / np.linalg.norm(w, axis=-1, keepdims=True)
         bends = [float(each.curvature) * model.length for each in model.network.members]
         turn = np.outer(np.array(bends)[model.network.owner] * model.lengths, s - 0.5)
         about = matrices(exponential(turn[..., None] * np.array([0.0, 0.0, 1.0])))
         drawn = np.einsum("kab,kibc->kiac", model.network.axes, about)
-        return np.einsum("lkiab,kibc->lkiac", matrices(w), drawn)
+        return np.asarray(np.einsum("lkiab,kibc->lkiac", matrices(w), drawn))

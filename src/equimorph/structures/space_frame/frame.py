@@ -12,7 +12,6 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.model import Descriptor, Drawing, Parameter
-from equimorph.structures.discrete import DiscreteStructure
 from equimorph.structures.network import Joints, length_limits
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.space_frame import descriptors
@@ -43,7 +42,7 @@ WALKED = 17
 """Places along a piece of a member where it is drawn."""
 
 
-class SpatialFrame(SpatialFrameFields, DiscreteStructure):
+class SpatialFrame(SpatialFrameFields):
     """Network of elastic rods in space, with displacements and rotations of any size.
 
     Members are unshearable, geometrically exact rods that bend about two axes and twist, straight

@@ -160,7 +160,10 @@ def turn_moments(order, width, derivative, inverse, relative, strain, moment, ma
             add_to(matrix, (3 * i + c) * width + 3 * i + c, own)
         for j in range(i):
             at = 4 * (i * order + j)
-            d, back = spread(0.5 * derivative[i, j] * inverse), spread(0.5 * derivative[j, i] * inverse)
+            d, back = (
+                spread(0.5 * derivative[i, j] * inverse),
+                spread(0.5 * derivative[j, i] * inverse),
+            )
             w1 = d * m1 - back * load(moment, 3 * j)
             w2 = d * m2 - back * load(moment, 3 * j + 1)
             w3 = d * m3 - back * load(moment, 3 * j + 2)
@@ -340,9 +343,17 @@ def linearise_lanes(
     count, multipliers = 3 * unknown + hinges, size - 4 * unknown - hinges
     scalar_count = multipliers + given + 1
     y, dy, rows = work_rows(scalar_count), work_rows(scalar_count), work_rows(size)
-    w, radii, turned = work_rows(4 * len(place)), work_rows(2 * unknown + 2), work_rows(4 * hinges + 4)
+    w, radii, turned = (
+        work_rows(4 * len(place)),
+        work_rows(2 * unknown + 2),
+        work_rows(4 * hinges + 4),
+    )
     held_q, held_v = work_rows(4 * len(held) + 4), work_rows(3 * len(held) + 3)
-    relative, sums_of, strain = work_rows(4 * order * order), work_rows(4 * order), work_rows(3 * order)
+    relative, sums_of, strain = (
+        work_rows(4 * order * order),
+        work_rows(4 * order),
+        work_rows(3 * order),
+    )
     jacobian, scaled = work_rows(3 * order * width), work_rows(3 * order * width)
     moment, change = work_rows(3 * order), work_rows(3 * order)
     gradient, rates = work_rows(width + 3), work_rows(width)

@@ -6,7 +6,7 @@ the multipliers. As for rods in space, ½ k m (|q|² − 1)² keeps lengths at 1
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters, Scalars, Values
 from equimorph.errors import InputError
@@ -38,6 +38,15 @@ def turn_about(angle: Jet, axes: Float[np.ndarray, "... 3"]) -> Jet:
     out[..., 0] = compose(c, -0.5 * s, -0.25 * c, angle)
     out[..., 1:] = compose(s, 0.5 * c, -0.25 * s, angle)[..., None] * axes
     return out
+
+
+def gathered(
+    values: Float[np.ndarray, "*batch some width"], at: Int[np.ndarray, " some"], count: int
+) -> Float[np.ndarray, "*batch count width"]:
+    """Sum of the rows that belong to each of `count` places."""
+    out = np.zeros((count, *values.shape[:-2], values.shape[-1]), values.dtype)
+    np.add.at(out, at, np.moveaxis(values, -2, 0))
+    return np.moveaxis(out, 0, -2)
 
 
 def conjugated(q: np.ndarray) -> np.ndarray:
@@ -140,7 +149,7 @@ class SpatialFrameLagrangian:
         """Moments on fixed axes at the points, turned back with the cross-sections."""
         strain = self.actuated(y)[0][:, :, self.model.owner]
         free = np.einsum("eiak,plek->pleia", self.model.moment_of_strain, strain)
-        return np.einsum("eiab,pleib->pleia", self.model.stiff, v) - free
+        return np.asarray(np.einsum("eiab,pleib->pleia", self.model.stiff, v) - free)
 
     def tensions(self, w: Jet, y: Jet) -> tuple[Jet, Jet, Jet]:
         """∂N/∂w and N at the points, and the stretch 1 + e + c N."""
@@ -174,9 +183,8 @@ class SpatialFrameLagrangian:
     def slope(self, w: Jet, y: Jet) -> Jet:
         """Gradient of L by unit quaternions at all nodes."""
         local = self.element_slopes(w, y)
-        out = np.zeros((*w.shape[:2], len(self.model.turning), 4), local.dtype)
-        np.add.at(out, np.s_[:, :, self.model.nodes], local)
-        return out
+        flat = local.reshape(*local.shape[:2], self.model.nodes.size, 4)
+        return gathered(flat, self.model.nodes.ravel(), len(self.model.turning))
 
     def chords(self, w: Jet, y: Jet) -> Float[np.ndarray, "parts lanes elements order 3"]:
         """Vectors along the member at the points: stretch times tangent times weight."""
@@ -187,29 +195,29 @@ class SpatialFrameLagrangian:
             return np.asarray(np.einsum("...eia,eicab,...eib->...eic", a, axes, b, optimize=True))
 
         tangent, stretch = bilinear(turn, local, local), self.tensions(w, y)[2]
-        return model.weights[..., None] * bilinear(_scale, stretch, tangent)
+        return np.asarray(model.weights[..., None] * bilinear(_scale, stretch, tangent))
 
     def by_scalars(self, w: Jet, y: Jet) -> Jet:
         """∂L/∂y at fixed rotations."""
         model, m = self.model, self.constraints
         chords, acting = self.chords(w, y), model.acting
-        parts, lanes = y.shape[:2]
-        first, second = np.zeros((2, parts, lanes, model.pieces, 3), chords.dtype)
-        np.add.at(first, np.s_[:, :, model.owner], chords.sum(axis=3))
+        first = gathered(chords.sum(axis=3), model.owner, model.pieces)
         moments = (chords * model.arclengths[..., None]).sum(axis=3)
-        np.add.at(second, np.s_[:, :, model.owner], moments)
+        second = gathered(moments, model.owner, model.pieces)
         work = np.einsum("plka,kra->plkr", first, acting.start)
         work = work - np.einsum("plka,kra->plkr", second, acting.drop)
         some = np.arange(acting.numbers.shape[1]) < acting.counts[:, None]
-        out = np.einsum("pls,st->plt", y, model.quadratic)
-        np.subtract.at(out, np.s_[:, :, acting.numbers[some]], work[:, :, some])
+        of_scalars = gathered(work[:, :, some][..., None], acting.numbers[some], model.scalars)
+        out = np.einsum("pls,st->plt", y, model.quadratic) - of_scalars[..., 0]
         _, _, v = self.strains(w)
-        weighted = np.einsum("eiak,pleia->plek", model.moment_of_strain * model.weights[..., None, None], v)
+        weighted = np.einsum(
+            "eiak,pleia->plek", model.moment_of_strain * model.weights[..., None, None], v
+        )
         bending = np.einsum("plek,eck->plc", weighted, model.strains[model.owner])
         out[..., m:] -= bending
         tension = (model.weights * self.tensions(w, y)[1]).sum(axis=3)
         out[..., m:] -= np.einsum("ple,ec->plc", tension, model.elongation[model.owner])
-        return out
+        return np.asarray(out)
 
     # --- contract -------------------------------------------------------------------------------
 
@@ -263,9 +271,12 @@ class SpatialFrameLagrangian:
         turned = turn_about(angles, model.hinge_axes)
         here = slope[:, :, model.hinged]
         axes = np.pad(model.hinge_axes, ((0, 0), (1, 0)))
-        rate = np.stack([product(part, np.broadcast_to(axes, part.shape)) for part in w[:, :, model.hinged]])
+        rate = np.stack(
+            [product(part, np.broadcast_to(axes, part.shape)) for part in w[:, :, model.hinged]]
+        )
         by_angle = 0.5 * bilinear(dot, here, rate)
-        np.add.at(slope, np.s_[:, :, model.parents], bilinear(product, here, conjugated(turned)))
+        leaning = bilinear(product, here, conjugated(turned))
+        slope += gathered(leaning, model.parents, len(model.turning))
         return by_angle
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:
@@ -293,7 +304,7 @@ class SpatialFrameLagrangian:
                 change[1, :, self.constraints + k] = 1.0
                 rate = self.held_turns(change)[1]
                 out[:, k] += dot(rate, slope[0][:, model.held]).sum(axis=1)
-        return out
+        return np.asarray(out)
 
     def body_couples(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 3"]:
         """Couple (x, y, z) by which each node resists turning: that of its support if held."""

@@ -11,7 +11,6 @@ from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.dense import no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-
 from equimorph.structures.equations import JointEquations, LinearSystem
 from equimorph.structures.space_frame.kernels import linearise_lanes
 from equimorph.structures.space_frame.lagrangian import SpatialFrameLagrangian

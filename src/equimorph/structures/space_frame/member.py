@@ -89,7 +89,7 @@ class SpatialMember:
         Joints to which it is hinged, by ball joints; or by joint "ball" or the axis (x, y, z) as
         drawn of a hinge that transmits all but the couple about this axis.
     weight
-        Weight per length, for loads on "weight", or a text like "0.1 kg/m"; None: as of the section.
+        Weight per length, for loads on "weight", or a text like "0.1 kg/m"; None: the section's.
     """
 
     joints: Annotated[Sequence[str], SEVERAL_NAMES]
@@ -174,7 +174,8 @@ class SpatialMember:
         if gyration > SLENDER * length:
             raise InputError(
                 f"`EI` and `EA` of member {self.name} must be those of a slender rod in one system "
-                f"of units; got a radius of gyration of {gyration:.3g} and a length of {length:.3g}."
+                f"of units; got a radius of gyration of {gyration:.3g} and a length of "
+                f"{length:.3g}."
             )
         return length
 

@@ -171,9 +171,7 @@ class SpatialFrameModel:
         for k, end in enumerate(self.network.ends[:, 1].tolist()):
             loads[:, end] += lines[:, k] * self.lengths[k]
         around, carried = self._circulating, self.statics.carrying_forces(loads)
-        none = SpaceFlows(
-            np.zeros((1, self.pieces, 3)), np.zeros((1, len(self.network.joints), 3))
-        )
+        none = SpaceFlows(np.zeros((1, self.pieces, 3)), np.zeros((1, len(self.network.joints), 3)))
         parts = zip(around, carried, none, strict=True)
         members, supports = (np.concatenate(each) for each in parts)
         return SpaceFlows(members, supports)
@@ -228,7 +226,7 @@ class SpatialFrameModel:
         bends = [float(member.curvature) * self.length for member in self.network.members]
         turn = np.array(bends)[self.network.owner][self.owner][:, None] * middle
         about = matrices(exponential(turn[..., None] * np.array([0.0, 0.0, 1.0])))
-        return np.einsum("eab,eibc->eiac", self.network.axes[self.owner], about)
+        return np.asarray(np.einsum("eab,eibc->eiac", self.network.axes[self.owner], about))
 
     @cached_property
     def tangents(self) -> Float[np.ndarray, "elements order 3"]:
@@ -244,7 +242,7 @@ class SpatialFrameModel:
     @cached_property
     def stiff(self) -> Float[np.ndarray, "elements order 3 3"]:
         """S: stiffness on fixed axes."""
-        return np.einsum("eiak,eibk->eiab", self.moment_of_strain, self.drawn)
+        return np.asarray(np.einsum("eiak,eibk->eiab", self.moment_of_strain, self.drawn))
 
     @cached_property
     def moment_of_strain(self) -> Float[np.ndarray, "elements order 3 3"]:
@@ -256,7 +254,7 @@ class SpatialFrameModel:
         """c: strain by unit tension."""
         unit = self.bending / self.length**2
         made = [0.0 if each.EA is None else unit / each.EA for each in self.network.made]
-        return np.array(made)[self.network.owner]
+        return np.asarray(np.array(made)[self.network.owner])
 
     # --- what scalars do ------------------------------------------------------------------------
 

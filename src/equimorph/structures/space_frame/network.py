@@ -72,7 +72,7 @@ class SpatialNetwork(Network):
     whole: ClassVar[str] = "frames"
 
     @cached_property
-    def edge_names(self) -> list[str]:  # type: ignore[override]
+    def edge_names(self) -> list[str]:
         """Names of the pieces: the joints at their starts and ends, joined."""
         return ["-".join(self.joints[end] for end in pair) for pair in self.ends.tolist()]
 

@@ -130,7 +130,8 @@ def _fill_actuator(
 
 def _three(value: float | Sequence[float], what: str) -> Float[np.ndarray, "3"]:
     """Three numbers, not all 0."""
-    found = np.array(vector([value] if is_number(value) else value, [3], what))  # type: ignore[list-item,arg-type]
+    given = value if isinstance(value, Sequence | np.ndarray) else [float(value)]
+    found = np.array(vector(list(given), [3], what), dtype=float)
     if not found.any():
         raise InputError(f"`{what}` must not be zero; got {value!r}.")
     return found
@@ -141,7 +142,7 @@ def _fill_length(
 ) -> None:
     if not (is_number(value) and value):
         raise InputError(f"`{what}` must be a finite number other than 0; got {value!r}.")
-    pieces = [at for at, _ in made.pieces_of(what.split(".")[-1])]
+    pieces = [at for at, _ in made.pieces_of(what.rsplit(".", maxsplit=1)[-1])]
     lengths = made.drawn_lengths[pieces]
     into.length[k, pieces] += float(value) * lengths / lengths.sum()  # type: ignore[arg-type]
 

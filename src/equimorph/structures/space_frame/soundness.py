@@ -20,6 +20,8 @@ from equimorph.tolerances import SINGULAR
 
 SWEEPS = 4
 """Inverse iterations by which the smallest eigenvalue is estimated."""
+NAMED = 6
+"""Members that a message names."""
 MOVING = 1e-6
 """Displacement in a mechanism that counts as one, where members turn by 1e-3."""
 
@@ -49,12 +51,9 @@ class GrowingFrame(SpatialFrameMechanics):
         """Take the initial strains of a frame as one more pattern."""
         given, strains = model.patterns, model.strains[None, :, -1]
         initial = model.elongation[None, :, -1] * model.lengths
+        none = {name: np.zeros((1, *each.shape[1:])) for name, each in vars(given).items()}
         last = SpatialPatterns(
-            *(np.zeros((1, *each.shape[1:])) for each in (given.forces, given.lines)),
-            strains,
-            initial,
-            *(np.zeros((1, *each.shape[1:])) for each in (given.moves, given.turns)),
-            np.zeros(1, bool),
+            **{**none, "strains": strains, "length": initial, "factors": np.zeros(1, bool)}
         )
         pairs = zip(vars(given).values(), vars(last).values(), strict=True)
         both = SpatialPatterns(*(np.concatenate(pair) for pair in pairs))
@@ -148,10 +147,16 @@ def _refuse_mechanism(frame: SpatialFrameFields, turns: Float[np.ndarray, " rows
     )
 
 
-def _refuse_stress(frame: SpatialFrameFields, forces: Float[np.ndarray, " multipliers"]) -> NoReturn:
+def _refuse_stress(
+    frame: SpatialFrameFields, forces: Float[np.ndarray, " multipliers"]
+) -> NoReturn:
     made, count = frame.model.network, frame.constraints
-    size = np.linalg.norm(np.einsum("s,ska->ka", forces, frame.model.forces.members[:count]), axis=1)
+    size = np.linalg.norm(
+        np.einsum("s,ska->ka", forces, frame.model.forces.members[:count]), axis=1
+    )
     names = [made.edge_names[k] for k in np.flatnonzero(size > 0.1 * size.max())]
+    if len(names) > NAMED:
+        names = [*names[:NAMED], f"{len(names) - NAMED} more"]
     raise InputError(
         f"`supports` must not stretch or squeeze inextensible members; got {', '.join(names)} held "
         "at a length that they have already. Give one of them EA, or release a support."

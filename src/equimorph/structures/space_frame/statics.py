@@ -106,8 +106,8 @@ class SpaceStatics:
         for axis, graph in enumerate(self._graphs):
             found = graph.carrying_forces(np.ascontiguousarray(loads[:, :, axis]))
             parts.append(_along(axis, found.members, found.supports))
-        members = sum(part.members for part in parts)
-        supports = sum(part.supports for part in parts)
+        members = np.sum([part.members for part in parts], axis=0)
+        supports = np.sum([part.supports for part in parts], axis=0)
         for k, one in self._reduced[1]:
             j, direction = self._slides[k]
             forces = (supports[:, j] @ direction)[:, None, None]

@@ -19,7 +19,7 @@ class Tables:
     """Sparsity of F_z in rotations, and what the kernel adds to which of its entries.
 
     Rows are three for each free node, one for each hinge, and the multipliers. Members are
-    condensed onto the joints first, then the multipliers are eliminated, then the joints.
+    condensed onto the joints first; joints and multipliers follow by minimum degree.
     """
 
     model: SpatialFrameModel
@@ -46,7 +46,7 @@ class Tables:
     @cached_property
     def hinges_of(self) -> Int[np.ndarray, "elements 2"]:
         """Hinges of both ends of each element, or −1."""
-        return self.hinge_of[self.model.nodes[:, [0, -1]]]
+        return np.asarray(self.hinge_of[self.model.nodes[:, [0, -1]]])
 
     @cached_property
     def dofs(self) -> Int[np.ndarray, "elements coordinates"]:
@@ -72,7 +72,7 @@ class Tables:
         most = max(int(acting.ties.max(initial=0)), 1)
         some = np.arange(acting.numbers.shape[1]) < acting.ties[:, None]
         rows = np.where(some, self.count + acting.numbers, NONE)[:, :most]
-        return rows[self.model.owner]
+        return np.asarray(rows[self.model.owner])
 
     @cached_property
     def _corner_pairs(self) -> Int[np.ndarray, "pairs 2"]:
@@ -120,26 +120,32 @@ class Tables:
 
     @cached_property
     def ranks(self) -> Int[np.ndarray, " size"]:
-        """Turn of each row in the elimination.
+        """Turn of each row in the elimination: inner nodes of the pieces, then joints and forces.
 
-        What holds a member from turning freely waits: the joints, the angles of hinges, and the
-        start of a member that has ball joints only.
+        Without forces, what members join rigidly turns freely as a whole, unless a support holds
+        it: one body or one angle of each such part waits until the end.
         """
-        model, bodies = self.model, self.model.network.bodies
-        late = np.zeros(len(model.turning), bool)
-        late[: len(bodies)] = True
-        ends, owner = model.network.body_of_end, model.network.owner
-        balls = np.ones(len(bodies), bool)
-        balls[model.network.body_of_joint[model.network.body_of_joint >= 0]] = False
-        balls[model.hinged] = False
-        for m in range(len(model.network.members)):
-            mine = ends[owner == m].ravel()
-            some = np.unique(mine[balls[mine]])
-            keep = 1 if balls[mine].all() else 0
-            late[some[keep:]] = False
-        nodes = np.where(late[model.free], 2, 0)
-        angles = np.full(len(model.hinged), 2)
+        model = self.model
+        bodies = np.arange(len(model.turning)) < len(model.network.bodies)
+        nodes, angles = np.where(bodies[model.free], 1, 0), np.ones(len(model.hinged), int)
+        for part in self._rigid_parts:
+            turning = model.turning[part]
+            if (turning == Turning.HELD).any():
+                continue
+            free = part[turning == Turning.FREE]
+            if len(free):
+                nodes[model.place[free[0]]] = 2
+            else:
+                angles[self.hinge_of[part[0]]] = 2
         return np.concatenate([np.repeat(nodes, 3), angles, np.ones(model.multipliers, int)])
+
+    @property
+    def _rigid_parts(self) -> list[Int[np.ndarray, " bodies"]]:
+        """Bodies that members join, part by part; hinges join nothing."""
+        part = np.arange(len(self.model.network.bodies))
+        for a, b in self.model.network.body_of_end.tolist():
+            part[part == part[b]] = part[a]
+        return [np.flatnonzero(part == each) for each in np.unique(part)]
 
     @cached_property
     def node_slots(self) -> Int[np.ndarray, "free 6"]:
