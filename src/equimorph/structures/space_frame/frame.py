@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -40,6 +40,15 @@ SUPPORTS = (
 )
 WALKED = 17
 """Places along a piece of a member where it is drawn."""
+
+
+class Stretch(NamedTuple):
+    """Points of a walk on one piece: which, the piece, whether from its start, shares of it."""
+
+    points: np.ndarray
+    piece: int
+    forward: bool
+    shares: np.ndarray
 
 
 class SpatialFrame(SpatialFrameFields):
@@ -190,10 +199,8 @@ class SpatialFrame(SpatialFrameFields):
 
     # --- pictures -------------------------------------------------------------------------------
 
-    def _walk(
-        self, s: Float[np.ndarray, " points"] | None
-    ) -> list[tuple[Float[np.ndarray, " points"], int, bool, Float[np.ndarray, " some"]]]:
-        """Points of a walk over all pieces, piece by piece: which, piece, forward, shares."""
+    def _walk(self, s: Float[np.ndarray, " points"] | None) -> list[Stretch]:
+        """Walk over all pieces, piece by piece."""
         made = self.model.network
         walk = made.walk
         place = np.linspace(0.0, 1.0, (len(walk) - 1) * (WALKED - 1) + 1) if s is None else s
@@ -206,7 +213,7 @@ class SpatialFrame(SpatialFrameFields):
             piece = number[frozenset(walk[k : k + 2].tolist())]
             forward = bool(made.ends[piece, 0] == walk[k])
             share = place[here] - k
-            found.append((here, piece, forward, share if forward else 1.0 - share))
+            found.append(Stretch(here, piece, forward, share if forward else 1.0 - share))
         return found
 
     def shape(
@@ -217,13 +224,11 @@ class SpatialFrame(SpatialFrameFields):
         `s` runs from 0 to 1 along it; all pieces get equal lengths.
         """
         parts = self._walk(s)
-        out = np.empty((len(z), sum(len(here) for here, *_ in parts), 3))
-        shares, at = np.unique(np.concatenate([each[3] for each in parts]), return_inverse=True)
-        whole = self.outline(z, p, shares)
-        for here, piece, _, share in parts:
-            del share
-            out[:, here] = whole[:, piece, at[: len(here)]]
-            at = at[len(here) :]
+        shares, at = np.unique(np.concatenate([each.shares for each in parts]), return_inverse=True)
+        out, whole = np.empty((len(z), len(at), 3)), self.outline(z, p, shares)
+        for points, piece, _, _ in parts:
+            out[:, points] = whole[:, piece, at[: len(points)]]
+            at = at[len(points) :]
         return np.asarray(out * self.model.length)
 
     def frames(
@@ -231,13 +236,12 @@ class SpatialFrame(SpatialFrameFields):
     ) -> Float[np.ndarray, "lanes points 3 3"]:
         """Cross-sections along the walk of `shape`: the columns are t, n, b; t points ahead."""
         parts = self._walk(s)
-        out = np.empty((len(z), sum(len(here) for here, *_ in parts), 3, 3))
-        shares, at = np.unique(np.concatenate([each[3] for each in parts]), return_inverse=True)
-        whole = self.axes_along(z, p, shares)
-        for here, piece, forward, _ in parts:
+        shares, at = np.unique(np.concatenate([each.shares for each in parts]), return_inverse=True)
+        out, whole = np.empty((len(z), len(at), 3, 3)), self.axes_along(z, p, shares)
+        for points, piece, forward, _ in parts:
             signs = np.ones(3) if forward else np.array([-1.0, 1.0, -1.0])
-            out[:, here] = whole[:, piece, at[: len(here)]] * signs
-            at = at[len(here) :]
+            out[:, points] = whole[:, piece, at[: len(points)]] * signs
+            at = at[len(points) :]
         return out
 
     @property

@@ -39,7 +39,7 @@ class SpaceStatics:
 
     joints: Sequence[str]
     ends: Int[np.ndarray, "members 2"]
-    held: Sequence[Float[np.ndarray, "held 3"]]
+    held: Sequence[Float[np.ndarray, "_ 3"]]
 
     @cached_property
     def _graphs(self) -> list[Graph]:
