@@ -1,5 +1,7 @@
 """Commands as a user meets them: exit codes, one line for bad input, nothing overwritten."""
 
+import json
+import math
 import os
 import re
 import resource
@@ -139,10 +141,104 @@ def test_a_run_shows_its_answers_and_names_its_page(shell: Shell):
     assert "Equilibrium set read from an earlier run" in shell.out
 
 
-def test_a_refused_route_is_a_successful_run(known: Shell):
+def test_a_refused_route_is_an_answer_with_exit_code_3(known: Shell):
     Path("spring.toml").write_text(SPRING + "margin = 50.0\n")
-    assert known("run", "spring.toml", "--out", "out") == 0
-    assert "Route over: refused" in known.out
+    assert known("run", "spring.toml", "--out", "out") == 3
+    assert "Route over: refused. " in known.out
+    assert known("run", "spring.toml", "--out", "out", "--allow-refused") == 0
+    assert "Route over: refused. " in known.out
+    assert Path("out/index.html").is_file()
+
+
+def test_answers_as_data(known: Shell):
+    """(0.8, 0) of the spring: cos δ = 0.8, PHYSICS section 2. stdout is one line of JSON."""
+    Path("spring.toml").write_text(SPRING)
+    assert known("run", "spring.toml", "--out", "out", "--json", "--quiet") == 0
+    assert known.err == ""
+    assert known.out.count("\n") == 1
+    told = json.loads(known.out)
+    assert told["study"] == "spring.toml"
+    assert Path(told["report"]).is_file()
+    assert told["set"]["clean"] is True
+    (point,) = told["equilibria"]
+    assert point["at"] == {"x_l": 0.8, "F": 0.0}
+    upper = max(point["states"], key=lambda state: state["angle"])
+    assert upper["angle"] == pytest.approx(math.acos(0.8), rel=1e-9)
+    (route,) = told["answers"]
+    assert (route["table"], route["name"], route["refused"]) == ("route", "over", False)
+    assert route["values"][0]["status"] == "arrived"
+    assert route["values"][0]["margin"] > 0.0
+
+
+def test_a_refusal_as_data_tells_why(known: Shell):
+    Path("spring.toml").write_text(SPRING + "margin = 50.0\n")
+    assert known("run", "spring.toml", "--out", "out", "--json") == 3
+    (route,) = json.loads(known.out)["answers"]
+    assert route["refused"]
+    assert route["why"]
+    assert route["line"] == f"Route over: refused. {route['why']}"
+
+
+def test_a_wrong_study_as_data_lists_its_mistakes(shell: Shell):
+    Path("wrong.toml").write_text(SPRING.replace("intervals", "intervalls"))
+    for command in ("run", "check"):
+        assert shell(command, "wrong.toml", "--json") == 2
+        (mistake,) = json.loads(shell.out)["errors"]
+        assert "`set.intervalls`" in mistake
+        assert _says_one_line(shell, "`set.intervalls`")
+
+
+def test_a_quiet_run_says_nothing(known: Shell):
+    Path("spring.toml").write_text(SPRING)
+    assert known("run", "spring.toml", "--out", "out", "--quiet") == 0
+    assert (known.out, known.err) == ("", "")
+
+
+def test_a_verbose_run_logs_its_stages(known: Shell):
+    Path("spring.toml").write_text(SPRING)
+    assert known("run", "spring.toml", "--out", "out", "--verbose") == 0
+    assert "equimorph.study.run: equilibrium set: done in " in known.err
+    assert "read from an earlier run" in known.err
+    assert "Route over: arrived" in known.out
+    assert known("run", "spring.toml", "--out", "out", "--quiet") == 0
+    assert known.err == ""
+
+
+def test_several_studies_have_the_worst_exit_code(shell: Shell, finished: tuple[Outcome, Path]):
+    Path("a.toml").write_text(SPRING)
+    Path("b.toml").write_text(SPRING + "margin = 50.0\n")
+    Path("wrong.toml").write_text(SPRING.replace("intervals", "intervalls"))
+    for name in ("a", "b"):
+        with_answers_of(finished[1], Path("results") / name)
+    assert shell("run", "a.toml", "b.toml", "--json", "--quiet") == 3
+    lines = [json.loads(line) for line in shell.out.splitlines()]
+    assert [line["study"] for line in lines] == ["a.toml", "b.toml"]
+    assert shell("run", "wrong.toml", "a.toml", "--quiet") == 2
+    assert _says_one_line(shell, "`set.intervalls`")
+    assert shell("check", "a.toml", "b.toml") == 0
+    assert shell.out.count("is valid") == 2
+
+
+def test_studies_of_one_name_would_share_a_folder(shell: Shell):
+    assert shell("run", "a/x.toml", "b/x.toml") == 2
+    assert _says_one_line(shell, "must have different names; got x twice")
+
+
+def test_a_check_lists_every_mistake(shell: Shell):
+    """Wrong keys in one table, wrong names in others, numbered as in the file."""
+    wrong = SPRING.replace("intervals", "intervalls").replace("x_l = 0.8, F = 0.0 }", "F = 9.0 }")
+    sound = SPRING + 'margn = 1.0\n\n[[optimum]]\nname = "best"\nobjective = "angel"\n'
+    Path("set.toml").write_text(wrong)
+    Path("tasks.toml").write_text(sound + 'within = ["high <= 1"]\n')
+    assert shell("check", "set.toml") == 2
+    assert _says_one_line(shell, "`set.intervalls`")
+    assert shell("check", "tasks.toml") == 2
+    lines = shell.err.splitlines()
+    assert ["`route[0].margn`" in lines[0], "optimum[0].objective" in lines[1]] == [True, True]
+    assert "optimum[0].within[0]" in lines[2]
+    assert len(lines) == 3
+    assert shell("run", "tasks.toml") == 2
+    assert _says_one_line(shell, "(2 more after this.)")
 
 
 # What is changed in the study, and a part of the one line.
@@ -305,10 +401,11 @@ def test_a_message_is_fit_for_a_terminal(shell: Shell):
 
 
 USAGE = {
-    "run": "Missing argument 'file'. See equimorph run --help.",
+    "run": "Missing argument 'FILE...'. See equimorph run --help.",
     "run x.toml --ouput y": "No such option: --ouput",
     "run x.toml --out": "Option '--out' requires an argument. See equimorph",
-    "run x.toml y.toml": "extra argument",
+    "new x.toml y.toml": "extra argument",
+    "run x.toml --quiet --verbose": "one of --quiet and --verbose",
     "rnu x.toml": "No such command 'rnu'. Did you mean 'run'?",
     "new x.toml --kind cantilever": "'cantilever' is not one of 'arch', 'arm', 'beam'",
     "--sideways": "No such option: --sideways",

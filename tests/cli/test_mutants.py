@@ -107,7 +107,7 @@ def test_a_plausible_study_is_run_or_gets_one_line(content: bytes, folder: Path)
         _run(folder / "study.toml", folder / "out")
 
 
-ENDS = {0: "run", 2: "refused while running", 130: "still running when it was ended"}
+ENDS = {0: "run", 3: "question refused", 2: "refused", 130: "still running at its end"}
 
 
 def _run(file: Path, out: Path) -> None:

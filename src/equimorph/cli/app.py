@@ -3,10 +3,13 @@
 Everything heavy is imported inside the command that needs it, so that ``--help`` answers at once.
 """
 
+import json
 import logging
 import sys
 import warnings
+from collections.abc import Callable, Iterable
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,10 +20,13 @@ from equimorph.errors import InputError
 PROGRAM = "equimorph"
 BAD_INPUT = 2
 """Exit code of a command with wrong input; Python itself uses 1 for a crash."""
+REFUSED = 3
+"""Exit code of a run in which a question was refused."""
 LONGEST_LINE = 450
 """Characters of an error message on the command line, beyond which it is cut."""
 INTERRUPTED = 130
 """What shells say of a program that was ended by Ctrl-C."""
+OUT_OF_MEMORY = "the computation must fit into memory; reduce `set.intervals` or `set.box`."
 LIBRARIES = ("matplotlib", "numba", "PIL", "h5py")
 """Names of the loggers of libraries."""
 WrongUsage: Any = typer.BadParameter.__base__
@@ -83,7 +89,7 @@ def main() -> None:
         _complain("interrupted.")
         sys.exit(INTERRUPTED)
     except MemoryError:
-        _complain("the computation must fit into memory; reduce `set.intervals` or `set.box`.")
+        _complain(OUT_OF_MEMORY)
         sys.exit(BAD_INPUT)
     sys.exit((code or 0) if words else BAD_INPUT)
 
@@ -134,34 +140,109 @@ def new(
     typer.echo(f"Wrote {file}. Next: equimorph run {file}")
 
 
+Files = Annotated[list[Path], typer.Argument(help="Study files.", metavar="FILE...")]
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Write one JSON object per study on stdout, one a line.")
+]
+
+
 @app.command()
-def check(file: Annotated[Path, typer.Argument(help="Study file.")]) -> None:
-    """Check a study file without computing anything."""
+def check(files: Files, as_json: AsJson = False) -> None:
+    """Check study files without computing anything; every mistake gets a line."""
     from equimorph.cli.check import check_and_show
 
-    check_and_show(file)
+    codes = []
+    for file in files:
+        command = partial(check_and_show, file, as_json=as_json)
+        codes.append(_exit_code(command, file, as_json=as_json, all_mistakes=True))
+    raise typer.Exit(_worst(codes))
 
 
 @app.command()
 def run(
-    file: Annotated[Path, typer.Argument(help="Study file.")],
+    files: Files,
     out: Annotated[
-        Path | None, typer.Option(help="Results folder; results/NAME unless given.")
+        Path | None,
+        typer.Option(
+            help="Results folder; results/NAME unless given. Of several studies: the folder in "
+            "which each gets one of its name."
+        ),
     ] = None,
     replace: Annotated[
         bool, typer.Option("--replace", help="Replace the results of another study there.")
     ] = False,
+    as_json: AsJson = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Show mistakes only; no answers, no progress.")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Log every stage with its time on stderr.")
+    ] = False,
+    allow_refused: Annotated[
+        bool, typer.Option("--allow-refused", help="Exit code 0 where questions are refused.")
+    ] = False,
 ) -> None:
-    """Run a study: equilibrium set, equilibria, routes, figures, schedules, report."""
-    out = out or Path("results") / file.stem
+    """Run studies: equilibrium set, equilibria, routes, figures, schedules, report.
+
+    The exit code is 0 if every question was answered, 3 if one was refused, 2 if an input is wrong;
+    of several studies the worst.
+    """
+    if quiet and verbose:
+        raise typer.BadParameter("give one of --quiet and --verbose.")
+    options = {"replace": replace, "as_json": as_json, "quiet": quiet, "verbose": verbose}
+    codes = []
+    for file, folder in _folders(files, out):
+        command = partial(_run_one, file, folder, **options)
+        codes.append(_exit_code(command, file, as_json=as_json))
+    raise typer.Exit(_worst(0 if allow_refused and code == REFUSED else code for code in codes))
+
+
+def _folders(files: list[Path], out: Path | None) -> list[tuple[Path, Path]]:
+    """Pair each study with its results folder."""
+    names = [file.stem for file in files]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(f"`study files` must have different names; got {twice[0]} twice.")
+    if out is not None and len(files) == 1:
+        return [(files[0], out)]
+    return [(file, (out or Path("results")) / file.stem) for file in files]
+
+
+def _run_one(file: Path, out: Path, *, replace: bool, **shown: bool) -> int:
+    """Run one study; return its exit code."""
     try:
+        from equimorph.cli.output import Output
         from equimorph.cli.run import run_and_show
 
-        run_and_show(file, out, replace=replace)
+        return REFUSED if run_and_show(file, out, Output(**shown), replace=replace) else 0
     except KeyboardInterrupt as stop:
         kept = str(stop) or f"what is finished is kept in {out}"
         typer.echo(f"equimorph: interrupted; {kept}. Run again to go on.", err=True)
         raise typer.Exit(INTERRUPTED) from None
+
+
+def _exit_code(
+    command: Callable[[], int], file: Path, *, as_json: bool, all_mistakes: bool = False
+) -> int:
+    """Run a command on one study; a wrong one gets a line, or all its lines, and exit code 2."""
+    try:
+        return command()
+    except InputError as error:
+        mistakes = tuple(getattr(error, "lines", ())) or (str(error),)
+        lines = mistakes if all_mistakes else (str(error),)
+    except MemoryError:
+        mistakes = lines = (OUT_OF_MEMORY,)
+    if as_json:
+        typer.echo(json.dumps({"study": str(file), "errors": mistakes}))
+    for line in lines:
+        _complain(line)
+    return BAD_INPUT
+
+
+def _worst(codes: Iterable[int]) -> int:
+    """Return the exit code of several studies: wrong input, then refusals, then success."""
+    found = set(codes)
+    return next((code for code in (BAD_INPUT, REFUSED) if code in found), 0)
 
 
 @app.command()

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from rich.console import Console
 from rich.markup import escape
 
+from equimorph.cli.output import Output
 from equimorph.model import names_of
 from equimorph.structures import Structure
 from equimorph.study import Problem, read_problem
@@ -14,23 +14,37 @@ from equimorph.study.question import Question
 from equimorph.tasks import unloaded_base
 
 
-def check_and_show(file: Path) -> None:
-    """Check a study, then print what running it would compute.
+def check_and_show(file: Path, *, as_json: bool = False) -> int:
+    """Check a study, then show what running it would compute.
 
     Parameters
     ----------
     file
         Study file.
+    as_json
+        Whether to write data for programs instead of text.
+
+    Returns
+    -------
+    Exit code 0.
+
+    Raises
+    ------
+    StudyError
+        With a line for each mistake of the study.
     """
-    screen = Console(highlight=False)
+    output = Output(as_json=as_json)
     _, study, problem = read_problem(file)
     counts = {"point": len(study.equilibria)}
     counts |= {table: len(sections) for table, sections in study.tasks.items()}
     asked = [_count(number, word) for word, number in counts.items() if number]
     what = " and ".join(filter(None, [", ".join(asked[:-1]), *asked[-1:]])) or "an equilibrium set"
-    screen.print(f"{escape(str(file))} is valid: it asks for {what}.", soft_wrap=True)
-    for line in _extents(problem):
-        screen.print(line, soft_wrap=True)
+    output.show(f"{escape(str(file))} is valid: it asks for {what}.")
+    lines = _extents(problem)
+    for line in lines:
+        output.show(line)
+    output.write_data({"study": str(file), "errors": [], "asks": counts, "computes": lines})
+    return 0
 
 
 def _extents(problem: Problem) -> list[str]:

@@ -13,6 +13,23 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from equimorph.logs import log_of
+
+LOG = log_of(__name__)
+
+
+class LoggedProgress:
+    """Progress sink that logs each stage when it begins."""
+
+    def __init__(self) -> None:
+        self._current: str | None = None
+
+    def report(self, stage: str, done: int, total: int | None) -> None:
+        """Log a stage that another one did not precede."""
+        if stage != self._current:
+            self._current = stage
+            LOG.info("%s: %d of %s", stage, done, "unknown" if total is None else total)
+
 
 class ScreenProgress:
     """Progress sink that draws one bar per stage on stderr while a ``with`` block lasts."""

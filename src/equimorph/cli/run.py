@@ -10,25 +10,25 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
-from equimorph.cli.progress import ScreenProgress
+from equimorph.cli.output import Output
 from equimorph.equilibria import find_equilibria, limit_load
 from equimorph.equilibria.step_kernels import proceed
 from equimorph.linalg.compiled import is_kept
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box, Constraint, Descriptor
 from equimorph.structures import Spring, States
-from equimorph.study import Outcome, Problem, read_problem, run_study
+from equimorph.study import Outcome, Problem, read_problem, run_study, summary
 
 COMPILED = "kernels that are compiled are kept; the study had not begun"
 """What is kept of a run that is interrupted while kernels are compiled."""
 _MARCH = f"from {__name__} import march; march()"
 
 
-def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
-    """Run a study with progress on stderr, then print its answers.
+def run_and_show(file: Path, out: Path, output: Output, *, replace: bool) -> bool:
+    """Run a study with progress on stderr, then show its answers.
 
     Parameters
     ----------
@@ -36,33 +36,42 @@ def run_and_show(file: Path, out: Path, *, replace: bool) -> None:
         Study file.
     out
         Results folder.
+    output
+        What to write, and where.
     replace
         Replace the results of another study there.
+
+    Returns
+    -------
+    Whether a question was refused.
     """
-    screen = Console(highlight=False)
     _, _, problem = read_problem(file)
     if not kernels_are_in_cache():
-        screen.print("The first run compiles the kernels: under a minute, and only once.")
+        output.show("The first run compiles the kernels: under a minute, and only once.")
         try:
             compile_kernels(problem)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(COMPILED) from None
-    with ScreenProgress() as progress:
+    with output.progress() as progress:
         outcome = run_study(file, out, replace=replace, progress=progress)
-    _show(outcome, screen)
-    screen.print(f"Report: {out / 'index.html'}", soft_wrap=True)
+    _show(outcome, output)
+    report = out / "index.html"
+    output.show(f"Report: {escape(str(report))}")
+    if output.as_json:
+        output.write_data({"study": str(file), "report": str(report), **summary(outcome)})
+    return bool(outcome.refused)
 
 
-def _show(outcome: Outcome, screen: Console) -> None:
+def _show(outcome: Outcome, output: Output) -> None:
     heights = outcome.problem.ground.height
     if outcome.equilibrium_set is not None:
-        screen.print(_set_line(outcome.equilibrium_set, reused=outcome.reused), soft_wrap=True)
+        output.show(_set_line(outcome.equilibrium_set, reused=outcome.reused))
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):
         where = ", ".join(f"{name} = {value:g}" for name, value in point.items())
-        screen.print(f"Equilibria at {where}:", soft_wrap=True)
-        screen.print(_table(heights, states))
+        output.show(f"Equilibria at {where}:")
+        output.show(_table(heights, states))
     for each in outcome.answers:
-        screen.print(each.question.kind.verdict(each.question, each.answer), soft_wrap=True)
+        output.show(each.line)
 
 
 def _set_line(eset: EquilibriumSet, *, reused: bool) -> str:

@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from equimorph.errors import InputError
+from equimorph.logs import log_of
 from equimorph.storage.files import checksum, fingerprint, move_whole
 from equimorph.storage.records import content_of, load_record
 from equimorph.structures import Structure
 from equimorph.study.folder import ResultsFolder, writable
 
+LOG = log_of(__name__)
 Answer = TypeVar("Answer")
 
 
@@ -63,6 +65,7 @@ class Checkpoints:
             found = self._load(file)
             if found is not None:
                 self.found.add(key)
+                LOG.info("answer %s read from an earlier run", file.name)
                 (kept,) = found
                 return cast(Answer, kept)
             file.unlink()

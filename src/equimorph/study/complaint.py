@@ -7,7 +7,8 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from equimorph.errors import InputError, suggestion
+from equimorph.errors import suggestion
+from equimorph.study.findings import StudyError
 
 LONGEST = 60
 """Characters of a key or value in a message."""
@@ -35,8 +36,8 @@ _REQUIREMENTS = {
 }
 
 
-def complaint(error: ValidationError, model: type[BaseModel], file: str) -> InputError:
-    """Describe the first error of a study file in one line, with the number of further errors.
+def complaint(error: ValidationError, model: type[BaseModel], file: str) -> StudyError:
+    """Describe each error of a study file in one line.
 
     Parameters
     ----------
@@ -45,14 +46,12 @@ def complaint(error: ValidationError, model: type[BaseModel], file: str) -> Inpu
     model
         The model of the whole file, which knows the allowed keys.
     file
-        Name of the file, to begin the line with.
+        Name of the file, to begin the lines with.
     """
     findings = error.errors(include_url=False)
-    # A misspelt key is also a missing one: name the misspelling.
-    first = min(findings, key=lambda finding: finding["type"] != "extra_forbidden")
-    line = _sentence(first, model)
-    more = f" ({len(findings) - 1} more after this.)" if len(findings) > 1 else ""
-    return InputError(f"{file}: {line}{more}")
+    # A misspelt key is also a missing one: name the misspelling first.
+    findings.sort(key=lambda finding: finding["type"] != "extra_forbidden")
+    return StudyError([f"{file}: {_sentence(finding, model)}" for finding in findings])
 
 
 def short(value: object) -> str:

@@ -11,6 +11,7 @@ from equimorph.manifold import INTERVALS, equilibrium_set
 from equimorph.model import Box, Constraint, parameter_vector
 from equimorph.structures import Structure
 from equimorph.study.fields import ComparisonText, Count, Interval, Point, Section, requirement
+from equimorph.study.findings import Findings
 from equimorph.study.lookup import Extent, at_key, check_value, constraints_of
 from equimorph.study.signatures import arguments_of
 
@@ -59,12 +60,17 @@ def extent_of_set(structure: Structure, wanted: Any) -> Extent:
     InputError
         For names that the structure does not have, or values without meaning.
     """
+    findings, constraints = Findings(), tuple[Constraint, ...]()
     with at_key("set.box"):
         box = Box(**{name: (bounds[0], bounds[1]) for name, bounds in wanted.box.items()})
-        for name, corner in zip(box.names * 2, [*box.lower, *box.upper], strict=True):
+    for name, corner in zip(box.names * 2, [*box.lower, *box.upper], strict=True):
+        with findings.collected(), at_key("set.box"):
             check_value(structure, name, corner)
-    _check_fixed(structure, box, wanted.fixed)
-    constraints = _bounds(structure, wanted.within)
+    with findings.collected():
+        _check_fixed(structure, box, wanted.fixed)
+    with findings.collected():
+        constraints = _bounds(structure, wanted.within)
+    findings.refuse()
     options = {each.name: getattr(wanted, each.key) for each in OPTIONS}
     return Extent(box, wanted.fixed, constraints, _intervals(wanted), options)
 

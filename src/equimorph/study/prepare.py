@@ -1,12 +1,13 @@
 """From a study file to the objects of the library; errors name the key."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study.extent import extent_of_set
+from equimorph.study.findings import Findings
 from equimorph.study.kinds import KINDS
 from equimorph.study.lookup import Extent, Ground, at_key, check_point
 from equimorph.study.problem import Study
@@ -48,6 +49,16 @@ class Answered:
         """Name in the study file; files of the answer begin with it."""
         return self.question.name
 
+    @property
+    def refusal(self) -> str:
+        """Why the question was refused; empty if it was answered."""
+        return self.question.kind.refusal(self.question, self.answer)
+
+    @property
+    def line(self) -> str:
+        """Verdict or refusal as one line for the screen, in rich's markup."""
+        return self.question.kind.line(self.question, self.answer)
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -77,38 +88,56 @@ class Outcome:
     reused: bool
     seconds: dict[str, float]
 
+    @property
+    def refused(self) -> tuple[Answered, ...]:
+        """Questions that were refused, with the reasons in their answers."""
+        return tuple(each for each in self.answers if each.refusal)
+
     def of(self, table: str) -> dict[str, Any]:
         """Answers to the questions of one kind, by name: ``outcome.of("route")``."""
         mine = (each for each in self.answers if each.question.kind.table == table)
         return {each.name: each.answer for each in mine}
 
 
-def prepare(study: Study) -> Problem:
+def prepare(study: Study, places: Mapping[str, Sequence[int]] | None = None) -> Problem:
     """Build the structure of a study and look up all its names.
 
     Parameters
     ----------
     study
         A study whose keys and types are right.
+    places
+        Numbers by which messages name the entries of lists of tables; 0, 1, ... by default.
 
     Raises
     ------
-    InputError
-        For a parameter or descriptor that the structure does not have, a value without meaning, or
-        a point outside the box; the line names the key.
+    StudyError
+        For parameters or descriptors that the structure does not have, values without meaning, and
+        points outside the box; a line for each names the key.
     """
     with at_key("structure"):
         structure = build_structure(study.structure)
     section = study.equilibrium_set
     ground = Ground(structure, None if section is None else extent_of_set(structure, section))
-    for i, point in enumerate(study.equilibria):
-        check_point(ground.box, point.at, f"equilibria[{i}].at")
-    questions = tuple(
-        kind.look_up(ground, section, f"{kind.table}[{i}]")
-        for kind in KINDS
-        for i, section in enumerate(study.tasks[kind.table])
-    )
-    return Problem(ground, tuple(point.at for point in study.equilibria), questions)
+    findings = Findings()
+    for key, point in _numbered("equilibria", study.equilibria, places):
+        with findings.collected():
+            check_point(ground.box, point.at, f"{key}.at")
+    questions = []
+    for kind in KINDS:
+        for key, section in _numbered(kind.table, study.tasks[kind.table], places):
+            with findings.collected():
+                questions.append(kind.look_up(ground, section, key))
+    findings.refuse()
+    return Problem(ground, tuple(point.at for point in study.equilibria), tuple(questions))
+
+
+def _numbered(
+    table: str, sections: Sequence[Any], places: Mapping[str, Sequence[int]] | None
+) -> list[tuple[str, Any]]:
+    """Pair entries of a list of tables with their keys for messages."""
+    numbers = (places or {}).get(table, range(len(sections)))
+    return [(f"{table}[{i}]", each) for i, each in zip(numbers, sections, strict=True)]
 
 
 def build_structure(section: StructureSection) -> Structure:

@@ -7,6 +7,8 @@ both. Types are strict and unknown keys are refused.
 
 import re
 import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -128,13 +130,70 @@ def parse_study(text: str, name: str, folder: Path | None = None) -> Study:
     Raises
     ------
     InputError
-        If `text` is no TOML or holds a key or value that is not allowed.
+        If `text` is no TOML or holds keys or values that are not allowed.
     """
     content = parse_toml(text, name)
     try:
-        return STUDY.model_validate(content, context={FOLDER: folder or Path()})
+        return _validate(content, folder)
     except ValidationError as error:
         raise complaint(error, STUDY, name) from error
+
+
+@dataclass(frozen=True)
+class SoundPart:
+    """The tables of a wrong study that are right by themselves.
+
+    Parameters
+    ----------
+    study
+        Made of these tables.
+    places
+        Numbers of its entries in the lists of the file, by the names of the lists.
+    """
+
+    study: Study
+    places: Mapping[str, Sequence[int]]
+
+
+def sound_part(text: str, error: ValidationError, folder: Path | None = None) -> SoundPart | None:
+    """Return what remains of a study without the tables in which mistakes were found.
+
+    Parameters
+    ----------
+    text
+        Content of the file, which is TOML.
+    error
+        What pydantic found.
+    folder
+        Where files lie that the study names.
+
+    Returns
+    -------
+    None if the structure is wrong, or what remains is no study.
+    """
+    broken = {_table_of(finding["loc"]) for finding in error.errors(include_url=False)}
+    kept: dict[str, Any] = {}
+    places: dict[str, list[int]] = {}
+    for table, content in tomllib.loads(text).items():
+        if (table,) not in broken:
+            kept[table] = content
+            if isinstance(content, list):
+                places[table] = [i for i in range(len(content)) if (table, i) not in broken]
+                kept[table] = [content[i] for i in places[table]]
+    try:
+        return SoundPart(_validate(kept, folder), places)
+    except ValidationError:
+        return None
+
+
+def _table_of(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """Table of the file, or entry of a list of tables, in which a location lies."""
+    listed = len(location) > 1 and isinstance(location[1], int)
+    return location[: 2 if listed else 1]
+
+
+def _validate(content: Mapping[str, Any], folder: Path | None) -> Study:
+    return STUDY.model_validate(content, context={FOLDER: folder or Path()})
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawn
 from pydantic import create_model, model_validator
+from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
@@ -23,6 +24,7 @@ from equimorph.model import Constraint, Descriptor, Progress, Schedule
 from equimorph.structures import Structure
 from equimorph.study.arguments import Argument
 from equimorph.study.fields import TaskSection
+from equimorph.study.findings import Findings
 from equimorph.study.lookup import Extent, Ground, Later, at_key
 from equimorph.study.names import task_files
 from equimorph.study.signatures import arguments_of
@@ -203,7 +205,11 @@ class Kind(ABC, Generic[A]):
 
     def look_up(self, ground: Ground, section: Any, key: str) -> Question:
         """Look up all names of a section; `InputError` names the key of what does not fit."""
-        values = {each.name: each.look_up(ground, section, key) for each in self.arguments}
+        findings, values = Findings(), dict[str, Any]()
+        for each in self.arguments:
+            with findings.collected():
+                values[each.name] = each.look_up(ground, section, key)
+        findings.refuse()
         question = Question(self, key, section, ground, values)
         return replace(question, extra=self.look_up_more(question))
 
@@ -236,7 +242,19 @@ class Kind(ABC, Generic[A]):
 
     @abstractmethod
     def verdict(self, question: Question, answer: A) -> str:
-        """Return one line for the screen, in rich's markup."""
+        """Return one line for the screen on an answer that is not refused, in rich's markup."""
+
+    def refusal(self, question: Question, answer: A) -> str:
+        """Say why the question was refused; empty if it was answered."""
+        del question
+        return str(getattr(answer, "why", "")) if getattr(answer, "status", "") == "refused" else ""
+
+    def line(self, question: Question, answer: A) -> str:
+        """Return the verdict or the refusal as one line for the screen, in rich's markup."""
+        why = self.refusal(question, answer)
+        if not why:
+            return self.verdict(question, answer)
+        return f"{question.title}: [bold red]refused[/]. {plain(why)}"
 
 
 def still(name: str, draw: Callable[[], Drawing]) -> Figure:

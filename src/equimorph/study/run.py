@@ -1,29 +1,35 @@
 """Run a study: compute, store, draw, report."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from pydantic import ValidationError
+
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
+from equimorph.logs import log_of
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent
 from equimorph.storage import write_results
 from equimorph.storage.files import read_text
 from equimorph.structures import States
 from equimorph.study.checkpoints import Checkpoints
+from equimorph.study.findings import StudyError, lines_of
 from equimorph.study.folder import ResultsFolder, open_results_folder
 from equimorph.study.lookup import Extent, Ground, at_key
 from equimorph.study.memory import MemoryWatch, check_memory
 from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, route_name
 from equimorph.study.prepare import Answered, Outcome, Problem, prepare
-from equimorph.study.problem import Study, parse_study, read_study_text
+from equimorph.study.problem import Study, parse_study, read_study_text, sound_part
 from equimorph.study.question import Question
 from equimorph.study.report import draw_figures, report
 from equimorph.tasks import Route
+
+LOG = log_of(__name__)
 
 
 @check_arguments
@@ -83,16 +89,38 @@ def read_problem(path: Path) -> tuple[str, Study, Problem]:
     Raises
     ------
     InputError
-        If the study file is wrong or needs more memory than there is.
+        If the study file cannot be read or needs more memory than there is.
+    StudyError
+        If the study is wrong: with a line for every mistake.
     """
     text = read_study_text(path)
-    study = parse_study(text, path.name, path.parent)
     try:
-        problem = prepare(study)
+        study = parse_study(text, path.name, path.parent)
+    except StudyError as error:
+        raise StudyError([*error.lines, *_further_mistakes(text, path, error)]) from error
+    return text, study, _prepare(study, path.name)
+
+
+def _prepare(study: Study, name: str, places: Mapping[str, Sequence[int]] | None = None) -> Problem:
+    """Look up all names of a study that fits into memory; mistakes begin with the file."""
+    try:
+        problem = prepare(study, places)
         check_memory(problem)
     except InputError as error:
-        raise InputError(f"{path.name}: {error}") from error
-    return text, study, problem
+        raise StudyError([f"{name}: {line}" for line in lines_of(error)]) from error
+    return problem
+
+
+def _further_mistakes(text: str, path: Path, error: StudyError) -> Sequence[str]:
+    """Mistakes in those tables whose keys and types are right."""
+    assert isinstance(error.__cause__, ValidationError)
+    sound = sound_part(text, error.__cause__, path.parent)
+    try:
+        if sound is not None:
+            _prepare(sound.study, path.name, sound.places)
+    except StudyError as further:
+        return further.lines
+    return ()
 
 
 def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progress) -> Outcome:
@@ -210,6 +238,8 @@ def _write_results(outcome: Outcome, path: Path) -> None:
 
 @contextmanager
 def _measure_time(seconds: dict[str, float], stage: str) -> Generator[None]:
+    LOG.info("%s: begun", stage)
     start = perf_counter()
     yield
     seconds[stage] = perf_counter() - start
+    LOG.info("%s: done in %.2f s", stage, seconds[stage])

@@ -127,7 +127,7 @@ class CalibrationKind(Kind[Calibration]):
         files, data = question.files, question.section.data.file
         states = len(question.extra.measured.parameters)
         words = (
-            html.refusal_line(f"{answer.status}: {answer.why}.")
+            html.refusal_line(self.refusal(question, answer))
             if not answer.fitted
             else '<p class="verdict"><strong>Fitted</strong> to '
             f"{question.extra.measured.count} coordinates "
@@ -144,11 +144,14 @@ class CalibrationKind(Kind[Calibration]):
             f'<a href="{files}-points.csv">{files}-points.csv</a> (measured and fitted).</p>',
         ]
 
+    def refusal(self, question: Question, answer: Calibration) -> str:
+        """Reason why no fit exists."""
+        del question
+        return "" if answer.fitted else f"{answer.status}: {answer.why}."
+
     def verdict(self, question: Question, answer: Calibration) -> str:
-        """Values with their deviations, or the reason why no fit exists."""
+        """Values with their deviations."""
         head = f"{question.title}"
-        if not answer.fitted:
-            return f"{head}: [bold red]{answer.status}[/]. {plain(answer.why)}"
         triples = zip(answer.names, answer.values, answer.deviations, strict=True)
         values = ", ".join(
             f"{plain(name)} = {html.number(x, 6)} ± {html.number(error, 2)}"

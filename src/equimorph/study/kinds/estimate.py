@@ -54,8 +54,6 @@ class EstimateKind(Kind[StateEstimate]):
     def verdict(self, question: Question, answer: StateEstimate) -> str:
         """Name the best candidate."""
         head = f"{question.title}"
-        if answer.status == "refused":
-            return f"{head}: [bold red]refused[/]. {plain(answer.why)}"
         where = ", ".join(
             f"{name} = {html.number(answer.state[name], 6)}" for name in question.free
         )

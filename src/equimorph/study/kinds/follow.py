@@ -51,14 +51,13 @@ class FollowKind(Kind[FollowedOptimum]):
     def report(self, question: Question, answer: FollowedOptimum, folder: Path) -> list[str]:
         """Verdict, jumps, and optima along the way."""
         head = heading(question)
-        legs = len(question["to"])
+        refused = html.refusal_line(self.refusal(question, answer))
         if not len(answer.states):
-            return [head, html.refusal_line(answer.why)]
-        first = f"After {html.number(answer.at[-1])} of {legs} legs: {answer.why}."
+            return [head, refused]
         words = (
             f'<p class="verdict"><strong>Arrived.</strong> {escape(_ends(question, answer))}</p>'
             if answer.arrived
-            else html.refusal_line(first)
+            else refused
         )
         caption = "Objective and actuators along the legs; dotted where the optimum jumps."
         pictures = html.pictures(folder, {}, {f"{question.files}.png": caption})
@@ -69,17 +68,15 @@ class FollowKind(Kind[FollowedOptimum]):
         )
         return [head, words, *links, pictures, *_jumps(question, answer), _table(question, answer)]
 
+    def refusal(self, question: Question, answer: FollowedOptimum) -> str:
+        """Reason why the optimum could be followed no further, and where."""
+        if answer.arrived or not len(answer.at):
+            return answer.why
+        return f"After {html.number(answer.at[-1])} of {len(question['to'])} legs: {answer.why}."
+
     def verdict(self, question: Question, answer: FollowedOptimum) -> str:
-        """Say up to which time the optimum could be followed."""
-        head = f"{question.title}"
-        if not answer.arrived:
-            done = (
-                f" after {answer.at[-1]:.4g} of {len(question['to'])} legs"
-                if len(answer.at)
-                else ""
-            )
-            return f"{head}: [bold red]refused[/]{done}. {plain(answer.why)}"
-        return f"{head}: [bold green]arrived[/]. {plain(_ends(question, answer))}"
+        """Say how it ends."""
+        return f"{question.title}: [bold green]arrived[/]. {plain(_ends(question, answer))}"
 
 
 def _ends(question: Question, found: FollowedOptimum) -> str:

@@ -84,6 +84,12 @@ class ImperfectionKind(Kind[Mapping[str, ImperfectionLaw]]):
             html.pictures(folder, {}, {f"{files}.png": caption}),
         ]
 
+    def refusal(self, question: Question, answer: Mapping[str, ImperfectionLaw]) -> str:
+        """Reasons why no law is known, where none is."""
+        if any(law.status == "fitted" for law in answer.values()):
+            return ""
+        return "; ".join(f"{name}: {law.why.rstrip('.')}" for name, law in answer.items()) + "."
+
     def verdict(self, question: Question, answer: Mapping[str, ImperfectionLaw]) -> str:
         """Return the formulas."""
         load = question.section.load

@@ -55,8 +55,6 @@ class OptimumKind(Kind[Optima]):
     def verdict(self, question: Question, answer: Optima) -> str:
         """Name the best one."""
         head = f"{question.title}"
-        if not answer.found:
-            return f"{head}: [bold red]refused[/]. {plain(answer.why)}"
         best = answer.best
         where = ", ".join(f"{name} = {html.number(best.state[name], 6)}" for name in question.free)
         value = f"{plain(question['objective'].name)} = {html.number(best.value, 6)}"
@@ -93,8 +91,6 @@ class RobustOptimumKind(Kind[RobustOptimum]):
 
     def verdict(self, question: Question, answer: RobustOptimum) -> str:
         """What is guaranteed, and its price."""
-        if not answer.found:
-            return f"{question.title}: [bold red]refused[/]. {plain(answer.why)}"
         return f"{question.title}: [bold green]found[/]. {plain(_price_in_words(question, answer))}"
 
 

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import AfterValidator
-from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.errors import InputError
@@ -123,11 +122,14 @@ class RouteKind(Kind[Routes]):
             pictures,
         ]
 
+    def refusal(self, question: Question, answer: Routes) -> str:
+        """Reason why there is no route."""
+        del question
+        return "" if answer[0].arrived else answer[0].why
+
     def verdict(self, question: Question, answer: Routes) -> str:
-        """Say whether it arrived."""
+        """Say how it arrived."""
         route, head = answer[0], f"{question.title}"
-        if not route.arrived:
-            return f"{head}: [bold red]refused[/]. {plain(route.why)}"
         others = f" {len(answer)} routes differ in how they pass holes." if len(answer) > 1 else ""
         how = snaps_in_words(route) or "without a snap"
         size = _size(route, lambda value: f"{value:.3f}")
@@ -234,11 +236,8 @@ class SampledRouteKind(Kind[Route]):
         ]
 
     def verdict(self, question: Question, answer: Route) -> str:
-        """Say whether it arrived."""
-        head = f"Sampled route {question.name}"
-        if not answer.arrived:
-            return f"{head}: [bold red]refused[/]. {plain(answer.why)}"
+        """Say how it arrived."""
         return (
-            f"{head}: [bold green]arrived[/] without a snap, smallest margin "
+            f"{question.title}: [bold green]arrived[/] without a snap, smallest margin "
             f"{answer.margin:.3f}, length {answer.length:.3f}."
         )

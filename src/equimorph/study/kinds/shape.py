@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from rich.markup import escape as plain
-
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.answers import figures_of_states, free_columns, heading, report_of_states
@@ -40,11 +38,14 @@ class ShapeKind(Kind[Shapes]):
         table = report_of_states(question, folder, answer.states, shown, more)
         return [heading(question), *words, *table]
 
+    def refusal(self, question: Question, answer: Shapes) -> str:
+        """Reason why there is none."""
+        del question
+        return "" if len(answer) else answer.why
+
     def verdict(self, question: Question, answer: Shapes) -> str:
         """How many there are."""
         head = f"{question.title}"
-        if not len(answer):
-            return f"{head}: [bold red]refused[/]. {plain(answer.why)}"
         stable = len(answer.stable)
         states = f"{len(answer)} states, {stable} of them stable"
         if len(answer) == 1:

@@ -64,10 +64,12 @@ class SnapKind(Kind[tuple[State, LeastSnap]]):
 
     def verdict(self, question: Question, answer: tuple[State, LeastSnap]) -> str:
         """Change and landing."""
-        snap, head = answer[1], f"{question.title}"
-        if snap.landing is None:
-            return f"{head}: [bold red]refused[/]. {plain(snap.why)}"
-        return f"{head}: {plain(_snap_in_words(snap))}"
+        return f"{question.title}: {plain(_snap_in_words(answer[1]))}"
+
+    def refusal(self, question: Question, answer: tuple[State, LeastSnap]) -> str:
+        """Reason why no snap was found."""
+        del question
+        return "" if answer[1].landing is not None else answer[1].why
 
 
 def _stations(answer: tuple[State, LeastSnap]) -> States:

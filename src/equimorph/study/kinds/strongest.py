@@ -66,7 +66,7 @@ class StrongestKind(Kind[Answer]):
         head = heading(question)
         lead = html.extent(amap.grid.box, amap.fixed, amap.within)
         if sure.status == "refused":
-            return [head, html.refusal_line(f"{sure.why}.")]
+            return [head, html.refusal_line(self.refusal(question, answer))]
         captions = {
             f"{question.files}.png": "Limit loads with their largest values, numbered as in the "
             f"table{'' if robust is None else ' (□: robust, with its box of errors)'}.",
@@ -80,12 +80,14 @@ class StrongestKind(Kind[Answer]):
             html.pictures(folder, {}, captions),
         ]
 
+    def refusal(self, question: Question, answer: Answer) -> str:
+        """Reason why no setting carries anything."""
+        del question
+        return f"{answer[1].why}." if answer[1].status == "refused" else ""
+
     def verdict(self, question: Question, answer: Answer) -> str:
         """Name the best one, and the price of a robust one."""
-        head = f"{question.title}"
-        if answer[1].status == "refused":
-            return f"{head}: [bold red]refused[/]. {plain(answer[1].why)}."
-        return f"{head}: [bold green]found[/]. {plain(_in_words(question, answer))}"
+        return f"{question.title}: [bold green]found[/]. {plain(_in_words(question, answer))}"
 
 
 def _in_words(question: Question, answer: Answer) -> str:

@@ -5,7 +5,6 @@ from html import escape
 from pathlib import Path
 
 import numpy as np
-from rich.markup import escape as plain
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.storage import write_schedule
@@ -42,9 +41,8 @@ class TrackKind(Kind[Tracking]):
         head = heading(question)
         pictures = pictures_of_way(folder, question.files, "motion")
         if not answer.arrived:
-            legs = f"{html.number(answer.last_good)} of {len(question['targets'])} legs"
-            done = f"After {legs}: {answer.why}"
-            return [head, html.refusal_line(done), *_compromise(answer), pictures]
+            refused = html.refusal_line(self.refusal(question, answer))
+            return [head, refused, *_compromise(answer), pictures]
         turn = answer.holonomy
         back = ""
         if turn is not None:
@@ -58,13 +56,14 @@ class TrackKind(Kind[Tracking]):
             pictures,
         ]
 
+    def refusal(self, question: Question, answer: Tracking) -> str:
+        """Reason why it cannot be followed further, and where."""
+        legs = f"{html.number(answer.last_good)} of {len(question['targets'])} legs"
+        return "" if answer.arrived else f"After {legs}: {answer.why}"
+
     def verdict(self, question: Question, answer: Tracking) -> str:
-        """Say whether it can be followed."""
-        head = f"{question.title}"
-        if not answer.arrived:
-            done = f"{answer.last_good:.4g} of {len(question['targets'])} legs"
-            return f"{head}: [bold red]refused[/] after {done}. {plain(answer.why)}"
-        return f"{head}: [bold green]arrived[/], smallest margin {answer.margin:.3f}."
+        """Say how near to instability it leads."""
+        return f"{question.title}: [bold green]arrived[/], smallest margin {answer.margin:.3f}."
 
 
 def _compromise(answer: Tracking) -> list[str]:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from rich.markup import escape as plain
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.storage import write_schedule
@@ -52,7 +51,7 @@ class VerifyKind(Kind[Verification]):
         head = heading(question)
         pictures = pictures_of_way(folder, question.files, "way")
         if not answer.verified:
-            return [head, html.refusal_line(_sentence(answer.why)), pictures]
+            return [head, html.refusal_line(self.refusal(question, answer)), pictures]
         return [
             head,
             '<p class="verdict"><strong>Verified.</strong> Every state on the way is stable: '
@@ -62,11 +61,14 @@ class VerifyKind(Kind[Verification]):
             pictures,
         ]
 
+    def refusal(self, question: Question, answer: Verification) -> str:
+        """Reason why it cannot be executed."""
+        del question
+        return "" if answer.verified else _sentence(answer.why)
+
     def verdict(self, question: Question, answer: Verification) -> str:
-        """Say whether it can be executed."""
+        """Say how near to instability it leads, and whether that is proved."""
         head = f"{question.title}"
-        if not answer.verified:
-            return f"{head}: [bold red]refused[/]. {plain(_sentence(answer.why))}"
         proof = "" if answer.proof is None else f", {answer.proof.status}"
         return f"{head}: [bold green]verified[/], smallest margin {answer.margin:.3f}{proof}."
 

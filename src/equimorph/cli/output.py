@@ -1,0 +1,74 @@
+"""What a command writes where: answers on stdout, progress and logs on stderr."""
+
+import json
+import logging
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import typer
+from rich.console import Console, RenderableType
+
+from equimorph.cli.progress import LoggedProgress, ScreenProgress
+from equimorph.logs import PACKAGE
+from equimorph.model import Progress, Silent
+
+FORM = "%(asctime)s %(name)s: %(message)s"
+"""Form of a line of the log."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """How much a command says.
+
+    Parameters
+    ----------
+    as_json
+        Whether the answers on stdout are data for programs instead of text.
+    quiet
+        Whether nothing but data and mistakes is shown.
+    verbose
+        Whether stages are logged on stderr, instead of bars.
+    """
+
+    as_json: bool = False
+    quiet: bool = False
+    verbose: bool = False
+
+    def show(self, text: RenderableType) -> None:
+        """Write text for people on stdout, in rich's markup."""
+        if not (self.as_json or self.quiet):
+            Console(highlight=False).print(text, soft_wrap=isinstance(text, str))
+
+    def write_data(self, content: dict[str, Any]) -> None:
+        """Write one line of JSON on stdout, if that was asked for."""
+        if self.as_json:
+            typer.echo(json.dumps(content, allow_nan=False))
+
+    @contextmanager
+    def progress(self) -> Generator[Progress]:
+        """Give a sink for progress while a block lasts."""
+        if self.quiet:
+            yield Silent()
+        elif self.verbose:
+            with _logged():
+                yield LoggedProgress()
+        else:
+            with ScreenProgress() as bars:
+                yield bars
+
+
+@contextmanager
+def _logged() -> Generator[None]:
+    """Show the logs of the package on stderr while a block lasts."""
+    log, handler = logging.getLogger(PACKAGE), logging.StreamHandler()
+    handler.setFormatter(logging.Formatter(FORM))
+    level = log.level
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(level)
