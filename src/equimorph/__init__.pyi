@@ -3,6 +3,7 @@
 from . import (
     charts as charts,
     cli as cli,
+    dynamics as dynamics,
     equilibria as equilibria,
     errors as errors,
     linalg as linalg,
@@ -34,6 +35,11 @@ from .charts import (
     nearest as nearest,
     quasi_static as quasi_static,
     reduce as reduce,
+)
+from .dynamics import (
+    Replay as Replay,
+    ReplaySettings as ReplaySettings,
+    replay as replay,
 )
 from .equilibria import (
     Branch as Branch,
@@ -110,8 +116,6 @@ from .structures import (
     SectionProperties as SectionProperties,
     SpaceStability as SpaceStability,
     SpatialEnd as SpatialEnd,
-    SpatialFrame as SpatialFrame,
-    SpatialMember as SpatialMember,
     SpatialRod as SpatialRod,
     Spring as Spring,
     State as State,

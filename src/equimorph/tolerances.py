@@ -35,3 +35,7 @@ FEASIBLE = 1e-7
 # Difference: steps of finite differences.
 CENTRAL_DIFFERENCE = 1e-6
 """Step of central differences, in units of the scales of what varies."""
+
+# Motion: what a replay in time tells apart.
+DEPARTURE = 0.05
+"""Distance from the static branch, relative to the structure's size, at which a motion has left."""

@@ -217,10 +217,8 @@ def check_parameter_names(names: Sequence[str]) -> None:
             )
 
 
-def built(kind: type[Part], given: Any, what: str, joints: str = "ends") -> Part:
-    """Edge of a network from one, from its data, or from the names of its joints.
-
-    `joints` is the field that takes these.
+def built(kind: type[Part], given: Any, what: str) -> Part:
+    """Edge of a network from one, from its data, or from the names of its ends.
 
     Raises
     ------
@@ -229,10 +227,10 @@ def built(kind: type[Part], given: Any, what: str, joints: str = "ends") -> Part
     """
     if isinstance(given, kind):
         return given
-    data = given if isinstance(given, Mapping) else {joints: given}
+    data = given if isinstance(given, Mapping) else {"ends": given}
     known = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # all are dataclasses
     strange = [name for name in data if name not in known]
-    if strange or joints not in data:
+    if strange or "ends" not in data:
         raise InputError(
             f"`{what}` must hold {kind.__name__}s ({', '.join(known)}) or pairs of joints; got "
             f"{given!r}."

@@ -342,12 +342,16 @@ class Rod(Described):
         return {"q": (self._arch_load,)} if self._general is None else self._general.terms
 
     @cached_property
+    def description(self) -> PlanarDescription:
+        """The rod as a general one; the arch has a rise then, as its last parameter."""
+        return self._general or PlanarDescription(
+            CLAMPED, PlanarDescription.defaults, {"q": self._arch_load}, {}, None,
+            {"nu": DEFAULT_SPAN, "rise": 0.0}, (), self.units, self._breaks,
+        )  # fmt: skip
+
+    @cached_property
     def lagrangian(self) -> RodModel:
         """Its Lagrangian; that of the arch as of a general rod with a rise."""
         if isinstance(self.mechanics, GeneralMechanics):
             return self.mechanics.model
-        twin = PlanarDescription(
-            CLAMPED, PlanarDescription.defaults, {"q": self._arch_load}, {}, None,
-            {"nu": DEFAULT_SPAN, "rise": 0.0}, (), self.units, self._breaks,
-        )  # fmt: skip
-        return twin.in_own_parameters(twin.raw_model(*self._resolution))
+        return self.description.in_own_parameters(self.description.raw_model(*self._resolution))

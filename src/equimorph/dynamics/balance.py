@@ -1,0 +1,166 @@
+"""Equilibria of a linkage along a motion of its parameters, and the fold at which they end."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import eigh, null_space
+
+from equimorph.dynamics.linkage import Linkage, Pulls, Settings, Vector
+
+NEWTON_STEPS = 40
+CONVERGED = 1e-10
+"""Largest Newton step, in radians and lengths of the structure, that counts as none."""
+LARGEST_STEP = 0.5
+"""Largest change in one Newton step."""
+NARROWEST = 1e-7
+"""Shortest step in time, relative to the whole, with which equilibria are followed to a fold."""
+FOLD_STEPS = 8
+"""Extrapolations to a fold by the square of the smallest eigenvalue."""
+SHARPEST = 1e-13
+"""Relative change of the time of a fold that is round-off."""
+SMALL = 0.1
+"""Share of ω² at the start below which an end of equilibria is a fold."""
+
+Course = Callable[[float], Settings]
+"""Settings by time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """An equilibrium of a linkage: entries, multipliers, settings."""
+
+    linkage: Linkage
+    v: Vector
+    multipliers: Pulls
+    y: Settings
+
+    @property
+    def places(self) -> Float[np.ndarray, "members joints 2"]:
+        """Places of the joints between links."""
+        return self.linkage.places(self.v)
+
+    def reduced(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Stiffness and mass on the null space of the constraints, and its basis."""
+        linkage, size = self.linkage, self.linkage.size
+        whole = linkage.jacobian(self.v, self.multipliers, self.y)
+        free = linkage.free
+        inner = null_space(whole[size:, :size][:, free])
+        basis = np.zeros((size, inner.shape[1]))
+        basis[free] = inner
+        stiff = basis.T @ whole[:size, :size] @ basis
+        mass = basis.T @ linkage.mass(self.v) @ basis
+        return 0.5 * (stiff + stiff.T), mass, basis
+
+    def modes(self) -> tuple[Float[np.ndarray, " modes"], Float[np.ndarray, "entries modes"]]:
+        """Squares of angular frequencies, ascending, and modes of unit mass."""
+        stiff, mass, basis = self.reduced()
+        values, vectors = eigh(stiff, mass)
+        return values, basis @ vectors
+
+    @property
+    def least(self) -> float:
+        """Square of the lowest angular frequency; negative where the equilibrium is unstable."""
+        stiff, mass, _ = self.reduced()
+        return float(eigh(stiff, mass, eigvals_only=True, subset_by_index=(0, 0))[0])
+
+
+def balance(linkage: Linkage, v: Vector, multipliers: Pulls, y: Settings) -> Balance | None:
+    """Equilibrium near a guess, by Newton's method; None if it does not converge."""
+    unknown = linkage.unknown
+    v, multipliers = linkage.prescribe(v, y), multipliers.copy()
+    for _ in range(NEWTON_STEPS):
+        residual = linkage.residual(v, multipliers, y)[unknown]
+        matrix = linkage.jacobian(v, multipliers, y)[np.ix_(unknown, unknown)]
+        if not np.isfinite(residual).all():
+            return None
+        try:
+            step = np.linalg.solve(matrix, -residual)
+        except np.linalg.LinAlgError:
+            return None
+        free = int(linkage.free.sum())
+        largest = float(np.abs(step[:free]).max())
+        step *= min(1.0, LARGEST_STEP / max(largest, 1e-300))
+        v[linkage.free] += step[:free]
+        multipliers += step[free:]
+        if largest < CONVERGED:
+            return Balance(linkage, v, multipliers, y)
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class Quasistatics:
+    """Equilibria at times, as far as they are stable.
+
+    fold: time of the fold at which they end; None where there is none, nan where Newton's method
+    lost them for another reason.
+    last: the equilibrium nearest to it.
+    """
+
+    balances: tuple[Balance, ...]
+    fold: float | None
+    last: Balance
+
+
+def follow(start: Balance, course: Course, times: Float[np.ndarray, " times"]) -> Quasistatics:
+    """Stable equilibria at all times, each from the ones before."""
+    found, here, at = [start], start, float(times[0])
+    before: tuple[Balance, float] | None = None
+    for time in times[1:].tolist():
+        step = time - at
+        while at < time:
+            aim = min(time, at + step)
+            new = _next(here, before, at, aim, course)
+            if new is None:
+                step *= 0.5
+                if step < NARROWEST * (times[-1] - times[0]):
+                    fold, last = fold_time(here, before, at, course, start.least)
+                    return Quasistatics(tuple(found), fold, last)
+                continue
+            before, here, at = (here, at), new, aim
+        found.append(here)
+    return Quasistatics(tuple(found), None, here)
+
+
+def _next(
+    here: Balance, before: tuple[Balance, float] | None, at: float, aim: float, course: Course
+) -> Balance | None:
+    """The stable equilibrium at a time, if Newton's method stays near."""
+    v, multipliers = here.v, here.multipliers
+    if before is not None and at > before[1]:
+        share = (aim - at) / (at - before[1])
+        v = v + share * (v - before[0].v)
+        multipliers = multipliers + share * (multipliers - before[0].multipliers)
+    new = balance(here.linkage, v, multipliers, course(aim))
+    if new is None:
+        return None
+    moved = np.abs(new.v - here.v).max()
+    return new if moved < LARGEST_STEP and new.least > 0.0 else None
+
+
+def fold_time(
+    here: Balance, before: tuple[Balance, float] | None, at: float, course: Course, rest: float
+) -> tuple[float, Balance]:
+    """Time at which equilibria end, where ω² vanishes as the square root of the time left.
+
+    nan where ω² does not fall to a small share of its value `rest` at the start, as when Newton's
+    method fails elsewhere.
+    """
+    known = [(at, here.least**2)]
+    if before is not None:
+        known.insert(0, (before[1], before[0].least ** 2))
+    end = at
+    for _ in range(FOLD_STEPS):
+        if len(known) < 2:
+            break
+        (t0, e0), (t1, e1) = known[-2:]
+        if e1 >= e0 or t1 <= t0:
+            break
+        end = t1 + (t1 - t0) * e1 / (e0 - e1)
+        new = balance(here.linkage, here.v, here.multipliers, course(end - 0.1 * (end - t1)))
+        if new is None or new.least <= 0.0 or end - t1 < SHARPEST * max(abs(end), 1.0):
+            break
+        here = new
+        known.append((end - 0.1 * (end - t1), new.least**2))
+    return (end if here.least < SMALL * rest else float("nan")), here

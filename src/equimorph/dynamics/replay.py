@@ -1,0 +1,338 @@
+"""`replay`: a schedule in time, in a simulator that knows nothing of equilibrium sets."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.argument_checks import check_arguments
+from equimorph.argument_kinds import one_of
+from equimorph.argument_vocabulary import POSITIVE
+from equimorph.dynamics.model import Course, Model, Plant, landing
+from equimorph.dynamics.motion import TimedCorners, timed_corners
+from equimorph.dynamics.simulators import model_of
+from equimorph.model import Schedule
+from equimorph.structures import State, Structure
+from equimorph.tasks.route import FINE
+from equimorph.tasks.verification.schedule_check import follow_polyline
+from equimorph.tolerances import DEPARTURE
+
+SAMPLES = 100
+"""Times at which a replay is compared with the statics."""
+STILL = 1e-6
+"""Speed below which the structure rests, in units of T."""
+LONGEST_HOLD = 20.0
+"""How often the hold is prolonged while the structure still moves."""
+ALIKE = 0.1
+"""Share of the deviation by which half the step may change it in a converged replay."""
+SAME_REST = 1e-4
+"""Distance of two equilibria, relative to the structure's size, that are the same."""
+NEGLIGIBLE = 1e-5
+"""Change of the deviation, relative to the structure's size, that is none."""
+
+Simulator = Annotated[Literal["mujoco", "own"], one_of("mujoco", "own")]
+Convergence = Literal["converged", "not converged", "not checked"]
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """What a structure did when its schedule was played in time.
+
+    Deviations are the largest distance of a point from where it should be, in the unit of length.
+    Before a snap they are the sum of two parts at most: that of the chain of links, which more
+    links reduce, and that of the motion, which a lower speed reduces.
+
+    Parameters
+    ----------
+    structure
+        The structure.
+    simulator
+        Which one; "own" is not independent of the library.
+    times
+        Times of the samples, from 0 on, in the schedule's unit; the last one is after the hold.
+    parameters
+        All parameters at these times.
+    points
+        Places of the structure's points.
+    deviation
+        From the equilibria of `lift`; nan where these have ended.
+    discretisation, dynamics
+        Its two parts: equilibria of the chain from those of `lift`, motion from those of the chain.
+    snapped
+        Whether the structure is away from the static branch after the hold.
+    where
+        Time at which it left the branch for good; None if it did not.
+    fold
+        Time at which the chain's own equilibria end; None if they do not.
+    lateness
+        Time from there to `where`.
+    expected_lateness
+        What the normal form of the fold predicts for it; see docs/time.md.
+    landed_in
+        Stable state of the library where it came to rest after a snap; None without one.
+    closure
+        Largest violation of a constraint, in the unit of length.
+    energy
+        Potential and kinetic energy at the times, in the structure's unit.
+    converged
+        "converged" if half the step in time changes the deviation little, twice the duration does
+        not raise it, and all tell the same snap; "not checked" if that was not asked for.
+    """
+
+    structure: Structure
+    simulator: str
+    times: Float[np.ndarray, " times"]
+    parameters: Float[np.ndarray, "times parameters"]
+    points: Float[np.ndarray, "times points space"]
+    deviation: Float[np.ndarray, " times"]
+    discretisation: Float[np.ndarray, " times"]
+    dynamics: Float[np.ndarray, " times"]
+    snapped: bool
+    where: float | None
+    fold: float | None
+    lateness: float
+    expected_lateness: float
+    landed_in: State | None
+    closure: float
+    energy: Float[np.ndarray, " times"]
+    converged: Convergence = "not checked"
+
+    def __repr__(self) -> str:
+        """Duration, largest deviation, and whether it snapped."""
+        end = "no snap"
+        if self.snapped:
+            end = f"snapped at {self.where:.4g}" if self.where is not None else "snapped"
+        checked = "" if self.converged == "not checked" else f", {self.converged}"
+        return (
+            f"Replay({self.simulator}: {self.times[-1]:.4g} long, deviation "
+            f"{self.largest_deviation:.3g}, {end}{checked})"
+        )
+
+    @property
+    def largest_deviation(self) -> float:
+        """Largest deviation where there are equilibria of `lift`."""
+        return float(np.nanmax(self.deviation))
+
+    @property
+    def independent(self) -> bool:
+        """Whether the simulator has equations of its own."""
+        return self.simulator != "own"
+
+
+@check_arguments
+@dataclass(frozen=True)
+class ReplaySettings:
+    """How a replay is computed.
+
+    Parameters
+    ----------
+    links
+        Links of each member of a chain.
+    step
+        Step in time, in units of T.
+    damping
+        Damping of elastic joints over their stiffness, in units of T.
+    hold
+        Time for which the last parameters are held, in units of T; longer while it still moves.
+    """
+
+    links: int = 40
+    step: Annotated[float, POSITIVE] = 0.02
+    damping: float = 0.05
+    hold: float = 20.0
+
+
+@check_arguments
+def replay(
+    schedule: Schedule | Sequence[Mapping[str, float]] | Mapping[str, float],
+    start: State | None = None,
+    *,
+    simulator: Simulator = "mujoco",
+    rate: float | None = None,
+    duration: float | None = None,
+    structure: Structure | None = None,
+    settings: ReplaySettings | None = None,
+    check: bool = False,
+) -> Replay:
+    """Play a schedule in time in a simulator, and compare with the equilibria that it promises.
+
+    MuJoCo [Todorov2012]_ gets the structure as chains of rigid links with elastic, damped joints,
+    and nothing else from this library. A replay without a snap does not prove that a lower speed is
+    safe: at a finite rate a structure passes a fold and snaps later; `snap_in_time` holds it.
+
+    Parameters
+    ----------
+    schedule
+        A schedule, or way-points that are met at straight lines from the start.
+    start
+        State to start in; by default that of the schedule.
+    simulator
+        "mujoco", or "own": the structure's own equations of motion, which are not independent.
+    rate
+        Speed in the scaled parameters, per unit of time: radians for angles; for schedules without
+        times, or instead of these.
+    duration
+        Time of the whole instead of a rate.
+    structure
+        Structure of a schedule that carries none.
+    settings
+        Links, step, damping and hold.
+    check
+        Whether to replay again with half the step and twice the duration; see `Replay.converged`.
+
+    Returns
+    -------
+    Shapes and deviations over time, and what happened.
+
+    Raises
+    ------
+    InputError
+        Without start or times, for a structure that the simulator does not cover (by name), or if
+        MuJoCo is not installed.
+
+    Examples
+    --------
+    ``em.replay(route.schedule, rate=0.02)``
+    """
+    begin, motion = timed_corners(schedule, start, structure, rate, duration)
+    used = settings or ReplaySettings()
+    model = model_of(begin.structure, simulator, used.links)
+    first = _run(model, begin, motion, used)
+    if not check:
+        return first
+    finer = _run(model, begin, motion, replace(used, step=0.5 * used.step))
+    slower = _run(model, begin, motion.slower(2.0), used)
+    return replace(first, converged=_convergence(first, finer, slower))
+
+
+def _convergence(first: Replay, finer: Replay, slower: Replay) -> Convergence:
+    size = _size(first.points[0])
+    change = abs(first.largest_deviation - finer.largest_deviation)
+    same = first.snapped == finer.snapped == slower.snapped
+    close = change <= ALIKE * first.largest_deviation + NEGLIGIBLE * size
+    falls = slower.largest_deviation <= first.largest_deviation + NEGLIGIBLE * size
+    # beyond a snap the deviation is that of another state, whatever the step
+    return "converged" if same and (first.snapped or (close and falls)) else "not converged"
+
+
+def _size(points: Float[np.ndarray, "points space"]) -> float:
+    return float(np.ptp(points, axis=0).max())
+
+
+@dataclass
+class _Record:
+    """What is kept of a plant at each sample."""
+
+    points: list[Float[np.ndarray, "points space"]]
+    energy: list[float]
+    closure: float = 0.0
+
+    def take(self, plant: Plant) -> None:
+        """Add a sample."""
+        self.points.append(plant.points)
+        self.energy.append(plant.energy)
+        self.closure = max(self.closure, plant.closure)
+
+
+def _run(model: Model, begin: State, motion: TimedCorners, used: ReplaySettings) -> Replay:
+    """One replay: at rest, the motion, and a hold at its end."""
+    step = used.step * model.unit
+    count = max(1, int(np.ceil(motion.duration / step - 1e-9)))
+    marks = np.unique(np.append(np.arange(0, count, max(1, count // SAMPLES)), count))
+    wanted = set(marks.tolist())
+    plant, record = model.plant(begin, used.step, used.damping), _Record([], [])
+    hold(plant, used)
+    record.take(plant)
+    for k in range(1, count + 1):
+        plant.set(motion.at(k * step))
+        plant.step()
+        if k in wanted:
+            record.take(plant)
+    held = step * hold(plant, used)
+    record.take(plant)
+    times = np.append(marks * step, count * step + held)
+    return _judge(model, begin, motion, times, plant, record, used)
+
+
+def hold(plant: Plant, used: ReplaySettings) -> int:
+    """Let the plant move at constant parameters until it rests; number of steps."""
+    once = max(1, round(used.hold / used.step))
+    done = 0
+    while done == 0 or (plant.speed > STILL and done < LONGEST_HOLD * once):
+        for _ in range(once):
+            plant.step()
+        done += once
+    return done
+
+
+def _judge(
+    model: Model, begin: State, motion: TimedCorners, times: Float[np.ndarray, " times"],
+    plant: Plant, record: _Record, used: ReplaySettings,
+) -> Replay:  # fmt: skip
+    """Compare a replay with the equilibria of the library and of the chain."""
+    rows = np.array([motion.at(t) for t in times])
+    points = np.array(record.points)
+    reference = _equilibria(model, begin, rows)
+    course = model.statics(begin, motion.at, times, used.damping)
+    deviation = _largest(points - reference)
+    size = _size(points[0])
+    away = _away(points, course)
+    gone = bool(away[-1] > DEPARTURE * size) or _elsewhere(plant, course, size)
+    where = _departure(times, away > DEPARTURE * size) if gone else None
+    fold = course.fold
+    landed = landing(begin.structure, plant.guess(), rows[-1]) if gone else None
+    late = float("nan") if where is None or fold is None else where - fold
+    return Replay(
+        begin.structure, "mujoco" if model.independent else "own", times, rows, points, deviation,
+        _largest(course.points - reference), _largest(points - course.points), gone, where, fold,
+        late, course.expected, landed, record.closure, np.array(record.energy),
+    )  # fmt: skip
+
+
+def _equilibria(
+    model: Model, begin: State, rows: Float[np.ndarray, "times parameters"]
+) -> Float[np.ndarray, "times points space"]:
+    """Points of the library's equilibria along a motion; nan where these have ended."""
+    moves = np.abs(np.diff(rows, axis=0)).max(axis=1) > 0.0
+    first = np.concatenate([[0], np.cumsum(moves)])
+    followed = follow_polyline(begin, rows[1:][moves], (), FINE)
+    corners = followed.corners
+    if followed.end.kind != "arrived":
+        corners = corners[followed.at[corners] < followed.end.at]
+    known = model.reference(followed.states[corners])
+    out = np.full((len(rows), *known.shape[1:]), np.nan)
+    there = first < len(known)
+    out[there] = known[first[there]]
+    return out
+
+
+def _largest(gaps: Float[np.ndarray, "times points space"]) -> Float[np.ndarray, " times"]:
+    return np.asarray(np.linalg.norm(gaps, axis=2).max(axis=1))
+
+
+def _away(
+    points: Float[np.ndarray, "times points space"], course: Course
+) -> Float[np.ndarray, " times"]:
+    """Distance from the static branch; after its end from where it ended."""
+    if course.last is None:
+        return _largest(points - course.points)
+    ended = np.isnan(course.points[:, 0, 0])
+    return _largest(points - np.where(ended[:, None, None], course.last, course.points))
+
+
+def _elsewhere(plant: Plant, course: Course, size: float) -> bool:
+    """Whether the plant came to rest at another equilibrium than the branch's last one."""
+    if course.fold is not None:
+        return False
+    settled = plant.equilibrium()
+    return settled is not None and bool(
+        _largest((settled - course.points[-1])[None])[0] > SAME_REST * size
+    )
+
+
+def _departure(times: Float[np.ndarray, " times"], left: np.ndarray) -> float:
+    """Time from which on it is away for good."""
+    near = np.flatnonzero(~left)
+    return float(times[min(near[-1] + 1, len(times) - 1)]) if len(near) else float(times[0])
