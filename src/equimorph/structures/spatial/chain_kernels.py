@@ -30,15 +30,16 @@ SYSTEM = np.int64(6)
 
 
 @njit(**INNER)
-def to_vertices(e, inner, size, width, matrix, base, vertices, ties):
-    """Add what remains of an element to the rows of its vertices."""
+def to_vertices(e, inner, size, width, matrix, base, border, vertices, ties):
+    """Add what remains of an element to the rows of its vertices, which have `border` columns."""
+    shares = 3 + border
     for side in range(2):
         for r in range(3):
-            row, to = base + (inner + 3 * side + r) * width, (3 * (e + side) + r) * SHARES
+            row, to = base + (inner + 3 * side + r) * width, (3 * (e + side) + r) * shares
             for c in range(r, 3):
                 own = load(matrix, row + inner + 3 * side + c)
                 store(vertices, to + c, load(vertices, to + c) + own)
-            for c in range(BORDER):
+            for c in range(border):
                 value = load(matrix, row + size + c)
                 store(vertices, to + 3 + c, load(vertices, to + 3 + c) + value)
     for r in range(3):
@@ -65,17 +66,21 @@ def complete_vertex(v, node, radii, row, slopes, vertices):
 
 
 @njit(**INNER)
-def eliminate_vertex(v, last, vertices, ties, products, extremes):
-    """Eliminate the rotation of a vertex from the next one and from the border."""
+def eliminate_vertex(v, last, border, left, vertices, ties, products, extremes):
+    """Eliminate the rotation of a vertex from the next one and from the border.
+
+    products: of the first `left` columns of the border with those from there on, `border` a row.
+    """
+    shares = 3 + border
     one = spread(1.0)
     for k in range(3):
-        row = (3 * v + k) * SHARES
+        row = (3 * v + k) * shares
         inverse = one / load(vertices, row + k)
         store(vertices, row + k, inverse)
         note_pivot(inverse, extremes)
         for i in range(k + 1, 3):
-            factor, to = load(vertices, row + i) * inverse, (3 * v + i) * SHARES
-            for j in range(i, SHARES):
+            factor, to = load(vertices, row + i) * inverse, (3 * v + i) * shares
+            for j in range(i, shares):
                 store(vertices, to + j, load(vertices, to + j) - factor * load(vertices, row + j))
             if v < last:
                 tie, here = 9 * v + 3 * i, 9 * v + 3 * k
@@ -84,17 +89,17 @@ def eliminate_vertex(v, last, vertices, ties, products, extremes):
         if v < last:
             for i in range(3):
                 factor = load(ties, 9 * v + 3 * k + i) * inverse
-                to = (3 * v + 3 + i) * SHARES
+                to = (3 * v + 3 + i) * shares
                 for j in range(i, 3):
                     own = load(vertices, to + j) - factor * load(ties, 9 * v + 3 * k + j)
                     store(vertices, to + j, own)
-                for j in range(3, SHARES):
+                for j in range(3, shares):
                     own = load(vertices, to + j) - factor * load(vertices, row + j)
                     store(vertices, to + j, own)
-        for a in range(BORDER):
+        for a in range(left):
             factor = load(vertices, row + 3 + a) * inverse
-            for c in range(a, BORDER):
-                at = BORDER * a + c
+            for c in range(a, border):
+                at = border * a + c
                 store(products, at, load(products, at) + factor * load(vertices, row + 3 + c))
 
 
@@ -111,20 +116,29 @@ def note_pivot(inverse, extremes):
 
 
 @njit(**INNER)
-def small_system(axes, compliance, products, closing, rates, row, given, small):
+def close_system(axes, compliant, products, width, system, small):
+    """Schur complement of the closures, in rows of `system`; rows of products have `width`."""
+    for a in range(3):
+        for c in range(3):
+            low, high = min(a, c), max(a, c)
+            value = load(compliant, 3 * a + c)
+            if axes[a] >= 0 and axes[c] >= 0:
+                value = value - load(products, width * low + high)
+            store(small, a * system + c, value)
+
+
+@njit(**INNER)
+def small_system(axes, compliant, products, closing, rates, row, given, small):
     """Schur system of the closures and the load, in rows of `SYSTEM`; given: corner and defect."""
+    close_system(axes, compliant, products, BORDER, SYSTEM, small)
     zero = spread(0.0)
     for a in range(3):
         at = a * SYSTEM
         if axes[a] < 0:
-            for c in range(SYSTEM):
-                store(small, at + c, spread(compliance[a, c] if c < 3 else 0.0))
+            for c in range(3, SYSTEM):
+                store(small, at + c, zero)
             store(small, 3 * SYSTEM + a, zero)
             continue
-        for c in range(3):
-            low, high = min(a, c), max(a, c)
-            value = spread(compliance[a, c]) - load(products, BORDER * low + high)
-            store(small, at + c, value if axes[c] >= 0 else zero)
         store(small, at + 3, load(rates, a) - load(products, BORDER * a + COLUMN))
         store(small, at + 4, zero - load(closing, a) - load(products, BORDER * a + FORCE))
         store(small, at + 5, zero)
@@ -136,10 +150,10 @@ def small_system(axes, compliance, products, closing, rates, row, given, small):
 
 
 @njit(**INNER)
-def note_closures(small, extremes):
+def note_closures(small, system, extremes):
     """Count negative eigenvalues of the closures' block, by the signs of its invariants; det."""
     a, b, c = load(small, 0), load(small, 1), load(small, 2)
-    d, e, f = load(small, SYSTEM + 1), load(small, SYSTEM + 2), load(small, 2 * SYSTEM + 2)
+    d, e, f = load(small, system + 1), load(small, system + 2), load(small, 2 * system + 2)
     zero, one = spread(0.0), spread(1.0)
     first, second = a + d + f, a * d - b * b + a * f - c * c + d * f - e * e
     third = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)

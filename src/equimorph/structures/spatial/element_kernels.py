@@ -252,6 +252,118 @@ def pull_nodes(
 
 
 @njit(**INNER)
+def turn_axes(q, at, axes):
+    """Components of t, n, b in space: nine rows, one axis after the other."""
+    two = spread(2.0)
+    q0, q1, q2, q3 = load(q, at), load(q, at + 1), load(q, at + 2), load(q, at + 3)
+    s0, s1, s2, s3 = q0 * q0, q1 * q1, q2 * q2, q3 * q3
+    store(axes, 0, s0 + s1 - s2 - s3)
+    store(axes, 1, two * (q1 * q2 + q0 * q3))
+    store(axes, 2, two * (q1 * q3 - q0 * q2))
+    store(axes, 3, two * (q1 * q2 - q0 * q3))
+    store(axes, 4, s0 - s1 + s2 - s3)
+    store(axes, 5, two * (q2 * q3 + q0 * q1))
+    store(axes, 6, two * (q1 * q3 + q0 * q2))
+    store(axes, 7, two * (q2 * q3 - q0 * q1))
+    store(axes, 8, s0 - s1 - s2 + s3)
+
+
+@njit(**INNER)
+def on_axes(axes, force, out):
+    """Components of a force on t, n, b."""
+    for k in range(3):
+        value = load(axes, 3 * k) * load(force, 0) + load(axes, 3 * k + 1) * load(force, 1)
+        store(out, k, value + load(axes, 3 * k + 2) * load(force, 2))
+
+
+@njit(**INNER)
+def turn_components(components, k, turns):
+    """Change of the k-th component by rotations on the axes: component of f × e_k."""
+    zero = spread(0.0)
+    a, n, b = load(components, 0), load(components, 1), load(components, 2)
+    store(turns, 0, zero if k == 0 else (b if k == 1 else zero - n))
+    store(turns, 1, zero - b if k == 0 else (zero if k == 1 else a))
+    store(turns, 2, n if k == 0 else (zero - a if k == 1 else zero))
+
+
+@njit(**INNER)
+def stretch_nodes(
+    e, order, first, places, weights, forces, picks, tension, tension_picks, softness, scalars,
+    rates, pulls, q, gradient, width, matrix, base, three, closing, compliant, closing_rates,
+    work,
+):  # fmt: skip
+    """As `pull_nodes` for a rod that stretches and shears by the force on its cross-sections.
+
+    compliant: the closures by the multipliers, nine rows; work: arrays of nine, then three rows.
+    """
+    zero, half, quarter = spread(0.0), spread(0.5), spread(0.25)
+    size = 3 * order
+    axes, force, speed, on, rate, stretch, soft, turns, column, gains = work
+    for i in range(order):
+        weight = spread(weights[e, i])
+        turn_axes(q, 4 * (first + places[i]), axes)
+        combine(e, i, forces, picks, scalars, three)
+        combine(e, i, forces, picks, rates, speed)
+        for c in range(3):
+            store(force, c, load(pulls, c) + load(three, c))
+        on_axes(axes, force, on)
+        on_axes(axes, speed, rate)
+        pull = combine_one(e, i, tension, tension_picks, scalars)
+        tightening = combine_one(e, i, tension, tension_picks, rates)
+        for k in range(3):
+            store(soft, k, weight * spread(softness[e, i, k]))
+            strain = load(on, k) + pull if k == 0 else load(on, k)
+            value = zero - load(soft, k) * strain
+            store(stretch, k, value + weight if k == 0 else value)
+        e0, e1, e2 = load(stretch, 0), load(stretch, 1), load(stretch, 2)
+        a, n, b = load(on, 0), load(on, 1), load(on, 2)
+        radial = quarter * load(gradient, 4 * i + 3)
+        at = base + 3 * i * width + 3 * i
+        store(matrix, at, zero - radial - e1 * n - e2 * b)
+        store(matrix, at + 1, half * (e0 * n + e1 * a))
+        store(matrix, at + 2, half * (e0 * b + e2 * a))
+        store(matrix, at + width + 1, zero - radial - e0 * a - e2 * b)
+        store(matrix, at + width + 2, half * (e1 * b + e2 * n))
+        store(matrix, at + 2 * width + 2, zero - radial - e0 * a - e1 * n)
+        to = base + 3 * i * width + size
+        for r in range(3):
+            for c in range(5):
+                store(matrix, to + r * width + c, zero)
+        for k in range(3):
+            by, yields = load(stretch, k), load(soft, k)
+            change = load(rate, k) + tightening if k == 0 else load(rate, k)
+            turn_components(on, k, turns)
+            turn_components(rate, k, gains)
+            for r in range(3):
+                turn = load(turns, r)
+                store(gradient, 4 * i + r, load(gradient, 4 * i + r) + by * turn)
+                here = at + r * width
+                for c in range(r, 3):
+                    own = load(matrix, here + c) - yields * turn * load(turns, c)
+                    store(matrix, here + c, own)
+                there = to + r * width + COLUMN
+                gain = by * load(gains, r) - yields * turn * change
+                store(matrix, there, load(matrix, there) + gain)
+            for c in range(3):
+                along = load(axes, 3 * k + c)
+                store(closing, c, load(closing, c) + by * along)
+                slowing = load(closing_rates, c) - yields * along * change
+                store(closing_rates, c, slowing)
+                for d in range(3):
+                    own = load(compliant, 3 * c + d) - yields * along * load(axes, 3 * k + d)
+                    store(compliant, 3 * c + d, own)
+                for d in range(3):
+                    store(column, d, load(axes, 3 * d + c))
+                turn_components(column, k, gains)
+                for r in range(3):
+                    there = to + r * width + c
+                    gain = by * load(gains, r) - yields * load(turns, r) * along
+                    store(matrix, there, load(matrix, there) + gain)
+        for r in range(3):
+            store(matrix, to + r * width + FORCE, zero - load(gradient, 4 * i + r))
+
+
+@njit(**INNER)
 def stiffen(
     e, order, width, stiff, torsion, torsion_picks, scalars, jacobian, scaled, matrix, base
 ):
@@ -327,3 +439,47 @@ def reduce_rows(inner, size, width, matrix, base, lower, pivots, at):
             store(pivots, at + i, inverse)
             for j in range(i + 1, width):
                 store(lower, i * width + j, inverse * load(matrix, base + i * width + j))
+
+
+@njit(**INNER)
+def assemble_element(
+    e, tables, width, scalars, rates, pulls, q, matrix, base, closing, closing_rates, compliant,
+    total, work,
+):  # fmt: skip
+    """Matrix and border columns of one element, its share of the closures, and ∂L/∂φ by node."""
+    (
+        places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
+        force_picks, tension, tension_picks, softness,
+    ) = tables  # fmt: skip
+    relative, strains, twists, jacobian, scaled, gradient, three, more = work
+    order = slopes.shape[1]
+    node = e * (order - 1)
+    relate(e, order, node, places, slopes, q, relative, strains)
+    own_moments(
+        e, order, stiff, moments, moment_picks, torsion, torsion_picks, scalars, slopes,
+        strains, twists, jacobian, width, gradient, three,
+    )  # fmt: skip
+    pair_moments(e, order, slopes, relative, strains, jacobian, width, gradient, matrix, base)
+    if softness.shape[0] > 0:
+        stretch_nodes(
+            e, order, node, places, weights, forces, force_picks, tension, tension_picks,
+            softness, scalars, rates, pulls, q, gradient, width, matrix, base, three, closing,
+            compliant, closing_rates, more,
+        )  # fmt: skip
+    else:
+        pull_nodes(
+            e, order, node, places, weights, forces, force_picks, scalars, rates, pulls, q,
+            gradient, width, matrix, base, three, closing,
+        )  # fmt: skip
+    for i in range(order):
+        to = 3 * (node + places[i])
+        for k in range(3):
+            store(total, to + k, load(total, to + k) + load(gradient, 4 * i + k))
+    stiffen(
+        e, order, width, stiff, torsion, torsion_picks, scalars, jacobian, scaled, matrix, base
+    )
+    if len(moment_picks) > 0 or len(torsion_picks) > 0:
+        add_moment_rates(
+            e, order, width, moments, moment_picks, torsion, torsion_picks, rates, twists,
+            jacobian, matrix, base, three,
+        )  # fmt: skip

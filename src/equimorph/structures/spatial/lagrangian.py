@@ -194,42 +194,6 @@ class SpatialLagrangian(RodMechanics):
         excess = square[0][:, self.model.unknown_nodes] - 1.0
         return np.asarray(total + 0.125 * (excess**2 @ self.stiff_lengths))
 
-    def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
-        """F with its derivatives along directions."""
-        parts = [
-            self._equations(z[at], p[at], *((dz[at], dp[at]) for dz, dp in directions))
-            for at in blocks_of(len(z))
-        ]
-        return np.concatenate(parts, axis=1)
-
-    def _equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
-        """`equations` of one block of lanes."""
-        given, y = self.jets(z, p, *directions)
-        unit, inverse, square = normalised(given)
-        slope = self.slope(unit, y)
-        along = bilinear(lambda a, b: (a * b).sum(axis=-1), unit, slope)
-        across = slope - bilinear(lambda a, b: a[..., None] * b, along, unit)
-        out = bilinear(lambda a, b: a[..., None] * b, inverse, across)
-        excess = square.copy()
-        excess[0] -= 1.0
-        inner = self.model.unknown_nodes
-        length = bilinear(lambda a, b: a[..., None] * b, excess, given)[:, :, inner]
-        out = out[:, :, inner] + 0.5 * self.stiff_lengths[:, None] * length
-        closing = self.by_scalars(unit, y)[..., : self.constraints]
-        return np.concatenate([out.reshape(*out.shape[:2], self.unknowns), closing], axis=-1)
-
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z; p)."""
-        return np.asarray(self.equations(z, p)[0])
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-        return np.asarray(self.equations(z, p, (np.zeros_like(z), dp))[1])
-
-    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
-        """D²F[v, w]."""
-        return np.asarray(self.equations(z, p, v, w)[3])
-
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p."""
         given, y = self.jets(z, p)

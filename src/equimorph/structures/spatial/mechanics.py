@@ -7,12 +7,22 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Entries, Lanes, Parameters, Values
 from equimorph.linalg import Border, BorderedSolution
+from equimorph.linalg.condensed import PIVOT_GUARD
+from equimorph.linalg.dense import no_border
+from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.equations import Advance, JointEquations
-from equimorph.structures.spatial.lagrangian import Nodes, SpatialLagrangian, blocks_of
-from equimorph.structures.spatial.quaternions import FRAME, RIGHT, normalised
+from equimorph.structures.equations import Advance, Direction, JointEquations
+from equimorph.structures.spatial.derivative_kernels import equations_lanes
+from equimorph.structures.spatial.lagrangian import (
+    LENGTH_STIFFNESS,
+    Nodes,
+    SpatialLagrangian,
+    blocks_of,
+)
+from equimorph.structures.spatial.quaternions import FRAME, RIGHT, Jet, normalised
+from equimorph.structures.spatial.solve_kernels import solve_bordered_lanes
 from equimorph.structures.spatial.step_kernels import advance_lanes
-from equimorph.structures.spatial.tables import step_tables
+from equimorph.structures.spatial.tables import equation_tables, pairs_of, step_tables
 
 
 class SpatialMechanics(SpatialLagrangian, JointEquations):
@@ -162,6 +172,39 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         )
         return blocks, self.assemble(crossing), closing
 
+    # --- equations ------------------------------------------------------------------------------
+
+    def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
+        """F with its derivatives along none, one or two directions."""
+        self.check_widths((z, p), *directions)
+        lanes, k = len(z), len(directions)
+        moves_z, moves_p = np.empty((lanes, k, self.size)), np.empty((lanes, k, self.parameters))
+        for i, (dz, dp) in enumerate(directions):
+            moves_z[:, i], moves_p[:, i] = dz, dp
+        out = np.empty((lanes, 2**k, self.size))
+        inputs = [np.ascontiguousarray(z), np.ascontiguousarray(p), moves_z, moves_p]
+        over_lanes(equations_lanes, (*pairs_of(2**k), *self._equation_tables), inputs, [out])
+        return np.moveaxis(out, 1, 0)
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+        return np.ascontiguousarray(self.equations(z, p)[0])
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return np.ascontiguousarray(self.equations(z, p, (np.zeros_like(z), dp))[1])
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        return np.ascontiguousarray(self.equations(z, p, v, w)[3])
+
+    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
+        """F and F_p·dp."""
+        both = self.equations(z, p, (np.zeros_like(z), dp))
+        return np.ascontiguousarray(both[0]), np.ascontiguousarray(both[1])
+
+    # --- solves ---------------------------------------------------------------------------------
+
     def solve(
         self,
         z: Lanes,
@@ -170,13 +213,29 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         border: Border | None = None,
         shift: Values | None = None,
     ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered."""
-        return self.layout.solve(self.entries(z, p, shift), border, rhs)
+        """Solve with F_z − shift·mass, bordered.
 
-    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
-        """F, F_p·dp and the entries of F_z."""
-        residual, column = self.equations(z, p, (np.zeros_like(z), dp))
-        return residual, column, self.entries(z, p)
+        One kernel; lanes with an unsafe pivot take the sparse solve, which may pivot.
+        """
+        self.check_widths((z, p))
+        lanes = len(z)
+        around = no_border(lanes, self.size) if border is None else border
+        lowered = np.zeros(lanes) if shift is None else shift * (2.0 / LENGTH_STIFFNESS)
+        inputs = [np.ascontiguousarray(each) for each in (z, p, lowered, *around, rhs)]
+        x, (determinant, ratio) = np.empty(rhs.shape), np.empty((2, lanes))
+        negative = np.empty(lanes, dtype=np.int64)
+        outputs = [x, negative, determinant, ratio]
+        over_lanes(solve_bordered_lanes, self._step_tables, inputs, outputs)
+        negative -= 3 - self.constraints
+        determinant *= self.determinant_sign
+        unsafe = ~(ratio >= PIVOT_GUARD)
+        if unsafe.any():
+            entries = self.entries(z[unsafe], p[unsafe], None if shift is None else shift[unsafe])
+            some = tuple(np.ascontiguousarray(each[unsafe]) for each in around)
+            again = self.layout.solve(entries, (some[0], some[1], some[2]), rhs[unsafe])
+            x[unsafe], negative[unsafe] = again.x, again.negative
+            determinant[unsafe], ratio[unsafe] = again.determinant, again.pivot_ratio
+        return BorderedSolution(x, negative, ratio, unsafe, determinant)
 
     def solve_with(
         self,
@@ -186,14 +245,18 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         rhs: Float[np.ndarray, "lanes sides bordered"],
         border: Border | None,
     ) -> BorderedSolution:
-        """Solve with F_z, given by its entries, bordered."""
-        del z, p
-        return self.layout.solve(parts[0], border, rhs)
+        """Solve with F_z, bordered."""
+        del parts
+        return self.solve(z, p, rhs, border)
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian, from the pivots of the fused step."""
         row, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
         return self.advance(z, p, np.zeros_like(p), row, one, none).index
+
+    @cached_property
+    def _equation_tables(self) -> tuple[np.ndarray, ...]:
+        return equation_tables(self.model, 0.5 * self.stiff_lengths)
 
     @cached_property
     def _step_tables(self) -> tuple[np.ndarray, ...]:
@@ -204,11 +267,8 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
     ) -> Advance:
         """One Newton step along the curve with parameter velocity `dp`.
 
-        One fused kernel; rods that stretch or shear, and lanes with an unsafe pivot, take the
-        general solve.
+        One fused kernel; lanes with an unsafe pivot take the general solve.
         """
-        if self.model.soft:
-            return super().advance(z, p, dp, row, corner, defect)
         return self.fused_advance(advance_lanes, self._step_tables, z, p, dp, row, corner, defect)
 
     @property

@@ -77,9 +77,9 @@ def hold_end(turned, side, scalars, rates, q, node, velocity):
 
 @njit(**INNER)
 def turn_row(q, at, row, to, scale):
-    """Replace a node's entries of the closing row by those along φ; return the one along q."""
+    """Replace four entries of a row by three along φ of a node; return the one along q."""
     q0, q1, q2, q3 = load(q, at), load(q, at + 1), load(q, at + 2), load(q, at + 3)
-    r0, r1, r2, r3 = load(row, at), load(row, at + 1), load(row, at + 2), load(row, at + 3)
+    r0, r1, r2, r3 = load(row, to), load(row, to + 1), load(row, to + 2), load(row, to + 3)
     store(row, to, scale * (r1 * q0 - r0 * q1 + r2 * q3 - r3 * q2))
     store(row, to + 1, scale * (r2 * q0 - r0 * q2 + r3 * q1 - r1 * q3))
     store(row, to + 2, scale * (r3 * q0 - r0 * q3 + r1 * q2 - r2 * q1))
@@ -87,8 +87,11 @@ def turn_row(q, at, row, to, scale):
 
 
 @njit(**INNER)
-def normalise(lengths, first, stop, q, row, radii, extremes, sums):
-    """Unit quaternions; what belongs to the lengths of all nodes, and the closing row along φ."""
+def normalise(lengths, lowered, first, stop, q, row, radii, extremes, sums):
+    """Unit quaternions; what belongs to the lengths of all nodes, and the closing row along φ.
+
+    lowered: one row, by how much a shift of the metric lowers r² in units of the stiffness.
+    """
     zero, one, three, half = spread(0.0), spread(1.0), spread(3.0), spread(0.5)
     count, product, defect = zero, one, zero
     for i in range(first, stop):
@@ -101,7 +104,8 @@ def normalise(lengths, first, stop, q, row, radii, extremes, sums):
         store(q, at + 1, q1 * inverse)
         store(q, at + 2, q2 * inverse)
         store(q, at + 3, q3 * inverse)
-        stiff, excess = c * (three * square - one), c * (square - one)
+        less = one + load(lowered, 0)
+        stiff, excess = c * (three * square - less), c * (square - less)
         soft, node = one / stiff, RADII * i
         count = count + where_less(stiff, zero, one, zero)
         product = product * (square * square * square * soft * spread(1.0 / 64.0))

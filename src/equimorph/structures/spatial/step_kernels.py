@@ -25,13 +25,8 @@ from equimorph.structures.spatial.chain_kernels import (
 )
 from equimorph.structures.spatial.element_kernels import (
     BORDER,
-    add_moment_rates,
-    own_moments,
-    pair_moments,
-    pull_nodes,
+    assemble_element,
     reduce_rows,
-    relate,
-    stiffen,
 )
 from equimorph.structures.spatial.node_kernels import (
     COUNT,
@@ -55,21 +50,34 @@ from equimorph.structures.spatial.node_kernels import (
 
 
 @njit(**INNER)
-def _start_block(closing_table, scalars, rates, compliance, pulls, closing, closing_rates, sums):
-    """Closures before the sum over nodes, and their rates by the parameters themselves."""
-    zero = spread(0.0)
+def start_closures(
+    closing_table, scalars, rates, compliance, pulls, closing, closing_rates, compliant
+):
+    """Closures before the sum over nodes, their rates by the parameters and by themselves.
+
+    compliant: nine rows.
+    """
     for a in range(3):
         value = mix(a, closing_table, scalars)
         for c in range(3):
             value = value + spread(compliance[a, c]) * load(pulls, c)
         store(closing, a, value)
         store(closing_rates, a, mix(a, closing_table, rates))
-    store(sums, WORST, zero)
-    store(sums, SUM, zero)
+        for c in range(3):
+            store(compliant, 3 * a + c, spread(compliance[a, c]))
 
 
 @njit(**INNER)
-def _clear_block(vertices, products, extremes):
+def hold_axes(axes, compliant):
+    """Leave −1 on the diagonal of coordinates without a closure, nothing else."""
+    for a in range(3):
+        for c in range(3):
+            if axes[a] < 0 or axes[c] < 0:
+                store(compliant, 3 * a + c, spread(-1.0 if a == c else 0.0))
+
+
+@njit(**INNER)
+def clear_block(vertices, products, extremes):
     """Reset what elements and pivots are added to."""
     zero = spread(0.0)
     for i in range(vertices.shape[0]):
@@ -81,20 +89,26 @@ def _clear_block(vertices, products, extremes):
     store(extremes, TOTAL, zero)
 
 
-@njit(**INNER)
-def _keep_slopes(order, first, places, gradient, slopes):
-    """Add an element's ∂L/∂φ to its nodes."""
-    for i in range(order):
-        to = 3 * (first + places[i])
-        for k in range(3):
-            store(slopes, to + k, load(slopes, to + k) + load(gradient, 4 * i + k))
+@njit(**FLAGS)
+def element_work(order, width, gradient):
+    """Work arrays of `assemble_element`."""
+    jacobian, scaled = work_rows((3 * order + 1) * width), work_rows((3 * order + 1) * width)
+    jacobian[:], scaled[:] = 0.0, 0.0
+    more = (
+        work_rows(9), work_rows(3), work_rows(3), work_rows(3), work_rows(3), work_rows(3),
+        work_rows(3), work_rows(3), work_rows(3), work_rows(3),
+    )  # fmt: skip
+    return (
+        work_rows(4 * order * order), work_rows(4 * order), work_rows(order), jacobian, scaled,
+        gradient, work_rows(3), more,
+    )  # fmt: skip
 
 
 @njit(**FLAGS)
 def advance_lanes(
     places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
-    force_picks, turned, held, axes, closing_table, compliance, lengths,
-    z, p, dp, row, corner, defect,
+    force_picks, tension, tension_picks, softness, turned, held, axes, closing_table, compliance,
+    lengths, z, p, dp, row, corner, defect,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Fused Newton step, tangent and inertia of a rod; see `structures.contract.Advance`.
@@ -115,16 +129,19 @@ def advance_lanes(
         work_rows(6), work_rows(3), work_rows(3), work_rows(3)
     )  # fmt: skip
     row_pulls, given, sums, extremes = work_rows(3), work_rows(2), work_rows(3), work_rows(5)
-    relative, strains, gradient = (
-        work_rows(4 * order * order), work_rows(4 * order), work_rows(4 * order)
+    gradient, compliant, total = work_rows(4 * order), work_rows(9), work_rows(3 * nodes)
+    tables = (
+        places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
+        force_picks, tension, tension_picks, softness,
     )  # fmt: skip
-    jacobian, scaled = work_rows((size + 1) * width), work_rows((size + 1) * width)
-    twists, three, total = work_rows(order), work_rows(3), work_rows(3 * nodes)
+    work = element_work(order, width, gradient)
+    lowered = work_rows(1)
+    lowered[:] = 0.0
     matrix, lower = work_rows((elements * size + 1) * width + 8), work_rows((size + 1) * width)
     pivots, vertices = work_rows(elements * inner), work_rows((elements + 1) * 3 * SHARES)
     ties, products, small = work_rows(elements * 9), work_rows(36), work_rows(24)
     turns, out = work_rows(6 * nodes), work_rows(8 * nodes + 16)
-    jacobian[:], scaled[:], matrix[:], lower[:] = 0.0, 0.0, 0.0, 0.0
+    matrix[:], lower[:] = 0.0, 0.0
     turns[:] = 0.0
     for block in range(0, lanes, LANES):
         start = min(block, lanes - LANES)
@@ -138,9 +155,12 @@ def advance_lanes(
                 pulls[c, k] = z[at, free + axes[c]] if there else 0.0
                 row_pulls[c, k] = row[at, free + axes[c]] if there else 0.0
             given[0, k], given[1, k] = corner[at], defect[at]
-        _clear_block(vertices, products, extremes)
-        _start_block(closing_table, scalars, rates, compliance, pulls, closing, closing_rates, sums)
-        normalise(lengths, first, stop, q, row_q, radii, extremes, sums)
+        clear_block(vertices, products, extremes)
+        start_closures(
+            closing_table, scalars, rates, compliance, pulls, closing, closing_rates, compliant
+        )
+        sums[:] = 0.0
+        normalise(lengths, lowered, first, stop, q, row_q, radii, extremes, sums)
         store(given, 1, load(given, 1) - load(sums, DEFECT))
         if held[0]:
             hold_end(turned, 0, scalars, rates, q, 0, velocity)
@@ -149,28 +169,10 @@ def advance_lanes(
         total[:] = 0.0
         for e in range(elements):
             node, base = e * degree, e * size * width
-            relate(e, order, node, places, slopes, q, relative, strains)
-            own_moments(
-                e, order, stiff, moments, moment_picks, torsion, torsion_picks, scalars, slopes,
-                strains, twists, jacobian, width, gradient, three,
+            assemble_element(
+                e, tables, width, scalars, rates, pulls, q, matrix, base, closing, closing_rates,
+                compliant, total, work,
             )  # fmt: skip
-            pair_moments(
-                e, order, slopes, relative, strains, jacobian, width, gradient, matrix, base
-            )
-            pull_nodes(
-                e, order, node, places, weights, forces, force_picks, scalars, rates, pulls, q,
-                gradient, width, matrix, base, three, closing,
-            )  # fmt: skip
-            _keep_slopes(order, node, places, gradient, total)
-            stiffen(
-                e, order, width, stiff, torsion, torsion_picks, scalars, jacobian, scaled, matrix,
-                base,
-            )  # fmt: skip
-            if len(moment_picks) > 0 or len(torsion_picks) > 0:
-                add_moment_rates(
-                    e, order, width, moments, moment_picks, torsion, torsion_picks, rates, twists,
-                    jacobian, matrix, base, three,
-                )  # fmt: skip
             if e == 0 and held[0]:
                 turn_held(order, order - 2, 0, velocity, width, matrix, base, closing_rates)
             if e == elements - 1 and held[1]:
@@ -180,13 +182,14 @@ def advance_lanes(
             for k in range(inner):
                 note_pivot(load(pivots, e * inner + k), extremes)
             add_products(inner, size, width, matrix, base, lower, products)
-            to_vertices(e, inner, size, width, matrix, base, vertices, ties)
+            to_vertices(e, inner, size, width, matrix, base, BORDER, vertices, ties)
         for v in range(begin, last + 1):
             complete_vertex(v, v * degree, radii, row_q, total, vertices)
         for v in range(begin, last + 1):
-            eliminate_vertex(v, last, vertices, ties, products, extremes)
-        small_system(axes, compliance, products, closing, closing_rates, row_pulls, given, small)
-        note_closures(small, extremes)
+            eliminate_vertex(v, last, BORDER, BORDER, vertices, ties, products, extremes)
+        hold_axes(axes, compliant)
+        small_system(axes, compliant, products, closing, closing_rates, row_pulls, given, small)
+        note_closures(small, SYSTEM, extremes)
         solve_lanes(small, 4, 6)
         for v in range(last, begin - 1, -1):
             restore_vertex(v, last, v * degree, (v + 1) * degree, vertices, ties, small, turns)
