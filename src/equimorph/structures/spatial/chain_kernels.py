@@ -23,13 +23,15 @@ from equimorph.structures.spatial.node_kernels import (
     stretch_of,
 )
 
+INLINE = {**INNER, "forceinline": True}
+"""Flags of kernels whose loops are unrolled where they are called, by constants there."""
 SHARES = 9
 """Rows of one row of a vertex: three of its own block, then the border."""
 SYSTEM = np.int64(6)
 """Width of the system of three closures and the load with its two right-hand sides."""
 
 
-@njit(**INNER)
+@njit(**INLINE)
 def to_vertices(e, inner, size, width, matrix, base, border, vertices, ties):
     """Add what remains of an element to the rows of its vertices, which have `border` columns."""
     shares = 3 + border
@@ -65,7 +67,7 @@ def complete_vertex(v, node, radii, row, slopes, vertices):
         store(vertices, to + 3 + ROW, own + load(row, 4 * node + k))
 
 
-@njit(**INNER)
+@njit(**INLINE)
 def eliminate_vertex(v, last, border, left, vertices, ties, products, extremes):
     """Eliminate the rotation of a vertex from the next one and from the border.
 

@@ -441,7 +441,7 @@ def reduce_rows(inner, size, width, matrix, base, lower, pivots, at):
                 store(lower, i * width + j, inverse * load(matrix, base + i * width + j))
 
 
-@njit(**INNER)
+@njit(**INNER, forceinline=True)
 def assemble_element(
     e, tables, width, scalars, rates, pulls, q, matrix, base, closing, closing_rates, compliant,
     total, work,
