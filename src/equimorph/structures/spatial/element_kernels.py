@@ -475,9 +475,7 @@ def assemble_element(
         to = 3 * (node + places[i])
         for k in range(3):
             store(total, to + k, load(total, to + k) + load(gradient, 4 * i + k))
-    stiffen(
-        e, order, width, stiff, torsion, torsion_picks, scalars, jacobian, scaled, matrix, base
-    )
+    stiffen(e, order, width, stiff, torsion, torsion_picks, scalars, jacobian, scaled, matrix, base)
     if len(moment_picks) > 0 or len(torsion_picks) > 0:
         add_moment_rates(
             e, order, width, moments, moment_picks, torsion, torsion_picks, rates, twists,

@@ -259,9 +259,7 @@ def fields_lanes(
                 tied, y, bends,
             )  # fmt: skip
         _find_places(elements, order, sums, steps, begins, origin, scalars, y, sites)
-        _largest(
-            elements, order, table, to_legendre, bends, best, where, chosen, series
-        )
+        _largest(elements, order, table, to_legendre, bends, best, where, chosen, series)
         write_lanes(unit, 0, 1, rotations, start * 4 * nodes, 4 * nodes, 4 * nodes)
         write_lanes(sites, 0, 1, places, start * 3 * many, 3 * many, 3 * many)
         write_lanes(bends, 0, 1, strains, start * 3 * many, 3 * many, 3 * many)

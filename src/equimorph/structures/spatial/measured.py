@@ -52,7 +52,7 @@ class MeasuredInSpace(AnyRod):
         """Mass matrix of a rod of mass 1: masses at the nodes of the elements."""
 
         def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points 3"]:
-            return self.recovery.nodal(z, p)[1].reshape(len(z), -1, 3)
+            return self.recovery.nodal(z, p).places.reshape(len(z), -1, 3)
 
         weights = self.mesh.element_weights.ravel()
         return inertia_of_places(self.mechanics, places, weights, z, p)

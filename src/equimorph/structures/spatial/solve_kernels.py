@@ -178,7 +178,7 @@ def restore_side(
     k, side, begin, last, shares, vertices, ties, elements, order, width, places, matrix,
     pivots, small, turns,
 ):  # fmt: skip
-    """Back-substitute one right-hand side, its number and the width of `small`: three rows a node."""
+    """Back-substitute one side, its number and the width of `small`: three rows a node."""
     size, inner, degree = 3 * order, 3 * (order - 2), order - 1
     for v in range(last, begin - 1, -1):
         node = v * degree
