@@ -204,11 +204,11 @@ def _record(
 
 def _closing(locus: Locus, side: Side, walk: Walks, after: Walks) -> Landmark | None:
     """Return to the start, if the step from `walk` passes it."""
-    place = _passes(locus, walk, float(after.travelled[0]), side.spots[0])
+    place = passes(locus, walk, float(after.travelled[0]), side.spots[0])
     return None if place is None else Landmark(EventKind.CLOSED, place[1], place[0])
 
 
-def _passes(locus: Locus, walk: Walks, stop: float, target: Spots) -> tuple[float, Spots] | None:
+def passes(locus: Locus, walk: Walks, stop: float, target: Spots) -> tuple[float, Spots] | None:
     """Length and point at which the step from `walk` to the length `stop` passes a point."""
     travelled = float(walk.travelled[0])
     if travelled == 0.0:
@@ -232,7 +232,7 @@ def _close(locus: Locus, sides: list[Side], walks: tuple[Walks, Walks], good: Fl
         for target in targets if good[one] else ():
             spot, at = target.spots.take(np.array([other])), float(target.travelled[other])
             stop = float(there.travelled[one])
-            place = _passes(locus, here.take(np.array([one])), stop, spot)
+            place = passes(locus, here.take(np.array([one])), stop, spot)
             if place is None or at == 0.0:
                 continue
             lengths = {one: place[0] - 2e-9, other: at}
