@@ -37,7 +37,7 @@ FREE = {"unit", "name", "natural"}
 FORMULAS = {"draw", "forces"}
 """Keys under which the text of a number is a formula."""
 UNLIMITED = {"lower", "upper"}
-OPTIONAL = {"guesses"}
+OPTIONAL = {"guesses", "normal"}
 
 
 def mutants(value: Any, key: str = "") -> Iterator[Any]:

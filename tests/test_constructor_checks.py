@@ -11,6 +11,7 @@ from typecheck import unchecked
 
 LEAST_CALLS = 3000
 JOINTS = {"A": (-1.0, 0.0), "B": (0.0, 0.3), "C": (1.0, 0.0)}
+IN_SPACE = {"A": (-1.0, 0.0, 0.0), "B": (0.0, 0.3, 0.2), "C": (1.0, 0.0, 0.0), "D": (0.0, 1.0, 1.0)}
 UNITS = {"force": "N", "length": "mm"}
 CLAMP_AND_PIN = ("clamped", {"angle": "free", "x": "held", "y": 2.0})
 SYMBOL = {"name": "x", "natural": "1 + 0*p", "guesses": (-2.0, 2.0), "mass": 1.0, "unit": "1"}
@@ -60,6 +61,21 @@ RIGHT: tuple[tuple[Any, Mapping[str, Any]], ...] = (
         "loads": {"F": {"B": (0.0, -1.0), "A-B": (0.0, -1.0)}, "g": {"weight": (0.0, -1.0)}},
         "actuators": {"a": {"curvature": {"A-B": 1.0}, "turn": {"A": 1.0}},
                       "b": {"length": {"B-C": 0.1}, "move": {"C": (0.1, 0.0)}}},
+        "elements": 1, "degree": 4, "units": UNITS,
+    }),
+    (em.SpatialMember, {"joints": ("A", "B", "C"), "EI": 1.0, "EI_out": 2.0, "GJ": 0.5, "EA": 900.0,
+                        "normal": (0.0, 0.0, 1.0), "curvature": 0.1, "strains": (0.0, 0.1, 0.0),
+                        "length": 2.0, "hinges": {"B": (0.0, 0.0, 1.0), "C": "ball"},
+                        "weight": 1.0, "inextensible": False}),
+    (em.SpatialFrame, {
+        "joints": IN_SPACE, "supports": {"A": "fixed", "C": {"x": "held", "y": 5.0, "z": "held"},
+                                         "D": {"plane": (0.0, 1.0, 1.0), "rotation": "held"}},
+        "members": [("A", "B", "C"), {"joints": ("B", "D"), "EI": 2.0, "hinges": ["B"],
+                                      "weight": 1.0}],
+        "loads": {"F": {"B": (0.0, 0.0, -1.0), "A-B": (0.0, 0.0, -1.0)},
+                  "g": {"weight": (0.0, 0.0, -1.0)}},
+        "actuators": {"a": {"curvature": {"A-B": (0.0, 0.0, 1.0)}, "turn": {"A": (0.0, 1.0, 0.0)}},
+                      "b": {"length": {"B-C": 0.1}, "move": {"C": (0.1, 0.0, 0.0)}}},
         "elements": 1, "degree": 4, "units": UNITS,
     }),
     (em.EnergyStructure, {

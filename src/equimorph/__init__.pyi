@@ -116,6 +116,8 @@ from .structures import (
     SectionProperties as SectionProperties,
     SpaceStability as SpaceStability,
     SpatialEnd as SpatialEnd,
+    SpatialFrame as SpatialFrame,
+    SpatialMember as SpatialMember,
     SpatialRod as SpatialRod,
     Spring as Spring,
     State as State,

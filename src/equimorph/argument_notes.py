@@ -4,6 +4,7 @@ They are written ``Annotated[Sequence[float], DIRECTION]``; see `argument_kinds`
 """
 
 import re
+from itertools import pairwise
 from typing import Any
 
 from equimorph.argument_kinds import Kind, is_listed, is_number, number_kind
@@ -54,6 +55,21 @@ TWO_NAMES = Kind(
         and value[0] != value[1]
     ),
 )
+SEVERAL_NAMES = Kind(
+    "two or more names of joints, successive ones different, like ('A', 'B', 'C')",
+    "sequences of joints, like ('A', 'B', 'C')",
+    lambda value: (
+        is_listed(value)
+        and len(value) >= 2
+        and all(isinstance(each, str) and NAME.fullmatch(each) for each in value)
+        and all(a != b for a, b in pairwise(value))
+    ),
+)
+SPACE_DIRECTION = Kind(
+    "three finite numbers (x, y, z), not all 0",
+    "directions (x, y, z)",
+    lambda value: _are_numbers(value, 3) and any(value),
+)
 QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 """A number and what follows it: its unit."""
 
@@ -79,3 +95,14 @@ def _quantity_in(allowed: Range) -> Kind:
 
     text = "a text with its unit, like '2.5 mm'"
     return Kind(f"{allowed.words}, or {text}", f"{allowed.several}, or texts", fits, number.convert)
+
+
+THREE_QUANTITIES = Kind(
+    "three finite numbers, or texts with their units",
+    "triples of numbers or texts",
+    lambda value: (
+        is_listed(value)
+        and len(value) == 3
+        and all(_quantity_in(FINITE).fits(each) for each in value)
+    ),
+)

@@ -115,6 +115,10 @@ CLASSES: Mapping[str, tuple[str, str]] = {
     "CrossSection": ('a section, like `Round("2 mm", E="70 GPa", nu=0.3)`', "sections"),
     "Bar": ("a bar, like `Bar(('A', 'B'))`", "bars, like `Bar(('A', 'B'))`"),
     "Member": ("a member, like `Member(('A', 'B'))`", "members, like `Member(('A', 'B'))`"),
+    "SpatialMember": (
+        "a member, like `SpatialMember(('A', 'B'))`",
+        "members, like `SpatialMember(('A', 'B'))`",
+    ),
     "Unknown": ('an unknown, like `Unknown("x")`', 'unknowns, like `Unknown("x")`'),
     "Parameter": ("a parameter, like `Parameter(...)`", "parameters, like `Parameter(...)`"),
     "End": ('an end, like `End(angle="free")`', 'ends, like `End(angle="free")`'),

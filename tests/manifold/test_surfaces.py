@@ -130,7 +130,12 @@ def island(radius: float, places: tuple[float, ...]) -> Polynomial:
 
 @pytest.mark.parametrize(
     ("radius", "places", "euler"),
-    [(0.1, (0.1,), 0), (0.3, (0.1, 0.2), 2), (0.07, (0.1, 0.2), 2), (0.2, (0.1, 0.2, 0.3), 0)],
+    [
+        (0.1, (0.1,), 0),
+        (0.07, (0.1, 0.2), 2),
+        pytest.param(0.3, (0.1, 0.2), 2, marks=pytest.mark.slow),
+        pytest.param(0.2, (0.1, 0.2, 0.3), 0, marks=pytest.mark.slow),
+    ],
 )
 def test_islands_between_grid_lines_are_found(radius, places, euler):
     """Intervals are 0.8 long: the random states of the checks find the island, bisection shows it.

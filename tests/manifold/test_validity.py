@@ -53,13 +53,12 @@ def test_green_strain_has_no_kink():
     assert set(dict(eset.audit.loops)) == {"box"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("box", "grid"),
     [
         (em.Box(a=(-0.2547, 0.2844), F=(-0.2957, -0.1195)), (9, 13)),
-        pytest.param(
-            em.Box(a=(0.1614, 0.2316), F=(-0.1236, 0.0103)), (14, 11), marks=pytest.mark.slow
-        ),
+        (em.Box(a=(0.1614, 0.2316), F=(-0.1236, 0.0103)), (14, 11)),
     ],
 )
 def test_tripods_whose_legs_collapse_are_clean(box, grid):

@@ -237,6 +237,7 @@ def test_what_a_bisection_leaves_is_found_only_once(monkeypatch):
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_refined_three_sphere_is_within_the_accuracy():
     """| |x| − 1 | inside the tetrahedra; the volume below each half tends to 4π/3."""
     eset = lifted(ball(), BOX, (5, 6, 5))
@@ -314,6 +315,7 @@ def test_refined_arch_over_three_parameters_has_no_slivers():
     assert away.max() <= 0.05
 
 
+@pytest.mark.slow
 def test_distances_from_the_edge_of_stability_in_three_parameters():
     """F = k (1 − x_l^(2/3))^(3/2) ends the upper branch: nearest point by a scan."""
     box = Box(x_l=(0.5, 1.2), F=(-0.3, 0.3), k=(1.0, 1.2))

@@ -19,6 +19,7 @@ from equimorph.structures import (
 )
 from oracles import rods, spatial_rods
 from oracles.frames import Twin
+from oracles.spatial_frames import SpaceTwin, bend, shed
 
 
 @dataclass(frozen=True)
@@ -235,6 +236,11 @@ def _frame(name, frame):
     return Specimen(name, frame, centre, 0.1, 0.3, Twin(frame).lagrangian)
 
 
+def _spatial_frame(name, frame):
+    centre = tuple(0.1 * np.arange(1.0, len(frame.parameters) + 1.0))
+    return Specimen(name, frame, centre, 0.1, 1.0, SpaceTwin(frame).lagrangian)
+
+
 SPECIMENS = (
     _rod("uniform"),
     _rod("left-half"),
@@ -258,5 +264,7 @@ SPECIMENS = (
     _frame("frame", portal(50.0)),
     _frame("frame, inextensible in part", portal(None)),
     _frame("frame of two members", toggle()),
+    _spatial_frame("everything in a frame in space", shed()),
+    _spatial_frame("bend in space", bend()),
     Specimen("chain by its energy", closed_chain(), (0.8, 0.3, 0.5), 0.15, 1.0, _chain_lagrangian),
 )

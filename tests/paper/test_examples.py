@@ -71,6 +71,7 @@ def test_limit_loads(numbers_of):
     np.testing.assert_allclose(found["left-half: its Delta"], 0.60, atol=0.02)
 
 
+@pytest.mark.slow
 def test_curvatures(numbers_of):
     """PHYSICS section 5: 2.132 and 14.17 at (0.96, 0); the optimum of Q_a near (0.65, 0.52)."""
     found = numbers_of("curvatures", grid=COARSE)
@@ -162,6 +163,7 @@ def test_space_stiffness(numbers_of):
         np.testing.assert_allclose(found[f"least A at (0.9, 0) up to {load}"], exact, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_space_loads(numbers_of):
     """The first lateral loads of the round rod; maps on few settings."""
     found = numbers_of("space_loads", grid=em.Grid(Theta=(0.5, 1.3, 3), Delta=(-0.6, 0.6, 4)))

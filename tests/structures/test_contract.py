@@ -11,6 +11,7 @@ from equimorph.structures import (
     EnergyStructure,
     Frame,
     Rod,
+    SpatialFrame,
     SpatialRod,
     Spring,
     Structure,
@@ -240,7 +241,9 @@ def test_symmetries_map_residuals_to_residuals(specimen):
         np.testing.assert_allclose(image_p, symmetry.image(p), rtol=1e-15)
         here = np.abs(structure.residual(z, p))
         there = np.abs(structure.residual(image_z, image_p))
-        if isinstance(structure, Rod | SpatialRod | Frame):  # most of them turn it round
+        if isinstance(
+            structure, Rod | SpatialRod | Frame | SpatialFrame
+        ):  # most of them turn it round
             here, there = np.sort(here, axis=1), np.sort(there, axis=1)
         np.testing.assert_allclose(there, here, atol=1e-12)
         back_z, back_p = symmetry.apply(image_z, image_p)

@@ -35,13 +35,15 @@ from equimorph.structures.rod import (
     Tendon,
     Tube,
 )
+from equimorph.structures.space_frame import SpatialFrame, SpatialMember
 from equimorph.structures.spatial import SpatialEnd, SpatialRod
 from equimorph.structures.spring import Spring
 from equimorph.structures.states import SpaceStability, State, States, natural_state
 from equimorph.structures.truss import Bar, Truss
 
 KINDS: dict[str, Callable[..., Structure]] = {
-    each.kind: each for each in (Rod, SpatialRod, Spring, EnergyStructure, Truss, Frame)
+    each.kind: each
+    for each in (Rod, SpatialRod, Spring, EnergyStructure, Truss, Frame, SpatialFrame)
 }
 """Classes of structures by their words in files."""
 
@@ -71,6 +73,8 @@ __all__ = [
     "SectionProperties",
     "SpaceStability",
     "SpatialEnd",
+    "SpatialFrame",
+    "SpatialMember",
     "SpatialRod",
     "Spring",
     "State",

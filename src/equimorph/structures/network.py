@@ -217,8 +217,10 @@ def check_parameter_names(names: Sequence[str]) -> None:
             )
 
 
-def built(kind: type[Part], given: Any, what: str) -> Part:
-    """Edge of a network from one, from its data, or from the names of its ends.
+def built(kind: type[Part], given: Any, what: str, joints: str = "ends") -> Part:
+    """Edge of a network from one, from its data, or from the names of its joints.
+
+    `joints` is the field that takes these.
 
     Raises
     ------
@@ -227,10 +229,10 @@ def built(kind: type[Part], given: Any, what: str) -> Part:
     """
     if isinstance(given, kind):
         return given
-    data = given if isinstance(given, Mapping) else {"ends": given}
+    data = given if isinstance(given, Mapping) else {joints: given}
     known = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # all are dataclasses
     strange = [name for name in data if name not in known]
-    if strange or "ends" not in data:
+    if strange or joints not in data:
         raise InputError(
             f"`{what}` must hold {kind.__name__}s ({', '.join(known)}) or pairs of joints; got "
             f"{given!r}."

@@ -323,6 +323,62 @@ class FrameSection(StructureSection):
     units: UnitSystem | None = None
 
 
+Space = Annotated[list[Number], Field(min_length=3, max_length=3)]
+PlaceInSpace = Annotated[list[Quantity], Field(min_length=3, max_length=3)]
+
+
+class SpatialMemberSection(Section):
+    """A member of a frame in space; see `equimorph.SpatialMember`."""
+
+    joints: list[str] = Field(min_length=2)
+    section: CrossSection | None = None
+    EI: Stiffness | None = None
+    EI_out: Stiffness | None = None
+    GJ: Stiffness | None = None
+    EA: Stiffness | None = None
+    inextensible: bool = False
+    normal: Space | None = None
+    curvature: Quantity = 0.0
+    strains: PlaceInSpace | None = None
+    length: Stiffness | None = None
+    hinges: list[str] | dict[str, Literal["ball"] | Space] = Field(default_factory=list)
+    weight: Stiffness | None = None
+
+
+class SpatialEffectSection(Section):
+    """What an actuator of a frame in space does, per unit of its parameter."""
+
+    curvature: dict[str, Space] | None = None
+    length: dict[str, Number] | None = None
+    move: dict[str, Space] | None = None
+    turn: dict[str, Space] | None = None
+
+
+def _support_in_space(given: Any) -> Any:
+    table = given if isinstance(given, dict) else {}
+    fine = table and all(isinstance(x, str | list) or is_number(x) for x in table.values())
+    if not (isinstance(given, str) or fine):
+        raise requirement(
+            'be "fixed", "pinned", axes to hold like "xz", or a table like '
+            '{ line = [1, 0, 0], rotation = "held" }'
+        )
+    return given
+
+
+class SpatialFrameSection(StructureSection):
+    """Rods between joints in space; see `equimorph.SpatialFrame`."""
+
+    kind: Literal["spatial frame"]
+    joints: dict[str, PlaceInSpace] = Field(min_length=2)
+    members: list[SpatialMemberSection] = Field(min_length=1)
+    supports: dict[str, Annotated[Any, AfterValidator(_support_in_space)]]
+    loads: dict[str, dict[str, Space]] = Field(default_factory=dict)
+    actuators: dict[str, SpatialEffectSection] = Field(default_factory=dict)
+    elements: int = Field(default=2, ge=1, le=1000)
+    degree: int = Field(default=6, ge=3, le=16)
+    units: UnitSystem | None = None
+
+
 ANY_STRUCTURE: Any = Annotated[
     Union[tuple(StructureSection.__subclasses__())],  # noqa: UP007  # of the classes above
     Field(discriminator="kind"),

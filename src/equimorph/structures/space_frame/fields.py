@@ -1,0 +1,201 @@
+"""Places, rotations, forces and curvatures of a frame in space."""
+
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from numpy.polynomial import legendre
+
+from equimorph.arrays import Lanes, Parameters
+from equimorph.structures.discrete import DiscreteStructure
+from equimorph.structures.space_frame.lagrangian import gathered
+from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
+from equimorph.structures.space_frame.network import Turning
+from equimorph.structures.space_frame.statics import SpaceFlows
+from equimorph.structures.spatial.quaternions import (
+    RIGHT,
+    exponential,
+    matrices,
+    rotation_vectors,
+)
+
+FINE = 21
+"""Places in each element among which an extremum of the curvature is sought."""
+POLISHING = 5
+"""Newton iterations from there."""
+
+Vectors = Float[np.ndarray, "lanes elements order 3"]
+
+
+class SpatialFrameFields(SpatialFrameMechanics, DiscreteStructure):
+    """A frame in space with the fields that descriptors and figures show, in units of its model."""
+
+    # --- joints ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _unit_loads(self) -> SpaceFlows:
+        """Forces for a load of size 1 on each joint along x, y and z."""
+        joints = len(self.model.network.joints)
+        loads = np.zeros((3 * joints, joints, 3))
+        loads[np.arange(3 * joints), np.arange(3 * joints) // 3, np.arange(3 * joints) % 3] = 1.0
+        return self.model.statics.carrying_forces(loads)
+
+    @cached_property
+    def _drawn_chords(self) -> Float[np.ndarray, "pieces 3"]:
+        """Vectors from start to end of the pieces as drawn, by the quadrature of the model."""
+        pull = (self.model.weights[..., None] * self.model.tangents).sum(axis=1)
+        return gathered(pull, self.model.owner, self.model.pieces)
+
+    def displacements(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
+        """Moves of the joints: what a load of size 1 on each would travel."""
+        model = self.model
+        _, w, _, y = self.jets(z, p)
+        chords = gathered(self.chords(w, y)[0].sum(axis=2), model.owner, model.pieces)
+        flow, supports = self._unit_loads
+        moves = np.einsum("fka,lka->lf", flow, chords - self._drawn_chords)
+        given = np.einsum("ls,sja->lja", y[0], model.moved)
+        given -= np.einsum("jab,ljb->lja", model.yielding, self.reactions(z, p))
+        moves -= np.einsum("fja,lja->lf", supports, given)
+        return np.asarray(moves.reshape(len(z), len(model.network.joints), 3))
+
+    def reactions(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
+        """Forces of the supports on the joints."""
+        return np.asarray(np.einsum("ls,sja->lja", self.scalars(z, p), self.model.forces.supports))
+
+    def couples(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
+        """Couples of the supports on the joints; 0 where rotations are free."""
+        made, found = self.model.network, self.body_couples(z, p)
+        out = np.zeros((len(z), len(made.joints), 3))
+        for k, body in enumerate(made.bodies):
+            if body.turning is Turning.HELD:
+                out[:, body.joint] = found[:, k]
+        return out
+
+    def turns_of_joints(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
+        """Rotation vectors of the joints; 0 where all members are hinged."""
+        bodies = self.model.network.body_of_joint
+        found = rotation_vectors(self.turns(z, p)[:, bodies])
+        return np.where(bodies[:, None] >= 0, found, 0.0)
+
+    def turns_of_ends(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes pieces 2 3"]:
+        """Rotation vectors of the ends of the pieces."""
+        ends = self.model.piece_nodes[:, [0, -1]]
+        return rotation_vectors(self.turns(z, p)[:, ends])
+
+    # --- along the members ----------------------------------------------------------------------
+
+    def cross_sections(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes e n 3 3"]:
+        """Axes t, n, b at the points, in the columns."""
+        turned = matrices(self.turns(z, p)[:, self.model.nodes])
+        return np.asarray(np.einsum("leiab,eibc->leiac", turned, self.model.drawn))
+
+    def end_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes pieces 2 3"]:
+        """Forces in the cross-sections at start and end, of what lies beyond, toward the end."""
+        y = self.jets(z, p)[3]
+        found = self.forces(y)[0].reshape(len(z), *self._elements, 3)
+        return np.stack([found[:, :, 0, 0], found[:, :, -1, -1]], axis=2)
+
+    @property
+    def _elements(self) -> tuple[int, int, int]:
+        """Pieces, elements of each, and nodes of these."""
+        mesh = self.model.mesh
+        return self.model.pieces, mesh.elements, mesh.degree + 1
+
+    def moments(self, z: Lanes, p: Parameters) -> Vectors:
+        """Moments (x, y, z) in the cross-sections at the points, from the balance of each element.
+
+        Ends of elements carry what the element's gradient says; inside ``m' = f × r'`` is
+        integrated, and the remaining difference is distributed in proportion.
+        """
+        model = self.model
+        _, w, _, y = self.jets(z, p)
+        local, axes = self.element_slopes(w, y)[0], w[0][:, model.nodes]
+        turned = np.einsum("kab,leib->leika", RIGHT, axes)
+        gradient = 0.5 * np.einsum("leika,leia->leik", turned, local)
+        world = np.einsum("leiab,leib->leia", matrices(axes), gradient)
+        chord = self.chords(w, y)[0] / model.weights[..., None]
+        turning = np.cross(self.forces(y)[0], chord)
+        sums = model.mesh.reference.integral * model.element_lengths[:, None, None]
+        change = np.einsum("eij,leja->leia", sums, turning)
+        gap = world[:, :, -1] + world[:, :, 0] - change[:, :, -1]
+        share = model.mesh.reference.nodes[:, None]
+        return np.asarray(change - world[:, :, :1] + gap[:, :, None] * share)
+
+    def section_moments(self, z: Lanes, p: Parameters) -> Vectors:
+        """Moments on the axes t, n, b of the cross-sections at the points."""
+        return np.asarray(
+            np.einsum("leica,leic->leia", self.cross_sections(z, p), self.moments(z, p))
+        )
+
+    def section_strains(self, z: Lanes, p: Parameters) -> Vectors:
+        """Twist and curvatures about n and b at the points, per length as drawn."""
+        model = self.model
+        elastic = self.section_moments(z, p) / model.rigidity[model.owner][:, None]
+        free = self.actuated(self.jets(z, p)[3])[0][0][:, model.owner]
+        bends = np.array([float(each.curvature) for each in model.network.members]) * model.length
+        drawn = bends[model.network.owner][model.owner][:, None] * np.array([0.0, 0.0, 1.0])
+        return np.asarray(elastic + (free + drawn)[:, :, None])
+
+    def largest_curvatures(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes pieces"]:
+        """Largest bending curvature √(κ_n² + κ_b²) in every piece, polished in each element."""
+        mesh = self.model.mesh
+        bends = self.section_strains(z, p)[..., 1:]
+        series = np.einsum("ij,lejk->leik", mesh.reference.to_legendre, bends)
+        grid = np.linspace(-1.0, 1.0, FINE)
+        sizes = np.linalg.norm(
+            np.einsum("gi,leik->legk", legendre.legvander(grid, mesh.degree), series), axis=3
+        )
+        start = grid[sizes.argmax(axis=2)]
+        slope = np.pad(legendre.legder(np.eye(mesh.degree + 1)), ((0, 1), (0, 0)))
+        first = np.einsum("ij,lejk->leik", slope, series)
+        second = np.einsum("ij,lejk->leik", slope, first)
+        place, step = start, grid[1] - grid[0]
+        for _ in range(POLISHING):
+            basis = legendre.legvander(place, mesh.degree)
+            value, rate, bend = (
+                np.einsum("lei,leik->lek", basis, each) for each in (series, first, second)
+            )
+            down = (value * rate).sum(axis=2)
+            curved = (value * bend + rate**2).sum(axis=2)
+            move = np.where(curved < 0.0, down / np.where(curved == 0.0, 1.0, curved), 0.0)
+            place = np.clip(
+                place - move, np.maximum(start - step, -1.0), np.minimum(start + step, 1.0)
+            )
+        basis = legendre.legvander(place, mesh.degree)
+        polished = np.linalg.norm(np.einsum("lei,leik->lek", basis, series), axis=2)
+        largest = np.maximum(polished, sizes.max(axis=2))
+        return np.asarray(largest.reshape(len(z), *self._elements[:2]).max(axis=2))
+
+    def outline(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes pieces points 3"]:
+        """Places along the pieces at shares of their lengths, moves of the joints included."""
+        model, mesh = self.model, self.model.mesh
+        _, w, _, y = self.jets(z, p)
+        count = mesh.elements * mesh.degree
+        field = (self.chords(w, y)[0] / model.weights[..., None]).reshape(
+            len(z), *self._elements, 3
+        )
+        whole = np.concatenate(
+            [field[:, :, :, :-1].reshape(len(z), model.pieces, count, 3), field[:, :, -1:, -1]],
+            axis=2,
+        )
+        moved = np.einsum("ij,lkja->lkia", mesh.integration(s)[:, : count + 1], whole)
+        joints = model.network.places[None] / model.length + self.displacements(z, p)
+        starts = joints[:, model.network.ends[:, 0]]
+        return np.asarray(starts[:, :, None] + moved * model.lengths[:, None, None])
+
+    def axes_along(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes pieces points 3 3"]:
+        """Axes t, n, b of the cross-sections, in the columns, at shares of the pieces' lengths."""
+        model = self.model
+        w = np.einsum(
+            "ij,lkja->lkia", model.mesh.interpolation(s), self.turns(z, p)[:, model.piece_nodes]
+        )
+        w = w / np.linalg.norm(w, axis=-1, keepdims=True)
+        bends = [float(each.curvature) * model.length for each in model.network.members]
+        turn = np.outer(np.array(bends)[model.network.owner] * model.lengths, s - 0.5)
+        about = matrices(exponential(turn[..., None] * np.array([0.0, 0.0, 1.0])))
+        drawn = np.einsum("kab,kibc->kiac", model.network.axes, about)
+        return np.asarray(np.einsum("lkiab,kibc->lkiac", matrices(w), drawn))

@@ -1,0 +1,328 @@
+"""The Lagrangian of a frame in space and its derivatives, by jets, in batches.
+
+z = (q₁, q₂, …; φ₁, …; λ): four entries a free node, whose turn is q/|q|, the angles of hinges, and
+the multipliers. As for rods in space, ½ k m (|q|² − 1)² keeps lengths at 1; see docs/decisions.md,
+"Rotations in space".
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Lanes, Parameters, Scalars, Values
+from equimorph.errors import InputError
+from equimorph.structures.equations import Direction
+from equimorph.structures.space_frame.model import SpatialFrameModel
+from equimorph.structures.spatial.quaternions import (
+    FRAME,
+    RIGHT,
+    Jet,
+    bilinear,
+    compose,
+    normalised,
+    product,
+)
+
+BLOCK = 16
+"""Lanes computed together: their arrays stay in the cache."""
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products summed over the last axis."""
+    return np.asarray((a * b).sum(axis=-1))
+
+
+def turn_about(angle: Jet, axes: Float[np.ndarray, "... 3"]) -> Jet:
+    """Quaternions exp(a φ/2) of angles about unit axes."""
+    c, s = np.cos(0.5 * angle[0]), np.sin(0.5 * angle[0])
+    out = np.zeros((*angle.shape, 4), angle.dtype)
+    out[..., 0] = compose(c, -0.5 * s, -0.25 * c, angle)
+    out[..., 1:] = compose(s, 0.5 * c, -0.25 * s, angle)[..., None] * axes
+    return out
+
+
+def gathered(
+    values: Float[np.ndarray, "*batch some width"], at: Int[np.ndarray, " some"], count: int
+) -> Float[np.ndarray, "*batch count width"]:
+    """Sum of the rows that belong to each of `count` places."""
+    out = np.zeros((count, *values.shape[:-2], values.shape[-1]), values.dtype)
+    np.add.at(out, at, np.moveaxis(values, -2, 0))
+    return np.moveaxis(out, 0, -2)
+
+
+def conjugated(q: np.ndarray) -> np.ndarray:
+    """Inverse rotations."""
+    return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
+
+
+class SpatialFrameLagrangian:
+    """The Lagrangian of a `SpatialFrameModel`; methods as in `structures.contract`."""
+
+    def __init__(self, model: SpatialFrameModel) -> None:
+        self.model = model
+        self.unknowns, self.constraints = model.unknowns, model.multipliers
+        self.mass = model.mass
+        self._slopes = model.mesh.reference.derivative / model.element_lengths[:, None, None]
+        self._rows = 4 * len(model.free)
+
+    # --- scalars and rotations ------------------------------------------------------------------
+
+    def scalars(self, z: Lanes, p: Parameters) -> Scalars:
+        """Multipliers, parameters and 1."""
+        size = self.unknowns + self.constraints
+        for name, given, width in (("z", z, size), ("p", p, self.model.patterns.count)):
+            if given.shape[1] != width:
+                raise InputError(
+                    f"`{name}` must have {width} columns; got shape {given.shape}. States belong "
+                    "to the frame, and the resolution, that made them."
+                )
+        return np.concatenate([z[:, self.unknowns :], p, np.ones((len(z), 1))], axis=1)
+
+    def quaternions(self, z: Lanes) -> Float[np.ndarray, "lanes free 4"]:
+        """Quaternions of the free nodes."""
+        return z[:, : self._rows].reshape(len(z), len(self.model.free), 4)
+
+    def held_turns(self, y: Jet) -> Float[np.ndarray, "parts lanes held 4"]:
+        """Turns of what supports hold: about the axes of the parameters, one after the other."""
+        model = self.model
+        out = np.zeros((*y.shape[:2], len(model.held), 4), y.dtype)
+        out[0, ..., 0] = 1.0
+        vectors = model.patterns.turns[:, model.held]
+        for k in range(model.patterns.count):
+            for h in np.flatnonzero(vectors[k].any(axis=1)):
+                size = float(np.linalg.norm(vectors[k, h]))
+                angle = size * y[..., model.multipliers + k]
+                more = turn_about(angle, vectors[k, h] / size)
+                out[:, :, h] = bilinear(product, out[:, :, h], more)
+        return out
+
+    def jets(self, z: Lanes, p: Parameters, *directions: Direction) -> tuple[Jet, Jet, Jet, Jet]:
+        """Quaternions of free nodes, unit ones at all nodes, angles of hinges, and scalars."""
+        model, parts = self.model, 2 ** len(directions)
+        y = np.zeros((parts, *self.scalars(z, p).shape), np.result_type(z, p))
+        y[0] = self.scalars(z, p)
+        q = np.zeros((parts, len(z), len(model.free), 4), y.dtype)
+        q[0] = self.quaternions(z)
+        angles = np.zeros((parts, len(z), len(model.hinged)), y.dtype)
+        angles[0] = z[:, self._rows : self.unknowns]
+        for k, (dz, dp) in enumerate(directions, 1):
+            y[k, :, :-1] = np.concatenate([dz[:, self.unknowns :], dp], axis=1)
+            q[k], angles[k] = self.quaternions(dz), dz[:, self._rows : self.unknowns]
+        w = np.zeros((parts, len(z), len(model.turning), 4), y.dtype)
+        w[:, :, model.free] = normalised(q)[0]
+        w[:, :, model.held] = self.held_turns(y)
+        turned = turn_about(angles, model.hinge_axes)
+        w[:, :, model.hinged] = bilinear(product, w[:, :, model.parents], turned)
+        return q, w, angles, y
+
+    def turns(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 4"]:
+        """Unit quaternions at all nodes: turns from where they are drawn."""
+        return np.asarray(self.jets(z, p)[1][0])
+
+    # --- elements -------------------------------------------------------------------------------
+
+    def strains(self, w: Jet) -> tuple[Jet, Jet, Jet]:
+        """w e_k and w' at the points, and the strains v on fixed axes."""
+        local = w[:, :, self.model.nodes]
+        turned = np.einsum("kab,...b->...ka", RIGHT, local)
+        moved = np.einsum("eij,pleja->pleia", self._slopes, local)
+        return turned, moved, 2.0 * bilinear(_apply, turned, moved)
+
+    def actuated(self, y: Jet) -> tuple[Jet, Jet]:
+        """Strains of the cross-sections, and elongations, that are free of stress, by piece."""
+        own = y[..., self.model.multipliers :]
+        strain = np.einsum("plc,kca->plka", own, self.model.strains)
+        return strain, np.einsum("plc,kc->plk", own, self.model.elongation)
+
+    def forces(self, y: Jet) -> Float[np.ndarray, "parts lanes elements order 3"]:
+        """Forces in the cross-sections at the points."""
+        acting, owner = self.model.acting, self.model.owner
+        here = y[..., acting.numbers]
+        some = np.arange(acting.numbers.shape[1]) < acting.counts[:, None]
+        here = np.where(some, here, 0.0)
+        start = np.einsum("plkr,kra->plka", here, acting.start)[:, :, owner]
+        drop = np.einsum("plkr,kra->plka", here, acting.drop)[:, :, owner]
+        return np.asarray(
+            start[:, :, :, None] - drop[:, :, :, None] * self.model.arclengths[..., None]
+        )
+
+    def point_moments(self, v: Jet, y: Jet) -> Jet:
+        """Moments on fixed axes at the points, turned back with the cross-sections."""
+        strain = self.actuated(y)[0][:, :, self.model.owner]
+        free = np.einsum("eiak,plek->pleia", self.model.moment_of_strain, strain)
+        return np.asarray(np.einsum("eiab,pleib->pleia", self.model.stiff, v) - free)
+
+    def tensions(self, w: Jet, y: Jet) -> tuple[Jet, Jet, Jet]:
+        """∂N/∂w and N at the points, and the stretch 1 + e + c N."""
+        model = self.model
+        local, force = w[:, :, model.nodes], self.forces(y)
+
+        def by_force(f: np.ndarray, at: np.ndarray) -> np.ndarray:
+            axes = np.einsum("eik,kcab->eicab", model.tangents, FRAME)
+            form = np.einsum("...eic,eicab->...eiab", f, axes, optimize=True)
+            return np.asarray(np.einsum("...ab,...b->...a", form, at))
+
+        slope = 2.0 * bilinear(by_force, force, local)
+        tension = 0.5 * bilinear(dot, slope, local)
+        stretch = model.compliance[model.owner][:, None] * tension
+        stretch = stretch + self.actuated(y)[1][:, :, model.owner, None]
+        stretch[0] += 1.0
+        return slope, tension, stretch
+
+    def element_slopes(self, w: Jet, y: Jet) -> Jet:
+        """Gradient of L by unit quaternions at the points, element by element."""
+        turned, moved, v = self.strains(w)
+        weights = self.model.weights[..., None]
+        moment = 2.0 * weights * self.point_moments(v, y)
+        pull, _, stretch = self.tensions(w, y)
+        own = -np.einsum("kab,...b->...ka", RIGHT, moved)
+        local = bilinear(_combine, moment, own)
+        local = local - weights * bilinear(_scale, stretch, pull)
+        spread = bilinear(_combine, moment, turned)
+        return np.asarray(local + np.einsum("eij,pleia->pleja", self._slopes, spread))
+
+    def slope(self, w: Jet, y: Jet) -> Jet:
+        """Gradient of L by unit quaternions at all nodes."""
+        local = self.element_slopes(w, y)
+        flat = local.reshape(*local.shape[:2], self.model.nodes.size, 4)
+        return gathered(flat, self.model.nodes.ravel(), len(self.model.turning))
+
+    def chords(self, w: Jet, y: Jet) -> Float[np.ndarray, "parts lanes elements order 3"]:
+        """Vectors along the member at the points: stretch times tangent times weight."""
+        model, local = self.model, w[:, :, self.model.nodes]
+        axes = np.einsum("eik,kcab->eicab", model.tangents, FRAME)
+
+        def turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+            return np.asarray(np.einsum("...eia,eicab,...eib->...eic", a, axes, b, optimize=True))
+
+        tangent, stretch = bilinear(turn, local, local), self.tensions(w, y)[2]
+        return np.asarray(model.weights[..., None] * bilinear(_scale, stretch, tangent))
+
+    def by_scalars(self, w: Jet, y: Jet) -> Jet:
+        """∂L/∂y at fixed rotations."""
+        model, m = self.model, self.constraints
+        chords, acting = self.chords(w, y), model.acting
+        first = gathered(chords.sum(axis=3), model.owner, model.pieces)
+        moments = (chords * model.arclengths[..., None]).sum(axis=3)
+        second = gathered(moments, model.owner, model.pieces)
+        work = np.einsum("plka,kra->plkr", first, acting.start)
+        work = work - np.einsum("plka,kra->plkr", second, acting.drop)
+        some = np.arange(acting.numbers.shape[1]) < acting.counts[:, None]
+        of_scalars = gathered(work[:, :, some][..., None], acting.numbers[some], model.scalars)
+        out = np.einsum("pls,st->plt", y, model.quadratic) - of_scalars[..., 0]
+        _, _, v = self.strains(w)
+        weighted = np.einsum(
+            "eiak,pleia->plek", model.moment_of_strain * model.weights[..., None, None], v
+        )
+        bending = np.einsum("plek,eck->plc", weighted, model.strains[model.owner])
+        out[..., m:] -= bending
+        tension = (model.weights * self.tensions(w, y)[1]).sum(axis=3)
+        out[..., m:] -= np.einsum("ple,ec->plc", tension, model.elongation[model.owner])
+        return np.asarray(out)
+
+    # --- contract -------------------------------------------------------------------------------
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """L without the multipliers' part."""
+        model = self.model
+        q, w, _, y = self.jets(z, p)
+        _, _, v = self.strains(w)
+        moment = self.point_moments(v, y)[0]
+        free = np.einsum("eiab,leib->leia", model.stiff, v[0]) - moment
+        _, tension, stretch = (jet[0] for jet in self.tensions(w, y))
+        soft = model.compliance[model.owner][:, None] * tension
+        density = 0.5 * dot(moment - free, v[0]) - (stretch - 0.5 * soft) * tension
+        total = np.einsum("ei,lei->l", model.weights, density)
+        total = total + 0.5 * np.einsum("ls,st,lt->l", y[0], model.quadratic, y[0])
+        m = self.constraints
+        total = total - (y[0][:, :m] * self.by_scalars(w, y)[0][:, :m]).sum(axis=1)
+        excess = dot(q[0], q[0]) - 1.0
+        return np.asarray(total + 0.125 * (excess**2 @ model.stiff_lengths))
+
+    def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
+        """F with its derivatives along directions."""
+        starts = range(0, max(len(z), 1), BLOCK)
+        parts = []
+        for start in starts:
+            at = slice(start, start + BLOCK)
+            parts.append(self._equations(z[at], p[at], *((d[at], e[at]) for d, e in directions)))
+        return np.concatenate(parts, axis=1)
+
+    def _equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
+        """`equations` of one block of lanes."""
+        model = self.model
+        q, w, angles, y = self.jets(z, p, *directions)
+        unit, inverse, square = normalised(q)
+        slope = self.slope(w, y)
+        by_angle = self.lean_on_parents(slope, w, angles)
+        own = slope[:, :, model.free]
+        along = bilinear(dot, unit, own)
+        across = own - bilinear(_scale, along, unit)
+        excess = square.copy()
+        excess[0] -= 1.0
+        out = bilinear(_scale, inverse, across)
+        out = out + 0.5 * model.stiff_lengths[:, None] * bilinear(_scale, excess, q)
+        closing = self.by_scalars(w, y)[..., : self.constraints]
+        flat = out.reshape(*out.shape[:2], self._rows)
+        return np.concatenate([flat, by_angle, closing], axis=-1)
+
+    def lean_on_parents(self, slope: Jet, w: Jet, angles: Jet) -> Jet:
+        """Add the slopes at hinged nodes to those of their parents; slopes by the angles."""
+        model = self.model
+        turned = turn_about(angles, model.hinge_axes)
+        here = slope[:, :, model.hinged]
+        axes = np.pad(model.hinge_axes, ((0, 0), (1, 0)))
+        rate = np.stack(
+            [product(part, np.broadcast_to(axes, part.shape)) for part in w[:, :, model.hinged]]
+        )
+        by_angle = 0.5 * bilinear(dot, here, rate)
+        leaning = bilinear(product, here, conjugated(turned))
+        slope += gathered(leaning, model.parents, len(model.turning))
+        return by_angle
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+        return np.asarray(self.equations(z, p)[0])
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return np.asarray(self.equations(z, p, (np.zeros_like(z), dp))[1])
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        return np.asarray(self.equations(z, p, v, w)[3])
+
+    def effort(self, z: Lanes, p: Parameters) -> Parameters:
+        """∂L/∂p: what actuators bear, and minus the travel of loads."""
+        model = self.model
+        _, w, angles, y = self.jets(z, p)
+        out = self.by_scalars(w, y)[0][:, self.constraints : -1].copy()
+        slope = self.slope(w, y)
+        self.lean_on_parents(slope, w, angles)
+        for k in range(model.patterns.count):
+            if model.patterns.turns[k].any():
+                change = np.stack([y[0], np.zeros_like(y[0])])
+                change[1, :, self.constraints + k] = 1.0
+                rate = self.held_turns(change)[1]
+                out[:, k] += dot(rate, slope[0][:, model.held]).sum(axis=1)
+        return np.asarray(out)
+
+    def body_couples(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 3"]:
+        """Couple (x, y, z) by which each node resists turning: that of its support if held."""
+        _, w, angles, y = self.jets(z, p)
+        slope = self.slope(w, y)
+        self.lean_on_parents(slope, w, angles)
+        units = np.eye(4)[1:]
+        turned = [product(np.broadcast_to(unit, w[0].shape), w[0]) for unit in units]
+        return np.stack([0.5 * dot(each, slope[0]) for each in turned], axis=-1)
+
+
+def _apply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(np.einsum("...ka,...a->...k", a, b))
+
+
+def _combine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(np.einsum("...k,...ka->...a", a, b))
+
+
+def _scale(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(a[..., None] * b)

@@ -1,0 +1,224 @@
+"""Members of a frame in space, as their user describes them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Annotated, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.argument_checks import check_arguments
+from equimorph.argument_kinds import one_of
+from equimorph.argument_notes import SEVERAL_NAMES, SPACE_DIRECTION, THREE_QUANTITIES
+from equimorph.errors import InputError
+from equimorph.structures.network import built
+from equimorph.structures.rod.sections import CrossSection, cross_section
+from equimorph.structures.unit_system import Quantity, UnitSystem
+
+BALL = "ball"
+"""Hinge that transmits forces only."""
+QUANTITIES = {
+    **dict.fromkeys(("EI", "EI_out", "GJ"), "force·length²"),
+    **{"EA": "force", "curvature": "1/length", "length": "length", "weight": "force/length"},
+}
+"""What each number of a member measures."""
+ROUND_TORSION = 1.0 / 1.3
+"""GJ over EI of a round section whose Poisson's ratio is 0.3."""
+SLENDER = 0.5
+"""Largest radius of gyration √(EI/EA) of a piece of a member, relative to its length."""
+UPRIGHT = 1e-6
+"""Sine of the angle between a chord and z below which the normal is drawn along x."""
+
+Direction = Annotated[Sequence[float], SPACE_DIRECTION]
+Hinge = Annotated[str, one_of(BALL)] | Direction
+Hinges = Annotated[
+    Mapping[str, Hinge] | Sequence[str],
+    "names of joints, or 'ball' or the axis of a hinge (x, y, z) by joint",
+]
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Numbers of a cross-section in the units of the frame.
+
+    strain: against twist, bending about n and bending about b; EA None: inextensible.
+    """
+
+    strain: tuple[float, float, float]
+    EA: float | None
+    weight: float | None
+
+
+@check_arguments
+@dataclass(frozen=True)
+class SpatialMember:
+    """An elastic rod through two or more joints, free of stress as drawn.
+
+    It is drawn straight from joint to joint, or in arcs towards its normal, and passes through
+    the joints between its ends without interruption. Numbers are in the units of the frame; texts
+    like "0.3 N m^2" are converted to these.
+
+    Parameters
+    ----------
+    joints
+        Names of the joints that it connects, in order.
+    section
+        A `Strip`, `Round`, `Tube` or `OwnSection` in place of EI, EI_out, GJ, EA and weight.
+    EI
+        Stiffness against bending about the binormal b, in the plane of the normal; 1 by default.
+    EI_out
+        Stiffness against bending about the normal n; as EI by default.
+    GJ
+        Stiffness against twist; EI/1.3 by default, as of round rods with Poisson's ratio 0.3.
+    EA
+        Axial stiffness, in units of force; None: that of the section, or inextensible.
+    inextensible
+        Whether the axial stiffness of the section is left out.
+    normal
+        Direction that the normal n is turned to as far as it is across the member: strips are thin
+        along it. By default upwards, along z, and for members along z it is x.
+    curvature
+        Curvature of the arcs as drawn, towards the normal; 0: straight.
+    strains
+        Twist, and curvatures about n and b, that it has free of stress in addition to those as
+        drawn: they stress it from the beginning.
+    length
+        Length free of stress, in place of that as drawn.
+    hinges
+        Joints to which it is hinged, by ball joints; or by joint "ball" or the axis (x, y, z) as
+        drawn of a hinge that transmits all but the couple about this axis.
+    weight
+        Weight per length, for loads on "weight", or a text like "0.1 kg/m"; None: the section's.
+    """
+
+    joints: Annotated[Sequence[str], SEVERAL_NAMES]
+    section: CrossSection | Mapping[str, Any] | None = None
+    EI: Quantity | None = None
+    EI_out: Quantity | None = None
+    GJ: Quantity | None = None
+    EA: Quantity | None = None
+    inextensible: bool = False
+    normal: Direction | None = None
+    curvature: Quantity = 0.0
+    strains: Annotated[Sequence[Quantity], THREE_QUANTITIES] = (0.0, 0.0, 0.0)
+    length: Quantity | None = None
+    hinges: Hinges = ()
+    weight: Quantity | None = None
+
+    def __post_init__(self) -> None:
+        """Check the hinges, and that nothing is said twice."""
+        strange = [joint for joint in self.hinges if joint not in self.joints]
+        if strange or len(set(self.hinges)) < len(self.hinges):
+            raise InputError(
+                f"`hinges` of member {self.name} must name some of its joints, each once; got "
+                f"{self.hinges!r}."
+            )
+        if self.section is None:
+            return
+        for key in ("EI", "EI_out", "GJ", "EA", "weight"):
+            if getattr(self, key) is not None:
+                raise InputError(
+                    f"`{key}` of member {self.name} must be left out beside `section`, which gives "
+                    f"it; got {getattr(self, key)!r}."
+                )
+
+    @property
+    def name(self) -> str:
+        """Its joints, joined: A-B-C."""
+        return "-".join(self.joints)
+
+    @property
+    def pieces(self) -> list[tuple[str, str]]:
+        """Pairs of successive joints."""
+        return list(pairwise(self.joints))
+
+    def hinge(self, joint: str) -> str | tuple[float, ...] | None:
+        """What connects it to a joint: None if rigidly joined, "ball", or the axis of a hinge."""
+        if joint not in self.hinges:
+            return None
+        if not isinstance(self.hinges, Mapping):
+            return BALL
+        given = self.hinges[joint]
+        return given if isinstance(given, str) else tuple(float(x) for x in given)
+
+    def measured(self, system: UnitSystem) -> "SpatialMember":
+        """The same member with its numbers in a system of units."""
+        there = {name: of for name, of in QUANTITIES.items() if getattr(self, name) is not None}
+        found = system.measured(self, there, f"member {self.name}")
+        strains = system.numbers(self.strains, "1/length", f"strains of member {self.name}")
+        return replace(found, strains=tuple(float(x) for x in strains))
+
+    def stiffness(self, system: UnitSystem) -> Stiffness:
+        """Stiffnesses and weight in the units of the frame."""
+        if self.section is not None:
+            made = cross_section(self.section).in_system(system)
+            axial = None if self.inextensible else made.EA
+            return Stiffness((made.GJ, made.EI_out, made.EI), axial, made.weight)
+        plane = 1.0 if self.EI is None else float(self.EI)
+        aside = plane if self.EI_out is None else float(self.EI_out)
+        twist = ROUND_TORSION * plane if self.GJ is None else float(self.GJ)
+        axial = None if self.inextensible or self.EA is None else float(self.EA)
+        return Stiffness((twist, aside, plane), axial, _number(self.weight))
+
+    def arc_length(self, chord: float, stiff: Stiffness) -> float:
+        """Length of an arc over a chord; InputError if no slender arc fits."""
+        half = 0.5 * abs(float(self.curvature)) * chord
+        if half >= 1.0:
+            raise InputError(
+                f"`curvature` of member {self.name} must be less than 2 over the distance of its "
+                f"joints, {2.0 / chord:.6g}, a half circle; got {self.curvature!r}."
+            )
+        length = chord if half == 0.0 else chord * float(np.arcsin(half)) / half
+        gyration = 0.0 if stiff.EA is None else float(np.sqrt(max(stiff.strain[1:]) / stiff.EA))
+        if gyration > SLENDER * length:
+            raise InputError(
+                f"`EI` and `EA` of member {self.name} must be those of a slender rod in one system "
+                f"of units; got a radius of gyration of {gyration:.3g} and a length of "
+                f"{length:.3g}."
+            )
+        return length
+
+    def axes(self, chord: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+        """Tangent, normal and binormal, as columns, in the middle of a piece as drawn."""
+        tangent = chord / np.linalg.norm(chord)
+        wish = np.array([0.0, 0.0, 1.0] if self.normal is None else self.normal, dtype=float)
+        wish = wish / np.linalg.norm(wish)
+        across = wish - (wish @ tangent) * tangent
+        if np.linalg.norm(across) < UPRIGHT:
+            if self.normal is not None:
+                raise InputError(
+                    f"`normal` of member {self.name} must not lie along it; got {self.normal!r}."
+                )
+            across = np.array([1.0, 0.0, 0.0]) - tangent[0] * tangent
+        normal = across / np.linalg.norm(across)
+        return np.stack([tangent, normal, np.cross(tangent, normal)], axis=1)
+
+    def data(self) -> dict[str, Any]:
+        """Return what it is made from."""
+        given = {key: value for key, value in asdict(self).items() if value is not None}
+        given["joints"], given["strains"] = list(self.joints), list(self.strains)
+        if self.normal is not None:
+            given["normal"] = [float(x) for x in self.normal]
+        if self.section is not None:
+            given["section"] = cross_section(self.section).data()
+        hinged = {joint: self.hinge(joint) for joint in self.hinges}
+        given["hinges"] = {
+            joint: list(each) if isinstance(each, tuple) else each for joint, each in hinged.items()
+        }
+        return given
+
+
+def _number(given: Any) -> float | None:
+    return None if given is None else float(given)
+
+
+SpatialMemberSpec = Annotated[
+    SpatialMember | Annotated[Sequence[str], SEVERAL_NAMES] | Mapping[str, Any],
+    "members, sequences of different joints, or data of members",
+]
+
+
+def member_of(given: SpatialMemberSpec) -> SpatialMember:
+    """Member from a `SpatialMember`, its data, or the names of its joints."""
+    return built(SpatialMember, given, "members", "joints")
