@@ -77,7 +77,8 @@ class Ground:
 class Pools:
     """Different equilibria by group, and the reasons of failed starts.
 
-    A group is one independent run at one point; all groups advance together in one batch.
+    A group is one independent run at one point; all groups advance together in one batch. What the
+    discretisation does not resolve is kept apart.
     """
 
     def __init__(
@@ -92,6 +93,7 @@ class Pools:
         self.z = np.zeros((0, ground.structure.size)) if z is None else z
         self.group = np.zeros(0, int) if group is None else group
         self.failures: list[tuple[str, Groups]] = []
+        self.unresolved: list[tuple[Lanes, Groups]] = []
 
     def start(self, guesses: int) -> None:
         """Newton from random guesses, homotopy where it fails, deflation next to what was found."""
@@ -218,6 +220,7 @@ class Pools:
         beyond = ~good
         beyond[~good] = self.ground.excess(z[~good], group[~good]) > 0.0  # not a number is no sign
         self.failures.append((UNRESOLVED, group[~good & ~beyond]))
+        self.unresolved.append((z[~good & ~beyond], group[~good & ~beyond]))
         self.failures.append((BEYOND, group[beyond]))
         z, group = z[good], group[good]
         # a little outside, states still serve as stepping stones

@@ -148,11 +148,14 @@ class FoundStates(States):
     arguments
         Arguments that no stable state is missing, and whether they hold; see `Argument`. A state
         whose neighbours of index one are all missing with it escapes them.
+    unresolved
+        Different states, which may obey the constraints, that the discretisation does not resolve.
     """
 
     completeness: Completeness
     failures: Mapping[str, int]
     arguments: tuple[Argument, ...] = ()
+    unresolved: States | None = None
 
     def __repr__(self) -> str:
         """How many, how many of them are stable, and how many there may be."""
@@ -294,6 +297,7 @@ class _Catch:
     run: Int[np.ndarray, " caught"]
     runs: int
     failures: Mapping[str, int]
+    unresolved: Float[np.ndarray, "dropped size"]
 
     @classmethod
     def empty(
@@ -304,7 +308,8 @@ class _Catch:
     ) -> "_Catch":
         """Before the first run."""
         ground = Ground(structure, point[None], within)
-        return cls(ground, np.zeros((0, structure.size)), np.zeros(0, int), 0, {})
+        none = np.zeros((0, structure.size))
+        return cls(ground, none, np.zeros(0, int), 0, {}, none)
 
     def with_runs(self, pools: Pools, first: int, runs: int) -> "_Catch":
         """With the groups `first`, `first` + 1, ... of pools as further runs."""
@@ -319,6 +324,13 @@ class _Catch:
             np.concatenate([self.run, run]),
             self.runs + runs,
             {reason: count for reason, count in counts.items() if count},
+            np.concatenate(
+                [self.unresolved]
+                + [
+                    each[(first <= group) & (group < first + runs)]
+                    for each, group in pools.unresolved
+                ]
+            ),
         )
 
     def with_states(self, z: Float[np.ndarray, "more size"]) -> "_Catch":
@@ -363,4 +375,14 @@ class _Catch:
         reasons = (UNRESOLVED,) if len(z) else (UNRESOLVED, BEYOND)
         unresolved = sum(self.failures.get(reason, 0) for reason in reasons)
         completeness = Completeness(self.captured, unresolved)
-        return FoundStates(self.ground.structure, z, p, completeness, self.failures, arguments)
+        dropped = self.unresolved[distinct(self.ground.structure, self.unresolved)]
+        there = np.tile(self.ground.p, (len(dropped), 1))
+        return FoundStates(
+            self.ground.structure,
+            z,
+            p,
+            completeness,
+            self.failures,
+            arguments,
+            States(self.ground.structure, dropped, there),
+        )

@@ -11,17 +11,17 @@ from jaxtyping import Float, Int
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import short
 from equimorph.errors import InputError
-from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.description import Frame
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import CellFinder, Cells, account
-from equimorph.manifold.lifting.completeness import check, seeds_from
+from equimorph.manifold.lifting.completeness import check
 from equimorph.manifold.lifting.crossing_branches import flood_crossings
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import Lines, bisect, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
+from equimorph.manifold.lifting.recovery import longest, off_zero, recover
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
 from equimorph.manifold.lifting.unseen import UnseenFinder
 from equimorph.manifold.refining.refine import refine_cells
@@ -34,7 +34,7 @@ from equimorph.model import (
     parameter_vector,
     position,
 )
-from equimorph.structures import States, Structure
+from equimorph.structures import Structure
 
 COARSE = {1: 12, 2: 12, 3: 7}
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
@@ -53,9 +53,6 @@ SEARCHES = 10
 needed seven."""
 RECOVERED = 200
 """Missing states, spread over all that were found, whose surroundings are lifted at once."""
-HIDDEN = 12
-"""Rounds of bisection around missing states that bring no new equilibria over grid vertices: of 50
-searches 46 needed six at most."""
 LIMIT = 60_000, 30
 """Default limit of the number of equilibria: this constant, or this many per grid point."""
 MOST_POINTS = 1_000_000
@@ -180,7 +177,7 @@ def _of_grid(
     progress: Progress,
 ) -> EquilibriumSet:
     """Lift a set over one grid, and what the completeness checks find that it lacks."""
-    lines = grid_lines(box, intervals, _off_zero(setting))
+    lines = grid_lines(box, intervals, off_zero(setting))
     progress.report("seeds", 0, 1)
     pairing = start_pairing(setting, grid_mesh(lines), effort.limit)
     pairing.points.over_vertices(*_spread(pairing, lines, effort.seed, progress))
@@ -200,7 +197,7 @@ def _of_grid(
             break
         recovered += lacking
         some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
-        _recover(pairing, found.missing[some])
+        recover(pairing, found.missing[some])
     stopped = pairing.points.count if pairing.is_full else 0
     audit = replace(
         eset.audit,
@@ -208,6 +205,7 @@ def _of_grid(
         missing=lacking,
         recovered=recovered,
         descents=found.descents,
+        left_out=found.left_out,
         stopped=stopped,
         cell_size=_cell_size(box, intervals),
         touching=tuple(_named(box, place) for place in cells.touching),
@@ -274,14 +272,6 @@ def _setting(
     return Setting(structure, base, free, (*within, *validity))
 
 
-def _off_zero(setting: Setting) -> tuple[bool, ...]:
-    """Free parameters whose zero no line of the grid may hold: all.
-
-    There much is symmetric, declared or not: a structure whose load is none may be its own image.
-    """
-    return (True,) * len(setting.free)
-
-
 def _lift_grid(
     pairing: Pairing, finder: CellFinder, unseen: UnseenFinder, progress: Progress
 ) -> tuple[Cells, int]:
@@ -298,35 +288,26 @@ def _lift_grid(
         hopeless = doubtful > max(HOPELESS, 4 * first)
         last = hopeless or pairing.is_full or number == rounds - 1
         if doubtful == 0 or last:
-            cells = unseen.look(pairing, cells)
+            cells = _look(pairing, cells, finder, unseen)
         if cells.doubtful == 0 or last:
             break
         bisected += cells.doubtful
-        longest = _longest_edges(pairing, cells)
-        pairing.use_mesh(bisect(pairing.mesh, longest, _off_zero(pairing.setting)))
+        chosen, exits = _longest_edges(pairing, cells), unseen.exits
+        # first those through which tongues leave their cells
+        chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
+        pairing.use_mesh(bisect(pairing.mesh, chosen, off_zero(pairing.setting), exits))
     return cells, bisected
 
 
-def _recover(pairing: Pairing, missing: States) -> None:
-    """Enter equilibria over the corners of grid cells around states that were missing.
-
-    Cells are bisected where that brings nothing new: no corner lies below the piece of the set, or
-    its straight cells leave out the states, which are close to a curved fold.
-    """
-    for _ in range(HIDDEN):
-        if pairing.is_full:
-            return
-        known, mesh = pairing.points.count, pairing.mesh
-        found, origin = seeds_from(pairing.setting, mesh, missing)
-        ids, _ = pairing.points.over_vertices(*found)
-        missing = missing[np.setdiff1d(np.arange(len(missing)), origin[ids >= known])]
-        if len(missing) == 0 or mesh.dimension == 1:
-            return
-        around = np.unique([mesh.locate(point) for point in missing.p[:, pairing.setting.free]])
-        sides = mesh.sides[around] if mesh.dimension == 2 else mesh.sides[mesh.faces[around]]
-        longest = _longest(mesh, sides.reshape(len(around), -1))
-        pairing.fit()
-        pairing.use_mesh(bisect(mesh, np.unique(longest), _off_zero(pairing.setting)))
+def _look(pairing: Pairing, cells: Cells, finder: CellFinder, unseen: UnseenFinder) -> Cells:
+    """Cells, doubtful where they hide something; found anew if folds turn sharply inside some."""
+    tips = len(pairing.tips)
+    cells = unseen.look(pairing, cells)
+    if len(pairing.tips) == tips:
+        return cells
+    again = finder.find(pairing)
+    doubtful = np.union1d(cells.doubtful_triangles, again.doubtful_triangles)
+    return replace(again, doubtful_triangles=doubtful, touching=cells.touching)
 
 
 def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Seeds:
@@ -354,11 +335,4 @@ def _longest_edges(pairing: Pairing, cells: Cells) -> Int[np.ndarray, " n"]:
         mesh.sides[cells.doubtful_triangles],
         mesh.sides[around].reshape(len(around), 12),
     ]
-    return np.unique(np.concatenate([_longest(mesh, sides) for sides in groups]))
-
-
-def _longest(mesh: BaseMesh, sides: Int[np.ndarray, "n sides"]) -> Int[np.ndarray, " n"]:
-    """Longest edge of each row, relative to the box."""
-    ends = mesh.vertices[mesh.edges[sides]] / np.ptp(mesh.vertices, axis=0)
-    length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
-    return np.asarray(sides[np.arange(len(sides)), length.argmax(axis=1)])
+    return np.unique(np.concatenate([longest(mesh, sides) for sides in groups]))

@@ -38,6 +38,10 @@ class Audit:
     with a neck inside are bisected; `touching`, of which there must be none, are the points at
     which they touch, like the tip of a cone, or are nearer than states can be told apart.
 
+    Vertices that the discretisation does not resolve (`unresolved`) belong to a set where curves
+    lead to them; the searches found `left_out` others, which it lacks: of what is not resolved sets
+    are never known to be complete, clean or not.
+
     `stopped`, which must be zero, is the number of equilibria at which lifting stopped because it
     exceeded the limit; much is unpaired and undecided then.
 
@@ -81,6 +85,8 @@ class Audit:
     stopped: int = 0
     cell_size: tuple[tuple[str, float], ...] = ()
     touching: tuple[tuple[tuple[str, float], ...], ...] = ()
+    unresolved: int = 0
+    left_out: int = 0
 
     @property
     def missing_at_most(self) -> float:
@@ -96,7 +102,10 @@ class Audit:
 
     @property
     def clean(self) -> bool:
-        """Whether there are no `faults`, and residuals are at round-off."""
+        """Whether there are no `faults`, and residuals are at round-off.
+
+        A clean set may lack states that the discretisation does not resolve; see `left_out`.
+        """
         return not self.faults and self.largest_residual < SMALL_RESIDUAL
 
     @property
@@ -159,6 +168,7 @@ class Audit:
                 else "not made: pieces that the seeds do not reach may be missing",
             ),
             ("descents from unstable strata", self._descents),
+            *([("not resolved", self._unresolved)] if self.unresolved + self.left_out else []),
             *([("sheets touch", self._touching)] if self.touching else []),
             *([("closed pieces, necks", self._unseen)] if self.cell_size else []),
             *(refined if self.accuracy else []),
@@ -169,6 +179,15 @@ class Audit:
         """Where sheets touch: one line."""
         places = (", ".join(f"{name} = {value:.6g}" for name, value in at) for at in self.touching)
         return f"in one point (cone point) at {'; '.join(places)}"
+
+    @property
+    def _unresolved(self) -> str:
+        """What the discretisation does not resolve: one line."""
+        found = f", and {self.left_out} states found besides, which are left out"
+        return (
+            f"{self.unresolved} vertices{found if self.left_out else ''}; of such states any "
+            "number may be missing: refine the discretisation, or exclude them by a constraint"
+        )
 
     @property
     def _unseen(self) -> str:

@@ -138,6 +138,7 @@ def describe_again(eset: EquilibriumSet, given: Complex, setting: Setting) -> Eq
         missing=audit.missing,
         recovered=audit.recovered,
         descents=audit.descents,
+        left_out=audit.left_out,
         stopped=audit.stopped,
         cell_size=audit.cell_size,
         touching=audit.touching,
@@ -248,6 +249,7 @@ def _audit(
         checked=0,
         missing=0,
         recovered=0,
+        unresolved=int((~points.resolved).sum()),
     )
 
 

@@ -35,12 +35,13 @@ class Check:
     """How many equilibria a search found, and those of them that the set lacks.
 
     descents: how many descents from unstable strata ended how; what they landed on is among those
-    that were found.
+    that were found. left_out: states that the set lacks, and the discretisation does not resolve.
     """
 
     found: int
     missing: States
     descents: tuple[tuple[str, int], ...] = ()
+    left_out: int = 0
 
 
 def check(
@@ -78,10 +79,13 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
         seed=seed,
     )
     scattered = _scattered(eset, SCATTERED, np.random.default_rng(seed))
+    resolved = scattered.resolved
     led = descents_of_set(eset)
-    found = _together([*searched, scattered])
+    found = _together([*searched, scattered[np.flatnonzero(resolved)]])
     lacking = _together([_lacking(each, eset) for each in (found, led.landed)])
-    return Check(len(found), lacking, led.outcomes)
+    dropped = [each.unresolved for each in searched if each.unresolved is not None]
+    left_out = _lacking(_together([*dropped, scattered[np.flatnonzero(~resolved)]]), eset)
+    return Check(len(found), lacking, led.outcomes, len(left_out))
 
 
 def _together(parts: Sequence[States]) -> States:
@@ -95,6 +99,7 @@ def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator)
 
     Twice: at fixed parameters, and with all free ones free as well, onto the nearest piece of the
     set. The second finds closed pieces far smaller than a cell, over which no random point lies.
+    Among them are states that the discretisation does not resolve.
     """
     structure, names = eset.structure, eset.names
     middle = dict(zip(names, (0.5 * (eset.box.lower + eset.box.upper)).tolist(), strict=True))
@@ -109,7 +114,6 @@ def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator)
     z, p = np.concatenate([fixed.z, freed.z]), np.concatenate([fixed.p, freed.p])
     found = np.concatenate([fixed.found, freed.found])
     found &= ((eset.box.lower <= p[:, free]) & (p[:, free] <= eset.box.upper)).all(axis=1)
-    found[found] = structure.resolved(z[found], p[found])
     for constraint in eset.constraints:
         found[found] = constraint.excess(z[found], p[found]) <= 0.0
     return States(structure, z[found], p[found])

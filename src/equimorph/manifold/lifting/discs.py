@@ -258,8 +258,20 @@ def _along_sides(
 
 
 def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
-    """Put an exact point on chords that would lie on a grid edge, or block triangulation."""
-    blocked = [(plan, chord) for plan in plans for chord in _chords_to_split(plan)]
+    """Put an exact point on chords that would lie on a grid edge, or block triangulation.
+
+    And on those of folds that turn sharply, where it is known.
+    """
+    for plan in plans:
+        plan.middle.update(
+            {each: pairing.tips[each] for each in plan.chords if each in pairing.tips}
+        )
+    blocked = [
+        (plan, chord)
+        for plan in plans
+        for chord in _chords_to_split(plan)
+        if chord not in pairing.tips
+    ]
     folds = [(plan, chord) for plan, chord in blocked if plan.singular(chord[0]) == TURN]
     groups = _groups([plan for plan, _ in folds], [chord for _, chord in folds])
     extra = _pin(pairing, groups, [VertexKind.FOLD] * len(folds))

@@ -18,7 +18,7 @@ from equimorph.manifold.lifting.balls import depths
 from equimorph.manifold.lifting.cells import Cells
 from equimorph.manifold.lifting.fold_forms import fold_forms
 from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.polygon_cuts import planes
+from equimorph.manifold.lifting.polygon_cuts import chord_of, planes
 from equimorph.manifold.lifting.stationary_points import Starts
 
 SHARP = 0.5
@@ -78,16 +78,39 @@ def fold_chords(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) 
     return FoldChords(ends, triangle, normals[place], sense < 0.0)
 
 
-def unseen_turns(pairing: Pairing, chords: FoldChords) -> Some:
-    """Triangles in which a fold turns sharply, and its middle is beyond a side or unknown."""
-    mesh, setting = pairing.mesh, pairing.setting
+@dataclass(frozen=True)
+class Turns:
+    """Folds that turn sharply in triangles.
+
+    ends (n, 2): points; triangle: below them; normals: see `FoldChords`; z, p: a point of the fold
+    between its ends, if it is one; inside: whether it is one, and in the triangle.
+    """
+
+    ends: Int[np.ndarray, "n 2"]
+    triangle: Some
+    normals: Float[np.ndarray, "n 2 d"]
+    z: Float[np.ndarray, "n size"]
+    p: Float[np.ndarray, "n parameters"]
+    inside: Flags
+
+    def take(self, some: Some | Flags) -> "Turns":
+        """Return some of the turns."""
+        return Turns(*(column[some] for column in vars(self).values()))
+
+
+def sharp_turns(pairing: Pairing, chords: FoldChords) -> Turns | None:
+    """Folds that turn sharply, with their middles; None if there are none."""
+    mesh, setting, points = pairing.mesh, pairing.setting, pairing.points
     sharp = chords.take(chords.cosines < SHARP)
+    known = np.array([chord_of(*pair) in pairing.tips for pair in sharp.ends.tolist()], bool)
+    sharp = sharp.take(~known)
     if len(sharp.ends) == 0:
-        return sharp.triangle
+        return None
     span = planes(pairing, sharp.triangle.tolist())
-    found = pin(setting, pairing.points, sharp.ends.tolist(), VertexKind.FOLD, span)
+    middle = pin(setting, points, sharp.ends.tolist(), VertexKind.FOLD, span)
     corners = mesh.vertices[mesh.triangles[sharp.triangle]]
-    return sharp.triangle[~(found.found & (depths(corners, found.p[:, setting.free]) > BEYOND))]
+    inside = middle.found & (depths(corners, middle.p[:, setting.free]) > BEYOND)
+    return Turns(sharp.ends, sharp.triangle, sharp.normals, middle.z, middle.p, inside)
 
 
 @dataclass(frozen=True)
@@ -119,7 +142,7 @@ def facing_folds(pairing: Pairing, chords: FoldChords) -> Facing:
     corners = mesh.vertices[mesh.triangles[chords.triangle[one]]]
     place = points.p[ends][:, :, free].mean(axis=1)
     place[: len(bent)] = _meetings(pairing, chords.take(bent))
-    shares = _shares(corners, place)
+    shares = shares_in(corners, place)
     starts = Starts(chords.triangle[one], corners, shares, points.z[ends].mean(axis=1))
     near = np.asarray((shares > NEAR).all(axis=1))
     return Facing(one[near], other[near], starts.take(near))
@@ -148,10 +171,10 @@ def _meetings(pairing: Pairing, chords: FoldChords) -> Float[np.ndarray, "n d"]:
     return np.asarray((np.linalg.pinv(chords.normals) @ level[:, :, None])[:, :, 0] * scales)
 
 
-def _shares(
+def shares_in(
     corners: Float[np.ndarray, "n corners d"], places: Float[np.ndarray, "n d"]
 ) -> Float[np.ndarray, "n corners"]:
-    """Barycentric coordinates, each place in its own simplex."""
+    """Return barycentric coordinates, each place in its own simplex."""
     sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     inner = np.linalg.solve(sides, (places - corners[:, 0])[:, :, None])[:, :, 0]
     return np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)

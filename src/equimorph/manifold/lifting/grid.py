@@ -3,6 +3,7 @@
 See docs/decisions.md, "Inner grid lines are moved a little".
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import permutations
 
@@ -17,6 +18,9 @@ SHIFT = 0.02
 
 APART = 0.15
 """Shift of the inner lines of a parameter with the same lines as another one, in intervals."""
+
+ASIDE = 0.1
+"""Part of an edge by which the point that splits it is moved off a line of symmetry."""
 
 MARGIN = 0.2
 """How far the coarse grid reaches beyond the box, in ranges of the parameters."""
@@ -97,11 +101,15 @@ def coarse_grid(
 
 
 def bisect(
-    mesh: BaseMesh, chosen: Int[np.ndarray, " some"], mirrored: tuple[bool, ...]
+    mesh: BaseMesh,
+    chosen: Int[np.ndarray, " some"],
+    mirrored: tuple[bool, ...],
+    shares: Mapping[int, float] | None = None,
 ) -> BaseMesh:
     """Split edges at their midpoints, and the triangles and tetrahedra around them.
 
-    Where the midpoint lies on a line of symmetry the edge is split off it.
+    Where the midpoint lies on a line of symmetry the edge is split off it. For some edges `shares`
+    has the part of the way from their first to their second end at which they are split instead.
 
     Edges are split one after the other; one that shares a cell with an earlier one of the same
     call waits for another call, so that every cell is split at most once.
@@ -114,7 +122,9 @@ def bisect(
         if touched[cells].any():
             continue
         touched[cells] = True
-        _split(growth, mesh, edge, mirrored, (by_triangle[edge], by_tetrahedron[edge]))
+        a, b = mesh.vertices[mesh.edges[edge]]
+        middle = _between(a, b, (shares or {}).get(edge, 0.5), mirrored)
+        _split(growth, mesh, edge, middle, (by_triangle[edge], by_tetrahedron[edge]))
     return growth.mesh(mesh)
 
 
@@ -176,13 +186,13 @@ def _split(
     growth: _Growth,
     mesh: BaseMesh,
     edge: int,
-    mirrored: tuple[bool, ...],
+    place: Float[np.ndarray, " d"],
     around: tuple[list[int], list[int]],
 ) -> None:
     """Split an edge and the triangles and tetrahedra around it, all of them unsplit so far."""
     a, b = mesh.edges[edge].tolist()
     middle = len(mesh.vertices) + len(growth.vertices)
-    growth.vertices.append(_between(mesh.vertices[a], mesh.vertices[b], mirrored))
+    growth.vertices.append(place)
     first_edge, half_edges = len(mesh.edges), {}
     for end in (a, b):
         half_edges[end] = first_edge + len(growth.edges)
@@ -239,10 +249,13 @@ def _side_between(mesh: BaseMesh, triangle: int, pair: tuple[int, int]) -> int:
 
 
 def _between(
-    a: Float[np.ndarray, " d"], b: Float[np.ndarray, " d"], mirrored: tuple[bool, ...]
+    a: Float[np.ndarray, " d"],
+    b: Float[np.ndarray, " d"],
+    share: float,
+    mirrored: tuple[bool, ...],
 ) -> Float[np.ndarray, " d"]:
-    """Middle of an edge, or a point next to it if the middle lies on a line of symmetry."""
-    middle = 0.5 * (a + b)
+    """Point of an edge, or one next to it if it lies on a line of symmetry."""
+    place = a + share * (b - a)
     on_line: Bool[np.ndarray, " d"] = np.array(mirrored)
-    on_line = on_line & (np.abs(middle) < 1e-9 * np.abs(b - a).max())
-    return np.asarray(0.6 * a + 0.4 * b if on_line.any() else middle)
+    on_line = on_line & (np.abs(place) < 1e-9 * np.abs(b - a).max())
+    return np.asarray(a + (share - ASIDE) * (b - a) if on_line.any() else place)

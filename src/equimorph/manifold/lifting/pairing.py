@@ -94,6 +94,8 @@ class Pairing:
     """Curves over each edge from a constraint through a crossing to a constraint: their points."""
     hubs: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points between two of these at which a fold of one of the sheets crosses, too."""
+    tips: dict[tuple[int, int], int] = field(default_factory=dict)
+    """Points of folds, by the points on both sides between which they turn sharply."""
 
     @property
     def is_full(self) -> bool:

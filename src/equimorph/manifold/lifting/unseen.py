@@ -3,24 +3,31 @@
 See docs/decisions.md, "Approaching sheets are followed to where they are nearest".
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.arrays import Some
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.approaches import approaches
 from equimorph.manifold.lifting.cells import Cells, Seen
 from equimorph.manifold.lifting.fold_chords import (
+    Turns,
     beyond_folds,
     facing_folds,
     fold_chords,
-    unseen_turns,
+    shares_in,
+    sharp_turns,
 )
 from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.polygon_cuts import chord_of
 from equimorph.manifold.lifting.stationary_points import stationary_points
 from equimorph.tolerances import SAME_STATE
+
+NEAR_AN_END = 0.02
+"""Part of an edge within which nothing is split off: slivers serve nobody."""
 
 Places = Float[np.ndarray, "t d"]
 
@@ -30,17 +37,25 @@ class Unseen:
     """What was found inside grid cells.
 
     hidden: cells in which something is joined or parted that their edges do not show; touching:
-    free parameters of points at which two sheets touch.
+    free parameters of points at which two sheets touch; exits: edges through which tongues of the
+    set leave hidden cells, with the part of the way between their ends at which they do.
     """
 
     hidden: Some
     touching: Places
+    exits: dict[int, float] = field(default_factory=dict)
 
 
 class UnseenFinder:
-    """Looks into the cells of a mesh that is being bisected; into each once."""
+    """Looks into the cells of a mesh that is being bisected; into each once.
+
+    Middles of folds that turn sharply inside a cell are entered in the pairing (`tips`).
+
+    exits: those that the last look found; see `Unseen`.
+    """
 
     def __init__(self) -> None:
+        self.exits: dict[int, float] = {}
         self._seen: Seen | None = None
         self._hidden = np.zeros(0, int)
         self._touching: Places | None = None
@@ -57,6 +72,7 @@ class UnseenFinder:
         found = [_holes(pairing, cells, flags)]
         if d == 2:
             found.append(_necks(pairing, cells, flags))
+        self.exits = found[-1].exits
         self._seen = seen
         before = np.zeros((0, d)) if self._touching is None else self._touching
         places = np.concatenate([before, *(each.touching for each in found)])
@@ -80,7 +96,8 @@ def _holes(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " C"]) -> Un
     """Cells over which two sheets are joined around a hole inside, and where they touch."""
     starts = approaches(pairing, cells, wanted)
     found = stationary_points(pairing.setting, starts, saddles=False)
-    return Unseen(starts.cell[found.none | found.lost], found.place[found.touching])
+    hidden = starts.cell[found.none | found.lost]
+    return Unseen(hidden, found.place[found.touching])
 
 
 def _necks(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Unseen:
@@ -89,8 +106,51 @@ def _necks(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Un
     facing = facing_folds(pairing, chords)
     found = stationary_points(pairing.setting, facing.starts, saddles=True)
     joined = found.parted & beyond_folds(pairing, chords, facing, found.place)
-    hidden = np.concatenate([facing.starts.cell[joined], unseen_turns(pairing, chords)])
-    return Unseen(hidden, found.place[found.touching])
+    turns = sharp_turns(pairing, chords)
+    hidden, touching = facing.starts.cell[joined], found.place[found.touching]
+    if turns is None:
+        return Unseen(hidden, touching)
+    _enter_tips(pairing, turns.take(turns.inside))
+    outside = turns.take(~turns.inside)
+    hidden = np.concatenate([hidden, outside.triangle])
+    return Unseen(hidden, touching, _exits(pairing, outside))
+
+
+def _enter_tips(pairing: Pairing, turns: Turns) -> None:
+    """Points of folds that turn sharply in their triangles: their chords are parted there."""
+    for k, (one, other) in enumerate(turns.ends.tolist()):
+        low = int(pairing.points.index[[one, other]].min())
+        point = pairing.points.add(turns.z[k], turns.p[k], low, VertexKind.FOLD)
+        pairing.tips[chord_of(one, other)] = point
+
+
+def _exits(pairing: Pairing, turns: Turns) -> dict[int, float]:
+    """Edges to which folds lead straight from both their ends; the middle between where they do."""
+    mesh, setting = pairing.mesh, pairing.setting
+    corners = mesh.vertices[mesh.triangles[turns.triangle]]
+    across = np.stack([-turns.normals[..., 1], turns.normals[..., 0]], axis=-1) * setting.scales
+    apexes, places = [], []
+    for k in range(2):
+        start = pairing.points.p[turns.ends[:, k]][:, setting.free]
+        shares = shares_in(corners, start)
+        rates = shares_in(corners, start + across[:, k]) - shares
+        # into the triangle, off the side on which the end lies
+        own = shares.argmin(axis=1)[:, None]
+        rates *= np.sign(np.take_along_axis(rates, own, axis=1))
+        way = np.where(rates < 0.0, shares / np.where(rates < 0.0, -rates, 1.0), np.inf)
+        np.put_along_axis(way, own, np.inf, axis=1)
+        apexes.append(way.argmin(axis=1))
+        places.append(shares + way.min(axis=1, keepdims=True) * rates)
+    exits, middle = {}, 0.5 * (places[0] + places[1])
+    for k in np.flatnonzero(apexes[0] == apexes[1]).tolist():
+        # sides are ab, bc, ca
+        first, last = (int(apexes[0][k] + turn) % 3 for turn in (1, 2))
+        side = int(mesh.sides[turns.triangle[k], first])
+        turned = mesh.triangles[turns.triangle[k], first] != mesh.edges[side, 0]
+        share = float(middle[k, first if turned else last])
+        if NEAR_AN_END < share < 1.0 - NEAR_AN_END:
+            exits[side] = share
+    return exits
 
 
 def _distinct(places: Places, setting: Setting) -> Places:

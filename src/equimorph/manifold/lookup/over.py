@@ -100,6 +100,11 @@ class Sheets:
         return np.asarray((self.folded | self.capped)[self.cells].any(axis=1))
 
     @cached_property
+    def _unresolved(self) -> Bool[np.ndarray, " C"]:
+        """Cells with a vertex that the discretisation does not resolve: so may states near them."""
+        return np.asarray(~self.points.resolved[self.cells].all(axis=1))
+
+    @cached_property
     def _of_cells(self) -> tuple[np.ndarray, ...]:
         """Sign by index, and whether cells are overturned, at an edge, at a constraint."""
         capped = np.asarray(self.capped[self.cells].any(axis=1))
@@ -221,10 +226,12 @@ class Sheets:
         guess = self._guess(hits)
         wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
         z, good, index = exact_states(self.structure, guess, at, wanted)
-        good &= (index == wanted) & self.structure.resolved(z, at)
-        mass = self.structure.mass
+        good &= (index == wanted) & (self.structure.resolved(z, at) | self._unresolved[hits.cell])
+        mass, converged = self.structure.mass, good.copy()
         found = one_of_each((hits.point, hits.inside), (z, good), guess, room, mass, SAME_STATE)
         sure = balanced((hits.point, hits.cell, hits.inside), good, found, self._of_cells, len(p))
+        # in a tongue all corners may be near its folds, and states between them far from their own
+        sure[hits.point[converged & ~good & hits.inside]] = False
         doubtful = None
         if not sure.all():
             found = found[sure[hits.point[found]]]
@@ -291,6 +298,7 @@ class Sheets:
             np.concatenate([guess, self.points.z[corner]]),
             p,
             np.concatenate([near.point, owner]),
+            near,
         )
         lifted, which = lift_to(self.points[corner], p[owner], self.constraints)
         z = np.concatenate([solved, lifted])
@@ -360,16 +368,19 @@ class Sheets:
         velocity = np.zeros((len(state), p.shape[1]))
         velocity[:, self.free] = way[number]
         found, which = turned_back(States(self.structure, z[state], p[point[state]]), velocity)
-        found, of_found = self._exact(found, p, point[state[which]])
+        found, of_found = self._exact(found, p, point[state[which]], near)
         return found, of_found
 
     def _exact(
-        self, starts: Lanes, p: Points, owner: Int[np.ndarray, " lanes"]
+        self, starts: Lanes, p: Points, owner: Int[np.ndarray, " lanes"], near: Hits
     ) -> tuple[Float[np.ndarray, "some size"], Int[np.ndarray, " some"]]:
         """Admissible states to which Newton leads over the points of the starts; which points."""
         z, good, _ = exact_states(self.structure, starts, p[owner])
         z, owner = z[good], owner[good]
-        good = self.structure.resolved(z, p[owner]) & self._admissible(z, p[owner])
+        unresolved = np.zeros(len(p), bool)
+        unresolved[near.point[self._unresolved[near.cell]]] = True
+        good = self.structure.resolved(z, p[owner]) | unresolved[owner]
+        good &= self._admissible(z, p[owner])
         return z[good], owner[good]
 
     def _nearest(
