@@ -63,6 +63,7 @@ RANGES: Mapping[str, Range] = {
     **dict.fromkeys(("mass", "masses", "duration", "rate", "hold", "dampings"), POSITIVE),
     "damping": NOT_NEGATIVE,
     "links": count(2, 1000),
+    **dict.fromkeys(("accelerations", "jerks", "sampling"), POSITIVE),
     **dict.fromkeys(("width", "thickness", "diameter", "wall", "density", "weight"), POSITIVE),
     **dict.fromkeys(("s", "start", "stop"), SHARE),
     "kinks": BETWEEN,

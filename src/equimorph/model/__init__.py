@@ -36,7 +36,8 @@ from equimorph.model.parameter import (
     parameter_vector,
     position,
 )
-from equimorph.model.schedule import Rates, Schedule
+from equimorph.model.rates import Rates
+from equimorph.model.schedule import Schedule
 from equimorph.model.spline import Spline
 
 __all__ = [

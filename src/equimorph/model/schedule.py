@@ -1,6 +1,5 @@
-"""Schedules of actuators, and the rates at which they may move."""
+"""Schedules of actuators."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -11,6 +10,7 @@ from scipy.interpolate import BPoly
 
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError, MissingError
+from equimorph.model.rates import Rates
 
 Instants = float | Float[np.ndarray, "*instants"]
 
@@ -96,7 +96,7 @@ class Schedule:
         return float(self._timed()[-1])
 
     @check_arguments
-    def in_time(self, rates: "Rates | None" = None, *, duration: float | None = None) -> "Schedule":
+    def in_time(self, rates: Rates | None = None, *, duration: float | None = None) -> "Schedule":
         """The same steps with times, between which the parameters change at constant rates.
 
         Parameters
@@ -114,9 +114,11 @@ class Schedule:
         """
         if (rates is None) == (duration is None):
             raise InputError("`rates` or `duration` must be given, one of them; got both or none.")
-        if rates is not None:
-            rates.check_covers(self)
-        times = self.progress * duration if rates is None else rates.times(self)
+        if rates is None:
+            times = self.progress * duration
+        else:
+            rates.check_covers(self.moving)
+            times = rates.times(self)
         keep = np.concatenate([[True], np.diff(times) > 0.0])
         return replace(self._steps(keep), times=times[keep], velocities=None, accelerations=None)
 
@@ -137,7 +139,7 @@ class Schedule:
             raise MissingError(
                 "`schedule` must have times; got one without. Give it a duration, like "
                 "schedule.in_time(Rates({...})), schedule.in_time(duration=10.0) or "
-                "schedule.in_time(speed_limit(schedule, tolerance=0.01))."
+                "speed_limit(schedule, tolerance=0.01).schedule."
             )
         return self.times
 
@@ -195,61 +197,3 @@ class Schedule:
             f"Schedule({', '.join(self.moving) or 'at rest'}: {len(self.values)} steps{time}; "
             f"margin {smallest:.4g})"
         )
-
-
-@check_arguments
-@dataclass(frozen=True)
-class Rates:
-    """Largest rates of parameters, in their units per unit of time: ``Rates({"Theta": 0.1})``.
-
-    Parameters without a limit may change at any rate.
-
-    Raises
-    ------
-    InputError
-        If a limit is not positive, or there is none.
-    """
-
-    limits: Mapping[str, float]
-
-    def __post_init__(self) -> None:
-        """Check the limits."""
-        if not self.limits:
-            raise InputError("`limits` must name at least one parameter; got none.")
-        for name, limit in self.limits.items():
-            if not (np.isfinite(limit) and limit > 0.0):
-                raise InputError(f"`limits` must be positive; got {name}: {limit!r}.")
-
-    @check_arguments
-    def durations(
-        self, names: tuple[str, ...], values: Float[np.ndarray, "steps parameters"]
-    ) -> Float[np.ndarray, " pieces"]:
-        """Shortest time between successive settings, as the slowest parameter determines it."""
-        unknown = [name for name in self.limits if name not in names]
-        if unknown:
-            raise InputError(
-                f"`limits` must name parameters ({', '.join(names)}); got {unknown[0]!r}."
-            )
-        at = [names.index(name) for name in self.limits]
-        bounds = np.array(list(self.limits.values()), dtype=float)
-        return np.asarray((np.abs(np.diff(values[:, at], axis=0)) / bounds).max(axis=1))
-
-    def check_covers(self, schedule: Schedule) -> None:
-        """Refuse a schedule that moves a parameter without a limit: it would jump.
-
-        Raises
-        ------
-        InputError
-            With its name.
-        """
-        for name in schedule.moving:
-            if name not in self.limits:
-                raise InputError(
-                    f"`rates` must limit every parameter that moves; got none for {name}."
-                )
-
-    @check_arguments
-    def times(self, schedule: Schedule) -> Float[np.ndarray, " steps"]:
-        """Earliest time of each step of a schedule, from zero on."""
-        spent = self.durations(schedule.names, schedule.values)
-        return np.concatenate([[0.0], np.cumsum(spent)])

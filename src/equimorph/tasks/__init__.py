@@ -60,6 +60,7 @@ from equimorph.tasks.robustness import (
 )
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes.solutions import Shapes, solve_shape, solve_shapes
+from equimorph.tasks.timing import SpeedLimit, deviation_bound, retime, speed_limit
 from equimorph.tasks.verification import Proof, ProofStatus, Verification, verify
 
 __all__ = [
@@ -91,6 +92,7 @@ __all__ = [
     "SamplingOptions",
     "Sensitivity",
     "Shapes",
+    "SpeedLimit",
     "StateEstimate",
     "Strongest",
     "StrongestSettings",
@@ -101,6 +103,7 @@ __all__ = [
     "attainable",
     "calibrate",
     "curvature_map",
+    "deviation_bound",
     "estimate_state",
     "follow_optimum",
     "imperfection_law",
@@ -114,11 +117,13 @@ __all__ = [
     "plan_sampled",
     "random_trials",
     "reachable",
+    "retime",
     "robust_optimum",
     "sensitivity",
     "smoothed",
     "solve_shape",
     "solve_shapes",
+    "speed_limit",
     "stable_room",
     "strongest",
     "track",
