@@ -8,7 +8,7 @@ from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, Su
 from equimorph.structures.space_frame.fields import SpatialFrameFields
 from equimorph.structures.space_frame.supports import SpatialSupport
 
-STATIONS = np.linspace(0.0, 1.0, 9)
+STATIONS = np.linspace(0.0, 1.0, 3)
 """Shares of a piece's length at which its line load is drawn."""
 SEGMENT = np.linspace(0.0, 1.0, 17)
 """Shares of a piece's length at which it is drawn if an actuator works in it."""
