@@ -60,9 +60,13 @@ def main() -> em.Path:
 
 
 def figure(path: em.Path) -> Figure:
-    """Shapes on the way."""
-    drawn = em.plotting.shapes(path, count=4).figure
-    assert isinstance(drawn, Figure)
+    """The grid pushed up a little, half-way, and as a shell under its weight."""
+    states = path.states
+    half = int(np.argmin(np.abs(states["draw"] - 0.3 * DRAWN_IN)))
+    drawn = Figure(figsize=(9.0, 2.6), layout="constrained")
+    for ax, at in zip(drawn.subplots(1, 3), (0, half, len(states) - 1), strict=True):
+        em.plotting.portraits(states[[at]], [""], ax)
+        ax.set_title(f"ends drawn in by {states['draw'][at]:.2f} m", fontsize=9)
     return drawn
 
 

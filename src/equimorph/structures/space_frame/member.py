@@ -170,7 +170,7 @@ class SpatialMember:
                 f"joints, {2.0 / chord:.6g}, a half circle; got {self.curvature!r}."
             )
         length = chord if half == 0.0 else chord * float(np.arcsin(half)) / half
-        gyration = 0.0 if stiff.EA is None else float(np.sqrt(max(stiff.strain[1:]) / stiff.EA))
+        gyration = 0.0 if stiff.EA is None else float(np.sqrt(min(stiff.strain[1:]) / stiff.EA))
         if gyration > SLENDER * length:
             raise InputError(
                 f"`EI` and `EA` of member {self.name} must be those of a slender rod in one system "
