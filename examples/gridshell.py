@@ -12,7 +12,6 @@ Run it: python examples/gridshell.py; it writes gridshell.png and gridshell.gif.
 from pathlib import Path as FilePath
 
 import numpy as np
-
 from matplotlib.figure import Figure
 
 import equimorph as em

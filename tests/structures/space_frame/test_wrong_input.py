@@ -58,14 +58,14 @@ def test_a_member_between_ball_joints_spins():
 
 def test_a_hinge_needs_something_to_turn_on():
     hinged = [em.SpatialMember(pair, hinges={"B": (0, 0, 1)}) for pair in BOTH]
-    with pytest.raises(InputError, match="`hinges.B` of member A-B must turn about an axis of"):
+    with pytest.raises(InputError, match=r"`hinges\.B` of member A-B must turn about an axis of"):
         frame(members=hinged)
 
 
 def test_inextensible_members_that_supports_stretch_are_named():
     members = [("A", "B"), ("B", "C")]
     straight = {"A": (0, 0, 0), "B": (1, 0, 0), "C": (2, 0, 0)}
-    with pytest.raises(InputError, match="must not stretch or squeeze .* got A-B, B-C"):
+    with pytest.raises(InputError, match=r"must not stretch or squeeze .* got A-B, B-C"):
         frame(straight, members, {"A": "fixed", "C": "fixed"})
 
 
