@@ -7,7 +7,8 @@ import pytest
 
 from equimorph.errors import InputError
 from equimorph.model import Schedule
-from equimorph.storage import read_schedule, write_schedule
+from equimorph.storage import read_schedule, trajectory_message, write_schedule, write_trajectory
+from equimorph.storage.schedule import _checksum
 
 
 @pytest.fixture
@@ -45,7 +46,10 @@ def test_a_schedule_comes_back_bit_for_bit(schedule: Schedule, written: Path):
 
 def test_the_table_has_a_header_and_one_row_per_step(written: Path):
     header, *rows = written.read_text().splitlines()
-    assert header == "progress,Theta,Delta,q,nu,stability_margin,max_curvature,height(0.5)"
+    assert header == (
+        "progress,Theta (rad),Delta (rad),q (4π²B/L²),nu (L),stability_margin,max_curvature,"
+        "height(0.5)"
+    )
     assert len(rows) == 7
 
 
@@ -119,8 +123,8 @@ def test_a_sidecar_without_keys_is_refused(written: Path):
 
 
 def test_a_newer_schedule_is_refused(written: Path):
-    _edit(written.with_suffix(".json"), '"version": 1', '"version": 2')
-    with pytest.raises(InputError, match="must have version 1; got 2"):
+    _edit(written.with_suffix(".json"), '"version": 2', '"version": 3')
+    with pytest.raises(InputError, match="must have version 2 or less; got 3"):
         read_schedule(written)
 
 
@@ -147,3 +151,113 @@ def test_the_order_of_keys_in_the_sidecar_does_not_count(schedule: Schedule, wri
     content = json.loads(sidecar.read_text())
     sidecar.write_text(json.dumps(dict(reversed(content.items()))))
     assert read_schedule(written).names == schedule.names
+
+
+@pytest.fixture
+def motion(schedule: Schedule) -> Schedule:
+    """The schedule in seconds, with rates and accelerations of what moves."""
+    rates = np.zeros((2, 7, 4))
+    rates[:, :, :2] = np.random.default_rng(6).normal(size=(2, 7, 2))
+    return replace(
+        schedule, times=np.linspace(0.0, 1.2, 7), velocities=rates[0], accelerations=rates[1],
+        time_unit="s",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["motion.csv", "motion.json"])
+def test_a_motion_comes_back_bit_for_bit(motion: Schedule, tmp_path: Path, name: str):
+    """Identity, from a table with its sidecar and from JSON alone."""
+    files = write_schedule(motion, tmp_path / name)
+    assert len(files) == (2 if name.endswith("csv") else 1)
+    back = read_schedule(tmp_path / name)
+    for each in ("times", "values", "velocities", "accelerations", "margins", "way_points"):
+        np.testing.assert_array_equal(getattr(back, each), getattr(motion, each))
+    assert (back.time_unit, back.names, back.start) == ("s", motion.names, motion.start)
+    np.testing.assert_array_equal(back.at(0.7), motion.at(0.7))
+
+
+def test_the_header_of_a_motion_has_units(motion: Schedule, tmp_path: Path):
+    header = write_schedule(motion, tmp_path / "motion.csv")[0].read_text().splitlines()[0]
+    assert header.startswith("time (s),progress,Theta (rad),Delta (rad),q (4π²B/L²),nu (L),")
+    assert header.endswith(
+        "Theta rate (rad/s),Delta rate (rad/s),Theta acceleration (rad/s²),"
+        "Delta acceleration (rad/s²)"
+    )
+
+
+def test_a_schedule_of_the_first_release_is_read(schedule: Schedule, written: Path):
+    """Its header had no units, its sidecar neither times nor derivatives."""
+    lines = written.read_text().splitlines()
+    lines[0] = "progress,Theta,Delta,q,nu,stability_margin,max_curvature,height(0.5)"
+    written.write_text("\n".join(lines) + "\n")
+    sidecar = json.loads(written.with_suffix(".json").read_text())
+    for key in ("checksum", "time_unit", "derivatives"):
+        del sidecar[key]
+    sidecar["version"] = 1
+    table = np.array([[float(each) for each in line.split(",")] for line in lines[1:]])
+    sidecar["checksum"] = _checksum(sidecar, table)
+    written.with_suffix(".json").write_text(json.dumps(sidecar))
+    back = read_schedule(written)
+    np.testing.assert_array_equal(back.values, schedule.values)
+    assert back.times is None
+
+
+def test_json_alone_that_was_changed_is_found(motion: Schedule, tmp_path: Path):
+    write_schedule(motion, tmp_path / "motion.json")
+    _edit(tmp_path / "motion.json", "0.2", "0.25")
+    with pytest.raises(InputError, match="must hold the numbers that were written"):
+        read_schedule(tmp_path / "motion.json")
+
+
+def test_the_sidecar_of_a_table_is_no_schedule_alone(written: Path):
+    with pytest.raises(InputError, match="or the sidecar of a table, whose name ends in"):
+        read_schedule(written.with_suffix(".json"))
+
+
+def test_a_trajectory_has_the_fields_of_the_ros_message(motion: Schedule, tmp_path: Path):
+    """trajectory_msgs/JointTrajectory: joint names, points with times in sec and nanosec."""
+    path = write_trajectory(motion, tmp_path / "motion.json", {"Delta": "left", "Theta": "right"})
+    message = json.loads(path.read_text())
+    assert message == trajectory_message(motion, {"Delta": "left", "Theta": "right"})
+    assert list(message) == ["header", "joint_names", "points"]
+    assert message["joint_names"] == ["left", "right"]
+    point = message["points"][6]
+    assert point["time_from_start"] == {"sec": 1, "nanosec": 200_000_000}
+    assert point["positions"] == motion.values[6, [1, 0]].tolist()
+    assert point["accelerations"] == motion.accelerations[6, [1, 0]].tolist()
+
+
+def test_the_yaml_of_a_trajectory_holds_the_numbers_of_the_json(motion: Schedule, tmp_path: Path):
+    """Flow lists are JSON, too: every line of numbers is read as such."""
+    tiny = replace(motion, velocities=motion.velocities * 1e-7)
+    lines = write_trajectory(tiny, tmp_path / "motion.yaml").read_text().splitlines()
+    message = trajectory_message(tiny)
+    assert lines[3:6] == ["joint_names:", '- "Theta"', '- "Delta"']
+    for word in ("positions", "velocities", "accelerations"):
+        found = [json.loads(line.split(": ")[1]) for line in lines if f"{word}:" in line]
+        assert found == [point[word] for point in message["points"]]
+    assert sum("e-" in line for line in lines) == 0
+    assert lines[-1] == "  time_from_start: {sec: 1, nanosec: 200000000}"
+
+
+def test_lengths_become_metres_and_units_of_time_seconds(motion: Schedule):
+    """2 mm/T are 0.004 m/s where T is half a second."""
+    units = ("mm", *motion.units[1:])
+    given = replace(motion, units=units, time_unit="T")
+    message = trajectory_message(given, {"Theta": "slide"}, seconds=0.5)
+    assert message["points"][1]["velocities"][0] == pytest.approx(motion.velocities[1, 0] * 2e-3)
+    assert message["points"][6]["time_from_start"] == {"sec": 0, "nanosec": 600_000_000}
+
+
+def test_wrong_trajectories_are_refused(schedule: Schedule, motion: Schedule, tmp_path: Path):
+    """One line each."""
+    with pytest.raises(InputError, match="`schedule` must have times"):
+        trajectory_message(schedule)
+    with pytest.raises(InputError, match="`seconds` must be given for a schedule that counts in T"):
+        trajectory_message(replace(motion, time_unit="T"))
+    with pytest.raises(InputError, match="`joints` must be angles in rad or lengths in m, mm"):
+        trajectory_message(motion, {"q": "load"})
+    with pytest.raises(InputError, match=r"`joints` must name parameters .*; got 'theta'"):
+        trajectory_message(motion, {"theta": "a"})
+    with pytest.raises(InputError, match=r"`path` must end in \.yaml, \.yml or \.json"):
+        write_trajectory(motion, tmp_path / "motion.txt")

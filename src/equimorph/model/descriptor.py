@@ -13,6 +13,7 @@ from equimorph.argument_vocabulary import LARGEST
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model.obstacle import Obstacle
+from equimorph.model.units import in_unit
 
 Evaluate = Callable[
     [Lanes, Parameters],
@@ -140,16 +141,37 @@ class Descriptor:
         """Return equal numbers for equal descriptors."""
         return hash(self._meaning)
 
-    def __le__(self, bound: float) -> "Constraint":
-        """Return the constraint that the descriptor stays at or below `bound`."""
-        return Constraint(self, "<=", _number(self.name, bound))
+    def __le__(self, bound: float | str) -> "Constraint":
+        """Return the constraint that the descriptor stays at or below `bound`.
 
-    def __ge__(self, bound: float) -> "Constraint":
+        A bound may be a text with its unit: ``abs(effort_of(rod, "theta_A")) <= "0.5 N m"``.
+        """
+        return Constraint(self, "<=", _number(self.name, bound, self.unit))
+
+    def __ge__(self, bound: float | str) -> "Constraint":
         """Return the constraint that the descriptor stays at or above `bound`."""
-        return Constraint(self, ">=", _number(self.name, bound))
+        return Constraint(self, ">=", _number(self.name, bound, self.unit))
+
+    def __abs__(self) -> "Descriptor":
+        """Return its absolute value, whose minima at zero are kinks."""
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return np.abs(self.function(z, p))
+
+        def both(
+            z: Lanes, p: Parameters
+        ) -> tuple[Float[np.ndarray, "lanes 2"], Float[np.ndarray, "lanes 2"]]:
+            found = self.function(z, p)
+            return np.stack([found, -found], axis=1), np.tile([0.0, 1.0], (len(z), 1))
+
+        symbol = f"|{self.symbol or self.name}|"
+        return Descriptor(
+            f"abs({self.name})", self.unit, value, symbol, self.origin, self.place, both
+        )
 
 
-def _number(name: str, bound: Any) -> float:
+def _number(name: str, bound: Any, unit: str) -> float:
+    bound = in_unit(bound, unit, name) if isinstance(bound, str) else bound
     number = float(bound) if is_number(bound) and abs(bound) <= LARGEST else np.nan
     if not np.isfinite(number):
         raise InputError(f"`{name}` must be compared with a finite number; got {bound!r}.")

@@ -14,6 +14,7 @@ from equimorph.storage.results import (
 from equimorph.storage.schedule import read_schedule, write_schedule
 from equimorph.storage.shapes import write_shapes
 from equimorph.storage.surface import write_surface
+from equimorph.storage.trajectory import trajectory_message, write_trajectory
 
 __all__ = [
     "Results",
@@ -25,9 +26,11 @@ __all__ = [
     "read_schedule",
     "save_chart",
     "save_set",
+    "trajectory_message",
     "write_map",
     "write_results",
     "write_schedule",
     "write_shapes",
     "write_surface",
+    "write_trajectory",
 ]

@@ -76,6 +76,10 @@ def _read_path(group: h5py.Group, structure: Structure) -> Path:
     )
 
 
+IN_TIME = ("times", "velocities", "accelerations")
+"""Fields of schedules that have times; files of older releases have none."""
+
+
 def _write_schedule(group: h5py.Group, schedule: Schedule) -> None:
     put(group, "values", schedule.values, ["step", "parameter"], "parameters")
     put(group, "progress", schedule.progress, ["step"], "share of the length")
@@ -90,7 +94,13 @@ def _write_schedule(group: h5py.Group, schedule: Schedule) -> None:
         "units": schedule.units,
         "descriptors": list(schedule.descriptors),
         "start": schedule.start,
+        "time_unit": schedule.time_unit,
     }
+    for name in IN_TIME:
+        values = getattr(schedule, name)
+        if values is not None:
+            axes = ["step", "parameter"][: values.ndim]
+            put(group, name, values, axes, f"see about, per {schedule.time_unit}")
     put_json(group, ABOUT, about)
 
 
@@ -106,4 +116,6 @@ def _read_schedule(group: h5py.Group) -> Schedule:
         descriptors=dict(zip(about["descriptors"], get(group, "descriptors"), strict=True)),
         start=about["start"],
         way_points=get(group, "way_points"),
+        time_unit=about.get("time_unit", "T"),
+        **{name: get(group, name) for name in IN_TIME if name in group},
     )

@@ -1,7 +1,9 @@
-"""Actuator schedules as files: a CSV table for people and a JSON sidecar for programs.
+"""Actuator schedules as files: a CSV table for people with a JSON sidecar for programs, or JSON.
 
-The table has one row per step: share of the route, all parameters, stability margin, descriptors.
-The parameters alone do not determine a state, so the sidecar carries the structure, the unknowns of
+The table has one row per step: time, share of the route, all parameters, stability margin,
+descriptors, and rates and accelerations of what moves, with units in the header: ``time (s)``,
+``theta_A (rad)``, ``theta_A rate (rad/s)``. A file of JSON alone has the same columns. The
+parameters alone do not determine a state, so the sidecar carries the structure, the unknowns of
 the first state and the loads. A checksum over the numbers and the sidecar finds damage; a
 spreadsheet may save the table again as long as it keeps every digit.
 """
@@ -22,25 +24,33 @@ from equimorph.model import Schedule
 from equimorph.storage.files import read_text, write_text
 
 FORMAT = "equimorph schedule"
-VERSION = 1
-"""Version of the layout of the sidecar file; other versions are refused."""
-PROGRESS, MARGIN = "progress", "stability_margin"
+VERSION = 2
+"""Version of the layout of the sidecar file; 1, without times and units, can be read."""
+READABLE = (1, VERSION)
+PROGRESS, MARGIN, TIME = "progress", "stability_margin", "time"
+DERIVATIVES = (("velocities", "rate", ""), ("accelerations", "acceleration", "²"))
+"""Fields of a schedule, how their columns are called, and the power of the time in their units."""
+COLUMNS = "columns"
+"""Key of the numbers in a file of JSON alone."""
+
+
+Column = Float[np.ndarray, " steps"]
 
 
 @check_arguments
-def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, Path]:
-    """Write a schedule to `path` (CSV) and to its sidecar with the suffix ``.json``.
+def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, ...]:
+    """Write a schedule to `path` (CSV) and to its sidecar with the suffix ``.json``; or JSON alone.
 
     Parameters
     ----------
     schedule
         What to write.
     path
-        Name of the table, ending in ``.csv``.
+        Name of the table, ending in ``.csv``; or of one file with everything, in ``.json``.
 
     Returns
     -------
-    Both files written.
+    The files written.
 
     Raises
     ------
@@ -52,22 +62,29 @@ def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, Path]:
     ``em.storage.write_schedule(route.schedule, "schedule.csv")``
     """
     table_path, sidecar_path = _paths(path)
-    table = _table(schedule)
+    columns = _columns(schedule)
+    table = np.column_stack(list(columns.values()))
     sidecar = _sidecar(schedule)
     sidecar["checksum"] = _checksum(sidecar, table)
-    write_text(table_path, _csv(_header(schedule), table))
+    if table_path is None:
+        lists = {name: values.tolist() for name, values in columns.items()}
+        text = json.dumps({**sidecar, COLUMNS: lists}, indent=1, ensure_ascii=False)
+        write_text(sidecar_path, text + "\n")
+        return (sidecar_path,)
+    write_text(table_path, _csv(list(columns), table))
     write_text(sidecar_path, json.dumps(sidecar, indent=2, ensure_ascii=False) + "\n")
     return table_path, sidecar_path
 
 
 @check_arguments
 def read_schedule(path: str | Path) -> Schedule:
-    """Read a schedule from its table and sidecar.
+    """Read a schedule from its table and sidecar, or from JSON alone.
 
     Parameters
     ----------
     path
-        Name of the table, ending in ``.csv``; the sidecar stands in the same folder.
+        Name of the table, ending in ``.csv``, with the sidecar in the same folder; or of the file
+        that holds everything, ending in ``.json``.
 
     Raises
     ------
@@ -76,41 +93,83 @@ def read_schedule(path: str | Path) -> Schedule:
     """
     table_path, sidecar_path = _paths(path)
     sidecar = _read_sidecar(sidecar_path)
-    header, table = _read_table(table_path)
+    lists = sidecar.pop(COLUMNS, None)
+    if table_path is None:
+        header, table = _numbers_of(lists, sidecar_path)
+    else:
+        header, table = _read_table(table_path)
     checksum = sidecar.pop("checksum", None)
     if checksum != _checksum(sidecar, table):
         raise InputError(
-            f"`{table_path}` must hold the numbers that were written with its sidecar; got other "
-            "ones, or a changed sidecar. Write the schedule again."
+            f"`{table_path or sidecar_path}` must hold the numbers that were written with its "
+            "sidecar; got other ones, or a changed sidecar. Write the schedule again."
         )
-    count = len(sidecar["names"])
+    return _schedule(sidecar, dict(zip(header, table.T, strict=True)))
+
+
+def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
+    """Schedule of the columns of a table, by their headers."""
+    names, units = tuple(sidecar["names"]), tuple(sidecar["units"])
+    plain = sidecar["version"] == 1
+    unit = sidecar.get("time_unit", "T")
+    heads = names if plain else [_head(*pair) for pair in zip(names, units, strict=True)]
+    values = np.column_stack([columns[head] for head in heads])
+    moments = {}
+    for key, word, power in DERIVATIVES:
+        if key in sidecar.get("derivatives", ()):
+            moments[key] = np.zeros_like(values)
+            for k, name in enumerate(names):
+                moments[key][:, k] = columns.get(_rate_head(name, word, units[k], unit, power), 0.0)
     return Schedule(
-        names=tuple(sidecar["names"]),
+        names=names,
         roles=tuple(sidecar["roles"]),
-        units=tuple(sidecar["units"]),
-        values=table[:, 1 : 1 + count],
-        progress=table[:, 0],
-        margins=table[:, 1 + count],
-        descriptors={name: table[:, header.index(name)] for name in sidecar["descriptors"]},
+        units=units,
+        values=values,
+        progress=columns[PROGRESS],
+        margins=columns[MARGIN],
+        descriptors={name: columns[name] for name in sidecar["descriptors"]},
         start=sidecar["start"],
         way_points=np.array(sidecar["way_points"], dtype=int),
+        times=columns.get(_head(TIME, unit)),
+        time_unit=unit,
+        **moments,
     )
 
 
-def _paths(path: str | Path) -> tuple[Path, Path]:
-    table = Path(path)
-    if table.suffix != ".csv":
-        raise InputError(f"`path` must end in .csv; got {table.name!r}.")
-    return table, table.with_suffix(".json")
+def _paths(path: str | Path) -> tuple[Path | None, Path]:
+    """Table, if there is one, and sidecar."""
+    given = Path(path)
+    if given.suffix not in (".csv", ".json"):
+        raise InputError(f"`path` must end in .csv or .json; got {given.name!r}.")
+    return (given if given.suffix == ".csv" else None), given.with_suffix(".json")
 
 
-def _header(schedule: Schedule) -> list[str]:
-    return [PROGRESS, *schedule.names, MARGIN, *schedule.descriptors]
+def _head(name: str, unit: str) -> str:
+    """Header of a column; numbers without unit have none."""
+    return f"{name} ({unit})" if unit not in ("", "1") else name
 
 
-def _table(schedule: Schedule) -> Float[np.ndarray, "steps columns"]:
-    columns = [schedule.progress, *schedule.values.T, schedule.margins]
-    return np.column_stack([*columns, *schedule.descriptors.values()])
+def _rate_head(name: str, word: str, unit: str, time: str, power: str) -> str:
+    return f"{name} {word} ({unit if unit not in ('',) else '1'}/{time}{power})"
+
+
+def _columns(schedule: Schedule) -> dict[str, Column]:
+    """Columns of the table, by their headers."""
+    unit, out = schedule.time_unit, {}
+    if schedule.times is not None:
+        out[_head(TIME, unit)] = schedule.times
+    out[PROGRESS] = schedule.progress
+    for name, measure, values in zip(
+        schedule.names, schedule.units, schedule.values.T, strict=True
+    ):
+        out[_head(name, measure)] = values
+    out |= {MARGIN: schedule.margins, **schedule.descriptors}
+    for key, word, power in DERIVATIVES:
+        rates = getattr(schedule, key)
+        for k, name in enumerate(schedule.names):
+            if rates is not None and name in schedule.moving:
+                out[_rate_head(name, word, schedule.units[k], unit, power)] = rates[:, k]
+    return out
 
 
 def _sidecar(schedule: Schedule) -> dict[str, Any]:
@@ -120,6 +179,8 @@ def _sidecar(schedule: Schedule) -> dict[str, Any]:
         "names": list(schedule.names),
         "roles": list(schedule.roles),
         "units": list(schedule.units),
+        "time_unit": schedule.time_unit,
+        "derivatives": [key for key, *_ in DERIVATIVES if getattr(schedule, key) is not None],
         "descriptors": list(schedule.descriptors),
         "loads": _loads(schedule),
         "way_points": schedule.way_points.tolist(),
@@ -160,12 +221,25 @@ def _read_sidecar(path: Path) -> dict[str, Any]:
         raise InputError(
             f"`{path}` must be the sidecar of an equimorph schedule; got another file."
         )
-    if sidecar.get("version") != VERSION:
+    if sidecar.get("version") not in READABLE:
         raise InputError(
-            f"`{path}` must have version {VERSION}; got {sidecar.get('version')!r}. "
+            f"`{path}` must have version {VERSION} or less; got {sidecar.get('version')!r}. "
             "Read it with the equimorph that wrote it, or a newer one."
         )
     return sidecar
+
+
+def _numbers_of(lists: Any, path: Path) -> tuple[list[str], Float[np.ndarray, "steps columns"]]:
+    try:
+        table = np.array([[float(each) for each in column] for column in lists.values()]).T
+    except (AttributeError, TypeError, ValueError):
+        table = np.zeros(0)
+    if table.ndim != 2:
+        raise InputError(
+            f"`{path}` must hold columns of numbers; got damaged ones, or the sidecar of a table, "
+            "whose name ends in .csv."
+        )
+    return list(lists), table
 
 
 def _read_table(path: Path) -> tuple[list[str], Float[np.ndarray, "steps columns"]]:

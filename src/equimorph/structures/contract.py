@@ -144,6 +144,10 @@ class Structure(Equations):
         mass = self.inertia(z, p)
         return lambda v: np.asarray(v @ mass)
 
+    def effort_unit(self, parameter: Parameter) -> str:
+        """Unit of the effort of a parameter, like N m for an angle."""
+        return f"energy/({parameter.unit})"
+
     @abstractmethod
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded state from which the structure starts, and whether it was found."""

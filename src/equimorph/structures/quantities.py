@@ -14,9 +14,19 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Box, Descriptor, position
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
+from equimorph.model.units import FORCE, LENGTH, UNITS
 from equimorph.structures.approach import nearest
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
+
+FORCES = [name for name, (_, of) in UNITS.items() if of == FORCE]
+LENGTHS = [name for name, (_, of) in UNITS.items() if of == LENGTH]
+EFFORTS = {
+    **{f"{force} {length}": "M" for force in FORCES for length in LENGTHS},
+    **dict.fromkeys(FORCES, "F"),
+    **{"4π²B/L": "M", "4π²B/L²": "F"},
+}
+"""Symbols of efforts by unit: couples M and forces F."""
 
 
 @check_arguments
@@ -72,8 +82,9 @@ def effort_of(structure: Structure, name: str) -> Descriptor:
     def value(z: Lanes, p: Parameters) -> Values:
         return np.asarray(unit * structure.effort(z, p)[:, at])
 
-    label = f"energy/({structure.parameters[at].unit})"
-    return Descriptor(f"effort({name})", label, value, f"∂L/∂{name}", structure.signature)
+    label = structure.effort_unit(structure.parameters[at])
+    symbol = f"{EFFORTS[label]}({name})" if label in EFFORTS else f"∂L/∂{name}"
+    return Descriptor(f"effort({name})", label, value, symbol, structure.signature)
 
 
 @check_arguments
@@ -154,7 +165,8 @@ def find_descriptor(structure: Structure, text: str) -> Descriptor:
     """Descriptor that a text means.
 
     Beside those of the structure: ``Theta`` (any parameter), ``effort(Theta)``,
-    ``stability_margin``, ``distance(half_plane(x, y, nx, ny))``, ``distance(disc(x, y, r))``,
+    ``abs(effort(Theta))``, ``stability_margin``, ``distance(half_plane(x, y, nx, ny))``,
+    ``distance(disc(x, y, r))``,
     ``distance(room(x, y, r))``, ``outside(Theta 1 to 2, Delta 0 to 1)`` and, of the drawn shape,
     ``shape_y(0.3)``.
 
@@ -182,6 +194,10 @@ def find_descriptor(structure: Structure, text: str) -> Descriptor:
 
 def _effort(structure: Structure, inner: str) -> Descriptor:
     return effort_of(structure, inner.strip())
+
+
+def _absolute(structure: Structure, inner: str) -> Descriptor:
+    return abs(find_descriptor(structure, inner))
 
 
 def _distance(structure: Structure, inner: str) -> Descriptor:
@@ -228,6 +244,7 @@ def _shape(axis: str, structure: Structure, inner: str) -> Descriptor:
 
 
 _FORMS: dict[str, Callable[[Structure, str], Descriptor]] = {
+    "abs": _absolute,
     "effort": _effort,
     "distance": _distance,
     "outside": _outside,

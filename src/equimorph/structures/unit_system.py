@@ -3,21 +3,25 @@
 See docs/decisions.md, "Units are converted where numbers enter".
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Annotated, Any, TypeVar
 
-import numpy as np
-
 from equimorph.argument_kinds import is_number, one_of
 from equimorph.argument_notes import QUANTITY, quantity
-from equimorph.errors import InputError, suggestion
+from equimorph.errors import InputError
+from equimorph.model.units import (
+    COMPARED,
+    FORCE,
+    LENGTH,
+    MASS,
+    STANDARD_GRAVITY,
+    UNITS,
+    Unit,
+    read_unit,
+)
 
-Dimension = tuple[int, int, int]
-"""Powers of kilogram, metre and second."""
-Unit = tuple[float, Dimension]
 Quantity = Annotated[float | str, quantity]
 """A number in the units at hand, or a text with a unit, like "12 kN"."""
 Units = Annotated[
@@ -26,73 +30,8 @@ Units = Annotated[
 ]
 """Units in which plain numbers are."""
 
-STANDARD_GRAVITY = 9.80665
-"""m/s², by definition [BIPM2019]_: what turns a mass per length into a weight per length."""
-POUND, INCH = 0.45359237, 0.0254
-"""In kilograms, and in metres."""
-LENGTH, FORCE, MASS = (0, 1, 0), (1, 1, -2), (1, 0, 0)
-"""Exponents of mass, length and time."""
-UNITS: dict[str, Unit] = {
-    **{name: (value, LENGTH) for name, value in {
-        "m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "um": 1e-6, "in": INCH, "ft": 12.0 * INCH,
-    }.items()},
-    **{name: (value, FORCE) for name, value in {
-        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "MN": 1e6, "lbf": POUND * STANDARD_GRAVITY,
-        "kip": 1e3 * POUND * STANDARD_GRAVITY, "kgf": STANDARD_GRAVITY,
-    }.items()},
-    **{name: (value, MASS) for name, value in {
-        "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": POUND,
-    }.items()},
-    **{name: (value, (1, -1, -2)) for name, value in {
-        "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": POUND * STANDARD_GRAVITY / INCH**2,
-    }.items()},
-    "J": (1.0, (1, 2, -2)),
-    "1": (1.0, (0, 0, 0)),
-}  # fmt: skip
-"""Values in SI."""
-_FACTOR = re.compile(r"\s*([·*/]?)\s*([A-Za-z]+|1)(?:\^?(-?\d+))?\s*")
-_POWERS = str.maketrans({"²": "2", "³": "3", "⁴": "4"})
+_POWER = {2: "²", 3: "³"}
 Part = TypeVar("Part")
-
-
-def read_unit(text: str, known: Mapping[str, Unit], what: str) -> Unit:
-    """Value and dimension of a product of powers of units, like ``kN m^2`` or ``N/mm``.
-
-    Parameters
-    ----------
-    text
-        Units with an optional power, joined by ``/``, ``·``, ``*`` or a space.
-    known
-        Units by name.
-    what
-        What the text is the unit of, for messages.
-
-    Raises
-    ------
-    InputError
-        For a unit that is not known, or a text that is no product.
-
-    Examples
-    --------
-    >>> read_unit("kN mm^2", UNITS, "EI")
-    (0.001, (1, 3, -2))
-    """
-    rest, value, powers = text.translate(_POWERS), 1.0, np.zeros(3, int)
-    while rest:
-        found = _FACTOR.match(rest)
-        name = found.group(2) if found else rest
-        if found is None or name not in known:
-            units = [each for each in known if each != "1"]
-            raise InputError(
-                f"`{what}` must be in units such as kN or N mm^2, of {', '.join(units)}; got "
-                f"{text!r}.{suggestion(name, units)}"
-            )
-        power = int(found.group(3) or 1) * (-1 if found.group(1) == "/" else 1)
-        one, dimension = known[name]
-        value, powers = value * one**power, powers + power * np.array(dimension)
-        rest = rest[found.end() :]
-    mass, length, time = powers.tolist()
-    return value, (mass, length, time)
 
 
 @dataclass(frozen=True)
@@ -201,6 +140,23 @@ class UnitSystem:
                 f"{given!r}."
             )
         return float(found.group(1)) * value / unit
+
+    def conjugate(self, unit: str) -> str:
+        """Unit of what does work on a parameter: force·length over the parameter's own unit.
+
+        Examples
+        --------
+        >>> UnitSystem("N", "mm").conjugate("rad"), UnitSystem("N", "mm").conjugate("N")
+        ('N mm', 'mm')
+        """
+        _, (mass, length, _) = read_unit(unit or "1", COMPARED, "unit")
+        powers = {"force": 1 - mass, "length": 1 - length + mass}
+        words = [
+            name if power == 1 else f"{name}{_POWER.get(power, f'^{power}')}"
+            for name, power in powers.items()
+            if power
+        ]
+        return self.label("·".join(words)) or "1"
 
     def check_all_have_units(self, given: Mapping[str, Any]) -> None:
         """Refuse plain numbers together with texts with units where no units are named for them.

@@ -5,7 +5,7 @@ descriptor, the bound is a number.
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -19,24 +19,29 @@ from equimorph.structures import Structure
 LARGEST = 1e9
 """Largest number of a study; all scales of a structure are near 1."""
 
-_FORM = re.compile(r"\s*([^<>=]*[^<>=\s])\s*(<=|>=)\s*([-+.\deE]+)\s*")
+_FORM = re.compile(
+    r"""\s*([^<>=]*[^<>=\s])\s*(<=|>=)\s*"?\s*([-+.\deE]+)\s*([A-Za-z1][^<>="]*?)?\s*"?\s*"""
+)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A constraint as it is written: descriptor, ``<=`` or ``>=``, bound."""
+    """A constraint as it is written: descriptor, ``<=`` or ``>=``, bound and perhaps its unit."""
 
     descriptor: str
     sense: Literal["<=", ">="]
     bound: float
+    unit: str = field(default="", repr=False)
 
     def on(self, structure: Structure) -> Constraint:
         """Return the same comparison with the descriptor of a structure."""
-        return Constraint(worst_named(structure, self.descriptor), self.sense, self.bound)
+        of = worst_named(structure, self.descriptor)
+        bound = f"{self.bound!r} {self.unit}" if self.unit else self.bound
+        return of <= bound if self.sense == "<=" else of >= bound
 
 
 def parse_comparison(text: str) -> Comparison:
-    """Read ``descriptor <= number`` or ``descriptor >= number``.
+    """Read ``descriptor <= number`` or ``descriptor >= number``, with or without a unit.
 
     Raises
     ------
@@ -58,7 +63,7 @@ def parse_comparison(text: str) -> Comparison:
             f"`constraint` must read like max_curvature <= 20 or height(0.5) >= 0, with a number "
             f"up to {LARGEST:g}; got {text!r}."
         )
-    return Comparison(found[1], cast(Literal["<=", ">="], found[2]), bound)
+    return Comparison(found[1], cast(Literal["<=", ">="], found[2]), bound, found[4] or "")
 
 
 def requirement(text: str) -> PydanticCustomError:

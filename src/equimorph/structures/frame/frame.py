@@ -220,6 +220,12 @@ class Frame(FrameFields):
         """Seconds in a frame with units, else that of its numbers."""
         return self.model.system.time_unit
 
+    def effort_unit(self, parameter: Parameter) -> str:
+        """Unit of the effort of a parameter, like N for a length."""
+        system = self.model.system
+        plain = system.plain
+        return super().effort_unit(parameter) if plain else system.conjugate(parameter.unit)
+
     @property
     def massless(self) -> str:
         """How a frame is given its mass."""

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters
+from equimorph.model import Parameter
 from equimorph.structures.contract import Structure
 from equimorph.structures.rod.units import Units
 
@@ -25,6 +26,11 @@ class HeavyRod(Structure):
     def time_unit(self) -> str:
         """T, or s of a rod with EI and length."""
         return self.units.time_label
+
+    def effort_unit(self, parameter: Parameter) -> str:
+        """Unit of the effort of a parameter: of a couple for an angle, a force for a length."""
+        known = self.units.conjugate(parameter.unit)
+        return super().effort_unit(parameter) if known is None else known
 
     @property
     def massless(self) -> str:

@@ -23,6 +23,16 @@ LABELS = {
 """Labels without units, and quantities as `UnitSystem` writes them."""
 
 
+PLAIN_EFFORTS = {
+    "rad": "4π²B/L",
+    "L": "4π²B/L²",
+    "4π²B/L²": "L",
+    "4π²B/L": "rad",
+    "1/L": "4π²B",
+}
+"""Units of efforts by those of parameters, without EI and length."""
+
+
 @dataclass(frozen=True)
 class Units:
     """Non-dimensional numbers times `value(quantity)` are the user's.
@@ -107,6 +117,12 @@ class Units:
         """Its unit."""
         plain, words = LABELS[quantity]
         return plain if self.plain else self._labelled.label(words)
+
+    def conjugate(self, unit: str) -> str | None:
+        """Unit of what does work on a parameter with a unit; None if it is not known."""
+        if self.plain:
+            return PLAIN_EFFORTS.get(unit)
+        return self._labelled.conjugate(unit)
 
     def number(self, given: Any, quantity: str, what: str) -> Any:
         """Number of a quantity that may be a text with units; see `UnitSystem.number`."""

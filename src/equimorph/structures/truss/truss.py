@@ -157,6 +157,12 @@ class Truss(TrussMechanics):
         """Seconds in a truss with units, else that of its numbers."""
         return self.system.time_unit
 
+    def effort_unit(self, parameter: Parameter) -> str:
+        """Unit of the effort of a parameter, like N for a length."""
+        system = self.system
+        plain = system.plain
+        return super().effort_unit(parameter) if plain else system.conjugate(parameter.unit)
+
     @property
     def massless(self) -> str:
         """How a truss is given its mass."""
