@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import is_number
+from equimorph.argument_notes import QUANTITY
 from equimorph.argument_vocabulary import LARGEST
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
@@ -171,7 +172,8 @@ class Descriptor:
 
 
 def _number(name: str, bound: Any, unit: str) -> float:
-    bound = in_unit(bound, unit, name) if isinstance(bound, str) else bound
+    if isinstance(bound, str) and QUANTITY.fullmatch(bound):
+        bound = in_unit(bound, unit, name)
     number = float(bound) if is_number(bound) and abs(bound) <= LARGEST else np.nan
     if not np.isfinite(number):
         raise InputError(f"`{name}` must be compared with a finite number; got {bound!r}.")

@@ -4,10 +4,10 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Lanes, Parameters
+from equimorph.model.units import STANDARD_GRAVITY
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.places_inertia import inertia_of_places
-from equimorph.structures.unit_system import STANDARD_GRAVITY
 
 
 def member_masses(model: FrameModel) -> Float[np.ndarray, " members"] | None:

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from equimorph.errors import InputError
-from equimorph.structures.unit_system import STANDARD_GRAVITY, UnitSystem, kilograms
+from equimorph.model.units import STANDARD_GRAVITY
+from equimorph.structures.unit_system import UnitSystem, kilograms
 
 FOUR_PI_SQUARED = 4.0 * np.pi**2
 SI = UnitSystem("N", "m")
