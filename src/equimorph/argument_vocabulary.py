@@ -37,6 +37,7 @@ class Range:
 FINITE = Range(-LARGEST, LARGEST, "a finite number", "finite numbers")
 NOT_NEGATIVE = Range(0.0, np.inf, "a number >= 0", "numbers >= 0")
 POSITIVE = Range(0.0, LARGEST, "positive and finite", "positive numbers", above=True)
+PERIOD = Range(0.0, np.inf, "a positive number", "positive numbers", above=True)
 SHARE = Range(0.0, 1.0, "a share of the length, from 0 to 1", "shares of the length, from 0 to 1")
 BETWEEN = Range(
     0.0, float(np.nextafter(1.0, 0.0)), "between 0 and 1 (both excluded)",

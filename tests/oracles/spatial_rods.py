@@ -206,3 +206,30 @@ def guided():
         return out - (z[:, -2] - P) * rise - (z[:, -1] + 0.5 * P) * aside
 
     return rod, (0.2, 0.1, 0.3, -0.1, 0.2, 0.1, 0.4, 0.1, 0.05), lagrangian
+
+
+def coaxial():
+    """Round rod between clamps on one axis, with the phase condition ∫ g t_z = 0."""
+    rod = SpatialRod(
+        torsion=0.7,
+        lateral=1.0,
+        loads={"P": PointForce(0.5, (1.0, 0.0, 0.0))},
+        axial=6.0,
+        phase=True,
+        elements=4,
+        degree=4,
+    )
+    g = InSpace(rod)
+
+    def lagrangian(z, p):
+        twist_A, twist_B, P, nu = p.T
+        at, out = g.state(z[:, :-4], clamp(0, 0, twist_A), clamp(0, 0, twist_B))
+        u, lam, mu, s = g.strains(at), z[:, -4:-1], z[:, -1], g.s
+        out = out + g.total(0.5 * UNIT * (u**2 * np.array([0.7, 1.0, 1.0])).sum(axis=-1))
+        weight = 2.0 - s - 0.5 * s * (1.0 - s)
+        along = column(lam[:, 0]) + column(P) * (s > 0.5)
+        force = columns(along, column(lam[:, 1]), column(lam[:, 2]) + column(mu) * weight)
+        a1 = (force * g.frames(at)[..., 0]).sum(axis=-1)
+        return out + g.total(a1 - a1**2 / 12) - (lam[:, 0] + P) * nu
+
+    return rod, (0.2, 0.5, 0.2, 0.84), lagrangian

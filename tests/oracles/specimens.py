@@ -256,6 +256,7 @@ SPECIMENS = (
     _general("everything on a rod in space", spatial_rods.everything),
     _general("sheared cantilever in space", spatial_rods.cantilever),
     _general("guided rod in space", spatial_rods.guided),
+    _general("rod with a phase condition", spatial_rods.coaxial),
     Specimen("spring", Spring(1.3), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     Specimen("spring by its energy", written_spring(), (0.9, 0.1, 1.3), 0.2, 0.7, _spring_energy),
     _truss("truss", arch_truss("engineering")),

@@ -153,7 +153,8 @@ def prepare_leg(states: States, leg: Leg) -> Prepared:
         return _track_descriptors(states, leg, first)
     if not callable(leg):
         stop = replace_parameters(structure, here, leg)
-        return Prepared(ParameterLine(structure, here.copy(), stop - here), states.z)
+        start = structure.pick_on_orbits(states.z, here, stop)
+        return Prepared(ParameterLine(structure, here.copy(), stop - here), start)
     base = here[:1] if (here == here[:1]).all() else here
 
     def at(t: float) -> Parameters:
@@ -260,6 +261,20 @@ def check_starts(states: States) -> None:
         raise InputError(
             f"`state` must hold equilibria (largest residual below {EQUILIBRIUM:g}); got a "
             f"residual of {states.residual[worst]:.2g} in number {worst}."
+        )
+
+
+def check_isolated(structure: Structure, p: Parameters) -> None:
+    """Raise `InputError` where equilibria are not isolated: a search would find no end of them."""
+    free = structure.have_orbits(p)
+    if free.any():
+        at = ", ".join(
+            f"{each.name}={value:g}"
+            for each, value in zip(structure.parameters, p[np.argmax(free)], strict=True)
+        )
+        raise InputError(
+            "`structure` must have isolated equilibria; got one whose states may be turned about "
+            f"an axis for nothing at {at}. Give it phase=True, which picks one state of each orbit."
         )
 
 

@@ -13,6 +13,7 @@ from scipy.special import gammaln, xlogy
 
 from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.arguments import Argument, arguments_of, contradicts
+from equimorph.equilibria.legs import check_isolated
 from equimorph.equilibria.minima_graph import MinimaGraph
 from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct
 from equimorph.model import Constraint, parameter_vector
@@ -238,6 +239,7 @@ def search_points(
     InputError
         For less than one start or run.
     """
+    check_isolated(structure, points)
     generator, guesses = np.random.default_rng(seed), -(-starts // runs)
     catches = [_Catch.empty(structure, point, tuple(within)) for point in points]
     todo = np.arange(len(points))

@@ -4,12 +4,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import short
+from equimorph.equilibria.legs import check_isolated
 from equimorph.errors import InputError
 from equimorph.manifold.complex.description import Frame
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -35,6 +37,7 @@ from equimorph.model import (
     position,
 )
 from equimorph.structures import Structure
+from equimorph.tolerances import SAME_TO_ROUNDING
 
 COARSE = {1: 12, 2: 12, 3: 7}
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
@@ -268,6 +271,18 @@ def _setting(
     for corner in (box.lower, box.upper):
         values = dict(zip(box.names, corner.tolist(), strict=True))
         base = parameter_vector(structure.parameters, {**fixed, **values})
+    sides = zip(box.lower.tolist(), box.upper.tolist(), strict=True)
+    corners = np.repeat(base[None], 2 ** len(free), axis=0)
+    corners[:, free] = list(product(*sides))
+    if structure.have_orbits(corners).all():
+        check_isolated(structure, corners)
+    for name, width in zip(box.names, box.upper - box.lower, strict=True):
+        period = structure.parameters[position(structure.parameters, name)].period
+        if width > period * (1.0 + SAME_TO_ROUNDING):
+            raise InputError(
+                f"`box.{name}` must be no wider than {period:g}, after which the structure is the "
+                f"same again; got {width:g}."
+            )
     validity = tuple(each for each in structure.validity if each not in within)
     return Setting(structure, base, free, (*within, *validity))
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import is_number
 from equimorph.argument_notes import BOUNDS, DIVIDED
-from equimorph.argument_vocabulary import FINITE, POSITIVE
+from equimorph.argument_vocabulary import FINITE, PERIOD, POSITIVE
 from equimorph.errors import InputError, suggestion
 
 Role = Literal["actuator", "load", "fixed"]
@@ -23,7 +23,8 @@ class Parameter:
 
     `role` is its usual role; a problem may give it another. `scale` is the change that counts as
     one unit of length in the parameter space; `lower` and `upper` are the open limits of its
-    meaning (a span between 0 and 1, say), not of a study.
+    meaning (a span between 0 and 1, say), not of a study. `period` is the change after which the
+    structure is the same again, like the turn of a clamp; boxes of sets are no wider.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Parameter:
     default: float | None = None
     lower: float = -np.inf
     upper: float = np.inf
+    period: Annotated[float, PERIOD] = np.inf
 
     def check(self, value: float) -> float:
         """Return `value` as a float, or raise `InputError` if it has no meaning."""

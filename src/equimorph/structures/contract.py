@@ -183,6 +183,22 @@ class Structure(Equations):
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether states lie within what the discretisation can represent."""
 
+    def have_orbits(self, p: Parameters) -> Flags:
+        """Whether a continuous symmetry moves equilibria at parameters; they are not isolated then.
+
+        Lifts keep to one phase (`pick_on_orbits`); searches and sets refuse such parameters.
+        """
+        return np.zeros(len(p), bool)
+
+    def pick_on_orbits(self, z: Lanes, p: Parameters, towards: Parameters) -> Lanes:
+        """States from which paths to other parameters begin; by default the given ones.
+
+        Where a continuous symmetry carries states over into each other, all along the way, the one
+        that the structure's phase condition picks.
+        """
+        del p, towards
+        return z
+
     @property
     def validity(self) -> tuple[Constraint, ...]:
         """Constraints beyond which the energy does not describe the structure; none by default.

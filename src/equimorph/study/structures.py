@@ -171,6 +171,7 @@ class SpatialRodSection(StructureSection):
     span: Quantity | None = None
     rise: Quantity | None = None
     sideways: Quantity | None = None
+    phase: bool | None = None
     EI: Quantity | None = None
     length: Quantity | None = None
     units: UnitSystem | None = None

@@ -143,7 +143,8 @@ class RodDescription(ABC):
     def combined(self) -> dict[str, dict[str, float]]:
         """Weights of the raw parameters in each coordinate."""
         if self.coordinates is None:
-            return TURNING if all(each.holds_rotation for each in self.supports) else {}
+            held = all(each.holds_rotation for each in self.supports)
+            return TURNING if held and {"theta_A", "theta_B"} <= set(self.raw_names) else {}
         for name, weights in self.coordinates.items():
             if not name.isidentifier():
                 raise InputError(

@@ -12,6 +12,7 @@ from equimorph.model import Descriptor
 from equimorph.structures.rod.any_rod import COORDINATES, Arclengths, Field, read_fraction
 from equimorph.structures.spatial.measured import MeasuredInSpace
 from equimorph.structures.spatial.orbits import on_orbit
+from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.states import State
 
 STRAINS = {"twist": "κ_t", "side_curvature": "κ_n", "curvature": "κ_b"}
@@ -112,13 +113,15 @@ class DescribedInSpace(MeasuredInSpace):
 
         Contact with itself, for a rod of some `thickness` in the user's unit of length; and orbits:
         equal bending stiffnesses between coaxial clamps let a state turn about their axis for
-        nothing, so that F_z is singular and no event found there is a fold.
+        nothing. Paths keep to one phase where this is the x axis; about another axis F_z is
+        singular, and no event found there is a fold.
         """
         found = list(self.warn_of_contact(state, thickness))
-        if on_orbit(self.mechanics, state.z[None], state.p[None])[0]:
+        pinned = isinstance(self.mechanics, PinnedMechanics)
+        if not pinned and on_orbit(self.mechanics, state.z[None], state.p[None])[0]:
             found.append(
-                "the state may be turned about the axis of the clamps for nothing: give the rod a "
-                "load across this axis, another clamp, or unequal bending stiffnesses"
+                "the state may be turned about the axis of the clamps for nothing: it is one of an "
+                "orbit, of which searches and sets pick one with phase=True"
             )
         return tuple(found)
 

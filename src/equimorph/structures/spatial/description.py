@@ -1,6 +1,7 @@
 """Description of a rod in space by its user, and how its model follows."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -18,12 +19,21 @@ from equimorph.structures.spatial.ends import (
     spatial_end,
     support_axes,
 )
+from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import (
     ANGLES,
     Build,
     SpatialModel,
     raw_model,
     raw_names,
+)
+from equimorph.structures.spatial.phase import (
+    BROKEN_BY,
+    OrbitMechanics,
+    PinnedMechanics,
+    check_orbits,
+    obstacle,
+    with_phase_condition,
 )
 
 WORDS = {"nu": "span", "rise": "rise", "sideways": "sideways"}
@@ -32,8 +42,12 @@ LARGEST_TWIST = 4.0 * np.pi
 """After a turn of a clamp by 4π a rod is the same again."""
 
 
+@dataclass(frozen=True, eq=False)
 class SpatialDescription(RodDescription):
     """A rod in space as its user describes it; see `SpatialRod`."""
+
+    phase: bool = False
+    """Whether a phase condition pins states on their orbits."""
 
     defaults: ClassVar[Mapping[str, Any]] = {
         **{"stiffness": 1.0, "curvature": 0.0, "side_curvature": 0.0, "natural_twist": 0.0},
@@ -55,8 +69,10 @@ class SpatialDescription(RodDescription):
 
     @cached_property
     def raw_names(self) -> tuple[str, ...]:
-        """Angles of the ends, amplitudes, places of end B."""
-        return raw_names(self.supports, self.terms)
+        """Angles of the ends, amplitudes, places of end B, but for those that break orbits."""
+        gone = BROKEN_BY if self.phase else ()
+        names = raw_names(self.supports, self.terms)
+        return tuple(name for name in names if name not in gone)
 
     def check_term(self, name: str, one: Term) -> None:
         """Refuse what has no potential in space."""
@@ -92,9 +108,23 @@ class SpatialDescription(RodDescription):
         """The Lagrangian in the raw parameters."""
         return raw_model(self.build(elements, degree))
 
+    def mechanics(self, raw: SpatialModel) -> SpatialMechanics:
+        """Mechanics in the user's parameters, from the Lagrangian in the raw ones."""
+        own = self.in_own_parameters(raw)
+        if self.phase:
+            check_orbits(own)
+            return PinnedMechanics(with_phase_condition(own))
+        return SpatialMechanics(own) if obstacle(own) else OrbitMechanics(own)
+
     def check_places(self) -> None:
         """Refuse places of end B that an inextensible rod cannot reach."""
         held = {axis.name for axis in support_axes(self.supports) if axis.opposed}
+        for name in ("rise", "sideways"):
+            if self.phase and self.places[name] != 0.0:
+                raise InputError(
+                    "`phase` must be False unless every state may be turned about the x axis for "
+                    f"nothing; got {name} = {self.places[name]:g}."
+                )
         if self.profiles["axial"] is not None:
             return
         length, unit = self.units.value("length"), self.units.label("length")
@@ -116,10 +146,17 @@ class SpatialDescription(RodDescription):
             return Parameter(raw, label, scale, "fixed", float(self.places[raw]), -far, far)
         if raw.startswith("twist_"):
             near = np.nextafter(LARGEST_TWIST, np.inf)
-            return Parameter(raw, label, scale, "actuator", 0.0, -near, near)
-        return Parameter(raw, label, scale, "actuator", 0.0)
+            return Parameter(raw, label, scale, "actuator", 0.0, -near, near, self._turn)
+        turn = self._turn if raw.startswith("theta_") else np.inf
+        return Parameter(raw, label, scale, "actuator", 0.0, period=turn)
+
+    @property
+    def _turn(self) -> float:
+        """Turn of a clamp after which the rod is the same again: 2π if it is the only one."""
+        alone = any(support.turns for support in self.supports)
+        return LARGEST_TWIST * (0.5 if alone else 1.0)
 
     def data(self) -> dict[str, Any]:
         """Everything that differs from the default, as plain data."""
         places = {WORDS[name]: self.places[name] for name in PLACES if name in self.raw_names}
-        return RodDescription.data(self) | places
+        return RodDescription.data(self) | places | ({"phase": True} if self.phase else {})

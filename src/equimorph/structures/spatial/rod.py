@@ -24,6 +24,8 @@ from equimorph.structures.spatial.ends import Ends
 from equimorph.structures.spatial.errors import discretisation_error
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.natural import natural_states
+from equimorph.structures.spatial.orbits import pinned_guess, pinned_natural_states
+from equimorph.structures.spatial.phase import OrbitMechanics, PinnedMechanics
 from equimorph.structures.spatial.planar import planar_guess
 from equimorph.structures.states import State
 from equimorph.structures.unit_system import Quantity, Units
@@ -86,6 +88,12 @@ class SpatialRod(DescribedInSpace):
         Named linear coordinates in place of parameters; see `Rod`. ``{}`` leaves theta_A, theta_B.
     rise, sideways
         Defaults of the place of end B along y and z.
+    phase
+        True pins states on their orbits. Where the bending stiffnesses are equal and nothing acts
+        across the axis of the clamps, the x axis, a state off the axis may be turned about it for
+        nothing: F_z is singular, and no event is a true one. A condition with a multiplier, which
+        is 0 at equilibria, picks the state with ``∫ g t_z ds = 0``; theta, tilt, rise and sideways
+        are no parameters then. Margins are those on this condition.
     kinks
         Arclengths at which a callable is not smooth.
     elements, degree
@@ -139,6 +147,7 @@ class SpatialRod(DescribedInSpace):
         coordinates: Mapping[str, Mapping[str, float]] | None = None,
         rise: Quantity = 0.0,
         sideways: Quantity = 0.0,
+        phase: bool = False,
         kinks: Sequence[float] = (),
         elements: ElementCount = 6,
         degree: int = 6,
@@ -178,11 +187,11 @@ class SpatialRod(DescribedInSpace):
             },
             kinks,
             self.units,
+            phase=phase,
         )
         self.description.check_places()
         self.parameters = self.description.parameters
-        made = self.description.in_own_parameters(self._raw.model)
-        self._use_mechanics(SpatialMechanics(made))
+        self._use_mechanics(self.description.mechanics(self._raw.model))
 
     def _ratios(self) -> dict[str, Any]:
         """Stiffnesses against twist and out of the plane, relative to that in the plane."""
@@ -210,7 +219,10 @@ class SpatialRod(DescribedInSpace):
 
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded rod, continued from its stress-free shape."""
-        return natural_states(self._raw, self.description.raw_parameters(self._raw.model, p))
+        given = self.description.raw_parameters(self._raw.model, p)
+        if isinstance(self.mechanics, PinnedMechanics):
+            return pinned_natural_states(self.mechanics, self._raw, p, given)
+        return natural_states(self._raw, given)
 
     @check_arguments
     def planar_state(self, state: Any, **values: float) -> State:
@@ -243,6 +255,48 @@ class SpatialRod(DescribedInSpace):
             )
         return State(self, z[0], p[0])
 
+    @check_arguments
+    def pinned_state(self, state: Any) -> State:
+        """State of a rod between coaxial clamps as one of this rod, which has a phase condition.
+
+        It is turned as a whole until the clamps lie on the x axis, then about this axis until it
+        meets the condition, and corrected by Newton's method. Clamps that were turned all round are
+        twisted by 2π more: a ring is a straight rod's state with a twist of 2π.
+
+        Raises
+        ------
+        InputError
+            If this rod has no phase condition, the clamps of `state` are not coaxial, or the
+            correction does not converge: the rods differ.
+        """
+        rod = self.mechanics
+        if not isinstance(rod, PinnedMechanics):
+            raise InputError(
+                "`pinned_state` must be asked of a rod with phase=True; got one without."
+            )
+        z, clamps = pinned_guess(rod, state)
+        names = [each.name for each in self.parameters]
+        given = {**state.parameters, **clamps}
+        known = {name: value for name, value in given.items() if name in names}
+        p = parameter_vector(self.parameters, known)[None]
+        z, found = correct_at_parameters(self, rod.aligned(z, p), p)
+        if found[0] and rod.resolved(z, p)[0]:
+            return State(self, z[0], p[0])
+        raise InputError(
+            "`state` must be one of a rod with the same supports, loads and stiffness; "
+            f"got {state!r}, near which this rod has no equilibrium."
+        )
+
+    def have_orbits(self, p: Parameters) -> Flags:
+        """Whether states off the x axis may be turned about it for nothing."""
+        rod = self.mechanics
+        return rod.have_orbits(p) if isinstance(rod, OrbitMechanics) else np.zeros(len(p), bool)
+
+    def pick_on_orbits(self, z: Lanes, p: Parameters, towards: Parameters) -> Lanes:
+        """States on orbits along the way are turned about the axis to the phase condition."""
+        rod = self.mechanics
+        return rod.pick_on_orbits(z, p, towards) if isinstance(rod, OrbitMechanics) else z
+
     def error_estimate(self, z: Lanes, p: Parameters) -> Values:
         """Bound of the errors of curvature and place, by solving again with a higher degree.
 
@@ -255,7 +309,7 @@ class SpatialRod(DescribedInSpace):
     def _refined(self) -> SpatialMechanics:
         elements, degree = self._resolution
         raw = self.description.raw_model(elements, min(degree + 4, 16))
-        return SpatialMechanics(self.description.in_own_parameters(raw))
+        return self.description.mechanics(raw)
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the ends, loads, tendons and segments that bend."""

@@ -1,0 +1,363 @@
+"""Rods between coaxial clamps whose states are pinned on their orbits by a phase condition.
+
+Where the bending stiffnesses are equal and nothing acts across the axis of the clamps, a state off
+the axis may be turned about it with all forces, its cross-sections turned back,
+``q → exp(e₁ α/2) q exp(−e₁ α/2)``: its orbit under SO(2). F_z is singular along ξ, the velocity of
+this turn. The condition ``c = ∫ g t_z ds = 0`` with a multiplier μ pins the orbit. L is constant
+along it, so that ``μ (ξ·∇c) = 0``: with ``ξ·∇c = ∫ g t_y ds ≠ 0`` no force remains, equilibria are
+those of the rod, and the direction ξ is among the constraints: neither negative nor zero.
+
+On the axis ξ = 0, there is nothing to pin, and the condition is void: μ = 0 stands in its place.
+See docs/decisions.md, "Orbits".
+"""
+
+from dataclasses import fields, replace
+from functools import cached_property, partial
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
+from equimorph.errors import InputError
+from equimorph.linalg import Border, BorderedSolution
+from equimorph.structures.equations import Advance, Direction, Equations, LinearSystem
+from equimorph.structures.spatial.mechanics import SpatialMechanics
+from equimorph.structures.spatial.model import ANGLES, SpatialModel
+from equimorph.structures.spatial.quaternions import (
+    Jet,
+    conjugate,
+    exponential,
+    matrices,
+    product,
+)
+from equimorph.tolerances import SAME_NUMBER
+
+ACROSS = tuple(f"{angle}_{side}" for side in "AB" for angle in ANGLES[:2])
+BROKEN_BY = (*ACROSS, "rise", "sideways")
+"""Parameters that a rod with a phase condition does not have: they move a clamp off the axis."""
+ON_AXIS = 1e-10
+"""Length of ξ in the metric below which a state lies on the axis."""
+NEAR_AXIS = 1e-12
+"""Angles, places and loads across the axis that are none: round-off of the way to them."""
+NO_FORCE = 1e-8
+"""Multiplier of the phase condition that is none, in units of 4π²B/L²."""
+
+
+def phase_weight(s: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """g(s): positive, and not symmetric, so that modes of either symmetry have a phase.
+
+    With both ends on the axis, c is the mean of z with the weight −g' = 1 + (1 − 2s)/2.
+    """
+    return np.asarray(2.0 - s - 0.5 * s * (1.0 - s))
+
+
+def with_phase_condition(model: SpatialModel) -> SpatialModel:
+    """The rod with one more multiplier, the last: of the phase condition."""
+    m = model.multipliers
+    mesh = model.mesh
+    row = np.zeros_like(model.force[0])
+    row[..., 2] = phase_weight(mesh.nodes[mesh.element_nodes])
+
+    def widened(rows: np.ndarray, axis: int) -> np.ndarray:
+        return np.insert(rows, m, 0.0, axis=axis)
+
+    force = widened(model.force, 0)
+    force[m] = row
+    return replace(
+        model,
+        multipliers=m + 1,
+        force=force,
+        moment=widened(model.moment, 0),
+        tension=widened(model.tension, 0),
+        torsion=widened(model.torsion, 0),
+        quadratic=widened(widened(model.quadratic, 0), 1),
+        turned=widened(model.turned, 2),
+        reaction=widened(model.reaction, 1),
+        origin=widened(model.origin, 1),
+    )
+
+
+def check_orbits(model: SpatialModel) -> None:
+    """Refuse a rod whose states cannot be turned about the x axis for nothing.
+
+    Raises
+    ------
+    InputError
+        With the first reason.
+    """
+    reason = obstacle(model) or _obstacle_by_parameters(model)
+    if reason:
+        raise InputError(
+            "`phase` must be False unless every state may be turned about the x axis for nothing; "
+            f"got {reason}."
+        )
+
+
+def obstacle(model: SpatialModel) -> str:
+    """What of section and supports keeps states from being turned; empty if nothing does."""
+    m = model.multipliers
+    if not _same(model.stiffness[..., 1], model.stiffness[..., 2]):
+        return "bending stiffnesses that differ: `lateral` is not 1"
+    if not _same(model.softness[..., 1], model.softness[..., 2]):
+        return "stiffnesses against shear that differ"
+    held = np.abs(model.force[:m, 0, 0, :]).max(axis=0, initial=0.0)
+    if held[1] != held[2] or _compliance(model, 1) != _compliance(model, 2):
+        return "supports that hold y and z in different ways"
+    return ""
+
+
+def _obstacle_by_parameters(model: SpatialModel) -> str:
+    """What of the parameters, or of the constant part, keeps states from being turned."""
+    m = model.multipliers
+    names = (*model.names, "")
+    rows = np.concatenate([_breaking(model), model.turned[:, 0]])
+    at = np.flatnonzero(np.abs(rows[:, m:]).max(axis=0, initial=0.0) > SAME_NUMBER)
+    if len(at) == 0:
+        return ""
+    return f"{names[at[0]]}, which acts across the axis" if names[at[0]] else "intrinsic curvature"
+
+
+def _breaking(model: SpatialModel) -> Float[np.ndarray, "some scalars"]:
+    """Combinations of the scalars that are zero where states can be turned about the x axis.
+
+    Beside these, the clamps' angles in the plane have to be multiples of 2π.
+    """
+    m, count = model.multipliers, model.scalars
+    force = model.force[..., 1:].reshape(count, -1).T.copy()
+    force[:, :m] = 0.0
+    moment = model.moment[..., 1:].reshape(count, -1).T
+    places = model.quadratic[:m].copy()
+    places[np.abs(model.force[:m, 0, 0, 1:]).max(axis=1) == 0.0] = 0.0
+    places[:, :m] = 0.0
+    rows = np.concatenate([force, moment, model.turned[:, 1], places])
+    rows = rows / np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-300)
+    _, size, basis = np.linalg.svd(rows, full_matrices=False)
+    return np.asarray(basis[size > SAME_NUMBER * size.max(initial=1e-300)])
+
+
+def _compliance(model: SpatialModel, axis: int) -> float:
+    """Compliance of the supports along y or z together."""
+    rows = np.flatnonzero(model.force[: model.multipliers, 0, 0, axis])
+    return float(sum(model.quadratic[k, k] for k in rows))
+
+
+def _same(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool(np.abs(a - b).max() <= SAME_NUMBER * np.abs(a).max(initial=1e-300))
+
+
+class PinnedMechanics(SpatialMechanics):
+    """Mechanics of a rod on whose orbits the phase condition picks one state, and that opposite."""
+
+    def orbit_direction(self, z: Lanes) -> Float[np.ndarray, "lanes unknowns"]:
+        """ξ = ∂q/∂α at α = 0, of the unknown quaternions."""
+        q = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
+        axis = np.array([0.0, 0.5, 0.0, 0.0])
+        return np.asarray((product(axis, q) - product(q, axis)).reshape(len(z), self.unknowns))
+
+    def on_axis(self, z: Lanes) -> Flags:
+        """Whether states are those that the turn leaves as they are."""
+        square = np.einsum("li,i->l", self.orbit_direction(z) ** 2, self.mass)
+        return np.asarray(square < ON_AXIS**2)
+
+    def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
+        """F with its derivatives along none, one or two directions."""
+        void = self.on_axis(z)
+        if not void.any():
+            return super().equations(z, p, *directions)
+        given, moves = z.copy(), [(dz.copy(), dp) for dz, dp in directions]
+        given[void, -1] = 0.0
+        for dz, _ in moves:
+            dz[void, -1] = 0.0
+        out = super().equations(given, p, *moves)
+        out[:, void, -1] = 0.0
+        for part, values in zip(out, (z, *(dz for dz, _ in directions)), strict=False):
+            part[void, -1] = -values[void, -1]
+        return out
+
+    def _entries(self, z: Lanes, p: Parameters, shift: Values) -> Entries:
+        out, void = super()._entries(z, p, shift), self.on_axis(z)
+        if void.any():
+            last = self.layout.rows == self.size - 1
+            out[np.ix_(void, last)] = 0.0
+            out[void, self.layout.diagonal[-1]] = -1.0
+        return out
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with F_z − shift·mass, bordered, by sparse elimination."""
+        return self.layout.solve(self.entries(z, p, shift), border, rhs)
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step along the curve with parameter velocity `dp`, by the general solve."""
+        return Equations.advance(self, z, p, dp, row, corner, defect)
+
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether the rotations are smooth, and the phase condition exerts no force."""
+        return np.asarray(super().resolved(z, p) & (np.abs(z[:, -1]) < NO_FORCE))
+
+    def turn(self, z: Lanes, angle: Values) -> Lanes:
+        """States turned about the axis by angles, with the forces of the supports."""
+        by = exponential(angle[:, None] * np.eye(3)[0])
+        q = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
+        q = product(product(by[:, None], q), conjugate(by)[:, None])
+        held = self.model.reaction[:, : self.constraints]
+        forces = np.einsum("lck,ka,la->lc", matrices(by), held, z[:, self.unknowns :])
+        ends = forces @ held
+        ends[:, -1] = z[:, -1]
+        return np.concatenate([q.reshape(len(z), self.unknowns), ends], axis=1)
+
+    def phase(self, z: Lanes, p: Parameters) -> Values:
+        """Angle by which a state is turned from one that the condition picks, −π/2 to π/2."""
+        t = matrices(self.rotations(z, p)[:, self.mesh.element_nodes])[..., 0]
+        g = phase_weight(self.mesh.nodes[self.mesh.element_nodes]) * self.weights
+        left, aside = (np.einsum("ei,lei->l", g, t[..., c]) for c in (1, 2))
+        side = np.where(left < 0.0, -1.0, 1.0)
+        return np.asarray(np.arctan2(side * aside, side * left))
+
+    def aligned(self, z: Lanes, p: Parameters) -> Lanes:
+        """The nearest states on their orbits that meet the phase condition."""
+        return self.turn(z, -self.phase(z, p))
+
+
+class OrbitMechanics(SpatialMechanics):
+    """Mechanics of a rod that has orbits at some parameters.
+
+    There, a state off the axis is turned to the phase condition, steps and solves are those of the
+    rod with it, and what they give is turned back: the phase stays, μ is 0. Paths along which the
+    orbits stay begin on the condition and stay there: predictors would amplify a phase that
+    nothing corrects. Elsewhere all is as for other rods.
+    """
+
+    @cached_property
+    def pinned(self) -> PinnedMechanics:
+        """The rod with the phase condition."""
+        return PinnedMechanics(with_phase_condition(self.model))
+
+    @cached_property
+    def _breaking(self) -> Float[np.ndarray, "some others"]:
+        return np.ascontiguousarray(_breaking(self.model)[:, self.constraints :])
+
+    def have_orbits(self, p: Parameters, *, moving: bool = False) -> Flags:
+        """Whether states at parameters, or along directions (moving), may be turned about x."""
+        given = np.concatenate([p, np.full((len(p), 1), 0.0 if moving else 1.0)], axis=1)
+        across = np.abs(given @ self._breaking.T).max(axis=1, initial=0.0)
+        angles = given @ self.model.turned[:, 0, self.constraints :].T
+        if not moving:  # turned all round, a clamp is the same again
+            angles -= 2.0 * np.pi * np.round(angles / (2.0 * np.pi))
+        return np.asarray(np.maximum(across, np.abs(angles).max(axis=1)) <= NEAR_AXIS)
+
+    def on_orbits(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether states could be turned about the x axis, and would move."""
+        symmetric = self.have_orbits(p)
+        if symmetric.any():
+            symmetric[symmetric] = ~self.pinned.on_axis(self._widen(z[symmetric]))
+        return symmetric
+
+    def pick_on_orbits(self, z: Lanes, p: Parameters, towards: Parameters) -> Lanes:
+        """States with the phase condition, where orbits lead on to other parameters."""
+        there = self.on_orbits(z, p) & self.have_orbits(towards)
+        if not there.any():
+            return z
+        out = z.copy()
+        out[there] = self.pinned.aligned(self._widen(z[there]), p[there])[:, :-1]
+        return out
+
+    def _widen(self, z: np.ndarray) -> np.ndarray:
+        """Unknowns, rows or columns with a 0 for μ."""
+        return np.insert(z, self.size, 0.0, axis=-1)
+
+    def advance(
+        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step along the curve with parameter velocity `dp`."""
+        there = self.on_orbits(z, p)
+        if not there.any():
+            return super().advance(z, p, dp, row, corner, defect)
+        own, by = self._widen(z[there]), self.pinned.turn
+        along = self.have_orbits(dp[there], moving=True) & dp[there].any(axis=1)
+        angle = np.where(along, 0.0, self.pinned.phase(own, p[there]))
+        rows = by(self._widen(row[there]), -angle)
+        step = self.pinned.advance(
+            by(own, -angle), p[there], dp[there], rows, corner[there], defect[there]
+        )
+        moves = (by(each, angle)[:, :-1] for each in (step.dz, step.tangent_z))
+        found = replace(step, **dict(zip(("dz", "tangent_z"), moves, strict=True)))
+        if there.all():
+            return found
+        rest = super().advance(*(each[~there] for each in (z, p, dp, row, corner, defect)))
+        return Advance(*(_merge(there, getattr(found, each.name), getattr(rest, each.name))
+                         for each in fields(Advance)))  # fmt: skip
+
+    def linear_system(
+        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
+    ) -> LinearSystem:
+        """F, F_p along directions, and solves with F_z; computed together."""
+        system = super().linear_system(z, p, directions)
+        if not self.on_orbits(z, p).any():
+            return system
+        return replace(system, solve=partial(self.solve, z, p))
+
+    def solve(
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Float[np.ndarray, "lanes sides bordered"],
+        border: Border | None = None,
+        shift: Values | None = None,
+    ) -> BorderedSolution:
+        """Solve with F_z − shift·mass, bordered."""
+        there = self.on_orbits(z, p)
+        if not there.any():
+            return super().solve(z, p, rhs, border, shift)
+        own = self._widen(z[there])
+        angle = self.pinned.phase(own, p[there])
+        turn = partial(self._turn_parts, angle)
+        around = None
+        if border is not None:
+            columns, rows, corner = (each[there] for each in border)
+            around = turn(columns, 1.0), turn(rows, 1.0), corner
+        shifts = None if shift is None else shift[there]
+        at = self.pinned.turn(own, -angle)
+        found = self.pinned.solve(at, p[there], turn(rhs[there], 1.0), around, shifts)
+        x = np.delete(turn(found.x, -1.0, self.size + 1), self.size, axis=-1)
+        found = replace(found, x=x, negative=found.negative - 1)
+        if there.all():
+            return found
+        outer = None if border is None else tuple(each[~there] for each in border)
+        rest = super().solve(z[~there], p[~there], rhs[~there], outer,
+                             None if shift is None else shift[~there])  # fmt: skip
+        return BorderedSolution(*(_merge(there, getattr(found, each.name), getattr(rest, each.name))
+                                  for each in fields(BorderedSolution)))  # fmt: skip
+
+    def _turn_parts(
+        self,
+        angle: Values,
+        parts: Float[np.ndarray, "lanes k wide"],
+        sign: float,
+        size: int | None = None,
+    ) -> np.ndarray:
+        """Right-hand sides, rows or solutions, turned to the condition (1) or back (−1)."""
+        lanes, k = parts.shape[:2]
+        if size is None:
+            size = self.size
+            parts = np.insert(parts, size, 0.0, axis=-1)
+            size += 1
+        out = parts.copy()
+        flat = parts[..., :size].reshape(lanes * k, size)
+        out[..., :size] = self.pinned.turn(flat, -sign * angle.repeat(k)).reshape(lanes, k, size)
+        return out
+
+
+def _merge(there: Flags, found: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Lanes of two parts in their order."""
+    out = np.empty((len(there), *found.shape[1:]), found.dtype)
+    out[there], out[~there] = found, rest
+    return out

@@ -1,0 +1,314 @@
+"""Rods with orbits: the phase condition against the rod without it, closed forms and symmetry."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh, null_space
+
+import equimorph as em
+from equimorph.errors import InputError
+from equimorph.structures.spatial.mechanics import SpatialMechanics
+from equimorph.structures.spatial.quaternions import (
+    clamp_rotation,
+    exponential,
+    matrices,
+    product,
+)
+from oracles.kirchhoff import clamped_buckling_moment
+
+ROUND = {"torsion": 0.75, "lateral": 1.0, "loads": {}, "span": 0.95}
+"""A round rod between clamps."""
+
+
+@pytest.fixture(scope="module")
+def pinned():
+    return em.SpatialRod(**ROUND, phase=True)
+
+
+@pytest.fixture(scope="module")
+def closing(pinned):
+    """Clamps of a rod with a twist of 9 moved together, to the looping fold."""
+    return em.lift(pinned.natural_state(twist_B=9.0), {"nu": -0.5})
+
+
+def bare_spectrum(rod, state):
+    """Residual, and eigenvalues in the metric, without the phase condition, by dense algebra."""
+    description = replace(rod.description, phase=False)
+    bare = SpatialMechanics(description.in_own_parameters(description.raw_model(*rod._resolution)))
+    p = np.array([[state.parameters.get(name, 0.0) for name in bare.model.names]])
+    z, n = state.z[None, :-1], bare.unknowns
+    full = bare.layout.dense(bare.entries(z, p))[0]
+    basis = null_space(full[n:, :n])
+    mass = basis.T @ (bare.mass[:, None] * basis)
+    values = eigh(basis.T @ full[:n, :n] @ basis, mass, eigvals_only=True)
+    return np.abs(bare.residual(z, p)).max(), values
+
+
+def clamp(angles):
+    """Rotation of a clamp."""
+    return clamp_rotation(np.array(angles)[None, None])[0, 0]
+
+
+def index_of(rod, state):
+    """Negative eigenvalues but for the one that the orbit makes zero."""
+    residual, values = bare_spectrum(rod, state)
+    assert residual < 1e-9
+    assert np.abs(values).min() < 1e-9
+    return (np.delete(values, np.argmin(np.abs(values))) < 0.0).sum()
+
+
+# --- the condition changes no equilibrium --------------------------------------------------------
+
+
+def test_multiplier_is_zero_and_index_leaves_the_orbit_out(pinned, closing):
+    """μ = 0: F of the rod without the condition vanishes, too; one of its eigenvalues is zero."""
+    states = closing.states
+    assert np.abs(states.multipliers[:, -1]).max() < 1e-10
+    for state in states[:-1:3]:
+        assert index_of(pinned, state) == state.index == 0
+
+
+@pytest.mark.slow
+def test_beyond_the_looping_fold_one_direction_is_negative(pinned, closing):
+    """The lift ends at a fold; around it the rod without the condition has index 1."""
+    assert closing.end.kind == "fold"
+    near = closing.states[-2]
+    path = em.lift(near, {"nu": -0.5}, through_folds=True)
+    beyond = path.states[np.flatnonzero(path.states.index == 1)[1]]
+    assert index_of(pinned, beyond) == 1
+
+
+def test_margin_vanishes_where_that_without_the_condition_does(pinned, closing):
+    """Signs agree; on the condition margins are at most those across the orbit."""
+    for state in closing.states[1:-1:3]:
+        _, values = bare_spectrum(pinned, state)
+        lowest = np.delete(values, np.argmin(np.abs(values)))[0]
+        assert 0.0 < state.margin <= lowest * (1.0 + 1e-9)
+
+
+def test_fold_is_the_limit_of_folds_of_rods_without_orbits(closing):
+    """Stiffnesses aside of 1 + ε have no orbit, and take none of this: O(ε), extrapolated to 0."""
+    found = []
+    for change in (0.01, 0.02):
+        rod = em.SpatialRod(**{**ROUND, "lateral": 1.0 + change}, coordinates={})
+        begin = rod.natural_state(theta_A=0.3, theta_B=-0.3, nu=0.9)
+        turned = em.lift(begin, [{"theta_A": 0.0, "theta_B": 0.0}, {"twist_B": 9.0}]).end
+        end = em.lift(turned.state, {"nu": -0.5}).end
+        assert (turned.kind, end.kind) == ("arrived", "fold")
+        found.append(end.state["nu"])
+    limit = 2.0 * found[0] - found[1]
+    assert closing.end.state["nu"] == pytest.approx(limit, abs=1e-6)
+
+
+# --- applied by itself ---------------------------------------------------------------------------
+
+
+def test_rods_with_other_parameters_keep_to_one_phase_by_themselves(closing):
+    """With theta, tilt, rise, sideways at zero, after a load aslant: the same fold to 1e-11."""
+    load = {"q": em.LineLoad(direction=(0.1, -1.0, 0.3))}
+    rod = em.SpatialRod(**{**ROUND, "loads": load})
+    begin = em.lift(rod.natural_state(Theta=0.3), [{"q": 0.2}, {"twist_B": 9.0}]).end.state
+    there = em.lift(begin, {"Theta": 0.0, "q": 0.0}).end
+    assert (there.kind, there.state.index) == ("arrived", 0)
+    assert rod.warnings(there.state)
+    end = em.lift(there.state, {"nu": -0.5}).end
+    assert end.kind == "fold"
+    assert end.state["nu"] == pytest.approx(closing.end.state["nu"], abs=1e-11)
+
+
+@pytest.mark.slow
+def test_limit_load_of_a_thrust_is_that_of_the_pinned_rod():
+    """A buckled strut under thrust: both ways to pose it give the same first critical load."""
+    options = {
+        **{"torsion": 1.0, "lateral": 1.0, "ends": ("clamped", "guided")},
+        "loads": {"P": em.PointForce(1.0, (-1.0, 0.0, 0.0))},
+    }
+    free, rod = em.SpatialRod(**options, coordinates={}), em.SpatialRod(**options, phase=True)
+    bent = em.lift(free.natural_state(theta_A=0.1), [{"P": 1.5}, {"theta_A": 0.0}]).end.state
+    ends = [em.lift(each, {"P": 3.0}).end for each in (bent, rod.pinned_state(bent))]
+    assert ends[0].kind == ends[1].kind == "branch point"
+    assert ends[0].state["P"] == pytest.approx(ends[1].state["P"], abs=1e-10)
+    unloading = em.lift(rod.pinned_state(bent), {"P": 0.5}).end
+    assert (unloading.kind, unloading.criticality) == ("branch point", "supercritical")
+    assert unloading.state["P"] == pytest.approx(1.0, abs=1e-11)  # Euler
+
+
+def test_a_strip_has_no_orbits_and_takes_no_condition():
+    for options, fixed in (({"lateral": 3.0}, {}), ({}, {"sideways": 0.1})):
+        rod = em.SpatialRod(**{**ROUND, **options})
+        p = np.array([[0.0, 0.0, 0.0, 0.3, 0.0, 0.4, 0.8, 0.0, fixed.get("sideways", 0.0)]])
+        assert not rod.have_orbits(p)[0]
+
+
+# --- on the axis ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("phase", [False, True])
+@pytest.mark.parametrize("pull", [0.0, 0.3])
+def test_on_the_axis_two_eigenvalues_vanish_at_once(phase, pull):
+    """Greenhill's combined load, clamped, by the determinant of its linear equation; C = 3.
+
+    There the condition is void: the double eigenvalue is named a multiple point, no fold.
+    """
+    rod = em.SpatialRod(
+        torsion=3.0, lateral=1.0, ends=("clamped", "guided"), phase=phase,
+        loads={"P": em.PointForce(1.0, (-1.0, 0.0, 0.0))},
+    )  # fmt: skip
+    legs = [{"P": -pull}, {"twist_B": 5.0}] if pull else {"twist_B": 5.0}
+    end = em.lift(rod.natural_state(), legs).end
+    assert (end.kind, end.state.index) == ("multiple point", 0)
+    moment = clamped_buckling_moment(pull * 4.0 * np.pi**2)
+    assert 3.0 * end.state["twist_B"] == pytest.approx(moment, rel=1e-7)
+
+
+def ring(rod):
+    """An untwisted ring, with its end turned by 2π."""
+    s = rod.mesh.nodes[rod.mechanics.model.unknown_nodes]
+    q = clamp_rotation(np.stack([2.0 * np.pi * s, 0.0 * s, 0.0 * s], axis=-1)[None])[0]
+    p = np.zeros(len(rod.parameters))
+    p[[each.name for each in rod.parameters].index("theta_B")] = 2.0 * np.pi
+    return em.structures.State(rod, np.append(q.ravel(), np.zeros(3)), p)
+
+
+@pytest.mark.slow
+def test_twisted_ring_is_stable_up_to_michell_and_zajac():
+    """C τ/(2πB) = √3; two modes, as a ring is the same from each of its points [Zajac1962]."""
+    options = {"torsion": 2.0, "lateral": 1.0, "span": 0.0, "loads": {}, "elements": 6}
+    free, rod = em.SpatialRod(**options, coordinates={}), em.SpatialRod(**options, phase=True)
+    closed = rod.pinned_state(ring(free))
+    assert closed["twist_B"] == pytest.approx(2.0 * np.pi)
+    for state, name, sign in ((closed, "twist_A", -1.0), (ring(free), "twist_B", 1.0)):
+        end = em.lift(state, {name: sign * 6.0}).end
+        assert (end.kind, end.state.index) == ("multiple point", 0)
+        assert sign * 2.0 * end.state[name] / (2.0 * np.pi) == pytest.approx(np.sqrt(3), rel=1e-7)
+
+
+# --- turns of 2π and 4π, rigid rotations ---------------------------------------------------------
+
+
+def test_twists_that_differ_by_four_pi_are_the_same_problem(pinned):
+    """The equilibrium at τ is one at τ − 4π; at τ − 2π it is none: another link."""
+    state = pinned.natural_state(twist_B=7.0)
+    p = np.repeat(state.p[None], 2, axis=0)
+    p[:, 1] -= [4.0 * np.pi, 2.0 * np.pi]
+    residual = np.abs(pinned.residual(state.z[None].repeat(2, axis=0), p)).max(axis=1)
+    assert residual[0] < 1e-11
+    assert residual[1] > 0.01
+    other = em.structures.State(pinned, state.z, p[0])
+    assert (other.index, other.energy) == (state.index, pytest.approx(state.energy, abs=1e-12))
+
+
+def test_quaternions_of_both_signs_are_the_same_rotations():
+    """Both clamps turned by 2π: −q is the same rod, with the same shape, energy, index, margin."""
+    rod = em.SpatialRod(torsion=0.77, lateral=1.4)
+    state = rod.natural_state(Theta=0.9, tilt_A=0.2, twist_A=0.3, twist_B=-0.5)
+    names, p, z = [each.name for each in rod.parameters], state.p.copy(), state.z.copy()
+    p[[names.index("twist_A"), names.index("twist_B")]] += 2.0 * np.pi
+    z[: rod.unknowns] *= -1.0
+    other = em.structures.State(rod, z, p)
+    assert other.residual < 1e-11
+    np.testing.assert_allclose(other.shape(), state.shape(), atol=1e-13)
+    assert other.energy == pytest.approx(state.energy, abs=1e-13)
+    assert (other.index, other.margin) == (state.index, pytest.approx(state.margin, rel=1e-9))
+
+
+def test_with_one_clamp_a_turn_of_two_pi_changes_nothing():
+    """No link is held: boxes of a set may be 2π wide; between two clamps 4π."""
+    for ends, period in ((("clamped", "free"), 2.0), (("clamped", "clamped"), 4.0)):
+        rod = em.SpatialRod(torsion=0.7, lateral=2.0, ends=ends, coordinates={})
+        periods = {each.name: each.period for each in rod.parameters}
+        assert periods["twist_A"] == periods["theta_A"] == period * np.pi
+        with pytest.raises(InputError, match=r"`box.twist_A` must be no wider than"):
+            em.equilibrium_set(rod, em.Box(twist_A=(-7.0, 7.0)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rigid_rotation_of_clamps_and_rod_is_taken_back(pinned, closing, seed):
+    """Clamps on any axis: told as an orbit; `pinned_state` gives the state that was turned."""
+    state = closing.states[5]
+    generator = np.random.default_rng(seed)
+    whole = exponential(0.5 * generator.normal(size=3))
+    rod = em.SpatialRod(**ROUND, coordinates={})
+    q = state.z[: pinned.unknowns].reshape(-1, 4)
+    q = pinned.mechanics.turn(state.z[None], np.array([generator.uniform(-1.5, 1.5)]))
+    forces = matrices(whole) @ q[0, pinned.unknowns : -1]
+    q = product(whole, q[0, : pinned.unknowns].reshape(-1, 4))
+    place = matrices(whole) @ [state["nu"], 0.0, 0.0]
+    values = dict(zip(("nu", "rise", "sideways"), place, strict=True))
+    for side, twist in (("A", 0.0), ("B", state["twist_B"])):
+        held = product(whole, clamp([0.0, 0.0, twist]))
+        r = matrices(held)
+        angles = [np.arctan2(r[1, 0], r[0, 0]), -np.arcsin(r[2, 0]), np.arctan2(r[2, 1], r[2, 2])]
+        angles[2] += 2.0 * np.pi * float(clamp(angles) @ held < 0.0)
+        names = [f"{angle}_{side}" for angle in ("theta", "tilt", "twist")]
+        values |= dict(zip(names, angles, strict=True))
+    p = np.array([values[each.name] for each in rod.parameters])
+    turned = em.structures.State(rod, np.append(q.ravel(), forces), p)
+    assert turned.residual < 1e-9
+    assert turned.energy == pytest.approx(state.energy, abs=1e-12)
+    assert rod.warnings(turned)
+    back = pinned.pinned_state(turned)
+    side = np.sign(back.shape()[50, 1])  # the same, or turned by π
+    shape = back.shape() * [1.0, side, side]
+    np.testing.assert_allclose(shape, state.shape(), atol=1e-9)
+    assert (back.index, back.margin) == (state.index, pytest.approx(state.margin, abs=1e-7))
+
+
+# --- refusals ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"lateral": 2.0}, "bending stiffnesses that differ"),
+        ({"loads": None}, "got q, which acts across the axis"),
+        ({"curvature": 1.0}, "got intrinsic curvature"),
+        ({"actuators": {"k": em.Curvature(about="n")}}, "got k, which acts across the axis"),
+        ({"actuators": {"T": em.Tendon(0.1)}}, "got T, which acts across the axis"),
+        ({"rise": 0.1}, "got rise = 0.1"),
+        ({"ends": ("clamped", em.SpatialEnd(y="free"))}, "supports that hold y and z"),
+        ({"ends": (em.SpatialEnd(y=2.0), "clamped")}, "supports that hold y and z"),
+        ({"coordinates": {"a": {"theta_A": 1.0}}}, "`coordinates.a` must combine"),
+    ],
+)
+def test_a_rod_without_orbits_takes_no_phase_condition(options, text):
+    with pytest.raises(InputError, match=text):
+        em.SpatialRod(**{**ROUND, **options}, phase=True)
+
+
+def test_what_needs_isolated_states_asks_for_a_phase_condition():
+    """Searches and sets would find states of one orbit again and again."""
+    rod = em.SpatialRod(**ROUND)
+    with pytest.raises(InputError, match=r"`structure` must have isolated equilibria.*phase=True"):
+        em.find_equilibria(rod, {"Theta": 0.0, "twist_B": 2.0})
+    box = em.Box(twist_B=(0.0, 3.0), nu=(0.5, 0.9))
+    with pytest.raises(InputError, match="`structure` must have isolated equilibria"):
+        em.equilibrium_set(rod, box, fixed={"Theta": 0.0})
+    with pytest.raises(InputError, match="`pinned_state` must be asked of a rod with phase=True"):
+        rod.pinned_state(rod.natural_state(Theta=0.3))
+
+
+def test_states_off_a_common_axis_are_not_pinned(pinned):
+    bent = em.SpatialRod(**ROUND).natural_state(Theta=0.3)
+    with pytest.raises(InputError, match="got clamps that are turned or moved"):
+        pinned.pinned_state(bent)
+    with pytest.raises(InputError, match="`state` must be a state of a rod in space; got 3"):
+        pinned.pinned_state(3)
+
+
+def test_the_condition_is_part_of_the_identity(pinned):
+    again = em.structures.from_identity(pinned.identity())
+    assert pinned.identity()["phase"] is True
+    assert again.signature == pinned.signature
+    assert [each.name for each in again.parameters] == ["twist_A", "twist_B", "nu"]
+
+
+@pytest.mark.slow
+def test_searches_find_each_orbit_twice(pinned):
+    """z and the state turned by π meet the condition: pairs of the same energy."""
+    at = {"twist_B": 5.0, "nu": 0.8}
+    found = em.find_equilibria(pinned, at, within=[pinned.max_curvature <= 12], starts=12, runs=2)
+    energies = np.sort([state.energy for state in found.stable])
+    assert len(energies) >= 2
+    np.testing.assert_allclose(energies[::2], energies[1::2], atol=1e-10)
