@@ -34,8 +34,8 @@ WRONG = {
     "unknown structure": (
         '"rod"',
         '"beam"',
-        r'`structure\.kind` must be one of "energy", "frame", "rod", "spatial rod", "spring", '
-        r'"truss"; got "beam"',
+        r'`structure\.kind` must be one of "energy", "frame", "rod", "spatial frame", '
+        r'"spatial rod", "spring", "truss"; got "beam"',
     ),
     "structure without a kind": ('kind = "rod"', "", r"`structure\.kind` .* got nothing"),
     "number as text": ("q = 2.5", 'q = "2.5"', r'`set\.fixed\.q` must be a number; got "2\.5"'),

@@ -114,7 +114,7 @@ def _may_vanish(values: Float[np.ndarray, "3 steps"]) -> Bool[np.ndarray, " step
     start, middle, end = np.sign(values[0]) * values
     bow, slope = start + end - 2.0 * middle, end - start
     with np.errstate(divide="ignore", invalid="ignore"):
-        least = middle - slope**2 / (8.0 * bow)
+        least = middle - slope * (slope / (8.0 * bow))  # a determinant's square may overflow
     dips = (np.abs(slope) < 2.0 * bow) & (least < EARLY_DIP * np.minimum(start, end))
     low = np.minimum(start, end) < EARLY_NEAR * middle
     return np.asarray(dips | low | (middle < EARLY_NEAR * np.minimum(start, end)))
