@@ -16,6 +16,7 @@ from equimorph.study import Outcome
 from studies import SPRING, draw_dots, with_answers_of
 from typecheck import unchecked
 
+SCHEMA = Path(__file__).parents[2] / "docs" / "study.schema.json"
 SMALL = SPRING[: SPRING.index("[[route]]")]
 """The study without its route."""
 
@@ -93,9 +94,49 @@ def test_version_is_shown(shell: Shell):
 @pytest.mark.parametrize("kind", ["arch", "column", "lee", "maps", "spring", "truss"])
 def test_a_new_study_passes_the_check(kind: str, shell: Shell):
     assert shell("new", "mine.toml", "--kind", kind) == 0
+    assert Path("mine.toml").read_text().startswith("#:schema study.schema.json\n")
+    assert Path("study.schema.json").read_text() == SCHEMA.read_text()
     assert shell("check", "mine.toml") == 0
     asked = "2 maps" if kind == "maps" else "1 point and 1 route"
     assert f"valid: it asks for {asked}" in shell.out
+
+
+def test_the_schema_is_that_of_the_docs(shell: Shell):
+    assert shell("schema") == 0
+    assert shell.out == SCHEMA.read_text()
+
+
+def test_a_schema_of_another_release_is_replaced_but_no_other_file(shell: Shell):
+    for old, new in (('{"title": "equimorph study"}', SCHEMA.read_text()), ("mine", "mine")):
+        Path("study.schema.json").write_text(old)
+        Path("mine.toml").unlink(missing_ok=True)
+        assert shell("new", "mine.toml") == 0
+        assert Path("study.schema.json").read_text() == new
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [("che", "check"), ("run --allow", "--allow-refused"), ("new x.toml --kind deep", "deep_arch")],
+)
+def test_shells_complete_commands_options_and_kinds(words: str, completed: str):
+    """As bash asks: the words of the line in the environment, the answers on stdout."""
+    line = f"equimorph {words}"
+    asked = {
+        "_EQUIMORPH_COMPLETE": "complete_bash",
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(len(line.split()) - 1),
+    }
+    done = subprocess.run(
+        [sys.executable, "-m", "equimorph.cli"], capture_output=True, text=True, check=False,
+        env={**os.environ, **asked},
+    )  # fmt: skip
+    assert completed in done.stdout.split()
+
+
+def test_completion_can_be_installed(shell: Shell):
+    assert shell("--help") == 0
+    assert "--install-completion" in shell.out
+    assert "--show-completion" in shell.out
 
 
 def test_new_overwrites_nothing(shell: Shell):

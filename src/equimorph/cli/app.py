@@ -33,7 +33,6 @@ WrongUsage: Any = typer.BadParameter.__base__
 """Class of all complaints about words on the command line; typer does not name it."""
 
 app = typer.Typer(
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="Quasi-static shape control of soft, morphing structures.",
@@ -138,6 +137,14 @@ def new(
 
     write_template(file, kind.value)
     typer.echo(f"Wrote {file}. Next: equimorph run {file}")
+
+
+@app.command()
+def schema() -> None:
+    """Write the JSON schema of study files to stdout, for editors."""
+    from equimorph.study.schema import schema_text
+
+    typer.echo(schema_text(), nl=False)
 
 
 Files = Annotated[list[Path], typer.Argument(help="Study files.", metavar="FILE...")]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, WithJsonSchema
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -132,7 +132,13 @@ def _objective(given: Any) -> Any:
     return given
 
 
-Objective = Annotated[Any, AfterValidator(_objective)]
+_WEIGHTS = {"type": "object", "propertyNames": {"enum": list(OBJECTIVES)}}
+_WEIGHTS |= {"additionalProperties": {"type": "number", "exclusiveMinimum": 0}}
+Objective = Annotated[
+    Any,
+    AfterValidator(_objective),
+    WithJsonSchema({"anyOf": [{"enum": list(OBJECTIVES)}, _WEIGHTS]}),
+]
 
 
 class GridArgument(Argument):

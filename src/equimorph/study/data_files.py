@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import BeforeValidator, PlainSerializer, PlainValidator
+from pydantic import BeforeValidator, PlainSerializer, PlainValidator, WithJsonSchema
 
 from equimorph.errors import InputError
 from equimorph.model import Schedule
@@ -74,7 +74,11 @@ def _number(cell: str, line: int) -> float:
     return value
 
 
-DataFile = Annotated[DataTable, BeforeValidator(_read_data)]
+DataFile = Annotated[
+    DataTable,
+    BeforeValidator(_read_data),
+    WithJsonSchema({"type": "string", "pattern": r"\.csv$"}),
+]
 """Name of a CSV file in a study, with its content."""
 
 
@@ -121,6 +125,7 @@ ScheduleName = Annotated[
     ScheduleFile,
     PlainValidator(_read_schedule_file),
     PlainSerializer(lambda file: {"schedule": file.fingerprint}),
+    WithJsonSchema({"type": "string", "pattern": r"\.csv$"}),
 ]
 
 

@@ -66,16 +66,28 @@ def meanings(task: Callable[..., Any]) -> dict[str, str]:
 
 
 def _of_set() -> str:
-    told = {"box": "Ranges of one, two or three free parameters."} | meanings(equilibrium_set)
-    return _page("[set]", [equilibrium_set], SetSection, told)
+    return _page("[set]", [equilibrium_set], SetSection, meanings_of_set())
 
 
 def _of_kind(kind: Kind[Any]) -> str:
+    return _page(f"[[{kind.table}]]", kind.tasks, kind.section, meanings_of_kind(kind))
+
+
+def meanings_of_set() -> dict[str, str]:
+    """Return what each key of ``[set]`` means."""
+    return {"box": "Ranges of one, two or three free parameters."} | meanings(equilibrium_set)
+
+
+def meanings_of_kind(kind: Kind[Any]) -> dict[str, str]:
+    """Return what each key of a kind of question means."""
     told = dict(SHARED)
     for task in reversed(kind.tasks):  # the first has the last word
         for name, words in meanings(task).items():
             told[kind.names.get(name, name)] = words
-    return _page(f"[[{kind.table}]]", kind.tasks, kind.section, told)
+    for key, field in kind.section.model_fields.items():
+        if field.description:
+            told[key] = field.description
+    return told
 
 
 def _page(title: str, tasks: Any, section: type[Section], told: dict[str, str]) -> str:
@@ -84,7 +96,7 @@ def _page(title: str, tasks: Any, section: type[Section], told: dict[str, str]) 
     lines = [f"## `{title}`", "", names, "", *head]
     for key, field in section.model_fields.items():
         if key != "name":
-            words = f"{field.description or told.get(key, '')} {_choice(field)}".strip()
+            words = f"{told.get(key, '')} {_choice(field)}".strip()
             lines.append(f"| `{key}` | {_default(field)} | {words} |")
     return "\n".join([*lines, ""])
 

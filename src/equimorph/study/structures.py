@@ -4,110 +4,19 @@ from typing import Annotated, Any, Literal, Union
 
 from pydantic import AfterValidator, Field, field_validator
 
-from equimorph.study.fields import (
-    LARGEST,
-    Interval,
-    Number,
-    Section,
-    is_number,
-    is_table,
-    requirement,
+from equimorph.study.fields import LARGEST, Interval, Number, Section, is_number, requirement
+from equimorph.study.forms import (
+    CrossSection,
+    EndInSpace,
+    EndOfRod,
+    Formula,
+    LoadShape,
+    Profile,
+    Quantity,
+    Stiffness,
+    Term,
+    UnitSystem,
 )
-
-
-def _load(shape: Any) -> Any:
-    """Check a load shape; one requirement for all forms makes one readable line."""
-    if shape not in ("uniform", "left-half") and not is_table(shape):
-        raise requirement(
-            'be "uniform", "left-half" or a table [[s, Q], ...] of finite numbers '
-            f"up to {LARGEST:g}"
-        )
-    return shape
-
-
-def _profile(shape: Any) -> Any:
-    if not (is_number(shape) or is_table(shape) or isinstance(shape, str)):
-        raise requirement(
-            f"be a number up to {LARGEST:g}, a table [[s, f], ...] of such, or a text with its unit"
-        )
-    return shape
-
-
-def _end(given: Any) -> Any:
-    return _end_of(given, ("angle", "x", "y", "slide"))
-
-
-def _end_in_space(given: Any) -> Any:
-    return _end_of(given, ("rotation", "x", "y", "z"))
-
-
-def _end_of(given: Any, keys: tuple[str, ...]) -> Any:
-    table = isinstance(given, dict) and set(given) <= set(keys)
-    parts = given.values() if table else [given]
-    if not all(isinstance(part, str) or (table and is_number(part)) for part in parts):
-        example = f'{{ {keys[0]} = "free", x = "held", y = 2.0 }}'
-        raise requirement(f'be a word like "clamped", or a table like {example}')
-    return given
-
-
-def _terms(given: Any) -> Any:
-    """Check that terms are data of numbers, texts and lists; the rod itself knows their keys."""
-
-    def plain(value: Any) -> bool:
-        if isinstance(value, list):
-            return all(map(plain, value))
-        return isinstance(value, str) or is_number(value)
-
-    for term in given if isinstance(given, list) else [given]:
-        if not (isinstance(term, dict) and all(map(plain, term.values()))):
-            raise requirement(
-                'be a table like { term = "point force", s = 0.5 }, or a list of such tables, of '
-                f"texts and numbers up to {LARGEST:g}"
-            )
-    return given
-
-
-def _formula(given: Any) -> Any:
-    if not (isinstance(given, str) or (type(given) in (int, float) and abs(given) <= LARGEST)):
-        raise requirement(f"be a formula in quotes, or a finite number up to {LARGEST:g}")
-    return given
-
-
-def _quantity(given: Any) -> Any:
-    """Check its form; whether a unit fits is known to the structure."""
-    if not (is_number(given) or isinstance(given, str)):
-        raise requirement(f'be a number up to {LARGEST:g}, or a text with its unit like "2 N m^2"')
-    return given
-
-
-def _stiff(given: Any) -> Any:
-    if is_number(given) and not given > 0:
-        raise requirement("be greater than 0")
-    return _quantity(given)
-
-
-def _section(given: Any) -> Any:
-    """Check the form of a cross-section; the rod itself knows its keys."""
-    plain = isinstance(given, dict) and all(
-        isinstance(value, str) or is_number(value) for value in given.values()
-    )
-    if not (plain and isinstance(given.get("kind"), str)):
-        raise requirement(
-            'be a table like { kind = "strip", width = "20 mm", thickness = "0.5 mm", '
-            'E = "210 GPa", nu = 0.3 }'
-        )
-    return given
-
-
-Formula = Annotated[Any, AfterValidator(_formula)]
-Quantity = Annotated[Any, AfterValidator(_quantity)]
-Stiffness = Annotated[Any, AfterValidator(_stiff)]
-UnitSystem = Annotated[dict[str, str], Field(min_length=2, max_length=2)]
-Profile = Annotated[Any, AfterValidator(_profile)]
-Term = Annotated[Any, AfterValidator(_terms)]
-CrossSection = Annotated[Any, AfterValidator(_section)]
-EndOfRod = Annotated[Any, AfterValidator(_end)]
-EndInSpace = Annotated[Any, AfterValidator(_end_in_space)]
 
 
 class StructureSection(Section):
@@ -120,7 +29,7 @@ class RodSection(StructureSection):
     """A planar rod: by default a curved one between two rotary actuators; see `equimorph.Rod`."""
 
     kind: Literal["rod"]
-    load: Annotated[Any, AfterValidator(_load)] | None = None
+    load: LoadShape | None = None
     ends: Annotated[list[EndOfRod], Field(min_length=2, max_length=2)] | None = None
     stiffness: Profile | None = None
     curvature: Profile | None = None
@@ -154,7 +63,7 @@ class SpatialRodSection(StructureSection):
     """A rod in space; see `equimorph.SpatialRod`."""
 
     kind: Literal["spatial rod"]
-    load: Annotated[Any, AfterValidator(_load)] | None = None
+    load: LoadShape | None = None
     torsion: Profile | None = None
     lateral: Profile | None = None
     section: CrossSection | None = None
