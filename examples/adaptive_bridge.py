@@ -60,6 +60,7 @@ def main() -> Result:
         rest, rest, actuators, loads=[*drive, {f"F{BAYS - 1}": 0.0}],
         within=[*level, truss.max_utilisation <= 1],
     )  # fmt: skip
+    assert route.schedule is not None, route.why
     check = em.verify(route.schedule, within=level)
     return Result(passive, route, check, np.stack([y(check.states) for y in deck], axis=1))
 
@@ -69,6 +70,7 @@ def figure(result: Result) -> Figure:
     drawing = Figure(figsize=(7.0, 3.0), layout="constrained")
     left, right = drawing.subplots(1, 2)
     schedule = result.check.schedule
+    assert schedule is not None, result.check.why
     left.plot(schedule.progress, schedule.values[:, : BAYS + 2], color="0.3", lw=0.8)
     left.set(xlabel="share of the way", ylabel="stroke", title="eight actuators")
     right.plot(schedule.progress, result.deck, color="0.3", lw=0.8)

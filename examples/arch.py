@@ -9,7 +9,7 @@ Run it: python examples/arch.py
 
 from dataclasses import dataclass
 
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 import equimorph as em
 
@@ -35,9 +35,9 @@ def main(intervals: tuple[int, int] = (47, 81)) -> Result:
     return Result(eset, em.plan(eset, up, down, via=WAY, within=safe, margin=0.1))
 
 
-def figure(result: Result) -> Figure:
+def figure(result: Result) -> Axes:
     """Shapes along the way."""
-    return em.plotting.shapes(result.route).figure
+    return em.plotting.shapes(result.route)
 
 
 if __name__ == "__main__":

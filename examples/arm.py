@@ -10,7 +10,7 @@ Run it: python examples/arm.py
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 import equimorph as em
 
@@ -46,9 +46,9 @@ def main(intervals: tuple[int, int] = (25, 25)) -> Result:
     return Result(eset, em.plan(eset, left, right, margin=0.002))
 
 
-def figure(result: Result) -> Figure:
+def figure(result: Result) -> Axes:
     """Shapes along the way."""
-    return em.plotting.shapes(result.route).figure
+    return em.plotting.shapes(result.route)
 
 
 if __name__ == "__main__":

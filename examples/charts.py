@@ -38,7 +38,7 @@ def main() -> Panels:
 
 def figure(panels: Panels) -> Figure:
     """Draw the set above, its coordinates below."""
-    return em.plotting.parameterisation(panels, panels[0].eset.structure.angle)
+    return em.plotting.parameterisation(panels, panels[0].eset.structure.descriptor("angle"))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ Run it: python examples/deep_arch.py
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 import equimorph as em
 
@@ -44,9 +44,9 @@ def main(intervals: tuple[int, int] = (25, 25)) -> Result:
     return Result(em.limit_load(rest, "P"), eset, em.plan(eset, rest, goal, margin=0.01))
 
 
-def figure(result: Result) -> Figure:
+def figure(result: Result) -> Axes:
     """Shapes along the way."""
-    return em.plotting.shapes(result.route).figure
+    return em.plotting.shapes(result.route)
 
 
 if __name__ == "__main__":

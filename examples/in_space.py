@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.optimize import brentq
 
 import equimorph as em
 
@@ -37,8 +36,19 @@ def strip(ratio: float) -> tuple[float, float]:
 
 def margins(way: em.Path, ratio: float) -> np.ndarray:
     """Lowest eigenvalue out of the plane along the way: negative where a strip leaves its plane."""
-    rod: em.Rod = way.states.structure
+    rod = way.states.structure
+    assert isinstance(rod, em.Rod)
     return rod.lateral_margin(*strip(ratio))(way.states)
+
+
+def least_ratio(way: em.Path) -> float:
+    """Width/thickness from which on the strip stays in its plane, by bisection to 1e-9."""
+    leaves, stays = 1.0, 2.0
+    while stays - leaves > 1e-9:
+        middle = 0.5 * (leaves + stays)
+        dips = margins(way, middle).min() < 0.0
+        leaves, stays = (middle, stays) if dips else (leaves, middle)
+    return stays
 
 
 def main() -> Result:
@@ -48,8 +58,7 @@ def main() -> Result:
     in_space = em.limit_load(rest, "q", within=[rod.stable_in_space])
     up = em.lift(rod.natural_state(Theta=1.0), {"q": 2.5}).end.state
     way = em.lift(up, WAY)
-    least = brentq(lambda ratio: margins(way, ratio).min(), 1.0, 2.0)
-    return Result(em.limit_load(rest, "q"), in_space, way, least)
+    return Result(em.limit_load(rest, "q"), in_space, way, least_ratio(way))
 
 
 def figure(result: Result) -> Figure:

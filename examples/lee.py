@@ -10,7 +10,7 @@ Run it: python examples/lee.py
 
 from dataclasses import dataclass
 
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 import equimorph as em
 
@@ -50,9 +50,9 @@ def main(intervals: tuple[int, int] = (25, 25)) -> Result:
     return Result((snap.value, down.events[0].state["P"]), eset, route)
 
 
-def figure(result: Result) -> Figure:
+def figure(result: Result) -> Axes:
     """Shapes along the way."""
-    return em.plotting.shapes(result.route).figure
+    return em.plotting.shapes(result.route)
 
 
 if __name__ == "__main__":

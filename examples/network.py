@@ -28,7 +28,8 @@ class Result:
 
 def network() -> em.Frame:
     """Return two arches with their post."""
-    joints, members = {}, [em.Member(("M1", "M2"), EI=20.0)]
+    joints: dict[str, tuple[float, float]] = {}
+    members = [em.Member(("M1", "M2"), EI=20.0)]
     for i, y in ((1, 0.0), (2, GAP)):
         joints |= {f"L{i}": (-1.0, y), f"M{i}": (0.0, y + RISE), f"R{i}": (1.0, y)}
         pairs = ((f"L{i}", f"M{i}"), (f"M{i}", f"R{i}"))

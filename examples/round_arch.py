@@ -29,6 +29,7 @@ def figure(result: tuple[float, em.Path]) -> Figure:
     """Load against sideways displacement, and shapes seen along the chord."""
     load, path = result
     rod = path.states.structure
+    assert isinstance(rod, em.SpatialRod)
     z = rod.position(0.5)[2]
     drawing, (left, right) = plt.subplots(
         1, 2, figsize=(7.2, 3.4), layout="constrained", width_ratios=(1.6, 1.0)

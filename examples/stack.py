@@ -9,7 +9,7 @@ Run it: python examples/stack.py
 
 from dataclasses import dataclass
 
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 import equimorph as em
 
@@ -49,9 +49,9 @@ def main(intervals: tuple[int, int] = (25, 25)) -> Result:
     return Result(eset, landed, em.plan(eset, upright, over, margin=2e-3))
 
 
-def figure(result: Result) -> Figure:
+def figure(result: Result) -> Axes:
     """Shapes along the way."""
-    return em.plotting.shapes(result.route).figure
+    return em.plotting.shapes(result.route)
 
 
 if __name__ == "__main__":

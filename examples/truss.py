@@ -8,7 +8,7 @@ Run it: python examples/truss.py
 
 from dataclasses import dataclass
 
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 import equimorph as em
 
@@ -39,9 +39,9 @@ def main(intervals: tuple[int, int] = (25, 25)) -> Result:
     return Result(eset, em.plan(eset, up, down, within=safe, margin=0.0003))
 
 
-def figure(result: Result) -> Figure:
+def figure(result: Result) -> Axes:
     """Shapes along the way."""
-    return em.plotting.shapes(result.route).figure
+    return em.plotting.shapes(result.route)
 
 
 if __name__ == "__main__":

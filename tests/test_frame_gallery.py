@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import equimorph as em
@@ -34,7 +35,7 @@ def test_lees_frame_is_led_around_its_snap():
     module = example("lee")
     with unchecked():
         found = module.main((9, 9))
-        assert isinstance(module.figure(found), Figure)
+        assert isinstance(module.figure(found), Axes)
     assert found.limits == pytest.approx((18.5588, -9.4213), abs=6e-5)
     assert found.eset.audit.clean
     assert found.route.status == "arrived"

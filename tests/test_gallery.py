@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 import equimorph as em
 from equimorph.study.prepare import prepare
@@ -77,7 +77,7 @@ def test_the_example_finds_its_set_and_its_way(name):
     module = example(name)
     with unchecked():
         result = module.main()
-        assert isinstance(module.figure(result), Figure)
+        assert isinstance(module.figure(result), Axes)
     assert result.eset.audit.clean
     assert result.route.status == "arrived"
     assert result.route.path.states.index.max() == 0
