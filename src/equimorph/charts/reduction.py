@@ -21,6 +21,7 @@ from equimorph.charts.preference import Preference, preferred_part
 from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
 from equimorph.charts.rules import Rule, Scores, rule_of
 from equimorph.errors import InputError
+from equimorph.html_tables import html_table
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
@@ -68,6 +69,13 @@ class Reduction(Chart):
             f"Reduction({self.rule}: {len(self.barriers)} barriers, {len(self.gaps.loops)} gaps "
             f"on {self.whole})"
         )
+
+    def _repr_html_(self) -> str:
+        """Table of rule, barriers and gaps, for notebooks."""
+        rows = [["preferred", str(self.rule)], ["over", ", ".join(self.whole.names)]]
+        rows += [["barriers", f"{len(self.barriers)}"], ["gaps", f"{len(self.gaps.loops)}"]]
+        rows += [["size of the gaps", f"{self.gaps.size:.6g}"], ["ends not found", f"{self.lost}"]]
+        return html_table("Reduction", [], rows)
 
     @cached_property
     def coordinates(self) -> Coordinates:

@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
+from equimorph.html_tables import html_table
 from equimorph.model import (
     Constraint,
     Descriptor,
@@ -91,6 +92,15 @@ class Structure(Equations):
     def __repr__(self) -> str:
         """Kind and parameters."""
         return f"{type(self).__name__}({', '.join(names_of(self.parameters))})"
+
+    def _repr_html_(self) -> str:
+        """Table of the parameters, for notebooks."""
+        rows = [
+            [each.name, each.role, "none" if each.default is None else each.default, each.unit]
+            for each in self.parameters
+        ]
+        head = ("parameter", "role", "default", "unit")
+        return html_table(f"{type(self).__name__} with {self.size} unknowns", head, rows)
 
     @abstractmethod
     def identity(self) -> dict[str, Any]:

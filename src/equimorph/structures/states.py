@@ -12,10 +12,14 @@ from jaxtyping import Float, Int
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
+from equimorph.html_tables import html_table
 from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
 from equimorph.structures.vibration import vibrations
+
+SHOWN = 20
+"""Number of states that notebooks show."""
 
 
 class SpaceStability(StrEnum):
@@ -63,6 +67,23 @@ class States:
     def __repr__(self) -> str:
         """Kind and number."""
         return f"States({self.structure.kind}: {len(self)})"
+
+    def _repr_html_(self) -> str:
+        """Table of parameters that differ, index, margin and energy, for notebooks."""
+        shown, parameters = self[:SHOWN], self.structure.parameters
+        names = [each.name for each in parameters if len(set(self[each.name].tolist())) != 1]
+        units = {each.name: each.unit for each in parameters}
+        energy = self.structure.descriptor("energy").unit
+        columns = [*(shown[name] for name in names), shown.index, shown.margin, shown.energy]
+        head = [
+            *(f"{name} ({units[name]})" for name in names),
+            "index",
+            "margin",
+            f"energy ({energy})",
+        ]
+        more = f", the first {SHOWN}" if len(self) > SHOWN else ""
+        rows = [[k, *row] for k, row in enumerate(zip(*columns, strict=True))]
+        return html_table(f"{self!r}{more}", ["", *head], rows)
 
     @property
     def parameters(self) -> dict[str, Values]:
@@ -190,6 +211,16 @@ class State:
         """Kind, parameters and index."""
         values = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items())
         return f"State({self.structure.kind}: {values}; index {self.index})"
+
+    def _repr_html_(self) -> str:
+        """Table of parameters, index, margin and energy, for notebooks."""
+        rows = [[each.name, self[each.name], each.unit] for each in self.structure.parameters]
+        energy = self.structure.descriptor("energy")
+        rows += [["index", self.index, ""], ["margin", self.margin, ""]]
+        rows += [["energy", self.energy, energy.unit]]
+        stability = "stable" if self.stable else "unstable"
+        head = ("", "value", "unit")
+        return html_table(f"State of a {self.structure.kind}, {stability}", head, rows)
 
     @property
     def parameters(self) -> dict[str, float]:

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_legs
 from equimorph.errors import InputError
+from equimorph.html_tables import html_table
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.distances import distance
@@ -48,6 +49,19 @@ class Route:
             return f"Route(refused: {self.why})"
         snaps = f", snaps {len(self.snaps)}" if self.snaps else ""
         return f"Route(arrived: length {self.length:.4g}, margin {self.margin:.4g}{snaps})"
+
+    def _repr_html_(self) -> str:
+        """Table of length, margin, cost and way-points, for notebooks."""
+        if not self.arrived:
+            return html_table("Route: refused", [], [["reason", self.why]])
+        rows: list[list[Any]] = [["length", self.length], ["smallest margin", self.margin]]
+        if self.objective != "length":
+            rows.append([self.objective, self.cost])
+        rows += [["snaps", len(self.snaps)], ["way-points", len(self.way_points)]]
+        for number, place in enumerate(self.way_points, 1):
+            words = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())
+            rows.append([f"way-point {number}", words])
+        return html_table("Route: arrived", [], rows)
 
     @property
     def arrived(self) -> bool:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from scipy.special import betaincinv
 
+from equimorph.html_tables import html_table
+
 SMALL_RESIDUAL = 1e-9
 """Largest residual of a clean set."""
 NECKS = (
@@ -87,6 +89,18 @@ class Audit:
     touching: tuple[tuple[tuple[str, float], ...], ...] = ()
     unresolved: int = 0
     left_out: int = 0
+
+    def __repr__(self) -> str:
+        """Whether it is clean, else what is not; sizes."""
+        faults = ", ".join(f"{name} {count}" for name, count in self.faults.items())
+        large = f"largest residual {self.largest_residual:.1e}"
+        state = "clean" if self.clean else f"NOT clean: {faults or large}"
+        return f"Audit({state}; {self.vertices} equilibria, {self.cells} cells)"
+
+    def _repr_html_(self) -> str:
+        """Table of all that was checked, for notebooks."""
+        state = "clean" if self.clean else "NOT clean"
+        return html_table(f"Audit: {state}", [], self.rows())
 
     @property
     def missing_at_most(self) -> float:

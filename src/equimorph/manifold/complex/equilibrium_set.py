@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
+from equimorph.html_tables import html_table
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.setting import Setting
@@ -119,6 +120,16 @@ class EquilibriumSet:
         lacking = f", {self.audit.left_out} states not resolved are left out"
         state += lacking if self.audit.left_out else ""
         return f"EquilibriumSet({self.box}: {len(self.cells)} cells; audit {state})"
+
+    def _repr_html_(self) -> str:
+        """Table of the box, the size and the audit, for notebooks."""
+        units = {each.name: each.unit for each in self.structure.parameters}
+        sides = zip(self.box.names, self.box.lower, self.box.upper, strict=True)
+        rows = [[name, f"{low:g} to {high:g} {units[name]}"] for name, low, high in sides]
+        rows += [["equilibria (vertices)", len(self.points)], ["cells", len(self.cells)]]
+        rows += [["components", len(self.components)], ["strata", len(self.strata)]]
+        rows += [["folds", len(self.folds)], ["audit", str(self.audit)]]
+        return html_table(f"Equilibrium set of a {self.structure.kind}", [], rows)
 
     @property
     def names(self) -> tuple[str, ...]:

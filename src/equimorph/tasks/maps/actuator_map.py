@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.errors import InputError
+from equimorph.html_tables import html_table
 from equimorph.model import Constraint, Grid, Progress, Silent, parameter_vector, position
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.maps.causes import Paths
@@ -65,6 +66,20 @@ class ActuatorMap(ABC):
         counts = ", ".join(f"{n} {kind}" for kind, n in self.counts.items() if n)
         name = type(self).__name__
         return f"{name}({shape} settings: {counts}; curves: {len(self.curves)})"
+
+    def _repr_html_(self) -> str:
+        """Table of grid, values and statuses, for notebooks."""
+        box, units = self.grid.box, {each.name: each.unit for each in self.structure.parameters}
+        sides = zip(box.names, box.lower, box.upper, strict=True)
+        rows = [[name, f"{low:g} to {high:g} {units[name]}"] for name, low, high in sides]
+        rows.append(["load", f"{self.load} ({units[self.load]})"])
+        known = self.value[np.isfinite(self.value)]
+        if known.size:
+            rows.append(["values", f"{known.min():.6g} to {known.max():.6g}"])
+        rows += [[kind, f"{count} settings"] for kind, count in self.counts.items() if count]
+        rows.append(["curves", f"{len(self.curves)}"])
+        shape = " × ".join(map(str, self.value.shape))
+        return html_table(f"{type(self).__name__} of {shape} settings", [], rows)
 
     @property
     def counts(self) -> dict[str, int]:
