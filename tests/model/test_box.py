@@ -73,3 +73,15 @@ def test_boxes_and_grids_say_what_they_are():
     b, a = grid.axes()
     assert b.tolist() == [-2.0, -1.0, 0.0, 1.0, 2.0]
     assert a.tolist() == [0.0, 0.5]
+
+
+def test_a_grid_goes_through_equidistant_values():
+    grid = Grid.of_values(Theta=np.linspace(0.2, 2.5, 24), Delta=[-1.0, 0.0, 1.0])
+    assert repr(grid) == "Grid(Theta=(0.2, 2.5, 23), Delta=(-1, 1, 2))"
+    np.testing.assert_allclose(grid.axes()[0], np.linspace(0.2, 2.5, 24), rtol=1e-15)
+
+
+@pytest.mark.parametrize("values", [[1.0], [0.0, 1.0, 3.0], [1.0, 0.0], [0.0, 0.0]])
+def test_other_values_make_no_grid(values):
+    with pytest.raises(InputError, match=r"`Theta` must be"):
+        Grid.of_values(Theta=values)

@@ -145,7 +145,7 @@ def test_bad_input_is_refused(arguments, text):
             lambda rod: rod.curvature(np.nan),
             "`s` must be a share of the length, from 0 to 1; got nan",
         ),
-        (lambda rod: rod.support_force("nu"), "`component` must be 'lambda' or 'mu'"),
+        (lambda rod: rod.support_force("nu"), "`component` must be 'x', 'y', 'lambda' or 'mu'"),
         (lambda rod: rod.end_moment(2), "`end` must be 0 or 1; got 2"),
         (lambda rod: rod.descriptor("colour(1)"), "`descriptor` must be one of height"),
         (lambda rod: rod.descriptor("height"), "`descriptor` must be one of height"),

@@ -1,5 +1,6 @@
 """Descriptors: scalars of a state; constraints: comparisons of descriptors with numbers."""
 
+import json
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol, overload, runtime_checkable
@@ -123,10 +124,30 @@ class Descriptor:
     @overload
     def __call__(self, states: OneState) -> float: ...
     def __call__(self, states: Any) -> Any:
-        """Value on a state (float) or on a batch of states (array)."""
+        """Value on a state (float) or on a batch of states (array).
+
+        Raises
+        ------
+        InputError
+            If the states belong to another structure than the descriptor.
+        """
+        self._check_origin(states)
         if states.z.ndim == 1:
             return float(self.function(states.z[None], states.p[None])[0])
         return self.function(states.z, states.p)
+
+    def _check_origin(self, states: Any) -> None:
+        structure = getattr(states, "structure", None)
+        if self.origin is None or structure is None or structure.signature == self.origin:
+            return
+        raise InputError(
+            f"`{self.name}` must be a descriptor of the structure of the state, a "
+            f"{structure.kind}; got one of {_kind_of(self.origin)}."
+        )
+
+    def __repr__(self) -> str:
+        """Name and unit."""
+        return f"Descriptor({self.name}, {self.unit})"
 
     @property
     def _meaning(self) -> Hashable:
@@ -169,6 +190,14 @@ class Descriptor:
         return Descriptor(
             f"abs({self.name})", self.unit, value, symbol, self.origin, self.place, both
         )
+
+
+def _kind_of(origin: Hashable) -> str:
+    """Kind of the structure of a signature, in words."""
+    try:
+        return f"a {json.loads(str(origin))['kind']} with other data"
+    except (ValueError, KeyError, TypeError):
+        return "another structure"
 
 
 def _number(name: str, bound: Any, unit: str) -> float:

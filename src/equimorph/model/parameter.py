@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from jaxtyping import Float
@@ -14,6 +14,8 @@ from equimorph.argument_vocabulary import FINITE, PERIOD, POSITIVE
 from equimorph.errors import InputError, suggestion
 
 Role = Literal["actuator", "load", "fixed"]
+SPACING = 1e-9
+"""Relative difference of the steps of a grid that count as equal: round-off of written numbers."""
 
 
 @check_arguments
@@ -40,8 +42,11 @@ class Parameter:
         """Return `value` as a float, or raise `InputError` if it has no meaning."""
         number = float(value) if is_number(value) and FINITE.holds(value) else np.nan
         if not (np.isfinite(number) and self.lower < number < self.upper):
+            unit = "" if self.unit == "1" else f" in units of {self.unit}"
+            quantity = isinstance(value, str) and value.strip()[:1].isdigit()  # like "320 mm"
+            remedy = f" Write a number{unit}." if quantity else ""
             raise InputError(
-                f"`{self.name}` must be a finite number{self._limits()}; got {value!r}."
+                f"`{self.name}` must be a finite number{self._limits()}; got {value!r}.{remedy}"
             )
         return number
 
@@ -135,6 +140,28 @@ class Grid:
         self.box = Box(**{name: triple[:2] for name, triple in ranges.items()})
         self.names = self.box.names
         self.intervals: tuple[int, ...] = tuple(int(triple[2]) for triple in ranges.values())
+
+    @classmethod
+    @check_arguments
+    def of_values(cls, **values: Sequence[float]) -> Self:
+        """Grid through equidistant values: ``Grid.of_values(Theta=np.linspace(0.2, 2.5, 94))``.
+
+        Raises
+        ------
+        InputError
+            If there are fewer than two values of a parameter, or they do not increase in equal
+            steps.
+        """
+        ranges = {}
+        for name, given in values.items():
+            steps = np.diff(np.asarray(given, float))
+            if not (len(steps) and steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=SPACING)):
+                raise InputError(
+                    f"`{name}` must be two or more values that increase in equal steps; got "
+                    f"{np.array2string(np.asarray(given), threshold=6)}."
+                )
+            ranges[name] = (float(given[0]), float(given[-1]), len(steps))
+        return cls(**ranges)
 
     def __repr__(self) -> str:
         """Return the call that makes this grid."""

@@ -125,7 +125,9 @@ class EquilibriumSet:
         """Table of the box, the size and the audit, for notebooks."""
         units = {each.name: each.unit for each in self.structure.parameters}
         sides = zip(self.box.names, self.box.lower, self.box.upper, strict=True)
-        rows = [[name, f"{low:g} to {high:g} {units[name]}"] for name, low, high in sides]
+        rows: list[list[object]] = [
+            [name, f"{low:g} to {high:g} {units[name]}"] for name, low, high in sides
+        ]
         rows += [["equilibria (vertices)", len(self.points)], ["cells", len(self.cells)]]
         rows += [["components", len(self.components)], ["strata", len(self.strata)]]
         rows += [["folds", len(self.folds)], ["audit", str(self.audit)]]

@@ -22,8 +22,8 @@ from equimorph.structures.rod.space import LateralMode
 from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.states import State
 
-FORCES = ("lambda", "mu")
-"""Components of the support's force."""
+FORCES = {"x": 0, "y": 1, "lambda": 0, "mu": 1}
+"""Axes of the components of the support's force, by the axis and by the symbol of the theory."""
 
 
 class Described(Measured):
@@ -32,7 +32,7 @@ class Described(Measured):
     written: ClassVar[tuple[str, ...]] = (
         *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy"),
         *("clearance(s)", "lateral_margin", "lateral_index"),
-        *("support_force(lambda)", "support_force(mu)", "end_moment(0)", "end_moment(1)"),
+        *("support_force(x)", "support_force(y)", "end_moment(0)", "end_moment(1)"),
     )
 
     @property
@@ -82,10 +82,10 @@ class Described(Measured):
 
     @check_arguments
     def support_force(self, component: str) -> Descriptor:
-        """Force of the support at A on the rod: "lambda" (horizontal) or "mu" (vertical)."""
+        """Force of the support at A on the rod along "x" or "y" ("lambda", "mu" in the theory)."""
         if component not in FORCES:
-            raise InputError(f"`component` must be 'lambda' or 'mu'; got {component!r}.")
-        return self.support_force_along(FORCES.index(component), component)
+            raise InputError(f"`component` must be 'x', 'y', 'lambda' or 'mu'; got {component!r}.")
+        return self.support_force_along(FORCES[component], component)
 
     @check_arguments
     def end_moment(self, end: int) -> Descriptor:
