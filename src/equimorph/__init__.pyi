@@ -37,9 +37,12 @@ from .charts import (
     reduce as reduce,
 )
 from .dynamics import (
+    HeldLanding as HeldLanding,
     Replay as Replay,
     ReplaySettings as ReplaySettings,
+    SnapInTime as SnapInTime,
     replay as replay,
+    snap_in_time as snap_in_time,
 )
 from .equilibria import (
     Branch as Branch,

@@ -157,3 +157,20 @@ def test_lateness_grows_with_the_rate_to_two_thirds(upright, damping):
     exponent = np.polyfit(np.log(rates), np.log(delays), 1)[0]
     assert exponent == pytest.approx(2.0 / 3.0, abs=0.07)
     assert np.allclose(delays, expected, rtol=0.25)
+
+
+@pytest.mark.slow
+def test_the_fold_holds_below_and_snaps_above_for_all_dampings(upright):
+    """TIME: 0.01 below and above the chain's fold; landings within 1e-3 of the gradient flow's."""
+    found = em.snap_in_time({"Delta": 1.0}, upright, dampings=(0.01, 0.03, 0.1, 0.3, 1.0))
+    assert found.fold == pytest.approx(FOLD, abs=1e-6)
+    assert found.held_below
+    assert len(found.beyond) == 5
+    assert all(each.left for each in found.beyond)
+    assert max(each.gap for each in found.beyond) < 1e-3
+
+
+def test_a_way_without_a_fold_is_refused(upright):
+    used = ReplaySettings(links=8)
+    with pytest.raises(em.errors.InputError, match="beyond a fold"):
+        em.snap_in_time({"Theta": 1.1}, upright, settings=used)

@@ -1,5 +1,7 @@
 """Planar rods and frames in MuJoCo, with the statics of their chains."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
@@ -10,7 +12,6 @@ from equimorph.dynamics.linkage import Pulls, Settings, Vector
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
 from equimorph.dynamics.plant import LinkagePlant
 from equimorph.structures import State, States
-from equimorph.tolerances import DEPARTURE
 
 
 class LinkageModel(Model):
@@ -93,6 +94,10 @@ class LinkageModel(Model):
             raise ArithmeticError("the chain of links has no stable equilibrium near the start")
         return found
 
+    def lowest_frequency(self, start: State) -> float:
+        """Lowest angular frequency of the chain at a state, in units of 1/T."""
+        return float(np.sqrt(self.begin(start).least))
+
     def quasistatics(
         self, start: State, motion: Motion, times: Float[np.ndarray, " times"]
     ) -> Quasistatics:
@@ -111,13 +116,13 @@ class LinkageModel(Model):
             points[k] = self.points(each.v)
         if found.fold is None:
             return Course(points)
-        last, expected = self.points(found.last.v), float("nan")
+        last, delay = self.points(found.last.v), None
         if np.isfinite(found.fold):
-            normal = fold_delay(
+            delay = fold_delay(
                 found.last, found.fold, lambda t: self.settings(motion(t)), damping, self.unit
             )
-            expected = normal.lateness(DEPARTURE)
-        return Course(points, found.fold, expected, last)
+            delay = replace(delay, reach=delay.reach * self._chained.length)
+        return Course(points, found.fold, delay, last)
 
 
 class MovingLinkage(Plant):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.dynamics.fold_delay import FoldDelay
 from equimorph.equilibria import settle, snap_landing
 from equimorph.errors import InputError
 from equimorph.structures import State, States, Structure
@@ -62,12 +63,12 @@ class Course:
     """Statics of the plant at the times of a motion, while they exist.
 
     points: at each time; nan after the fold; fold: its time, None without one, nan where the
-    statics were lost for another reason; expected: lateness predicted by the fold's normal form.
+    statics were lost for another reason; delay: normal form of the fold; last: points there.
     """
 
     points: Float[np.ndarray, "times points space"]
     fold: float | None = None
-    expected: float = float("nan")
+    delay: FoldDelay | None = None
     last: Points | None = None
 
 

@@ -5,28 +5,31 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_vocabulary import POSITIVE
 from equimorph.dynamics.model import Course, Model, Plant, landing
 from equimorph.dynamics.motion import TimedCorners, timed_corners
+from equimorph.dynamics.quasistatics import equilibria_along
 from equimorph.dynamics.simulators import model_of
 from equimorph.model import Schedule
 from equimorph.structures import State, Structure
-from equimorph.tasks.route import FINE
-from equimorph.tasks.verification.schedule_check import follow_polyline
 from equimorph.tolerances import DEPARTURE
 
 SAMPLES = 100
 """Times at which a replay is compared with the statics."""
+FINE_SAMPLES = 10
+"""Times in each of these at which it is asked whether it has left."""
 STILL = 1e-6
 """Speed below which the structure rests, in units of T."""
 LONGEST_HOLD = 20.0
 """How often the hold is prolonged while the structure still moves."""
 ALIKE = 0.1
 """Share of the deviation by which half the step may change it in a converged replay."""
+PART_OF_SNAP = 0.25
+"""Share of the distance to where it comes to rest at which a motion has left the branch."""
 SAME_REST = 1e-4
 """Distance of two equilibria, relative to the structure's size, that are the same."""
 NEGLIGIBLE = 1e-5
@@ -198,7 +201,7 @@ def replay(
     """
     begin, motion = timed_corners(schedule, start, structure, rate, duration)
     used = settings or ReplaySettings()
-    model = model_of(begin.structure, simulator, used.links)
+    model = model_of(begin, simulator, used.links)
     first = _run(model, begin, motion, used)
     if not check:
         return first
@@ -223,37 +226,44 @@ def _size(points: Float[np.ndarray, "points space"]) -> float:
 
 @dataclass
 class _Record:
-    """What is kept of a plant at each sample."""
+    """What is kept of a plant: places often, the rest at each sample."""
 
+    times: list[float]
     points: list[Float[np.ndarray, "points space"]]
     energy: list[float]
     closure: float = 0.0
 
-    def take(self, plant: Plant) -> None:
-        """Add a sample."""
+    def take(self, time: float, plant: Plant, sample: bool) -> None:
+        """Add places, and what belongs to a sample."""
+        self.times.append(time)
         self.points.append(plant.points)
-        self.energy.append(plant.energy)
-        self.closure = max(self.closure, plant.closure)
+        if sample:
+            self.energy.append(plant.energy)
+            self.closure = max(self.closure, plant.closure)
 
 
 def _run(model: Model, begin: State, motion: TimedCorners, used: ReplaySettings) -> Replay:
     """One replay: at rest, the motion, and a hold at its end."""
     step = used.step * model.unit
     count = max(1, int(np.ceil(motion.duration / step - 1e-9)))
-    marks = np.unique(np.append(np.arange(0, count, max(1, count // SAMPLES)), count))
-    wanted = set(marks.tolist())
-    plant, record = model.plant(begin, used.step, used.damping), _Record([], [])
+    often = max(1, count // (SAMPLES * FINE_SAMPLES))
+    every = often * max(1, count // (SAMPLES * often))
+    plant, record = model.plant(begin, used.step, used.damping), _Record([], [], [])
     hold(plant, used)
-    record.take(plant)
+    record.take(0.0, plant, True)
+    samples = [0]
     for k in range(1, count + 1):
         plant.set(motion.at(k * step))
         plant.step()
-        if k in wanted:
-            record.take(plant)
+        sample = k % every == 0 or k == count
+        if sample or k % often == 0:
+            if sample:
+                samples.append(len(record.times))
+            record.take(k * step, plant, sample)
     held = step * hold(plant, used)
-    record.take(plant)
-    times = np.append(marks * step, count * step + held)
-    return _judge(model, begin, motion, times, plant, record, used)
+    samples.append(len(record.times))
+    record.take(count * step + held, plant, True)
+    return _judge(model, begin, motion, np.array(samples), plant, record, used)
 
 
 def hold(plant: Plant, used: ReplaySettings) -> int:
@@ -268,44 +278,35 @@ def hold(plant: Plant, used: ReplaySettings) -> int:
 
 
 def _judge(
-    model: Model, begin: State, motion: TimedCorners, times: Float[np.ndarray, " times"],
+    model: Model, begin: State, motion: TimedCorners, samples: Int[np.ndarray, " samples"],
     plant: Plant, record: _Record, used: ReplaySettings,
 ) -> Replay:  # fmt: skip
     """Compare a replay with the equilibria of the library and of the chain."""
+    fine, everywhere = np.array(record.times), np.array(record.points)
+    times, points = fine[samples], everywhere[samples]
     rows = np.array([motion.at(t) for t in times])
-    points = np.array(record.points)
-    reference = _equilibria(model, begin, rows)
+    reference = equilibria_along(model, begin, rows).points
     course = model.statics(begin, motion.at, times, used.damping)
-    deviation = _largest(points - reference)
     size = _size(points[0])
-    away = _away(points, course)
-    gone = bool(away[-1] > DEPARTURE * size) or _elsewhere(plant, course, size)
-    where = _departure(times, away > DEPARTURE * size) if gone else None
+    away = _away(fine, everywhere, times, course)
     fold = course.fold
+    # at rest where the branch has no equilibrium, it is on another one, however near
+    gone = _folded(fold) or bool(away[-1] > DEPARTURE * size) or _elsewhere(plant, course, size)
+    departure = PART_OF_SNAP * float(away[-1])
+    where = _departure(fine, away > departure) if gone else None
+    expected = course.delay.lateness(departure) if course.delay and gone else float("nan")
     landed = landing(begin.structure, plant.guess(), rows[-1]) if gone else None
     late = float("nan") if where is None or fold is None else where - fold
     return Replay(
-        begin.structure, "mujoco" if model.independent else "own", times, rows, points, deviation,
-        _largest(course.points - reference), _largest(points - course.points), gone, where, fold,
-        late, course.expected, landed, record.closure, np.array(record.energy),
+        begin.structure, "mujoco" if model.independent else "own", times, rows, points,
+        _largest(points - reference), _largest(course.points - reference),
+        _largest(points - course.points), gone, where, fold, late, expected, landed,
+        record.closure, np.array(record.energy),
     )  # fmt: skip
 
 
-def _equilibria(
-    model: Model, begin: State, rows: Float[np.ndarray, "times parameters"]
-) -> Float[np.ndarray, "times points space"]:
-    """Points of the library's equilibria along a motion; nan where these have ended."""
-    moves = np.abs(np.diff(rows, axis=0)).max(axis=1) > 0.0
-    first = np.concatenate([[0], np.cumsum(moves)])
-    followed = follow_polyline(begin, rows[1:][moves], (), FINE)
-    corners = followed.corners
-    if followed.end.kind != "arrived":
-        corners = corners[followed.at[corners] < followed.end.at]
-    known = model.reference(followed.states[corners])
-    out = np.full((len(rows), *known.shape[1:]), np.nan)
-    there = first < len(known)
-    out[there] = known[first[there]]
-    return out
+def _folded(fold: float | None) -> bool:
+    return fold is not None and bool(np.isfinite(fold))
 
 
 def _largest(gaps: Float[np.ndarray, "times points space"]) -> Float[np.ndarray, " times"]:
@@ -313,13 +314,19 @@ def _largest(gaps: Float[np.ndarray, "times points space"]) -> Float[np.ndarray,
 
 
 def _away(
-    points: Float[np.ndarray, "times points space"], course: Course
-) -> Float[np.ndarray, " times"]:
+    fine: Float[np.ndarray, " fine"],
+    points: Float[np.ndarray, "fine points space"],
+    times: Float[np.ndarray, " samples"],
+    course: Course,
+) -> Float[np.ndarray, " fine"]:
     """Distance from the static branch; after its end from where it ended."""
-    if course.last is None:
-        return _largest(points - course.points)
-    ended = np.isnan(course.points[:, 0, 0])
-    return _largest(points - np.where(ended[:, None, None], course.last, course.points))
+    branch = course.points
+    if course.last is not None:
+        branch = np.where(np.isnan(branch[:, :1, :1]), course.last, branch)
+    after = np.clip(np.searchsorted(times, fine, side="right"), 1, len(times) - 1)
+    share = (fine - times[after - 1]) / (times[after] - times[after - 1])
+    between = branch[after - 1] + share[:, None, None] * (branch[after] - branch[after - 1])
+    return _largest(points - between)
 
 
 def _elsewhere(plant: Plant, course: Course, size: float) -> bool:

@@ -3,23 +3,32 @@
 from equimorph.dynamics.frames import ChainedFrame
 from equimorph.dynamics.linkage_model import LinkageModel
 from equimorph.dynamics.model import Model
+from equimorph.dynamics.own import OwnModel
+from equimorph.dynamics.plant import mujoco_module
 from equimorph.dynamics.rods import ChainedRod
+from equimorph.dynamics.trusses import TrussModel
 from equimorph.errors import InputError
-from equimorph.structures import Frame, Rod, Structure
+from equimorph.structures import Frame, Rod, State, Truss
 
 
-def model_of(structure: Structure, simulator: str, links: int) -> Model:
-    """A structure as a simulator sees it.
+def model_of(start: State, simulator: str, links: int) -> Model:
+    """The structure of a state as a simulator sees it.
 
     Raises
     ------
     InputError
-        If the simulator does not cover it; there is no silent fall-back.
+        If the simulator does not cover it, or is not installed; there is no silent fall-back.
     """
+    structure = start.structure
+    if simulator == "own":
+        return OwnModel(structure, start)
+    mujoco_module()
     if isinstance(structure, Rod):
         return LinkageModel(ChainedRod(structure, links))
     if isinstance(structure, Frame):
         return LinkageModel(ChainedFrame(structure, links))
+    if isinstance(structure, Truss):
+        return TrussModel(structure, start)
     raise InputError(
         f"`simulator` must cover the structure; got {simulator!r} for a {structure.kind}. "
         'simulator="own" replays every structure by its own equations of motion.'

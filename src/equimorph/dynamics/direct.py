@@ -1,0 +1,127 @@
+"""Structures that a simulator takes as they are, without a chain: trusses, and all by their own."""
+
+from abc import abstractmethod
+
+import numpy as np
+from jaxtyping import Float
+
+from equimorph.arrays import Lanes, Parameters
+from equimorph.dynamics.fold_delay import FoldDelay
+from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
+from equimorph.dynamics.quasistatics import equilibria_along
+from equimorph.equilibria import settle
+from equimorph.structures import State, States, Structure
+
+FIRST_MODE = 5.0
+"""Lowest angular frequency at the start in units of 1/T: about that of a clamped arch."""
+PROBE = 1e-5
+"""Relative step of difference quotients."""
+SWEEPS = 4
+"""Inverse iterations for the critical mode."""
+
+
+class DirectModel(Model):
+    """A structure whose equations a plant takes over unknown by unknown."""
+
+    def __init__(self, structure: Structure, start: State) -> None:
+        self.structure = structure
+        self.frequency = float(start.batch.natural_frequencies(1)[0, 0])
+        self.unit = FIRST_MODE / self.frequency
+
+    def reference(self, states: States) -> Float[np.ndarray, "lanes points space"]:
+        """Shapes as they are drawn."""
+        return self.structure.shape(states.z, states.p)
+
+    @abstractmethod
+    def resistance(
+        self, z: Lanes, p: Parameters, mode: Float[np.ndarray, " unknowns"], damping: float
+    ) -> float:
+        """Damping matrix times a velocity twice; damping in units of T."""
+
+    def statics(
+        self, start: State, motion: Motion, times: Float[np.ndarray, " times"], damping: float
+    ) -> Course:
+        """Equilibria of the library, which are the plant's."""
+        rows = np.array([motion(t) for t in times])
+        found = equilibria_along(self, start, rows)
+        if found.end is None:
+            return Course(found.points)
+        last = self.reference(found.end.batch)[0]
+        fold = float(np.interp(found.at, np.arange(len(times)), times))
+        if found.kind != "fold":
+            return Course(found.points, float("nan"), None, last)
+        return Course(found.points, fold, self._normal_form(found.end, fold, motion, damping), last)
+
+    def _normal_form(self, fold: State, time: float, motion: Motion, damping: float) -> FoldDelay:
+        structure, n = self.structure, self.structure.unknowns
+        z, p = fold.z[None], fold.p[None]
+        wide = np.random.default_rng(0).normal(size=structure.size)
+        for _ in range(SWEEPS):
+            rhs = np.zeros((1, 1, structure.size))
+            rhs[0, 0, :n] = structure.mass * wide[:n]
+            wide = structure.solve(z, p, rhs).x[0, 0]
+            wide /= np.sqrt(structure.mass @ wide[:n] ** 2)
+        step = PROBE * max(abs(time), 1e-12)
+        rate = (motion(time + step) - motion(time - step)) / (2.0 * step)
+        drive = -float(wide @ structure.parameter_derivative(z, p, rate[None])[0])
+        along = (wide[None], np.zeros_like(p))
+        bend = -0.5 * float(wide @ structure.second_derivative(z, p, along, along)[0])
+        if bend < 0.0:
+            drive, bend = -drive, -bend
+        inertia = float(structure.inertia_product(z, p)(wide[None, None, :n])[0, 0] @ wide[:n])
+        apart = self.reference(_moved(fold, PROBE * wide)) - self.reference(
+            _moved(fold, -PROBE * wide)
+        )
+        reach = float(np.linalg.norm(apart[0], axis=1).max()) / (2.0 * PROBE)
+        return FoldDelay(inertia, self.resistance(z, p, wide[:n], damping), drive, bend, reach)
+
+
+def _moved(state: State, by: Float[np.ndarray, " size"]) -> States:
+    return States(state.structure, (state.z + by)[None], state.p[None])
+
+
+class DirectPlant(Plant):
+    """A plant whose unknowns are those of the structure."""
+
+    structure: Structure
+    p: Row
+
+    @property
+    @abstractmethod
+    def z(self) -> Float[np.ndarray, " size"]:
+        """Unknowns and multipliers."""
+
+    @property
+    @abstractmethod
+    def velocity(self) -> Float[np.ndarray, " unknowns"]:
+        """Rates of the unknowns."""
+
+    @property
+    def points(self) -> Points:
+        """The shape as it is drawn."""
+        return np.asarray(self.structure.shape(self.z[None], self.p[None])[0])
+
+    @property
+    def closure(self) -> float:
+        """Largest residual of a constraint."""
+        n = self.structure.unknowns
+        rest = self.structure.residual(self.z[None], self.p[None])[0, n:]
+        return float(np.abs(rest).max(initial=0.0))
+
+    @property
+    def energy(self) -> float:
+        """Potential and kinetic energy."""
+        z, p, v = self.z[None], self.p[None], self.velocity
+        kinetic = 0.5 * float(self.structure.inertia_product(z, p)(v[None, None])[0, 0] @ v)
+        potential = float(self.structure.energy(z, p)[0])
+        return (potential + kinetic) * self.structure.energy_scale
+
+    def equilibrium(self) -> Points | None:
+        """The stable equilibrium of the structure nearby."""
+        found = settle(self.structure, self.guess()[None], self.p[None])
+        state = State(self.structure, found.z[0], self.p)
+        return state.shape() if found.found[0] and state.index == 0 else None
+
+    def guess(self) -> Float[np.ndarray, " size"]:
+        """Unknowns and multipliers."""
+        return self.z.copy()
