@@ -28,7 +28,7 @@ LONGEST_HOLD = 20.0
 """How often the hold is prolonged while the structure still moves."""
 ALIKE = 0.1
 """Share of the deviation by which half the step may change it in a converged replay."""
-PART_OF_SNAP = 0.25
+PART_OF_SNAP = 0.75
 """Share of the distance to where it comes to rest at which a motion has left the branch."""
 SAME_REST = 1e-4
 """Distance of two equilibria, relative to the structure's size, that are the same."""
