@@ -8,7 +8,7 @@ from equimorph.dynamics import ReplaySettings, replay
 
 ARCH = ({"A": (-1, 0), "B": (0, 0.1), "C": (1, 0)}, [("A", "B"), ("B", "C")])
 HELD = {"A": "xy", "C": "xy"}
-COARSE = ReplaySettings(step=0.1)
+COARSE = ReplaySettings(step=0.03)
 
 
 def von_mises(**more):
