@@ -107,7 +107,8 @@ def summary(rows: list[dict[str, Any]]) -> str:
         f"{max((run['dynamics'] for run in slow), default=0.0):.2g} of the size, at most "
         f"{TOLERANCE} allowed; too careful by {careful:.2g} in the median. {len(folds)} with a "
         f"fold: {sum(row['snapped'] for row in folds)} snap, "
-        f"{sum(row['landed'] for row in folds)} land in a stable state. {sum('error' in row for row in rows)} failed."
+        f"{sum(row['landed'] for row in folds)} land in a stable state. "
+        f"{sum('error' in row for row in rows)} failed."
     )
 
 

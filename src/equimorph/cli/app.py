@@ -204,6 +204,29 @@ def run(
     raise typer.Exit(_worst(0 if allow_refused and code == REFUSED else code for code in codes))
 
 
+@app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(help="Schedule, a table with its sidecar.")],
+    rate: Annotated[
+        float | None, typer.Option(help="Speed in the scaled parameters, of a schedule untimed.")
+    ] = None,
+    simulator: Annotated[str, typer.Option(help="mujoco, or own: not independent.")] = "mujoco",
+    links: Annotated[int, typer.Option(help="Links of each chain.")] = 40,
+    picture: Annotated[
+        Path | None, typer.Option(help="File for a figure of the deviation over time.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Replay a schedule in time in MuJoCo; exit code 3 if the structure snaps."""
+    from equimorph.cli.replay import as_json as numbers
+    from equimorph.cli.replay import lines, replay_file
+
+    played = replay_file(file, rate=rate, simulator=simulator, links=links, picture=picture)
+    for line in [numbers(played)] if as_json else lines(played):
+        typer.echo(line)
+    raise typer.Exit(REFUSED if played.snapped else 0)
+
+
 def _folders(files: list[Path], out: Path | None) -> list[tuple[Path, Path]]:
     """Pair each study with its results folder."""
     names = [file.stem for file in files]

@@ -11,6 +11,7 @@ from equimorph.plotting.maps import curvature_map, load_map
 from equimorph.plotting.margins import margins
 from equimorph.plotting.plane import parameter_plane, solutions
 from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
+from equimorph.plotting.replays import deviation_over_time
 from equimorph.plotting.robustness import imperfection_laws, room, sensitivities, trials
 from equimorph.plotting.route_panels import alternative_routes, route_panels
 from equimorph.plotting.schedule_strips import schedule_strips
@@ -26,6 +27,7 @@ __all__ = [
     "calibration",
     "chart_domain",
     "curvature_map",
+    "deviation_over_time",
     "diagram",
     "film",
     "followed",
