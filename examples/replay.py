@@ -5,7 +5,7 @@ moves a chain of 24 links. Known answer: the way over (1.3, 1.3) holds, the stra
 Δ = 0.418 does not.
 """
 
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 import equimorph as em
 from equimorph.dynamics import Replay
@@ -22,11 +22,12 @@ def main() -> tuple[Replay, Replay]:
     return safe, snapping
 
 
-def figure(result: tuple[Replay, Replay]) -> Figure:
-    """Deviation of the safe way from its equilibria."""
-    return em.plotting.deviation_over_time(result[0]).figure
+def figure(result: tuple[Replay, Replay]) -> Axes:
+    """Deviation of the way that snaps from its equilibria, while they last."""
+    return em.plotting.deviation_over_time(result[1])
 
 
 if __name__ == "__main__":
-    for played in main():
-        print(played)
+    result = main()
+    print(*result, sep="\n")
+    em.plotting.save(figure(result), ".", "replay")

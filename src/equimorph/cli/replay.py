@@ -17,8 +17,8 @@ def replay_file(
     schedule = read_schedule(file)
     played = replay(schedule, rate=rate, simulator=simulator, settings=ReplaySettings(links=links))  # type: ignore[arg-type]  # a word of the user, which `replay` checks
     if picture is not None:
-        figure = deviation_over_time(played).figure
-        save(figure, picture)  # type: ignore[arg-type]  # axes of their own figure
+        suffix = picture.suffix.lstrip(".") or "png"
+        save(deviation_over_time(played), picture.parent, picture.stem, (suffix,))
     return played
 
 
