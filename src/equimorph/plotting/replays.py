@@ -12,6 +12,9 @@ from equimorph.tasks import SpeedLimit
 _SMALLEST = 1e-7
 """Least deviation that is drawn, relative to the largest."""
 
+_AFTER = 1.25
+"""End of the time axis relative to when a motion that snaps leaves: no deviation is known then."""
+
 
 @check_arguments
 def deviation_over_time(
@@ -58,7 +61,8 @@ def deviation_over_time(
                         textcoords="offset points", ha="left", va="top", size=6.5,
                         color=style.ROUTE_COLOUR)  # fmt: skip
         ax.set_yscale("log")
-        ax.set_xlim(0.0, float(played.times[-1]))
+        last = float(played.times[-1])
+        ax.set_xlim(0.0, last if played.where is None else min(last, _AFTER * played.where))
         ax.set_xlabel("time")
         ax.set_ylabel("largest deviation")
         ax.legend(frameon=False, fontsize=6.5, loc="lower right")
