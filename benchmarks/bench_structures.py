@@ -20,6 +20,7 @@ from equimorph.structures import (
     PointForce,
     Pressure,
     Rod,
+    SpatialRod,
     Tendon,
     Truss,
     Unknown,
@@ -150,7 +151,20 @@ def rod_under_pressure():
     return Rod(ends=("clamped", "pinned"), curvature=-2.0, loads={"p": Pressure()}, span=0.82)
 
 
-RODS = {"all": rod_with_every_option, "arm": rod_with_a_tendon, "pressure": rod_under_pressure}
+def round_rod_in_space():
+    """The round arch in space: quaternions at 37 nodes."""
+    return SpatialRod(torsion=0.77, lateral=1.0)
+
+
+def stretching_rod_in_space():
+    """The same, extensible and shearable."""
+    return SpatialRod(torsion=0.77, lateral=1.0, axial=50.0, shear=20.0)
+
+
+RODS = {
+    "all": rod_with_every_option, "arm": rod_with_a_tendon, "pressure": rod_under_pressure,
+    "in space": round_rod_in_space, "stretching in space": stretching_rod_in_space,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("lanes", [100, 4096])

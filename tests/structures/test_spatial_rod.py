@@ -197,6 +197,19 @@ def test_heights_converge_with_twice_the_degree():
     assert 7.0 < np.log2(errors[0] / errors[1]) < 10.0
 
 
+@pytest.mark.parametrize(
+    ("elements", "degree", "error"), [(4, 4, 1e-7), (3, 4, 1e-5), (4, 3, 1e-5), (2, 8, 1e-10)]
+)
+def test_coarse_rods_have_natural_states_near_the_planar_one(elements, degree, error):
+    """Errors of the middle's height, near those that the rods estimate or below."""
+    planar = em.Rod()
+    exact = planar.height(0.5)(planar.natural_state(Theta=0.9))
+    rod = arch(elements=elements, degree=degree)
+    state = rod.natural_state(Theta=0.9)
+    assert float(rod.height(0.5)(state)) == pytest.approx(float(exact), abs=error)
+    assert state.error_estimate > abs(float(rod.height(0.5)(state) - exact))
+
+
 # --- closed forms and published values -----------------------------------------------------------
 
 

@@ -1,0 +1,56 @@
+"""Sets of rods in space: sheets beside the plane, mirror images, and a study from file to film."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.study import run_study
+
+LATERAL, REJOINED = 1.601471549048, 2.476483
+"""Loads between which the round arch at (0.9, 0) is stable beside its plane only; SPACE."""
+TWISTED = 1.0
+"""Energy above which stable states are of another pair, with five times that energy."""
+EXAMPLE = Path(__file__).parents[2] / "examples" / "sideways.toml"
+pytestmark = pytest.mark.slow
+
+
+def aside(rod, states):
+    """Places z of the middle."""
+    return rod.position(0.5)[2](states)
+
+
+def test_the_arch_over_theta_and_load_has_two_sheets_aside_that_are_mirror_images():
+    """Stable beside the plane between both loads only, ± z each; in the plane elsewhere."""
+    rod = em.SpatialRod(torsion=0.77, lateral=1.0)
+    assert "sideways mirror" in [each.name for each in rod.symmetries()]
+    within, box = [rod.max_curvature <= 9.0], em.Box(Theta=(0.8, 1.0), q=(0.0, 3.0))
+    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 4), checks=0)
+    assert eset.audit.clean
+    for load in (1.2, 1.8, 2.2):
+        near = eset.at(Theta=0.9, q=load).stable
+        places = np.sort(aside(rod, near)[near.energy < TWISTED])
+        beside = places[np.abs(places) > 1e-6]
+        assert len(beside) == (2 if LATERAL < load < REJOINED else 0)
+        np.testing.assert_allclose(beside, -beside[::-1], atol=1e-9)
+
+
+def test_a_study_of_a_rod_in_space_has_its_route_figures_film_and_files(tmp_path):
+    """Both ends of the route lie in the plane; it goes aside and stays stable."""
+    file, out = tmp_path / "sideways.toml", tmp_path / "out"
+    text = EXAMPLE.read_text(encoding="utf-8").replace("intervals = [6, 4]", "intervals = [4, 2]")
+    file.write_text(text, encoding="utf-8")
+    outcome = run_study(file, out)
+    assert outcome.equilibrium_set.audit.clean
+    route = outcome.answers[0]
+    assert route.arrived
+    states, rod = route.states, outcome.study.structure
+    assert states.margin.min() > 0.01
+    places = np.abs(aside(rod, states))
+    assert places.max() > 0.1
+    assert max(places[0], places[-1]) < 1e-9
+    for name in ("index.html", "results.h5", "sideways-film.gif", "sideways-shapes.png"):
+        assert (out / name).stat().st_size > 1000
+    em.storage.write_shapes(out / "route.vtp", states)
+    assert (out / "route.vtp").stat().st_size > 1000
