@@ -43,9 +43,9 @@ def test_a_study_of_a_rod_in_space_has_its_route_figures_film_and_files(tmp_path
     file.write_text(text, encoding="utf-8")
     outcome = run_study(file, out)
     assert outcome.equilibrium_set.audit.clean
-    route = outcome.answers[0]
+    route = outcome.of("route")["sideways"]
     assert route.arrived
-    states, rod = route.states, outcome.study.structure
+    states, rod = route.states, outcome.problem.structure
     assert states.margin.min() > 0.01
     places = np.abs(aside(rod, states))
     assert places.max() > 0.1
