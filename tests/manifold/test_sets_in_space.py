@@ -38,6 +38,29 @@ def test_the_arch_over_theta_and_load_has_two_sheets_aside_that_are_mirror_image
         np.testing.assert_allclose(beside, -beside[::-1], atol=1e-9)
 
 
+def test_a_twisted_clamped_rod_that_is_pushed_together_has_its_folds_where_lifts_meet_them():
+    """Over (twist, span), of unequal stiffnesses and slightly curved, so that nothing has orbits.
+
+    Lifts from stable states end at folds; there the set has two states fewer or more.
+    """
+    rod = em.SpatialRod(
+        torsion=0.77, lateral=1.3, loads={}, coordinates={}, curvature=0.4, side_curvature=0.1
+    )
+    box, within = em.Box(twist_B=(3.0, 8.0), nu=(0.75, 0.9)), [rod.max_curvature <= 8.0]
+    eset = em.equilibrium_set(rod, box, within=within, intervals=(4, 2), checks=0)
+    assert eset.audit.clean
+    met = []
+    for state in eset.at(twist_B=6.0, nu=0.82).stable:
+        for name, value in (("twist_B", 3.0), ("twist_B", 8.0), ("nu", 0.9)):
+            end = em.lift(state, {name: value}).end
+            if end.kind == "fold":
+                place = {each: float(end.state[each]) for each in ("twist_B", "nu")}
+                sides = [len(eset.at(**{**place, name: place[name] + d})) for d in (-1e-4, 1e-4)]
+                assert abs(sides[0] - sides[1]) == 2
+                met.append(name)
+    assert {"twist_B", "nu"} == set(met)
+
+
 def test_a_study_of_a_rod_in_space_has_its_route_figures_film_and_files(tmp_path):
     """Both ends of the route lie in the plane; it goes aside and stays stable."""
     file, out = tmp_path / "sideways.toml", tmp_path / "out"
