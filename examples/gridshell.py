@@ -33,7 +33,8 @@ def grid() -> em.SpatialFrame:
     }
     crossings = [f"j{i}{j}" for i in range(1, COLUMNS + 1) for j in range(1, ROWS + 1)]
     hinges = dict.fromkeys(crossings, (0.0, 0.0, 1.0))
-    members, inwards = [], {}
+    members: list[em.SpatialMember] = []
+    inwards: dict[str, tuple[float, float, float]] = {}
     for j in range(1, ROWS + 1):
         through = [f"j{i}{j}" for i in range(COLUMNS + 2)]
         members.append(em.SpatialMember(through, section=ROD))
@@ -72,6 +73,7 @@ def figure(path: em.Path) -> Figure:
 def report(path: em.Path) -> str:
     """What the way and its end are like."""
     states, frame = path.states, path.states.structure
+    assert isinstance(frame, em.SpatialFrame)
     effort = np.array([frame.descriptor("effort(draw)")(state) for state in states])
     rise = frame.place("j23", "z")(path.end.state)
     bent = frame.max_curvature(path.end.state)

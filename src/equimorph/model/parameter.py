@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -143,7 +143,7 @@ class Grid:
 
     @classmethod
     @check_arguments
-    def of_values(cls, **values: Sequence[float]) -> Self:
+    def of_values(cls, **values: Sequence[float] | Float[np.ndarray, " points"]) -> "Grid":
         """Grid through equidistant values: ``Grid.of_values(Theta=np.linspace(0.2, 2.5, 94))``.
 
         Raises
