@@ -16,7 +16,7 @@ TEXT = """
 [structure]
 kind = "spatial frame"
 elements = 1
-degree = 5
+degree = 6
 loads = { P = { B = [0, 0, -1] }, w = { A-B = [0, 0.1, 0] } }
 members = [
     { joints = ["A", "B", "C"], EA = 2000.0, strains = [0.0, 0.0, 0.01] },
@@ -41,7 +41,7 @@ A = [0.1, 0, 0]
 
 [set]
 box = { P = [0.0, 3.0] }
-intervals = [3]
+intervals = [4]
 """
 
 
