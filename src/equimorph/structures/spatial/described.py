@@ -19,6 +19,8 @@ STRAINS = {"twist": "κ_t", "side_curvature": "κ_n", "curvature": "κ_b"}
 """Strains in the order in which fields have them, with their symbols."""
 ANGLES = {"turn": "a", "tilt": "b", "roll": "τ"}
 """Angles of a cross-section with their symbols."""
+LOCKED = 1e-3
+"""Cosine of a clamp's tilt below which its two other angles turn it about the same axis."""
 FORCES = {"lambda": 0, "mu": 1, "x": 0, "y": 1, "z": 2}
 """Components of the support's force; the first two as on a planar rod."""
 
@@ -114,7 +116,7 @@ class DescribedInSpace(MeasuredInSpace):
         Contact with itself, for a rod of some `thickness` in the user's unit of length; and orbits:
         equal bending stiffnesses between coaxial clamps let a state turn about their axis for
         nothing. Paths keep to one phase where this is the x axis; about another axis F_z is
-        singular, and no event found there is a fold.
+        singular, and no event found there is a fold. And clamps tilted by a quarter turn.
         """
         found = list(self.warn_of_contact(state, thickness))
         pinned = isinstance(self.mechanics, PinnedMechanics)
@@ -123,6 +125,15 @@ class DescribedInSpace(MeasuredInSpace):
                 "the state may be turned about the axis of the clamps for nothing: it is one of an "
                 "orbit, of which searches and sets pick one with phase=True"
             )
+        turned = (
+            self.mechanics.model.turned @ self.mechanics.scalars(state.z[None], state.p[None])[0]
+        )
+        for side, (_, tilt, _) in zip("AB", turned, strict=True):
+            if abs(np.cos(tilt)) < LOCKED:
+                found.append(
+                    f"tilt_{side} = {tilt:.6g} is at a quarter turn: theta_{side} and twist_{side} "
+                    "turn the clamp about the same axis there, and one direction is missing"
+                )
         return tuple(found)
 
     def own_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
