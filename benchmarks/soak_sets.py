@@ -1,14 +1,16 @@
 """Random equilibrium sets of all specimens: how many are clean, how long they take, what fails.
 
-``python benchmarks/soak_sets.py 0 1000`` lifts the sets with numbers 0 to 999 one after the other
-in one process and prints a line for each: number, specimen, outcome, vertices, processor time,
-memory, and the question itself, so that it can be asked again alone. Every set is determined by its
-number. A summary follows; ``python benchmarks/soak_sets.py summary FILES`` adds up the lines of
-several runs.
+``python benchmarks/soak_sets.py FILE 0 1000`` lifts the sets with numbers 0 to 999 one after the
+other in one process and appends a line for each to a file: number, specimen, outcome, vertices,
+processor time, memory, and the question itself, so that it can be asked again alone. Every set is
+determined by its number; those in the file are not lifted again, so that a run that was interrupted
+goes on. A summary follows; ``python benchmarks/soak_sets.py summary FILES`` adds up the lines of
+several runs, and repeats those that are not clean.
 
 Specimens are those of the tests of the contract: rods, frames, trusses, chains, springs. Boxes,
 grids, values of the other parameters and constraints are random; symmetric values, zero, are as
-frequent as others.
+frequent as others. Half of the boxes are most of the range of their parameters, and half of the
+chains may wind as far as they like.
 """
 
 import sys
@@ -29,6 +31,8 @@ from equimorph.model import Box, Constraint, Descriptor, Silent  # noqa: E402
 from equimorph.structures import Truss  # noqa: E402
 from oracles.specimens import LINKS, SPECIMENS, Specimen  # noqa: E402
 
+COLUMNS = 7
+"""Of a line."""
 LONGEST = 60.0
 """Seconds of processor time that no set may take."""
 GIVEN_UP = 240.0
@@ -59,6 +63,9 @@ DIMENSIONS, INTERVALS = (1, 2, 2, 2, 2, 2, 2, 2, 2, 3), {1: (20, 200), 2: (4, 18
 """Numbers of free parameters to choose from, and fewest and most intervals along each."""
 CAPS, ANGLES, SHORTENINGS, HALF = (8.0, 24.0), (1.5, 3.5), (0.05, 0.5), 0.5
 """Bounds of curvature, of the angles of a chain (which may wind for ever), and of shortenings."""
+WIDE, MOST = 0.5, 0.7
+"""Share of boxes that are wide, and the part of the ranges of their parameters that these cover at
+least."""
 SYMMETRIC = 0.3
 """Share of fixed parameters that are zero, where zero is in their range."""
 
@@ -117,8 +124,10 @@ def _within(specimen: Specimen, generator: np.random.Generator) -> tuple[Constra
     if hasattr(structure, "max_curvature"):
         return (structure.max_curvature <= round(_share(CAPS, share), 2),)
     if specimen.name.startswith("chain"):
+        if share < HALF:
+            return ()
         largest = Descriptor("largest_angle", "1", lambda z, p: np.abs(z[:, :LINKS]).max(axis=1))
-        return (largest <= round(_share(ANGLES, share), 2),)
+        return (largest <= round(_share(ANGLES, 2.0 * share - 1.0), 2),)
     if isinstance(structure, Truss) and share < HALF:
         return (structure.max_shortening <= round(_share(SHORTENINGS, 2.0 * share), 2),)
     return ()
@@ -136,10 +145,14 @@ def question(number: int) -> Question:
     d = min(int(generator.choice(DIMENSIONS)), len(names))
     free = sorted(generator.choice(len(names), d, replace=False).tolist())
     ranges = {name: _range(specimen, name) for name in names}
-    sides = {}
+    sides, wide = {}, generator.random() < WIDE
     for name in (names[k] for k in free):
         low, high = np.sort(generator.uniform(*ranges[name], 2))
         width = 0.05 * (ranges[name][1] - ranges[name][0])
+        if wide:
+            least, most = ranges[name]
+            spare = generator.uniform(0.0, 0.5 * (1.0 - MOST), 2) * (most - least)
+            low, high = least + spare[0], most - spare[1]
         sides[name] = (round(low, 4), round(max(high, low + width), 4))
     fixed = {}
     for name in names:
@@ -181,9 +194,9 @@ def memory() -> int:
     return pages * 4096 // 2**20
 
 
-def run(first: int, count: int) -> Iterable[str]:
+def run(numbers: Iterable[int]) -> Iterable[str]:
     """Lines of the sets with these numbers."""
-    for number in range(first, first + count):
+    for number in numbers:
         asked, start = question(number), time.process_time()
         try:
             said, vertices = outcome(asked)
@@ -198,15 +211,16 @@ def run(first: int, count: int) -> Iterable[str]:
 
 def summary(lines: Iterable[str]) -> str:
     """Counts, time and memory of some lines."""
-    rows = [line.split("\t") for line in lines if line.count("\t") == 6]
+    rows = [line.split("\t") for line in lines if line.count("\t") == COLUMNS - 1]
     kinds = Counter(row[2].split(":")[0] for row in rows)
     seconds = np.array([float(row[4].split()[0]) for row in rows])
     megabytes = [int(row[5].split()[0]) for row in rows]
     counts = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+    faults = "".join("\n" + "\t".join(row) for row in rows if row[2] != "clean")
     return (
         f"{len(rows)} sets: {counts}; median {np.median(seconds):.1f} s, longest "
         f"{seconds.max():.1f} s, {int((seconds > LONGEST).sum())} over {LONGEST:.0f} s; memory "
-        f"{megabytes[len(rows) // 4]} MB after a quarter, {megabytes[-1]} MB at the end"
+        f"{megabytes[len(rows) // 4]} MB after a quarter, {megabytes[-1]} MB at the end{faults}"
     )
 
 
@@ -216,11 +230,14 @@ def main(arguments: list[str]) -> None:
         texts = [Path(name).read_text(encoding="utf-8") for name in arguments[1:]]
         print(summary(line for text in texts for line in text.splitlines()))  # noqa: T201
         return
-    lines = []
-    for line in run(*(int(each) for each in arguments)):
-        lines.append(line)
-        print(line, flush=True)  # noqa: T201
-    print(summary(lines))  # noqa: T201
+    file, first, count = Path(arguments[0]), int(arguments[1]), int(arguments[2])
+    known = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+    done = {int(line.split("\t")[0]) for line in known if line.count("\t") == COLUMNS - 1}
+    with file.open("a", encoding="utf-8") as out:
+        for line in run(number for number in range(first, first + count) if number not in done):
+            out.write(line + "\n")
+            out.flush()
+    print(summary(file.read_text(encoding="utf-8").splitlines()))  # noqa: T201
 
 
 if __name__ == "__main__":

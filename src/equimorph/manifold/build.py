@@ -13,7 +13,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import short
 from equimorph.equilibria.legs import check_isolated
 from equimorph.errors import InputError
-from equimorph.manifold.complex.description import Frame
+from equimorph.manifold.complex.description import Frame, wrong_cells
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
@@ -56,6 +56,8 @@ SEARCHES = 10
 needed seven."""
 RECOVERED = 200
 """Missing states, spread over all that were found, whose surroundings are lifted at once."""
+MENDED = 8
+"""Rounds of bisection around cells of a wrong sense: two tripods needed one and two."""
 LIMIT = 60_000, 30
 """Default limit of the number of equilibria: this constant, or this many per grid point."""
 MOST_POINTS = 1_000_000
@@ -187,11 +189,19 @@ def _of_grid(
     generator = np.random.default_rng([effort.seed, 1])
     recovered = 0
     finder, unseen = CellFinder(), UnseenFinder()
-    for number in range(SEARCHES):
-        pairing.fit()
+
+    def lift() -> tuple[Cells, EquilibriumSet]:
         cells, bisected = _lift_grid(pairing, finder, unseen, progress)
         frame = Frame(setting, pairing.mesh, box, fixed, intervals)
-        eset = account(pairing, cells, frame, bisected)
+        return cells, account(pairing, cells, frame, bisected)
+
+    for number in range(SEARCHES):
+        pairing.fit()
+        cells, eset = lift()
+        for _ in range(MENDED):
+            if not _divide_wrong(pairing, eset):
+                break
+            cells, eset = lift()
         found = check(eset, generator, _checks(effort.checks, setting), progress)
         lacking = len(found.missing)
         # what stays undecided in spite of bisection is not mended by more equilibria
@@ -214,6 +224,22 @@ def _of_grid(
         touching=tuple(_named(box, place) for place in cells.touching),
     )
     return replace(eset, audit=audit)
+
+
+def _divide_wrong(pairing: Pairing, eset: EquilibriumSet) -> bool:
+    """Bisect the grid cells below cells of a wrong index or sense, if there are any.
+
+    So it is where a constraint bends sharply: at a tip on it straight cells turn over.
+    """
+    mesh = pairing.mesh
+    if not eset.audit.wrong or mesh.dimension == 1 or eset.crossings or pairing.is_full:
+        return False
+    middle = eset.coordinates[eset.cells[wrong_cells(eset)]].mean(axis=1)
+    around = np.unique([mesh.locate(place) for place in middle])
+    sides = mesh.sides[around] if mesh.dimension == 2 else mesh.sides[mesh.faces[around]]
+    chosen = np.unique(longest(mesh, sides.reshape(len(around), -1)))
+    pairing.use_mesh(bisect(mesh, chosen, off_zero(pairing.setting)))
+    return True
 
 
 def _cell_size(box: Box, intervals: tuple[int, ...]) -> tuple[tuple[str, float], ...]:

@@ -253,6 +253,15 @@ def _audit(
     )
 
 
+def wrong_cells(eset: EquilibriumSet) -> Bool[np.ndarray, " C"]:
+    """Return which cells of a set without crossings `Audit.wrong` counts."""
+    coordinates, scales = eset.coordinates, eset.setting.scales
+    sense = senses(eset.cells, eset.cell_index, coordinates, adjacency(eset.cells), eset.component)
+    off = turned_off_folds(eset.kinds, eset.cells, sense.overturned, coordinates / scales)
+    of_index = contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index)
+    return np.asarray(of_index | off)
+
+
 SLIVER = 0.03
 """Height of a cell over its longest edge, below which it may be overturned next to folds."""
 VANISHING = 1e-4

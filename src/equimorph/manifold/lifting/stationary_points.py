@@ -83,6 +83,7 @@ class Stationary:
         return np.asarray(self.inside & (self.squared < -(SAME_STATE**2)))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # lanes that diverge are given up
 def stationary_points(setting: Setting, starts: Starts, *, saddles: bool) -> Stationary:
     """Stationary points of the squared distance: its minima, or saddles as well."""
     structure, count = setting.structure, len(starts.cell)
@@ -135,7 +136,9 @@ class _Newton:
     step: Float[np.ndarray, "lanes k1"]
 
 
-@np.errstate(divide="ignore", invalid="ignore")  # no second derivative along the null vector
+@np.errstate(
+    divide="ignore", over="ignore", invalid="ignore"
+)  # no second derivative along the null vector
 def _newton_step(
     mass: Float[np.ndarray, " unknowns"], known: Reduction, *, saddles: bool
 ) -> _Newton:
