@@ -36,7 +36,7 @@ FREE = {"unit", "name", "natural"}
 """Keys whose texts are free, or formulas."""
 FORMULAS = {"draw", "forces"}
 """Keys under which the text of a number is a formula."""
-UNLIMITED = {"lower", "upper"}
+UNLIMITED = {"lower", "upper", "period"}
 OPTIONAL = {"guesses", "normal"}
 
 
