@@ -136,7 +136,7 @@ NAMED: Mapping[str, Sequence[Any]] = {
     **dict.fromkeys(("distance", "reach"), NEGATIVE),
     **dict.fromkeys(("starts", "runs", "trials", "checks", "samples", "count"), (10**15, 10**400)),
 }
-UNBOUNDED = {"lower", "upper", "margin"}
+UNBOUNDED = {"lower", "upper", "margin", "period"}
 
 
 def wrong(name: str, annotation: Any, things: Things) -> Iterator[Any]:
