@@ -27,6 +27,9 @@ if os.environ.get("EQUIMORPH_SHAPES", "checked") != "unchecked":
 
 TENTHS = 10
 
+collect_ignore = ["typing/uses.py"]
+"""Read by type checkers, never run: half of its lines are wrong."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(

@@ -34,9 +34,13 @@ def _command(*words: str) -> tuple[int, str, str]:
     return code, out.getvalue(), err.getvalue()
 
 
-def _is_one_line(complaint: str) -> bool:
-    line = complaint.removesuffix("\n")
-    return line.startswith("equimorph: ") and line.isprintable() and 20 < len(line) < 500
+def _are_lines(complaint: str) -> bool:
+    """Whether each mistake has one line."""
+    lines = complaint.removesuffix("\n").split("\n")
+    return all(
+        line.startswith("equimorph: ") and line.isprintable() and 20 < len(line) < 500
+        for line in lines
+    )
 
 
 @contextmanager
@@ -57,7 +61,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _check(content: bytes, file: Path) -> bool:
-    """Whether a study is sound; if it is not, there is one line."""
+    """Whether a study is sound; if it is not, there is a line for each mistake."""
     file.write_bytes(content)
     with unchecked():
         code, said, complaint = _command("check", str(file))
@@ -67,7 +71,7 @@ def _check(content: bytes, file: Path) -> bool:
         assert complaint == ""
     else:
         assert code == 2
-        assert _is_one_line(complaint), complaint
+        assert _are_lines(complaint), complaint
     return code == 0
 
 
@@ -120,5 +124,5 @@ def _run(file: Path, out: Path) -> None:
         assert "Equilibrium set computed" in said or "Map " in said
         assert (out / "index.html").is_file()
     else:
-        assert _is_one_line(complaint.splitlines()[-1] + "\n"), complaint
+        assert _are_lines(complaint.splitlines()[-1] + "\n"), complaint
         assert not (out / "index.html").exists()

@@ -18,7 +18,11 @@ def blind(search):
 
     def some(*args, **options):
         found = search(*args, **options)
-        return [each[np.flatnonzero((each.index > 0) | (each.z[:, 0] > 2.0))] for each in found]
+        seen = [np.flatnonzero((each.index > 0) | (each.z[:, 0] > 2.0)) for each in found]
+        return [
+            replace(each, z=each.z[some], p=each.p[some])
+            for each, some in zip(found, seen, strict=True)
+        ]
 
     return some
 

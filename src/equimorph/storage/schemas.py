@@ -58,9 +58,10 @@ class Change:
 
 
 CHANGES: Mapping[str, Change] = {
-    "Audit": Change(version=5),
+    "Audit": Change(version=6),
     "LeastSnap": Change(version=2),
     "Proof": Change(version=2, removed=("status",)),  # it follows from `why` and `bounds`
+    "Schedule": Change(version=2),  # older ones have no times
     "Shapes": Change(version=2, renamed={"wanted": "targets"}),
 }
 """Changes by class; a class that is not listed is as it was in version 1."""

@@ -67,8 +67,14 @@ def retime(
     sampling
         Samples per unit of time, as a controller takes them: the motion is made longer by less than
         one of them so that it ends with a sample. None: 200 samples in all.
-    start, structure, within, margin
-        As of `verify`.
+    start
+        State in which the schedule begins; as of `verify`.
+    structure
+        Structure of a schedule that was read from a file; as of `verify`.
+    within
+        Constraints to obey on the way.
+    margin
+        Smallest stability margin allowed.
 
     Returns
     -------

@@ -91,8 +91,10 @@ def speed_limit(
     damping
         Damping of the material over its stiffness, η = c/k, in units of time. By default 0.27/ω₁
         with the lowest frequency ω₁ at the start: 14 % of critical damping, or more.
-    start, structure
-        As of `verify`.
+    start
+        State in which the schedule begins; as of `verify`.
+    structure
+        Structure of a schedule that was read from a file; as of `verify`.
 
     Returns
     -------
@@ -156,7 +158,18 @@ def deviation_bound(
 ) -> tuple[Steps, Steps]:
     """Times, and the deviation to be expected at each, of a schedule with times.
 
-    The bound of `speed_limit`, with its assumptions and arguments, in the unit of length.
+    The bound of `speed_limit`, with its assumptions, in the unit of length.
+
+    Parameters
+    ----------
+    schedule
+        Schedule with times.
+    damping
+        Time by which the damping of a joint exceeds its stiffness; as in `speed_limit`.
+    start
+        State in which the schedule begins, where its structure has several.
+    structure
+        Structure of a schedule that was read from a file without one.
 
     Raises
     ------
