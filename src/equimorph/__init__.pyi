@@ -3,6 +3,7 @@
 from . import (
     charts as charts,
     cli as cli,
+    control as control,
     dynamics as dynamics,
     equilibria as equilibria,
     errors as errors,
@@ -35,6 +36,11 @@ from .charts import (
     nearest as nearest,
     quasi_static as quasi_static,
     reduce as reduce,
+)
+from .control import (
+    Belief as Belief,
+    Controller as Controller,
+    ControlStatus as ControlStatus,
 )
 from .dynamics import (
     HeldLanding as HeldLanding,

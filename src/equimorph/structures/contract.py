@@ -166,9 +166,9 @@ class Structure(Equations):
         """Whether natural states are defined at parameters; they need not exist everywhere."""
         return np.ones(len(p), bool)
 
+    @abstractmethod
     def unloaded(self) -> Mapping[str, float]:
-        """Parameter values at which natural states are defined: all loads zero by default."""
-        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
+        """Parameter values at which natural states are defined (loads at zero)."""
 
     def natural_parameters(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameters"]:
         """Parameters of a natural state: loads as in `unloaded`, the rest as given or by default.

@@ -1,7 +1,7 @@
 """Structures of finitely many unknowns whose KKT matrix is sparse, and their natural states."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 
@@ -171,6 +171,10 @@ class DiscreteStructure(JointEquations, Structure):
         """Natural state, continued from the default parameters."""
         start = np.where(np.isnan(self._reference), p, self._reference)
         return continue_equilibria(self, self.natural_guess, start, p)
+
+    def unloaded(self) -> Mapping[str, float]:
+        """All loads zero."""
+        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
 
     @check_arguments
     def natural_state(self, **values: float) -> State:

@@ -1,6 +1,7 @@
 """The constrained spring: one degree of freedom, everything in closed form."""
 
 import re
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -203,6 +204,10 @@ class Spring(Structure):
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded: the stress-free spring δ = arccos x_l for x_l < 1, else δ = 0."""
         return np.arccos(np.minimum(p[:, :1], 1.0)), np.ones(len(p), bool)
+
+    def unloaded(self) -> Mapping[str, float]:
+        """F = 0."""
+        return {"F": 0.0}
 
     @check_arguments
     def natural_state(self, **values: float) -> State:

@@ -231,6 +231,10 @@ class AnyRod(HeavyRod):
 
     # --- natural states -------------------------------------------------------------------------
 
+    def unloaded(self) -> Mapping[str, float]:
+        """All loads zero."""
+        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
+
     @check_arguments
     def natural_state(self, **values: float) -> State:
         """Natural state at given actuators: unloaded, continued from the stress-free rod.
