@@ -62,6 +62,7 @@ def test_the_examples_have_no_errors_in_strict_mode(tmp_path: Path):
     assert [f"{each['file']}: {each['message']}" for each in errors] == []
 
 
+@pytest.mark.slow
 def test_completion_lists_classes_methods_and_arguments():
     """By jedi, as notebooks and prompts use it: it reads the stub, it does not run the code."""
     project = jedi.Project(str(ROOT), added_sys_path=[str(ROOT / "src")])

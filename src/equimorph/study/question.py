@@ -247,7 +247,9 @@ class Kind(ABC, Generic[A]):
     def refusal(self, question: Question, answer: A) -> str:
         """Say why the question was refused; empty if it was answered."""
         del question
-        return str(getattr(answer, "why", "")) if getattr(answer, "status", "") == "refused" else ""
+        status = getattr(answer, "status", "")  # maps have one for each setting
+        is_refused = isinstance(status, str) and status == "refused"
+        return str(getattr(answer, "why", "")) if is_refused else ""
 
     def line(self, question: Question, answer: A) -> str:
         """Return the verdict or the refusal as one line for the screen, in rich's markup."""
