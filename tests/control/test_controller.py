@@ -80,10 +80,10 @@ def test_a_spring_arrives_under_a_load_that_jumps(controller, begun, seed):
     belief = controller.run(begun, plant.read, plant.write, 40)
     assert not plant.snapped
     assert plant.least > 0.0
-    if belief.status == em.ControlStatus.ARRIVED:
-        assert controller.command(belief) == {"x_l": pytest.approx(0.7)}
-        spread = np.sqrt(belief.covariance[0, 0])
-        assert abs(belief.state["F"] - plant.state["F"]) < 5.0 * spread
+    assert belief.status == em.ControlStatus.ARRIVED
+    assert controller.command(belief) == {"x_l": pytest.approx(0.7)}
+    spread = np.sqrt(belief.covariance[0, 0])
+    assert abs(belief.state["F"] - plant.state["F"]) < 5.0 * spread
 
 
 def test_a_load_that_takes_the_goal_away_stops_it(controller, begun):
@@ -115,6 +115,17 @@ def test_what_no_state_explains_is_named(controller, begun):
     assert belief.status == em.ControlStatus.NOT_EXPLAINED
     assert controller.command(belief) == controller.command(begun)
     assert "1 measured value" in belief.why
+
+
+def test_starts_and_goals_are_stable_states_of_the_problem(controller, begun, spring_set):
+    angle = spring_set.structure.angle
+    elsewhere = em.lift(begun.state, {"F": 0.2}).end.state
+    unstable = next(each for each in spring_set.at(x_l=0.55) if each.index == 1)
+    for state, words in ((elsewhere, "fixed parameters"), (unstable, "must be stable")):
+        with pytest.raises(em.errors.InputError, match=words):
+            controller.start(state)
+        with pytest.raises(em.errors.InputError, match=words):
+            em.Controller(spring_set, state, {angle: 0.1}, {"F": 0.1})
 
 
 def test_wrong_input_is_refused(controller, begun, spring_set):

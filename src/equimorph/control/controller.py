@@ -25,6 +25,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks import Route, plan
+from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, check_stable
 from equimorph.tolerances import SAME_STATE, SAME_TO_ROUNDING
 
 SURPRISING = 1e-4
@@ -141,6 +142,12 @@ class Controller:
         _check_sizes("stride", {"the stride": self.stride})
         if isinstance(self.goal, Route) and not self.goal.arrived:
             raise InputError("`goal` must be a state or a route that arrived; got a refused route.")
+        self._check_end("goal", self.goal if isinstance(self.goal, State) else _end_of(self.goal))
+
+    def _check_end(self, name: str, state: State) -> None:
+        check_equilibrium(name, state)
+        check_stable(name, state)
+        check_fixed_parameters(name, state, self.eset)
 
     def command(self, belief: Belief) -> Command:
         """Actuators that are to be applied, by name."""
@@ -160,6 +167,7 @@ class Controller:
         InputError
             If `state` is no stable state of the set's problem.
         """
+        self._check_end("state", state)
         here = Belief(state, self._drift, (), state.p[self._loads], ControlStatus.FOLLOWING)
         likely = self._under(state, self._loads_of(here))
         if isinstance(self.goal, Route) and self._route_is_safe(likely, self.goal.way_points):
@@ -190,12 +198,16 @@ class Controller:
         likely = self._under(belief.state, self._loads_of(belief))
         if not likely.keep(self.margin).all():
             return self._retreat(belief)
-        if self._is_stale(belief) and not self._route_is_safe(likely, belief.way_points):
-            belief = self._replanned(belief, likely)
-            if belief.status == ControlStatus.NO_SAFE_WAY:
-                return belief
+        if self._is_stale(belief):
+            if self._route_is_safe(likely, belief.way_points):
+                belief = replace(belief, checked=belief.state.p[self._loads])
+            else:
+                belief = self._replanned(belief, likely)
+        if belief.status == ControlStatus.NO_SAFE_WAY:
+            return belief
         return self._strode(belief, likely)
 
+    @check_arguments
     def run(
         self,
         belief: Belief,
@@ -238,7 +250,7 @@ class Controller:
         """Belief with the measurement; on another sheet if this one does not explain it."""
         prior = belief.covariance + self._drift
         if len(measured.values) == 0:
-            return replace(belief, covariance=prior)
+            return replace(belief, covariance=prior, status=ControlStatus.FOLLOWING, why="")
         best = self._fit(belief.state, prior, measured)
         if self._is_surprising(best, measured):  # a load jumped, or the structure did
             wide = prior + np.diag(self._jumps**2)
@@ -251,10 +263,9 @@ class Controller:
                 belief, status=ControlStatus.NOT_EXPLAINED, why=why, surprise=likely,
                 covariance=prior,
             )  # fmt: skip
-        status = ControlStatus.FOLLOWING
         return replace(
-            belief, state=best.state, covariance=best.covariance, status=status, why="",
-            surprise=likely,
+            belief, state=best.state, covariance=best.covariance, surprise=likely,
+            status=ControlStatus.FOLLOWING, why="",
         )  # fmt: skip
 
     def _fit(self, state: State, prior: np.ndarray, measured: Measurement) -> Estimate:
@@ -286,12 +297,10 @@ class Controller:
         z, p = state.z[None].repeat(count, 0), state.p[None].repeat(count, 0)
         return moved(States(self.structure, z, p), list(self.unknown), loads, self.within)
 
-    def _after(self, likely: Moved, targets: Float[np.ndarray, "moves d"]) -> Moved:
-        """The states under likely loads after each of some moves, one move after the other."""
-        moves, states = len(targets), likely.states
-        z, p = np.tile(states.z, (moves, 1)), np.tile(states.p, (moves, 1))
-        goals = targets.repeat(len(states), axis=0)
-        return moved(States(self.structure, z, p), self.eset.names, goals, self.within)
+    def _driven(self, likely: Moved, target: Float[np.ndarray, " d"]) -> Moved:
+        """The states under likely loads after a move of the actuators."""
+        goals = target[None].repeat(len(likely.states), 0)
+        return moved(likely.states, self.eset.names, goals, self.within)
 
     def _borne(self, belief: Belief, target: Float[np.ndarray, " d"]) -> float:
         """Smallest margin under likely loads after a move under the estimated ones."""
@@ -317,9 +326,8 @@ class Controller:
         for point in way_points:
             if not likely.keep(self.margin).all():
                 return False
-            here = likely.states.p[:, self._actuators]
-            goals = np.array([_towards(point, self.eset.names, row) for row in here])
-            likely = moved(likely.states, self.eset.names, goals, self.within)
+            here = likely.states.p[0, self._actuators]  # the actuators are the same in all
+            likely = self._driven(likely, _towards(point, self.eset.names, here))
         return bool(likely.keep(self.margin).all() and self._is_goal(likely.states).all())
 
     def _is_goal(self, states: States) -> Flags:
@@ -373,7 +381,7 @@ class Controller:
         whole = min(1.0, self.stride / float(np.linalg.norm((there - here) / scales)))
         for share in SHARES:
             target = there if share * whole == 1.0 else here + share * whole * (there - here)
-            after = self._after(likely, target[None])
+            after = self._driven(likely, target)
             if after.keep(self.margin).all():
                 return replace(belief, state=after.states[0], way_points=tuple(ahead))
         changed = self._replanned(belief, likely)
