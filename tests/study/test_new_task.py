@@ -18,7 +18,6 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress, Silent
 from equimorph.structures import State
 from equimorph.study import Outcome
-from equimorph.study.answers import heading
 from equimorph.study.kinds import KINDS
 from equimorph.study.prepare import Problem
 from equimorph.study.question import Kind, Question
@@ -64,14 +63,8 @@ class HeightKind(Kind[Height]):
     table = "height"
     tasks = (height_above,)
 
-    def figures(self, question: Question, eset: EquilibriumSet | None, answer: Height) -> list[Any]:
-        return []
-
-    def report(self, question: Question, answer: Height, folder: Path) -> list[str]:
-        return [heading(question), f"<p>{answer.above}</p>"]
-
-    def verdict(self, question: Question, answer: Height) -> str:
-        return f"{question.title}: {answer.above}"
+    def words(self, question: Question, answer: Height) -> str:
+        return f"**above** by {answer.above:.6f}"
 
 
 GIVEN = {
@@ -106,7 +99,10 @@ def test_names_are_looked_up_and_the_task_is_called(finished: tuple[Outcome, Pat
     assert question["descriptor"] == outcome.problem.structure.descriptor("angle")
     found = question.answer(outcome.equilibrium_set, Silent())
     assert found.above == pytest.approx(0.6435011088 - 0.5, abs=1e-9)
-    assert question.kind.report(question, found, Path())[0] == "<h2>Height here</h2>"
+    title, words = question.kind.report(question, outcome.equilibrium_set, found, Path())
+    assert title == "<h2>Height here</h2>"
+    assert words == '<p class="verdict"><strong>Above</strong> by 0.143501</p>'
+    assert question.kind.line(question, found) == "Height here: [bold green]above[/] by 0.143501"
 
 
 @pytest.mark.parametrize(

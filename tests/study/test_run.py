@@ -100,7 +100,7 @@ def test_the_page_needs_nothing_from_elsewhere(finished: tuple[Outcome, Path]):
 def test_the_page_says_the_answers(finished: tuple[Outcome, Path]):
     outcome, out = finished
     page = (out / "index.html").read_text(encoding="utf-8")
-    assert "Arrived." in page
+    assert "<strong>Arrived</strong>" in page
     assert "3 found, 2 of them stable" in page
     assert "0.6435" in page
     assert "Audit: clean" in page

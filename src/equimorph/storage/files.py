@@ -1,12 +1,15 @@
 """Files that a reader finds old or new, never half-written, and locks on them."""
 
+import csv
 import fcntl
 import hashlib
+import io
 import json
+import math
 import os
 import socket
 import tempfile
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -63,6 +66,23 @@ def write_bytes(path: Path, content: bytes) -> Path:
 def write_text(path: Path, text: str) -> Path:
     """Write a text file in one step."""
     return write_bytes(path, text.encode("utf-8"))
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return a table as text: entries with commas between them, a line for each row."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def number_text(value: float) -> str:
+    """Return the shortest decimal that gives a number back exactly; nothing for no number."""
+    return repr(float(value)) if math.isfinite(value) else ""
+
+
+def write_csv(path: Path, rows: Iterable[Iterable[object]]) -> Path:
+    """Write a table of texts and numbers in one step."""
+    return write_text(path, csv_text(rows))
 
 
 def read_text(path: Path) -> str:

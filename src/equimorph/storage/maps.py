@@ -1,8 +1,5 @@
 """Maps over actuator settings: as HDF5 groups, and as tables for people."""
 
-import csv
-import io
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +9,7 @@ from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.model import Grid
-from equimorph.storage.files import write_text
+from equimorph.storage.files import number_text, write_csv
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json
 from equimorph.storage.owner import Owner, words_of
 from equimorph.structures import States, Structure
@@ -138,36 +135,29 @@ def write_map(amap: ActuatorMap, path: str | Path) -> tuple[Path, Path]:
         If the files cannot be written.
     """
     table = Path(path)
+    curves = table.with_name(f"{table.stem}-curves.csv")
+    return write_csv(table, rows_of_settings(amap)), write_csv(curves, rows_of_curves(amap))
+
+
+def rows_of_settings(amap: ActuatorMap) -> list[list[str]]:
+    """Values of a map, setting by setting, below a head."""
     first, second = amap.grid.axes()
     settings = ((x, y) for x in first.tolist() for y in second.tolist())
     known = zip(amap.value.ravel().tolist(), amap.status.ravel().tolist(), strict=True)
     rows = (
-        [repr(x), repr(y), _number(value), amap.kinds[status]]
+        [repr(x), repr(y), number_text(value), amap.kinds[status]]
         for (x, y), (value, status) in zip(settings, known, strict=True)
     )
-    write_text(table, _csv([*amap.grid.names, "value", "status"], rows))
-    points = (
-        [str(k), curve.kind, repr(x), repr(y), _number(low), _number(high), f"{error:.1e}"]
+    return [[*amap.grid.names, "value", "status"], *rows]
+
+
+def rows_of_curves(amap: ActuatorMap) -> list[list[str]]:
+    """Curves of a map, point by point, below a head."""
+    rows = (
+        [str(k), curve.kind, repr(x), repr(y), number_text(low), number_text(high), f"{error:.1e}"]
         for k, curve in enumerate(amap.curves)
         for (x, y), (low, high), error in zip(
             curve.points.tolist(), curve.values.tolist(), curve.errors.tolist(), strict=True
         )
     )
-    curves = table.with_name(f"{table.stem}-curves.csv")
-    write_text(
-        curves, _csv(["curve", "kind", *amap.grid.names, "lower", "higher", "error"], points)
-    )
-    return table, curves
-
-
-def _number(value: float) -> str:
-    """Shortest decimal that gives the number back exactly; nothing for none."""
-    return repr(value) if np.isfinite(value) else ""
-
-
-def _csv(header: list[str], rows: Iterable[list[str]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return text.getvalue()
+    return [["curve", "kind", *amap.grid.names, "lower", "higher", "error"], *rows]

@@ -21,7 +21,7 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.model import Schedule
-from equimorph.storage.files import read_text, write_text
+from equimorph.storage.files import read_text, write_csv, write_text
 
 FORMAT = "equimorph schedule"
 VERSION = 2
@@ -71,7 +71,7 @@ def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, ...]:
         text = json.dumps({**sidecar, COLUMNS: lists}, indent=1, ensure_ascii=False)
         write_text(sidecar_path, text + "\n")
         return (sidecar_path,)
-    write_text(table_path, _csv(list(columns), table))
+    write_csv(table_path, [list(columns), *(map(repr, row) for row in table.tolist())])
     write_text(sidecar_path, json.dumps(sidecar, indent=2, ensure_ascii=False) + "\n")
     return table_path, sidecar_path
 
@@ -196,15 +196,6 @@ def _loads(schedule: Schedule) -> dict[str, float | str]:
             constant = bool((values == values[0]).all())
             loads[name] = float(values[0]) if constant else "varies: see the table"
     return loads
-
-
-def _csv(header: list[str], table: Float[np.ndarray, "steps columns"]) -> str:
-    """Shortest decimals that give every number back exactly."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([[repr(value) for value in row] for row in table.tolist()])
-    return text.getvalue()
 
 
 def _checksum(sidecar: dict[str, Any], table: Float[np.ndarray, "steps columns"]) -> str:

@@ -1,6 +1,5 @@
 """What answers of several kinds have in common: states of the set, ways on it, snaps on a way."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from functools import partial
 from html import escape
@@ -11,40 +10,27 @@ from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.plotting.curves import snap_steps
-from equimorph.structures import States
+from equimorph.structures import State, States
 from equimorph.study import html
-from equimorph.study.names import route_figures
 from equimorph.study.question import Figure, Question, still
 from equimorph.tasks import Route, Tracking, Verification
-
-
-def heading(question: Question) -> str:
-    """Return the heading of an answer."""
-    return f"<h2>{escape(question.title)}</h2>"
 
 
 def figures_of_states(
     question: Question, eset: EquilibriumSet | None, states: States
 ) -> list[Figure]:
     """Where the states lie on the plane of two free parameters."""
-    assert eset is not None
-    if len(eset.names) != 2:
+    if eset is None or len(eset.names) != 2 or not len(states):
         return []
-    return [still(question.files, partial(plotting.solutions, eset, states))]
+    draw = partial(plotting.solutions, eset, states)
+    return [still(question.files, draw, "Where they lie: full dots are stable.")]
 
 
-def report_of_states(
-    question: Question,
-    folder: Path,
-    states: States,
-    descriptors: Sequence[Descriptor],
-    more: Mapping[str, list[str]] | None = None,
+def table_of_states(
+    states: States, descriptors: Sequence[Descriptor], more: Mapping[str, list[str]] | None = None
 ) -> list[str]:
-    """Return a numbered table of states, with the plane on which they lie."""
-    file = f"{question.files}.png"
-    picture = html.pictures(folder, {}, {file: "Where they lie: full dots are stable."})
-    table = html.table_of_states(states, descriptors, more, numbered=True)
-    return [picture, table, html.EXPLANATION]
+    """Return a table of states, numbered as on their figure."""
+    return [html.table_of_states(states, descriptors, more, numbered=True), html.EXPLANATION]
 
 
 def free_columns(
@@ -59,40 +45,47 @@ def free_columns(
     }
 
 
+def place_of(values: State | Mapping[str, float], names: Sequence[str]) -> str:
+    """Parameters in words: ``x_l = 0.8, F = 0.02``."""
+    return ", ".join(f"{name} = {html.number(round(values[name], 12), 6)}" for name in names)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun: ``1 run``, ``2 runs``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def as_route(answer: Tracking | Verification, status: Literal["arrived", "refused"]) -> Route:
     """The way of a motion or a schedule as a route, for figures."""
     way, length = answer.path, float(answer.path.length[-1])
     return Route(status, answer.why, [], way, answer.margin, length, answer.schedule)
 
 
-def figures_of_way(eset: EquilibriumSet | None, name: str, route: Route) -> Sequence[Figure]:
+def figures_of_way(eset: EquilibriumSet | None, name: str, route: Route, what: str) -> list[Figure]:
     """Shapes and margins; the plane (alone if refused) and a film over two parameters.
 
-    Over fewer or more, the parameters that move instead.
+    Over fewer or more, the parameters that move instead. `what` is "route" or "motion".
     """
-    names = route_figures(name)
-    shapes = still(names.shapes, partial(plotting.shapes, route))
-    margins = still(names.margins, partial(plotting.margins, route))
+    shapes = still(
+        f"{name}-shapes", partial(plotting.shapes, route),
+        f"Shapes at equal steps along the {what}, start to goal.",
+    )  # fmt: skip
+    margins = still(
+        f"{name}-margins", partial(plotting.margins, route),
+        f"How far each state is from instability along the {what}.",
+    )  # fmt: skip
     if eset is None or len(eset.names) != 2:
         if not route.arrived or route.schedule is None:
             return []
-        moves = still(names.parameters, partial(plotting.schedule_strips, route.schedule))
-        return [moves, shapes, margins]
-    plane = still(names.plane, partial(plotting.parameter_plane, eset, route))
-    film = Figure((names.film,), partial(_draw_film, eset, route, names.film))
+        draw = partial(plotting.schedule_strips, route.schedule)
+        caption = f"Parameters that move along the {what}."
+        return [still(f"{name}-parameters", draw, caption), shapes, margins]
+    draw_plane = partial(plotting.parameter_plane, eset, route)
+    caption = f"The {what} on the plane of the free parameters."
+    plane, gif = still(f"{name}-plane", draw_plane, caption), f"{name}-film.gif"
+    draw_film = partial(_draw_film, eset, route, gif)
+    film = Figure((gif,), draw_film, f"The structure along the {what}.", wide=True)
     return [plane, shapes, margins, film] if route.arrived else [plane]
-
-
-def pictures_of_way(folder: Path, name: str, what: str) -> str:
-    """Those of the figures that there are, with captions; `what` is "route" or "motion"."""
-    names = route_figures(name)
-    captions = {
-        f"{names.plane}.png": f"The {what} on the plane of the free parameters.",
-        f"{names.parameters}.png": f"Parameters that move along the {what}.",
-        f"{names.shapes}.png": f"Shapes at equal steps along the {what}, start to goal.",
-        f"{names.margins}.png": f"How far each state is from instability along the {what}.",
-    }
-    return html.pictures(folder, {names.film: f"The structure along the {what}."}, captions)
 
 
 def _draw_film(eset: EquilibriumSet, route: Route, name: str, folder: Path) -> None:
@@ -100,29 +93,25 @@ def _draw_film(eset: EquilibriumSet, route: Route, name: str, folder: Path) -> N
 
 
 def snaps_in_words(route: Route) -> str:
-    """Return how many snaps there are, and what energy they release; nothing without one."""
+    """Return how many snaps there are, and what energy they release."""
     if not route.snaps:
-        return ""
+        return "without a snap"
     count = len(route.snaps)
     released = html.number(sum(each.released for each in route.snaps))
-    snaps = "1 snap that releases" if count == 1 else f"{count} snaps that release"
-    return f"by {snaps} {released} of energy"
+    verb = "releases" if count == 1 else "release"
+    return f"by {counted(count, 'snap')} that {verb} {released} of energy"
 
 
-def report_of_snaps(route: Route) -> list[str]:
+def table_of_snaps(route: Route) -> list[str]:
     """Return a table of the snaps: where, from what to what, and the energy released."""
     if not route.snaps:
         return []
     assert route.path is not None
     before = [route.path.states[int(step)] for step in snap_steps(route)]
     height, energy = before[0].structure.elevation, before[0].structure.descriptor("energy")
-    moved = [
-        each.name
-        for each, lowest, highest in zip(
-            before[0].structure.parameters, *_range(route), strict=True
-        )
-        if highest > lowest
-    ]
+    varies = route.path.states.p.max(axis=0) > route.path.states.p.min(axis=0)
+    parameters = zip(before[0].structure.parameters, varies, strict=True)
+    moved = [each.name for each, is_moved in parameters if is_moved]
     rows = [
         [
             str(number),
@@ -136,15 +125,3 @@ def report_of_snaps(route: Route) -> list[str]:
     named = f"{height.name} ({height.unit})"
     head = ["snap", *moved, f"{named} before", f"{named} after", f"{energy.name} released"]
     return [html.table([escape(each) for each in head], rows)]
-
-
-def _range(route: Route) -> tuple[list[float], list[float]]:
-    assert route.path is not None
-    p = route.path.states.p
-    return p.min(axis=0).tolist(), p.max(axis=0).tolist()
-
-
-def write_rows(path: Path, rows: Sequence[Sequence[object]]) -> None:
-    """Write a table of texts and numbers."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)

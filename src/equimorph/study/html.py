@@ -1,6 +1,7 @@
 """Pieces of a page that needs nothing but itself."""
 
 import base64
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -20,6 +21,8 @@ EXPLANATION = (
     "<p>Index: number of directions in which the energy falls. Margin: smallest stiffness in "
     "any direction, negative where unstable.</p>"
 )
+BOLD = re.compile(r"\*\*(.+?)\*\*")
+"""What is bold on page and screen, in the words on an answer."""
 _MEDIA = {".png": "image/png", ".gif": "image/gif"}
 
 
@@ -65,24 +68,27 @@ def figure(file: Path, caption: str, *, larger: str = "", wide: bool = False) ->
     return f"<figure{kind}>{linked}<figcaption>{words}</figcaption></figure>"
 
 
-def still(folder: Path, name: str, caption: str) -> str:
-    """Return the picture ``name.png`` of a folder, which links to ``name.svg``."""
-    return figure(folder / f"{name}.png", caption, larger=f"{name}.svg")
+def pictures(folder: Path, wide: Mapping[str, str], small: Mapping[str, str]) -> str:
+    """Return those of some pictures that are in a folder, by file name with their captions.
+
+    A PNG links to the SVG of the same name.
+    """
+    shown = [
+        figure(
+            folder / name, text, larger=name.replace(".png", ".svg") * name.endswith(".png"),
+            wide=name in wide,
+        )
+        for name, text in {**wide, **small}.items()
+        if (folder / name).exists()
+    ]  # fmt: skip
+    return f'<div class="figures">{"".join(shown)}</div>'
 
 
-def pictures(folder: Path, wide: Mapping[str, str], captions: Mapping[str, str]) -> str:
-    """Return those of some pictures that are in a folder, by file name with their captions."""
-    large = [
-        figure(folder / name, text, wide=True)
-        for name, text in wide.items()
-        if (folder / name).exists()
-    ]
-    small = [
-        figure(folder / name, text, larger=name.replace(".png", ".svg"))
-        for name, text in captions.items()
-        if (folder / name).exists()
-    ]
-    return f'<div class="figures">{"".join([*large, *small])}</div>'
+def found_line(words: str) -> str:
+    """Return the paragraph of an answer; what stands between two pairs of stars is bold."""
+    text = BOLD.sub(lambda bold: f"<strong>{bold[1].capitalize()}</strong>", escape(words), count=1)
+    kind = ' class="verdict"' if text.startswith("<strong>") else ""
+    return f"<p{kind}>{text}</p>"
 
 
 def refusal_line(why: str) -> str:
@@ -97,6 +103,14 @@ def schedule_links(table: str) -> str:
         f'<p>Actuator schedule: <a href="{table}">{table}</a>, with the structure, the first state '
         f'and the loads in <a href="{sidecar}">{sidecar}</a>.</p>'
     )
+
+
+def table_links(contents: Mapping[str, str]) -> list[str]:
+    """Return a line with links to tables, each with what is in it; nothing without tables."""
+    links = ", ".join(
+        f'<a href="{file}">{file}</a> ({escape(content)})' for file, content in contents.items()
+    )
+    return [f"<p>Tables: {links}.</p>"] if links else []
 
 
 def extent(box: Box, fixed: Mapping[str, float], constraints: Sequence[Constraint]) -> list[str]:

@@ -1,7 +1,5 @@
 """What the files of a results folder are called."""
 
-from dataclasses import dataclass
-
 INPUT_COPY = "study.toml"
 RESULTS = "results.h5"
 REPORT = "index.html"
@@ -10,33 +8,6 @@ SURFACE = "surface"
 DIAGRAM = "diagram"
 PLANE = "parameter-plane"
 STABLE_PLANE = "stable-plane"
-
-
-@dataclass(frozen=True)
-class RouteFigures:
-    """File names of the figures of one route, without extension; the film's with it."""
-
-    plane: str
-    parameters: str
-    shapes: str
-    margins: str
-    film: str
-
-
-def route_figures(name: str) -> RouteFigures:
-    """File names of the figures of the route called `name`."""
-    return RouteFigures(
-        f"{name}-plane",
-        f"{name}-parameters",
-        f"{name}-shapes",
-        f"{name}-margins",
-        f"{name}-film.gif",
-    )
-
-
-def map_files(name: str) -> str:
-    """Beginning of the names of all files of the map called `name`: a figure and two tables."""
-    return f"{name}-map"
 
 
 def task_files(table: str, name: str) -> str:

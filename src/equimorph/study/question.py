@@ -1,8 +1,9 @@
 """Questions of a study: sections and look-ups come from the signature of a task.
 
-A kind of question names its task, draws its figures and says its words. What a user may write, the
-defaults, and how names become objects follow from the task's signature, see `arguments`; what each
-key means, from its docstring.
+A kind of question names its task and says what was found; where there is more to show, it draws
+figures and gives tables. What a user may write, the defaults, and how names become objects follow
+from the task's signature, see `arguments`; what each key means, from its docstring. Page, screen
+and files follow from what the kind says.
 """
 
 import inspect
@@ -10,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from html import escape
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -21,12 +23,15 @@ from rich.markup import escape as plain
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress, Schedule
+from equimorph.storage import write_schedule
+from equimorph.storage.files import write_csv
 from equimorph.structures import Structure
+from equimorph.study import html
 from equimorph.study.arguments import Argument
 from equimorph.study.fields import TaskSection
 from equimorph.study.findings import Findings
 from equimorph.study.lookup import Extent, Ground, Later, at_key
-from equimorph.study.names import task_files
+from equimorph.study.names import schedule_table, task_files
 from equimorph.study.signatures import arguments_of
 
 A = TypeVar("A")
@@ -35,10 +40,49 @@ Drawing = Axes | Drawn
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a study: its files, and how they get into a folder."""
+    """A figure of a study.
+
+    Parameters
+    ----------
+    files
+        Names of its files; the page shows the first.
+    draw
+        Draws it into a folder.
+    caption
+        What the page says below it, as plain text.
+    wide
+        Whether it takes a whole row of the page.
+    """
 
     files: tuple[str, ...]
     draw: Callable[[Path], None]
+    caption: str
+    wide: bool = False
+
+
+def still(name: str, draw: Callable[[], Drawing], caption: str, *, wide: bool = False) -> Figure:
+    """Figure that does not move, as PNG and SVG."""
+    return Figure((f"{name}.png", f"{name}.svg"), partial(_save, draw, name), caption, wide)
+
+
+def _save(draw: Callable[[], Drawing], name: str, folder: Path) -> None:
+    plotting.save(draw(), folder, name)
+
+
+def pictures(folder: Path, figures: Sequence[Figure]) -> list[str]:
+    """Pieces of the page with those of some figures that are in the folder."""
+    wide = {each.files[0]: each.caption for each in figures if each.wide}
+    small = {each.files[0]: each.caption for each in figures if not each.wide}
+    return [html.pictures(folder, wide, small)] if figures else []
+
+
+@dataclass(frozen=True)
+class DataTable:
+    """A table for other programs: name of its file, what it holds, and its rows, the head first."""
+
+    file: str
+    content: str
+    rows: Sequence[Sequence[object]]
 
 
 @dataclass(frozen=True)
@@ -227,22 +271,28 @@ class Kind(ABC, Generic[A]):
         answer: A = task(**arguments.of(task))
         return answer
 
-    def write_tables(self, question: Question, answer: A, folder: Path) -> None:
-        """Write what people open with other programs."""
-
-    @abstractmethod
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: A
     ) -> Sequence[Figure]:
         """Figures of the answer."""
+        return ()
+
+    def tables(self, question: Question, answer: A) -> Sequence[DataTable]:
+        """What people open with other programs."""
+        return ()
+
+    def schedules(self, question: Question, answer: A) -> Mapping[str, Schedule]:
+        """Schedules by what the names of their files begin with."""
+        found = getattr(answer, "schedule", None)
+        return {} if found is None else {question.files: found}
 
     @abstractmethod
-    def report(self, question: Question, answer: A, folder: Path) -> list[str]:
-        """Pieces of the page; the figures are in the folder."""
+    def words(self, question: Question, answer: A) -> str:
+        """Say what was found, in one paragraph for page and screen; ``**found**`` is bold there."""
 
-    @abstractmethod
-    def verdict(self, question: Question, answer: A) -> str:
-        """Return one line for the screen on an answer that is not refused, in rich's markup."""
+    def details(self, question: Question, answer: A) -> list[str]:
+        """Further pieces of the page, like tables."""
+        return []
 
     def refusal(self, question: Question, answer: A) -> str:
         """Say why the question was refused; empty if it was answered."""
@@ -251,18 +301,31 @@ class Kind(ABC, Generic[A]):
         is_refused = isinstance(status, str) and status == "refused"
         return str(getattr(answer, "why", "")) if is_refused else ""
 
-    def line(self, question: Question, answer: A) -> str:
-        """Return the verdict or the refusal as one line for the screen, in rich's markup."""
+    def write_files(self, question: Question, answer: A, folder: Path) -> None:
+        """Write tables and schedules."""
+        for table in self.tables(question, answer):
+            write_csv(folder / table.file, table.rows)
+        for name, schedule in self.schedules(question, answer).items():
+            write_schedule(schedule, folder / schedule_table(name))
+
+    def report(
+        self, question: Question, eset: EquilibriumSet | None, answer: A, folder: Path
+    ) -> list[str]:
+        """Pieces of the page; the figures are in the folder."""
         why = self.refusal(question, answer)
-        if not why:
-            return self.verdict(question, answer)
-        return f"{question.title}: [bold red]refused[/]. {plain(why)}"
+        return [
+            f"<h2>{escape(question.title)}</h2>",
+            html.refusal_line(why) if why else html.found_line(self.words(question, answer)),
+            *map(html.schedule_links, map(schedule_table, self.schedules(question, answer))),
+            *pictures(folder, self.figures(question, eset, answer)),
+            *self.details(question, answer),
+            *html.table_links({x.file: x.content for x in self.tables(question, answer)}),
+        ]
 
-
-def still(name: str, draw: Callable[[], Drawing]) -> Figure:
-    """Figure that does not move, as PNG and SVG."""
-    return Figure((f"{name}.png", f"{name}.svg"), partial(_save, draw, name))
-
-
-def _save(draw: Callable[[], Drawing], name: str, folder: Path) -> None:
-    plotting.save(draw(), folder, name)
+    def line(self, question: Question, answer: A) -> str:
+        """Return what was found or the refusal as one line for the screen, in rich's markup."""
+        why = self.refusal(question, answer)
+        words = f"**refused**. {why}" if why else self.words(question, answer)
+        colour = "red" if why else "green"
+        bold = rf"[bold {colour}]\1[/]"
+        return f"{question.title}: {html.BOLD.sub(bold, plain(words), count=1)}"

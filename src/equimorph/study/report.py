@@ -9,14 +9,14 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph import plotting
-from equimorph.manifold import Audit, EquilibriumSet
+from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, Progress
 from equimorph.structures import States
 from equimorph.study import html
 from equimorph.study.folder import ResultsFolder
 from equimorph.study.names import DIAGRAM, PLANE, STABLE_PLANE, SURFACE
 from equimorph.study.prepare import Outcome, Problem
-from equimorph.study.question import Figure, still
+from equimorph.study.question import Figure, pictures, still
 
 
 def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) -> None:
@@ -51,18 +51,26 @@ def _figures(outcome: Outcome) -> list[Figure]:
 def _figures_of_set(outcome: Outcome, eset: EquilibriumSet) -> list[Figure]:
     height = outcome.problem.ground.height
     if len(eset.names) == 1:
-        return [still(DIAGRAM, partial(plotting.diagram, eset, height))]
+        caption = "Equilibria over the free parameter: stable ones as full lines."
+        return [still(DIAGRAM, partial(plotting.diagram, eset, height), caption)]
     if len(eset.names) == 3:
         return []
     routes = [found[0] for found in outcome.of("route").values()]
     first = next((route for route in routes if route.arrived), None)
     figures = [
-        still(SURFACE, partial(plotting.surface, eset, height, route=first)),
-        still(STABLE_PLANE, partial(plotting.parameter_plane, eset, count="stable")),
-    ]
+        still(
+            SURFACE, partial(plotting.surface, eset, height, route=first),
+            "The equilibrium set, coloured by index, with its folds.", wide=True,
+        ),
+        still(
+            STABLE_PLANE, partial(plotting.parameter_plane, eset, count="stable"),
+            "Number of stable equilibria.",
+        ),
+    ]  # fmt: skip
     # With routes, each of them is shown on this plane; once more without it would say nothing new.
     if not routes:
-        figures.append(still(PLANE, partial(plotting.parameter_plane, eset)))
+        caption = "Number of equilibria over the free parameters."
+        figures.append(still(PLANE, partial(plotting.parameter_plane, eset), caption))
     return figures
 
 
@@ -82,11 +90,13 @@ def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
     """
     body = [f"<h1>{escape(title)}</h1>", _question(outcome.problem)]
     for each in outcome.answers:
-        body += each.question.kind.report(each.question, each.answer, folder)
+        body += each.question.kind.report(
+            each.question, outcome.equilibrium_set, each.answer, folder
+        )
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):
         body += _equilibria(point, states, _shown_descriptors(outcome.problem))
     if outcome.equilibrium_set is not None:
-        body += _set(outcome, outcome.equilibrium_set.audit, folder)
+        body += _set(outcome, outcome.equilibrium_set, folder)
     body += ["<h2>Study</h2>", f"<pre>{escape(text.strip())}</pre>", _colophon(outcome)]
     return html.page(title, body)
 
@@ -130,23 +140,13 @@ def _equilibria(
     ]
 
 
-def _set(outcome: Outcome, audit: Audit, folder: Path) -> list[str]:
+def _set(outcome: Outcome, eset: EquilibriumSet, folder: Path) -> list[str]:
+    audit = eset.audit
     word = "clean" if audit.clean else "not clean: do not rely on the set where it says so"
-    captions = {
-        SURFACE: "The equilibrium set, coloured by index, with its folds.",
-        DIAGRAM: "Equilibria over the free parameter: stable ones as full lines.",
-        STABLE_PLANE: "Number of stable equilibria.",
-        PLANE: "Number of equilibria over the free parameters.",
-    }
-    pictures = [
-        html.figure(folder / f"{name}.png", caption, larger=f"{name}.svg", wide=name == SURFACE)
-        for name, caption in captions.items()
-        if (folder / f"{name}.png").exists()
-    ]
     rows = [[escape(what), escape(value)] for what, value in audit.rows()]
     return [
         "<h2>Equilibrium set</h2>",
-        f'<div class="figures">{"".join(pictures)}</div>',
+        *pictures(folder, _figures_of_set(outcome, eset)),
         f"<h3>Audit: {word}</h3>",
         html.table([], rows, "words"),
         '<p>All of it is in <a href="results.h5">results.h5</a>, for ParaView '

@@ -209,7 +209,7 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
     with folder.adding() as staging:
         (staging / INPUT_COPY).write_text(text, encoding="utf-8")
         for each in outcome.answers:
-            each.question.kind.write_tables(each.question, each.answer, staging)
+            each.question.kind.write_files(each.question, each.answer, staging)
         if not folder.holds([RESULTS]):
             _write_results(outcome, staging / RESULTS)
 

@@ -5,27 +5,26 @@ from copy import deepcopy
 from dataclasses import dataclass
 from functools import partial
 from html import escape
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
-from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import parameter_vector
+from equimorph.storage.files import number_text
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study import html
-from equimorph.study.answers import heading, write_rows
+from equimorph.study.answers import counted
 from equimorph.study.data_files import DataFile, Measured, measured_shapes
 from equimorph.study.fields import Point, Positive
 from equimorph.study.lookup import at_key
-from equimorph.study.question import Arguments, Figure, Kind, Question, still
-from equimorph.tasks import Calibration, Family, calibrate
+from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
+from equimorph.tasks import Calibration, Family, MeasuredShape, calibrate
 from equimorph.tasks.calibration.unknowns import Kind as UnknownKind
 
 
@@ -93,75 +92,62 @@ class CalibrationKind(Kind[Calibration]):
         start = _natural_states(question.structure, data.measured)
         return calibrate(start, data.unknown, [data.measured.shape], family=data.family)
 
-    def write_tables(self, question: Question, answer: Calibration, folder: Path) -> None:
-        """Write the unknowns with their covariances; measured and fitted points side by side."""
+    def tables(self, question: Question, answer: Calibration) -> list[DataTable]:
+        """Return the unknowns with their covariances; measured and fitted points side by side."""
         head = ["unknown", "value", "deviation", *[f"covariance with {x}" for x in answer.names]]
         columns = zip(
             answer.names, answer.values, answer.deviations, answer.covariance, strict=True
         )
-        rows = [[name, *map(_entry, [x, error, *row])] for name, x, error, row in columns]
-        write_rows(folder / f"{question.files}.csv", [head, *rows])
-        points = np.asarray(question.extra.measured.shape.points, dtype=float)
-        fitted = answer.states.shape(np.asarray(question.extra.measured.shape.s, dtype=float))
-        rows = [["state", "s", "x", "y", "fitted x", "fitted y"]]
-        for state, (given, found) in enumerate(zip(points, fitted, strict=True), 1):
-            for s, here, there in zip(
-                question.extra.measured.shape.s or (), given, found, strict=True
-            ):
+        unknowns = [[name, *map(number_text, [x, error, *row])] for name, x, error, row in columns]
+        shape: MeasuredShape = question.extra.measured.shape
+        points, s = (np.asarray(each, dtype=float) for each in (shape.points, shape.s))
+        compared = [["state", "s", "x", "y", "fitted x", "fitted y"]]
+        for state, own in enumerate(zip(points, answer.states.shape(s), strict=True), 1):
+            for place, here, there in zip(s, *own, strict=True):
                 if np.isfinite(here).any():
-                    rows.append([str(state), *map(_entry, [s, *here, *there])])
-        write_rows(folder / f"{question.files}-points.csv", rows)
+                    compared.append([str(state), *map(number_text, [place, *here, *there])])
+        files = question.files
+        return [
+            DataTable(f"{files}.csv", "unknowns and covariances", [head, *unknowns]),
+            DataTable(f"{files}-points.csv", "measured and fitted", compared),
+        ]
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Calibration
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Measured points over the fitted shapes, and the residuals."""
-        return [
-            still(
-                question.files, partial(plotting.calibration, answer, question.extra.measured.shape)
-            )
-        ]
-
-    def report(self, question: Question, answer: Calibration, folder: Path) -> list[str]:
-        """Values with deviations and correlations."""
-        files, data = question.files, question.section.data.file
-        states = len(question.extra.measured.parameters)
-        words = (
-            html.refusal_line(self.refusal(question, answer))
-            if not answer.fitted
-            else '<p class="verdict"><strong>Fitted</strong> to '
-            f"{question.extra.measured.count} coordinates "
-            f"of {states} measured {'state' if states == 1 else 'states'} ({escape(data)}). "
-            f"{_scatter(question, answer)}</p>"
-        )
+        draw = partial(plotting.calibration, answer, question.extra.measured.shape)
         caption = "Measured points over the fitted shapes; below, fitted less measured coordinates."
-        return [
-            heading(question),
-            words,
-            _table(answer),
-            f'<div class="figures">{html.still(folder, files, caption)}</div>',
-            f'<p>Tables: <a href="{files}.csv">{files}.csv</a> (unknowns and covariances) and '
-            f'<a href="{files}-points.csv">{files}-points.csv</a> (measured and fitted).</p>',
+        return [still(question.files, draw, caption)]
+
+    def words(self, question: Question, answer: Calibration) -> str:
+        """Values with their deviations, and how far the points are from the fit."""
+        triples = zip(answer.names, answer.values, answer.deviations, strict=True)
+        values = ", ".join(
+            f"{name} = {html.number(x, 6)} ± {html.number(error, 2)}" for name, x, error in triples
+        )
+        data: Data = question.extra
+        states = counted(len(data.measured.parameters), "measured state")
+        return (
+            f"**fitted** to {data.measured.count} coordinates of {states} "
+            f"({question.section.data.file}): {values}. {_scatter(data, answer)}"
+        )
+
+    def details(self, question: Question, answer: Calibration) -> list[str]:
+        """Unknowns with their deviations and the covariances between them."""
+        names = [escape(name) for name in answer.names]
+        head = ["", "value", "±", *[f"cov. with {name}" for name in names]]
+        columns = zip(names, answer.values, answer.deviations, answer.covariance, strict=True)
+        rows = [
+            [name, html.number(value, 7), html.number(error, 3), *[html.number(c, 3) for c in row]]
+            for name, value, error, row in columns
         ]
+        return [html.table(head, rows)]
 
     def refusal(self, question: Question, answer: Calibration) -> str:
         """Reason why no fit exists."""
         del question
         return "" if answer.fitted else f"{answer.status}: {answer.why}."
-
-    def verdict(self, question: Question, answer: Calibration) -> str:
-        """Values with their deviations."""
-        head = f"{question.title}"
-        triples = zip(answer.names, answer.values, answer.deviations, strict=True)
-        values = ", ".join(
-            f"{plain(name)} = {html.number(x, 6)} ± {html.number(error, 2)}"
-            for name, x, error in triples
-        )
-        return f"{head}: [bold green]fitted[/], {values}."
-
-
-def _entry(value: float) -> str:
-    return repr(float(value)) if np.isfinite(value) else ""
 
 
 def _family(structure: Structure, paths: Sequence[str | tuple[str, ...]]) -> Family | None:
@@ -232,23 +218,10 @@ def _natural_states(structure: Structure, measured: Measured) -> States:
     return lifts.states
 
 
-def _scatter(question: Question, answer: Calibration) -> str:
+def _scatter(data: Data, answer: Calibration) -> str:
     """How far the points are from the fit."""
-    if question.extra.measured.shape.sigma is not None:
+    if data.measured.shape.sigma is not None:
         return f"χ² = {html.number(answer.chi_squared)} at {answer.freedom} degrees of freedom."
     spread = float(np.sqrt(np.mean(answer.residuals**2)))
     unit = answer.states.structure.length_unit
-    return f"Root mean square residual: {html.number(spread)} {escape(unit)}."
-
-
-def _table(answer: Calibration) -> str:
-    """Unknowns with their deviations and the covariances between them."""
-    names = [escape(name) for name in answer.names]
-    head = ["", "value", "±", *[f"cov. with {name}" for name in names]]
-    rows = [
-        [name, html.number(value, 7), html.number(error, 3), *[html.number(c, 3) for c in row]]
-        for name, value, error, row in zip(
-            names, answer.values, answer.deviations, answer.covariance, strict=True
-        )
-    ]
-    return html.table(head, rows)
+    return f"Root mean square residual: {html.number(spread)} {unit}."

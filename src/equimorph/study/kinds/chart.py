@@ -4,18 +4,16 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
-from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.charts import Atlas, Chart, DescriptorChart, Projection, Reduction, dissect, reduce
 from equimorph.manifold import EquilibriumSet, part
 from equimorph.study import html
-from equimorph.study.answers import heading
+from equimorph.study.answers import counted
 from equimorph.study.fields import requirement
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 
@@ -67,48 +65,32 @@ class ChartKind(Kind[Chart | Atlas]):
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Chart | Atlas
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Return the part of the set that is covered above, the domains of the charts below."""
-        if len(answer.coordinates.names) != 2:
-            return []
-        draw = partial(plotting.parameterisation, [answer], question.ground.height)
-        return [still(question.files, draw)]
-
-    def report(self, question: Question, answer: Chart | Atlas, folder: Path) -> list[str]:
-        """Where it fails: overlaps of a chart, or transitions of an atlas."""
         caption = "Above, the part of the set that is covered; below, the domain of each chart."
-        return [
-            heading(question),
-            f"<p>{escape(_chart_in_words(answer))}</p>",
-            html.pictures(folder, {f"{question.files}.png": caption}, {}),
-            *([] if isinstance(answer, Atlas) else _overlaps(answer)),
-        ]
+        return _draw(question, answer, answer.coordinates.names, caption)
 
-    def verdict(self, question: Question, answer: Chart | Atlas) -> str:
+    def words(self, question: Question, answer: Chart | Atlas) -> str:
         """Whether it is single-valued, or how many charts there are."""
-        return f"{question.title}: {plain(_chart_in_words(answer))}"
+        names = ", ".join(answer.coordinates.names)
+        if isinstance(answer, Atlas):
+            kinds = Counter(each.kind for each in answer.transitions)
+            joined = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(kinds.items()))
+            charts = counted(len(answer), "chart")
+            return f"{charts} over {names}; transitions: {joined or 'none'}."
+        if answer.single_valued:
+            return f"({names}) are coordinates: one state over each point."
+        return f"({names}) are not single-valued: several states lie over some points."
 
-
-def _chart_in_words(chart: Chart | Atlas) -> str:
-    names = ", ".join(chart.coordinates.names)
-    if isinstance(chart, Atlas):
-        kinds = Counter(each.kind for each in chart.transitions)
-        number = "1 chart" if len(chart) == 1 else f"{len(chart)} charts"
-        joined = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(kinds.items()))
-        return f"{number} over {names}; transitions: {joined or 'none'}."
-    if chart.single_valued:
-        return f"({names}) are coordinates: one state over each point."
-    return f"({names}) are not single-valued: several states lie over some points."
-
-
-def _overlaps(chart: Chart) -> list[str]:
-    if not chart.overlaps:
-        return []
-    rows = [
-        [escape(each.kind), ", ".join(map(str, each.sheets)), html.number(each.domain.size)]
-        for each in chart.overlaps
-    ]
-    return [html.table(["overlap", "sheets", "size"], rows)]
+    def details(self, question: Question, answer: Chart | Atlas) -> list[str]:
+        """Where a chart fails: its overlaps."""
+        if isinstance(answer, Atlas) or not answer.overlaps:
+            return []
+        rows = [
+            [escape(each.kind), ", ".join(map(str, each.sheets)), html.number(each.domain.size)]
+            for each in answer.overlaps
+        ]
+        return [html.table(["overlap", "sheets", "size"], rows)]
 
 
 class ReductionKind(Kind[Reduction]):
@@ -119,37 +101,31 @@ class ReductionKind(Kind[Reduction]):
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Reduction
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Return the preferred part of the set above, its domain with barriers and gaps below."""
-        if len(answer.names) != 2:
-            return []
-        draw = partial(plotting.parameterisation, [answer], question.ground.height)
-        return [still(question.files, draw)]
-
-    def report(self, question: Question, answer: Reduction, folder: Path) -> list[str]:
-        """Barriers with their jumps, and gaps."""
         caption = "Above, the preferred part of the set; below, its domain with barriers and gaps."
+        return _draw(question, answer, answer.names, caption)
+
+    def words(self, question: Question, answer: Reduction) -> str:
+        """How many barriers and gaps there are."""
+        count = counted(len(answer.barriers), "barrier") if answer.barriers else "no barriers"
+        size = answer.gaps.size
+        gaps = f"gaps of size {html.number(size)}" if size > 0.0 else "no gaps"
+        lost = f" {answer.lost} edges end where no end was found." if answer.lost else ""
+        return f"{answer.rule}: {count}, {gaps}.{lost}"
+
+    def details(self, question: Question, answer: Reduction) -> list[str]:
+        """Barriers with their jumps."""
         rows = [
             [escape(each.kind), *(html.number(jump) for jump in (each.jump.min(), each.jump.max()))]
             for each in answer.barriers
         ]
-        head = ["barrier", "least jump", "largest jump"]
-        return [
-            heading(question),
-            f"<p>{escape(_reduction_in_words(answer))}</p>",
-            html.pictures(folder, {f"{question.files}.png": caption}, {}),
-            *([html.table(head, rows)] if rows else []),
-        ]
-
-    def verdict(self, question: Question, answer: Reduction) -> str:
-        """How many barriers and gaps there are."""
-        return f"{question.title}: {plain(_reduction_in_words(answer))}"
+        return [html.table(["barrier", "least jump", "largest jump"], rows)] if rows else []
 
 
-def _reduction_in_words(found: Reduction) -> str:
-    barriers = len(found.barriers)
-    count = {0: "no barriers", 1: "1 barrier"}.get(barriers, f"{barriers} barriers")
-    size = found.gaps.size
-    gaps = f"gaps of size {html.number(size)}" if size > 0.0 else "no gaps"
-    lost = f" {found.lost} edges end where no end was found." if found.lost else ""
-    return f"{found.rule}: {count}, {gaps}.{lost}"
+def _draw(
+    question: Question, chart: Chart | Atlas, names: Sequence[str], caption: str
+) -> list[Figure]:
+    """Return the figure of a chart over two coordinates."""
+    draw = partial(plotting.parameterisation, [chart], question.ground.height)
+    return [still(question.files, draw, caption, wide=True)] if len(names) == 2 else []

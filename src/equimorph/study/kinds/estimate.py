@@ -1,15 +1,9 @@
 """State estimation: ``[[estimate]]``."""
 
-from collections.abc import Sequence
-from html import escape
-from pathlib import Path
-
-from rich.markup import escape as plain
-
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
-from equimorph.study.answers import figures_of_states, free_columns, heading, report_of_states
+from equimorph.study.answers import figures_of_states, free_columns, place_of, table_of_states
 from equimorph.study.question import Figure, Kind, Question
 from equimorph.tasks import StateEstimate, estimate_state
 
@@ -31,32 +25,21 @@ class EstimateKind(Kind[StateEstimate]):
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: StateEstimate
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Where the candidates lie."""
         return figures_of_states(question, eset, answer.states)
 
-    def report(self, question: Question, answer: StateEstimate, folder: Path) -> list[str]:
+    def words(self, question: Question, answer: StateEstimate) -> str:
+        """Name the best candidate."""
+        where, weight = place_of(answer.state, question.free), html.number(answer.weight[0])
+        return f"**{answer.status}**: {where} with weight {weight}. {answer.why}".rstrip()
+
+    def details(self, question: Question, answer: StateEstimate) -> list[str]:
         """A table of the candidates."""
-        words = {
-            "known": '<p class="verdict"><strong>Known.</strong></p>',
-            "ambiguous": f"<p><strong>Ambiguous.</strong> {escape(answer.why)}</p>",
-            "refused": html.refusal_line(answer.why),
-        }[answer.status]
         shown = list(question["measured"])
         more = free_columns(answer.states, question.free, shown)
         for free, error in answer.standard_errors.items():
             more[f"± {free}"] = [html.number(value, 2) for value in error]
         more["χ²"] = [html.number(value) for value in answer.chi2]
         more["weight"] = [html.number(value) for value in answer.weight]
-        table = report_of_states(question, folder, answer.states, shown, more)
-        return [heading(question), words, *table]
-
-    def verdict(self, question: Question, answer: StateEstimate) -> str:
-        """Name the best candidate."""
-        head = f"{question.title}"
-        where = ", ".join(
-            f"{name} = {html.number(answer.state[name], 6)}" for name in question.free
-        )
-        colour = "green" if answer.known else "yellow"
-        best = f"{where} with weight {html.number(answer.weight[0])}. {plain(answer.why)}"
-        return f"{head}: [bold {colour}]{answer.status}[/], {best}".rstrip()
+        return table_of_states(answer.states, shown, more) if len(answer.states) else []

@@ -1,20 +1,14 @@
 """Optima that move: ``[[follow]]``."""
 
-from collections.abc import Sequence
 from functools import partial
 from html import escape
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
-from equimorph.storage import write_schedule
 from equimorph.study import html
-from equimorph.study.answers import heading
-from equimorph.study.names import schedule_table
 from equimorph.study.question import Figure, Kind, Question, still
 from equimorph.tasks import Certificate, FollowedOptimum, follow_optimum
 
@@ -32,60 +26,36 @@ class FollowKind(Kind[FollowedOptimum]):
     names = MappingProxyType({"to": "targets"})
     within_set = True
 
-    def write_tables(self, question: Question, answer: FollowedOptimum, folder: Path) -> None:
-        """Write the schedule."""
-        if answer.schedule is not None:
-            write_schedule(answer.schedule, folder / schedule_table(question.files))
-
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: FollowedOptimum
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Objective and actuators along the legs."""
         if not len(answer.states):
             return []
-        draw = partial(
-            plotting.followed, answer, question["objective"], tuple(question["actuators"])
-        )
-        return [still(question.files, draw)]
-
-    def report(self, question: Question, answer: FollowedOptimum, folder: Path) -> list[str]:
-        """Verdict, jumps, and optima along the way."""
-        head = heading(question)
-        refused = html.refusal_line(self.refusal(question, answer))
-        if not len(answer.states):
-            return [head, refused]
-        words = (
-            f'<p class="verdict"><strong>Arrived.</strong> {escape(_ends(question, answer))}</p>'
-            if answer.arrived
-            else refused
-        )
+        actuators = tuple(question["actuators"])
+        draw = partial(plotting.followed, answer, question["objective"], actuators)
         caption = "Objective and actuators along the legs; dotted where the optimum jumps."
-        pictures = html.pictures(folder, {}, {f"{question.files}.png": caption})
-        links = (
-            [html.schedule_links(schedule_table(question.files))]
-            if answer.schedule is not None
-            else []
-        )
-        return [head, words, *links, pictures, *_jumps(question, answer), _table(question, answer)]
+        return [still(question.files, draw, caption)]
+
+    def words(self, question: Question, answer: FollowedOptimum) -> str:
+        """Both ends, and how often it jumps."""
+        first, last = (html.number(answer.values[k], 6) for k in (0, -1))
+        jumps = len(answer.jumps)
+        often = {0: "does not jump", 1: "jumps once"}.get(jumps, f"jumps {jumps} times")
+        name = question["objective"].name
+        return f"**arrived**: {name} goes from {first} to {last} and {often}."
+
+    def details(self, question: Question, answer: FollowedOptimum) -> list[str]:
+        """Jumps, and optima along the way."""
+        if not len(answer.states):
+            return []
+        return [*_jumps(question, answer), _table(question, answer)]
 
     def refusal(self, question: Question, answer: FollowedOptimum) -> str:
         """Reason why the optimum could be followed no further, and where."""
         if answer.arrived or not len(answer.at):
             return answer.why
         return f"After {html.number(answer.at[-1])} of {len(question['to'])} legs: {answer.why}."
-
-    def verdict(self, question: Question, answer: FollowedOptimum) -> str:
-        """Say how it ends."""
-        return f"{question.title}: [bold green]arrived[/]. {plain(_ends(question, answer))}"
-
-
-def _ends(question: Question, found: FollowedOptimum) -> str:
-    jumps = {0: "It does not jump.", 1: "It jumps once."}
-    return (
-        f"{question['objective'].name} from {html.number(found.values[0], 6)} to "
-        f"{html.number(found.values[-1], 6)}. "
-        f"{jumps.get(len(found.jumps), f'It jumps {len(found.jumps)} times.')}"
-    )
 
 
 def _jumps(question: Question, found: FollowedOptimum) -> list[str]:

@@ -1,20 +1,17 @@
 """Limit loads of imperfect structures: ``[[imperfection]]``."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from html import escape
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
 
 from pydantic import Field
-from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
-from equimorph.study.answers import heading
 from equimorph.study.lookup import check_parameters
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.tasks import ImperfectionLaw, imperfection_law
@@ -53,19 +50,20 @@ class ImperfectionKind(Kind[Mapping[str, ImperfectionLaw]]):
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Mapping[str, ImperfectionLaw]
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Return the powers on logarithmic axes, if any was found."""
         known = {name: law for name, law in answer.items() if law.status == "fitted"}
-        if not known:
-            return []
         draw = partial(plotting.imperfection_laws, question.structure, known, question.section.load)
-        return [still(question.files, draw)]
+        caption = "Changes of the limit load with imperfections, and the fitted powers."
+        return [still(question.files, draw, caption)] if known else []
 
-    def report(
-        self, question: Question, answer: Mapping[str, ImperfectionLaw], folder: Path
-    ) -> list[str]:
+    def words(self, question: Question, answer: Mapping[str, ImperfectionLaw]) -> str:
+        """Return the formulas."""
+        load = question.section.load
+        return "; ".join(_in_words(load, name, law) for name, law in answer.items()) + "."
+
+    def details(self, question: Question, answer: Mapping[str, ImperfectionLaw]) -> list[str]:
         """A table: one row for each imperfection."""
-        files = question.files
         rows = [
             [
                 escape(name),
@@ -76,25 +74,14 @@ class ImperfectionKind(Kind[Mapping[str, ImperfectionLaw]]):
             ]
             for name, law in answer.items()
         ]
-        caption = "Changes of the limit load with imperfections, and the fitted powers."
         head = ["imperfection ε", "limit load", "coefficient", "fitted exponent", "law"]
-        return [
-            heading(question),
-            html.table(head, rows),
-            html.pictures(folder, {}, {f"{files}.png": caption}),
-        ]
+        return [html.table(head, rows)]
 
     def refusal(self, question: Question, answer: Mapping[str, ImperfectionLaw]) -> str:
         """Reasons why no law is known, where none is."""
         if any(law.status == "fitted" for law in answer.values()):
             return ""
         return "; ".join(f"{name}: {law.why.rstrip('.')}" for name, law in answer.items()) + "."
-
-    def verdict(self, question: Question, answer: Mapping[str, ImperfectionLaw]) -> str:
-        """Return the formulas."""
-        load = question.section.load
-        laws = "; ".join(_in_words(load, name, law) for name, law in answer.items())
-        return plain(f"{question.title}: {laws}.")
 
 
 def _in_words(load: str, name: str, law: ImperfectionLaw) -> str:

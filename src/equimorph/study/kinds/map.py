@@ -1,25 +1,22 @@
 """Maps over two actuators: ``[[map]]``."""
 
-from collections.abc import Sequence
+from functools import partial
 from html import escape
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from matplotlib.axes import Axes
 from pydantic import Field
 
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
-from equimorph.storage import write_map
+from equimorph.storage.maps import rows_of_curves, rows_of_settings
 from equimorph.study import html
 from equimorph.study.composite_arguments import unloaded_load
 from equimorph.study.fields import Number, requirement
 from equimorph.study.lookup import Extent, at_key
-from equimorph.study.names import map_files
-from equimorph.study.question import Arguments, Figure, Kind, Question, still
+from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
 from equimorph.tasks import (
     ActuatorMap,
     CurvatureMap,
@@ -78,46 +75,45 @@ class MapKind(Kind[ActuatorMap]):
             return limit_load_map(**arguments.of(limit_load_map))
         return curvature_map(**arguments.of(curvature_map), descriptor=question.extra)
 
-    def write_tables(self, question: Question, answer: ActuatorMap, folder: Path) -> None:
-        """Write settings and curves."""
-        write_map(answer, folder / f"{map_files(question.name)}.csv")
+    def tables(self, question: Question, answer: ActuatorMap) -> list[DataTable]:
+        """Return settings and curves."""
+        files = question.files
+        return [
+            DataTable(f"{files}.csv", "settings", rows_of_settings(answer)),
+            DataTable(f"{files}-curves.csv", "curves", rows_of_curves(answer)),
+        ]
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: ActuatorMap
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Return the map with its curves."""
-
-        def draw() -> Axes:
-            if isinstance(answer, CurvatureMap):
-                return plotting.curvature_map(answer)
-            assert isinstance(answer, LimitLoadMap)
-            return plotting.load_map(answer)
-
-        return [still(map_files(question.name), draw)]
-
-    def report(self, question: Question, answer: ActuatorMap, folder: Path) -> list[str]:
-        """How many settings ended in which way, the figure, and the tables."""
-        section, files = question.section, map_files(question.name)
-        counts = [f"{count} {kind}" for kind, count in answer.counts.items() if count]
-        what, caption = "Limit loads", "Limit loads, with the curves on which they jump or bend."
-        if section.at is not None:
-            what = f"States at {section.load} = {html.number(section.at)}"
+        if isinstance(answer, CurvatureMap):
             caption = "The first stable state on each path; dots: a real loading snaps on the way."
-        extent = html.extent(answer.grid.box, answer.fixed, answer.within)
-        return [
-            f"<h2>Map {escape(section.name)}</h2>",
-            f'<p class="lead">{escape(" · ".join(extent))}</p>',
-            f"<p>{escape(what)} at {answer.value.size} settings: {escape(', '.join(counts))}.</p>",
-            f'<div class="figures">{html.still(folder, files, caption)}</div>',
-            _accuracy(answer),
-            f'<p>Tables: <a href="{files}.csv">{files}.csv</a> (settings) and '
-            f'<a href="{files}-curves.csv">{files}-curves.csv</a>.</p>',
-        ]
+            return [still(question.files, partial(plotting.curvature_map, answer), caption)]
+        assert isinstance(answer, LimitLoadMap)
+        caption = "Limit loads, with the curves on which they jump or bend."
+        return [still(question.files, partial(plotting.load_map, answer), caption)]
 
-    def verdict(self, question: Question, answer: ActuatorMap) -> str:
+    def words(self, question: Question, answer: ActuatorMap) -> str:
         """How many settings ended in which way."""
+        section = question.section
         counts = ", ".join(f"{count} {kind}" for kind, count in answer.counts.items() if count)
-        return f"{question.title}: {counts}."
+        what = "limit loads"
+        if section.at is not None:
+            what = f"states at {section.load} = {html.number(section.at)}"
+        return f"{what} at {answer.value.size} settings: {counts}."
+
+    def details(self, question: Question, answer: ActuatorMap) -> list[str]:
+        """Extent of the map, and how well the places of curves are known, kind by kind."""
+        extent = html.extent(answer.grid.box, answer.fixed, answer.within)
+        lead = f'<p class="lead">{escape(" · ".join(extent))}</p>'
+        worst: dict[str, float] = {}
+        for curve in answer.curves:
+            error = float(curve.errors.max(initial=0.0))
+            worst[curve.kind] = max(worst.get(curve.kind, 0.0), error)
+        errors = escape(", ".join(f"{kind} {error:.0e}" for kind, error in worst.items()))
+        told = f"<p>Curves, with the largest error of a place along a grid line: {errors}.</p>"
+        return [lead, told] if worst else [lead]
 
 
 def _check_level(question: Question) -> None:
@@ -128,14 +124,3 @@ def _check_level(question: Question) -> None:
             f"`at` must lie between {section.load} = {low:g} and `bound` = "
             f"{section.bound:g}; got {section.at:g}."
         )
-
-
-def _accuracy(amap: ActuatorMap) -> str:
-    """How well the places of curves are known, kind by kind."""
-    worst: dict[str, float] = {}
-    for curve in amap.curves:
-        worst[curve.kind] = max(worst.get(curve.kind, 0.0), float(curve.errors.max(initial=0.0)))
-    if not worst:
-        return ""
-    words = ", ".join(f"{kind} {error:.0e}" for kind, error in worst.items())
-    return f"<p>Curves, with the largest error of a place along a grid line: {escape(words)}.</p>"

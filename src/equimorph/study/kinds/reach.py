@@ -1,24 +1,20 @@
 """Reachable and attainable sets: ``[[reach]]``."""
 
-import csv
+from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from html import escape
-from itertools import groupby
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
-from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
-from equimorph.study.answers import heading
 from equimorph.study.fields import Number, requirement
-from equimorph.study.question import Arguments, Figure, Kind, Question, still
+from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
 from equimorph.tasks import Reach, attainable, reachable
 from equimorph.tasks.reach import Answer
 
@@ -69,58 +65,51 @@ class ReachKind(Kind[Reached]):
         targets = [dict(zip(descriptors, x, strict=True)) for x in question.section.targets]
         return reach, tuple(reach.query(each) for each in targets)
 
-    def write_tables(self, question: Question, answer: Reached, folder: Path) -> None:
-        """Write the boundary: one row for each of its states."""
+    def tables(self, question: Question, answer: Reached) -> list[DataTable]:
+        """Return the boundary: one row for each of its states."""
         reach, names = answer[0], answer[0].whole.names
-        with (folder / f"{question.files}.csv").open("w", encoding="utf-8", newline="") as file:
-            table = csv.writer(file, lineterminator="\n")
-            shown = [each.name for each in question["descriptors"]]
-            table.writerow(["piece", "kind", "detail", *names, *shown])
-            for number, piece in enumerate(reach.boundary):
-                columns = zip(*(piece.states[name].tolist() for name in names), strict=True)
-                for setting, values in zip(columns, piece.values.tolist(), strict=True):
-                    table.writerow([number, piece.kind, piece.detail, *setting, *values])
+        shown = [each.name for each in question["descriptors"]]
+        rows: list[list[object]] = [["piece", "kind", "detail", *names, *shown]]
+        for number, piece in enumerate(reach.boundary):
+            columns = zip(*(piece.states[name].tolist() for name in names), strict=True)
+            for setting, values in zip(columns, piece.values.tolist(), strict=True):
+                rows.append([number, piece.kind, piece.detail, *setting, *values])
+        return [DataTable(f"{question.files}.csv", "all states of the boundary", rows)]
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Reached
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Image and region, of two descriptors over two parameters."""
-        reach = answer[0]
+        reach, files = answer[0], question.files
         if len(reach.descriptors) != 2 or len(reach.whole.names) != 2:
             return []
         image = partial(plotting.reach_plane, reach, targets=question.section.targets)
         region = partial(plotting.reach_parameters, reach)
-        return [still(question.files, image), still(f"{question.files}-parameters", region)]
-
-    def report(self, question: Question, answer: Reached, folder: Path) -> list[str]:
-        """Size, boundary by kinds, and the targets."""
-        reach, answers = answer
-        captions = {
-            f"{question.files}.png": "Values of the descriptors, with the kinds of their boundary.",
-            f"{question.files}-parameters.png": "The same region over the parameters.",
-        }
-        words = [f"<p>{escape(line)}</p>" for line in (_extent(question, reach), reach.why) if line]
-        rows = [
-            [escape(kind), str(len(list(group)))]
-            for kind, group in groupby(sorted(piece.kind for piece in reach.boundary))
-        ]
-        file = f"{question.files}.csv"
+        caption = "Values of the descriptors, with the kinds of their boundary."
         return [
-            heading(question),
-            *words,
-            html.pictures(folder, {}, captions),
-            html.table(["boundary", "pieces"], rows),
-            f'<p>All states of the boundary: <a href="{file}">{file}</a>.</p>',
-            *([] if not answers else [_queries(question, answers)]),
+            still(files, image, caption),
+            still(f"{files}-parameters", region, "The same region over the parameters."),
         ]
 
-    def verdict(self, question: Question, answer: Reached) -> str:
+    def words(self, question: Question, answer: Reached) -> str:
         """Its size, and how many targets are reached."""
         reach, answers = answer
         can = sum(each.can for each in answers)
         asked = f" {can} of {len(answers)} targets can be reached." if answers else ""
-        head = f"{question.title}: [bold green]{reach.status}[/]"
-        return f"{head}. {plain(_extent(question, reach))}{asked}"
+        why = f" {reach.why}" if reach.why else ""
+        return f"**{reach.status}**: {_extent(question, reach)}{asked}{why}"
+
+    def details(self, question: Question, answer: Reached) -> list[str]:
+        """Boundary by kinds, and the targets."""
+        reach, answers = answer
+        kinds = Counter(piece.kind for piece in reach.boundary)
+        rows = [[escape(kind), str(count)] for kind, count in sorted(kinds.items())]
+        queries = [_queries(question, answers)] if answers else []
+        return [html.table(["boundary", "pieces"], rows), *queries]
+
+    def refusal(self, question: Question, answer: Reached) -> str:
+        """Reason why nothing is reached."""
+        return super().refusal(question, answer[0])  # type: ignore[arg-type]  # its status and why
 
 
 def _extent(question: Question, reach: Reach) -> str:

@@ -1,9 +1,8 @@
 """Routes: ``[[route]]`` on a set, and ``[[sampled_route]]`` for many actuators."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from functools import partial
 from html import escape
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -13,17 +12,11 @@ from pydantic import AfterValidator
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.storage import write_schedule
+from equimorph.model import Schedule
 from equimorph.study import html
-from equimorph.study.answers import (
-    figures_of_way,
-    heading,
-    pictures_of_way,
-    report_of_snaps,
-    snaps_in_words,
-)
+from equimorph.study.answers import figures_of_way, snaps_in_words, table_of_snaps
 from equimorph.study.fields import Name, Positive, requirement
-from equimorph.study.names import PLANE, STABLE_PLANE, route_name, schedule_table
+from equimorph.study.names import PLANE, STABLE_PLANE, route_name
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.study.signatures import MEANINGS
 from equimorph.study.states import NaturalSection
@@ -88,61 +81,53 @@ class RouteKind(Kind[Routes]):
         demands = arguments.of(smoothed) | {"within": tuple(bounds)}
         return tuple(smoothed(route, **demands) if route.arrived else route for route in routes)
 
-    def write_tables(self, question: Question, answer: Routes, folder: Path) -> None:
-        """Write the schedules."""
-        for name, route in _name_routes(question, answer):
-            if route.schedule is not None:
-                write_schedule(route.schedule, folder / schedule_table(name))
+    def schedules(self, question: Question, answer: Routes) -> Mapping[str, Schedule]:
+        """Return those of all routes."""
+        named = _name_routes(question, answer)
+        return {name: route.schedule for name, route in named if route.schedule is not None}
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Routes
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Shapes, margins, plane and film of the best; all of them on one plane."""
-        found = [*figures_of_way(eset, question.name, answer[0])]
+        found = figures_of_way(eset, question.name, answer[0], "route")
         if len(answer) > 1 and eset is not None:
             draw = partial(plotting.alternative_routes, eset, answer)
-            found.insert(0, still(_overview(question), draw))
+            caption = "Routes that cannot be drawn into each other; the first is the best."
+            found.insert(0, still(f"{question.name}-alternatives", draw, caption))
         return found
 
-    def report(self, question: Question, answer: Routes, folder: Path) -> list[str]:
-        """Verdict, schedule and figures."""
-        name, route = question.name, answer[0]
-        heading = f"<h2>Route {escape(name)}</h2>"
-        pictures = pictures_of_way(folder, name, "route")
-        if not route.arrived:
-            return [heading, html.refusal_line(route.why), pictures]
-        snapping = "Every state between the snaps" if route.snaps else "Every state on the way"
-        return [
-            heading,
-            f'<p class="verdict"><strong>Arrived.</strong> {snapping} is stable: '
-            f"{_size(route, html.number)}{_cost(route)}{_rounding(question)}.</p>",
-            *report_of_snaps(route),
-            html.schedule_links(schedule_table(name)),
-            *_report_of_all(question, answer, folder),
-            pictures,
-        ]
+    def words(self, question: Question, answer: Routes) -> str:
+        """Say how it arrived."""
+        route, smooth = answer[0], question.section.smooth
+        least = "" if route.snaps else f"smallest margin {html.number(route.margin)}, "
+        size = f"{least}length {html.number(route.length)}{_cost(route)}"
+        rounded = "" if smooth is None else f", corners rounded by {html.number(smooth)} at most"
+        others = f" {len(answer)} routes differ in how they pass holes." if len(answer) > 1 else ""
+        if question.section.alternatives is not None and len(answer) == 1:
+            others = " No other route passes the holes of the stable set differently."
+        return f"**arrived** {snaps_in_words(route)}, {size}{rounded}.{others}"
+
+    def details(self, question: Question, answer: Routes) -> list[str]:
+        """Snaps on the way, and routes side by side where there are several."""
+        found = table_of_snaps(answer[0])
+        if len(answer) > 1:
+            rows = [
+                [name, *map(html.number, (route.length, route.margin, route.cost))]
+                for name, route in _name_routes(question, answer)
+            ]
+            head = ["", "length", "smallest margin", escape(answer[0].objective)]
+            found.append(html.table(head, rows))
+        return found
 
     def refusal(self, question: Question, answer: Routes) -> str:
         """Reason why there is no route."""
         del question
         return "" if answer[0].arrived else answer[0].why
 
-    def verdict(self, question: Question, answer: Routes) -> str:
-        """Say how it arrived."""
-        route, head = answer[0], f"{question.title}"
-        others = f" {len(answer)} routes differ in how they pass holes." if len(answer) > 1 else ""
-        how = snaps_in_words(route) or "without a snap"
-        size = _size(route, lambda value: f"{value:.3f}")
-        return f"{head}: [bold green]arrived[/] {how}, {size}{_cost(route)}.{others}"
-
 
 def _name_routes(question: Question, answer: Routes) -> list[tuple[str, Route]]:
     return [(route_name(question.name, k), route) for k, route in enumerate(answer, 1)]
-
-
-def _size(route: Route, number: Any) -> str:
-    least = "" if route.snaps else f"smallest margin {number(route.margin)}, "
-    return f"{least}length {number(route.length)}"
 
 
 def _cost(route: Route) -> str:
@@ -151,40 +136,6 @@ def _cost(route: Route) -> str:
         return ""
     priced = " with the price of the snaps" if route.snaps else ""
     return f", {route.objective}{priced} {html.number(route.cost)}"
-
-
-def _rounding(question: Question) -> str:
-    smooth = question.section.smooth
-    return "" if smooth is None else f", corners rounded by {html.number(smooth)} at most"
-
-
-def _report_of_all(question: Question, answer: Routes, folder: Path) -> list[str]:
-    """Routes side by side; nothing where there is only one."""
-    if question.section.alternatives is None:
-        return []
-    if len(answer) == 1:
-        return ["<p>No other route passes the holes of the stable set differently.</p>"]
-    rows = [
-        [
-            str(number),
-            html.number(route.length),
-            html.number(route.margin),
-            html.number(route.cost),
-            f'<a href="{schedule_table(name)}">{schedule_table(name)}</a>',
-        ]
-        for number, (name, route) in enumerate(_name_routes(question, answer), 1)
-    ]
-    head = ["", "length", "smallest margin", escape(answer[0].objective), "schedule"]
-    caption = "Routes that cannot be drawn into each other; the first is the best."
-    return [
-        html.table(head, rows),
-        html.pictures(folder, {}, {f"{_overview(question)}.png": caption}),
-    ]
-
-
-def _overview(question: Question) -> str:
-    """Beginning of the name of the figure with all routes."""
-    return f"{question.name}-alternatives"
 
 
 class SampledRouteKind(Kind[Route]):
@@ -210,34 +161,13 @@ class SampledRouteKind(Kind[Route]):
                     f"`{question.key}.loads[{i}]` must not move actuators; got {both[0]}."
                 )
 
-    def write_tables(self, question: Question, answer: Route, folder: Path) -> None:
-        """Write the schedule."""
-        if answer.schedule is not None:
-            write_schedule(answer.schedule, folder / schedule_table(question.files))
-
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Route
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Parameters, shapes and margins."""
-        return figures_of_way(None, question.files, answer)
+        return figures_of_way(None, question.files, answer, "route")
 
-    def report(self, question: Question, answer: Route, folder: Path) -> list[str]:
-        """Verdict, schedule and figures."""
-        head = heading(question)
-        if not answer.arrived:
-            return [head, html.refusal_line(answer.why)]
-        length = html.number(answer.length)
-        return [
-            head,
-            '<p class="verdict"><strong>Arrived.</strong> Every state on the way is stable: '
-            f"smallest margin {html.number(answer.margin)}, length {length}.</p>",
-            html.schedule_links(schedule_table(question.files)),
-            pictures_of_way(folder, question.files, "route"),
-        ]
-
-    def verdict(self, question: Question, answer: Route) -> str:
+    def words(self, question: Question, answer: Route) -> str:
         """Say how it arrived."""
-        return (
-            f"{question.title}: [bold green]arrived[/] without a snap, smallest margin "
-            f"{answer.margin:.3f}, length {answer.length:.3f}."
-        )
+        margin, length = html.number(answer.margin), html.number(answer.length)
+        return f"**arrived** without a snap, smallest margin {margin}, length {length}."

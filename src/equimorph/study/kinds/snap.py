@@ -1,25 +1,21 @@
 """Snaps: the least change that leads to one, ``[[snap]]``, and all of them, ``[[snap_graph]]``."""
 
-import csv
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from html import escape
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 from pydantic import Field
-from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
 from equimorph.study import html
-from equimorph.study.answers import figures_of_states, heading, report_of_states
+from equimorph.study.answers import counted, figures_of_states, table_of_states
 from equimorph.study.lookup import descriptor_at
-from equimorph.study.question import Arguments, Figure, Kind, Question, still
+from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
 from equimorph.tasks import LeastSnap, least_snap
 
 Snaps = tuple[tuple[int, ...], tuple[Snap, ...], tuple[States, ...]]
@@ -42,29 +38,29 @@ class SnapKind(Kind[tuple[State, LeastSnap]]):
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: tuple[State, LeastSnap]
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """State, fold and landing on the plane."""
         return figures_of_states(question, eset, _stations(answer))
 
-    def report(
-        self, question: Question, answer: tuple[State, LeastSnap], folder: Path
-    ) -> list[str]:
-        """Change, landing, and a table of state, fold and landing."""
-        _, snap = answer
-        words = escape(_snap_in_words(snap))
-        line = html.refusal_line(snap.why) if snap.landing is None else f"<p>{words}</p>"
+    def words(self, question: Question, answer: tuple[State, LeastSnap]) -> str:
+        """Change and landing."""
+        snap = answer[1]
+        assert snap.landing is not None
+        moves = ", ".join(f"{name} by {value:+.6g}" for name, value in snap.change.items())
+        end, least = snap.landing, f" ({snap.why})" if snap.why else ""
+        released = f"{end.released:.4g} released{least}"
+        return f"the least way to a snap is {moves}; {end.status}, {released}."
+
+    def details(self, question: Question, answer: tuple[State, LeastSnap]) -> list[str]:
+        """A table of state, fold and landing."""
         states = _stations(answer)
         more = {
             "": ["state", "edge of stability", "landing"][: len(states)],
-            **{each: [html.number(value, 6) for value in states[each]] for each in snap.change},
+            **{
+                each: [html.number(value, 6) for value in states[each]] for each in answer[1].change
+            },
         }
-        shown = [states.structure.elevation]
-        table = report_of_states(question, folder, states, shown, more)
-        return [heading(question), line, *table]
-
-    def verdict(self, question: Question, answer: tuple[State, LeastSnap]) -> str:
-        """Change and landing."""
-        return f"{question.title}: {plain(_snap_in_words(answer[1]))}"
+        return table_of_states(states, [states.structure.elevation], more)
 
     def refusal(self, question: Question, answer: tuple[State, LeastSnap]) -> str:
         """Reason why no snap was found."""
@@ -79,14 +75,6 @@ def _stations(answer: tuple[State, LeastSnap]) -> States:
         return state.batch
     z, p = (np.vstack([getattr(each, name) for each in (state, snap.states)]) for name in "zp")
     return States(state.structure, z, p)
-
-
-def _snap_in_words(snap: LeastSnap) -> str:
-    assert snap.landing is not None
-    moves = ", ".join(f"{name} by {value:+.6g}" for name, value in snap.change.items())
-    end = snap.landing
-    least = f" ({snap.why})" if snap.why else ""
-    return f"the least way to a snap is {moves}; {end.status}, {end.released:.4g} released{least}."
 
 
 class SnapGraphKind(Kind[Snaps]):
@@ -118,40 +106,49 @@ class SnapGraphKind(Kind[Snaps]):
         snaps = tuple(_lean(snap) for snap in graph.snaps)
         return graph.strata, snaps, tuple(arguments.eset.points[each.vertices] for each in snaps)
 
-    def write_tables(self, question: Question, answer: Snaps, folder: Path) -> None:
-        """Write every snap that was followed: from where, to where, and the energy released."""
-        with (folder / f"{question.files}.csv").open("w", encoding="utf-8", newline="") as file:
-            table = csv.writer(file, lineterminator="\n")
-            head = ["run", "from stratum", "to stratum", "status", "energy released"]
-            value, parameters = question.extra, self._parameters(answer)
-            table.writerow([*head, *parameters, f"{value.name} before", f"{value.name} after"])
-            for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1):
-                for state, landing in zip(states, snap.landings, strict=True):
-                    after = value(landing.state) if landing.landed else ""
-                    table.writerow([
-                        number, snap.source, snap.target, landing.status, landing.released,
-                        *state.parameters.values(), value(state), after,
-                    ])  # fmt: skip
+    def tables(self, question: Question, answer: Snaps) -> list[DataTable]:
+        """Return every snap that was followed: from where, to where, and the energy released."""
+        head = ["run", "from stratum", "to stratum", "status", "energy released"]
+        value, parameters = question.extra, _parameters(answer)
+        rows: list[list[object]] = [
+            [*head, *parameters, f"{value.name} before", f"{value.name} after"]
+        ]
+        for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1):
+            for state, landing in zip(states, snap.landings, strict=True):
+                after = value(landing.state) if landing.landed else ""
+                rows.append([
+                    number, snap.source, snap.target, landing.status, landing.released,
+                    *state.parameters.values(), value(state), after,
+                ])  # fmt: skip
+        told = DataTable(f"{question.files}.csv", "every snap that was followed", rows)
+        return [told] if answer[1] else []
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Snaps
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Two panels, over two parameters."""
-        assert eset is not None
-        if len(eset.names) != 2 or not answer[1]:
+        if eset is None or len(eset.names) != 2 or not answer[1]:
             return []
         draw = partial(plotting.snap_panels, SnapGraph(eset, *answer[:2]), question.extra)
-        return [still(question.files, draw)]
+        return [still(question.files, draw, CAPTION, wide=True)]
 
-    def report(self, question: Question, answer: Snaps, folder: Path) -> list[str]:
-        """Figure, and a table of the runs."""
-        title = f"<h2>Snap graph {escape(question.name)}</h2>"
-        words = f"<p>{escape(_extent(answer))}</p>"
+    def words(self, question: Question, answer: Snaps) -> str:
+        """Strata, runs, and the most energy that is released."""
+        strata, snaps, _ = answer
+        if not snaps:
+            return "no stability boundary in the box: nothing snaps."
+        most = max(snap.released[1] for snap in snaps)
+        stable = "1 stable stratum" if len(strata) == 1 else f"{len(strata)} stable strata"
+        runs = f"{counted(len(snaps), 'run')} of the stability boundary"
+        return f"{stable}, {runs}; a snap releases {most:.4g} at most."
+
+    def details(self, question: Question, answer: Snaps) -> list[str]:
+        """A table of the runs."""
         if not answer[1]:
-            return [title, words]
+            return []
         varied = [
             name
-            for name in self._parameters(answer)
+            for name in _parameters(answer)
             if np.ptp(np.concatenate([states[name] for states in answer[2]])) > 0.0
         ]
         head = ["run", "from", "to", *map(escape, varied), "snaps followed", "energy released"]
@@ -166,23 +163,12 @@ class SnapGraphKind(Kind[Snaps]):
             ]
             for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1)
         ]
-        file = f"{question.files}.csv"
-        return [
-            title,
-            words,
-            html.pictures(folder, {f"{question.files}.png": CAPTION}, {}),
-            html.table(head, rows),
-            f'<p>Every snap that was followed: <a href="{file}">{file}</a>.</p>',
-        ]
+        return [html.table(head, rows)]
 
-    @staticmethod
-    def _parameters(answer: Snaps) -> list[str]:
-        """Names of all parameters."""
-        return list(answer[2][0][0].parameters) if answer[2] else []
 
-    def verdict(self, question: Question, answer: Snaps) -> str:
-        """Strata, runs, and the most energy that is released."""
-        return f"Snap graph {question.name}: {plain(_extent(answer))}"
+def _parameters(answer: Snaps) -> list[str]:
+    """Names of all parameters."""
+    return list(answer[2][0][0].parameters) if answer[2] else []
 
 
 def _lean(snap: Snap) -> Snap:
@@ -199,16 +185,6 @@ def _goal(snap: Snap) -> str:
     if snap.status == "held":
         return "no snap: nothing moves"
     return f"stratum {snap.target}" if snap.target >= 0 else f"out of the set ({snap.status})"
-
-
-def _extent(answer: Snaps) -> str:
-    strata, snaps, _ = answer
-    if not snaps:
-        return "no stability boundary in the box: nothing snaps."
-    most = max(snap.released[1] for snap in snaps)
-    stable = "1 stable stratum" if len(strata) == 1 else f"{len(strata)} stable strata"
-    runs = "1 run" if len(snaps) == 1 else f"{len(snaps)} runs"
-    return f"{stable}, {runs} of the stability boundary; a snap releases {most:.4g} at most."
 
 
 def _between(low: float, high: float) -> str:

@@ -1,18 +1,15 @@
 """Settings that carry most: ``[[strongest]]``."""
 
-from collections.abc import Mapping, Sequence
 from functools import partial
 from html import escape
-from pathlib import Path
 
 import numpy as np
-from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
-from equimorph.study.answers import heading
+from equimorph.study.answers import place_of
 from equimorph.study.lookup import Extent
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.tasks import LimitLoadMap, StrongestSettings, limit_load_map, strongest
@@ -50,7 +47,7 @@ class StrongestKind(Kind[Answer]):
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Answer
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """The settings on the map, and limit loads near the best one."""
         amap, sure, robust = answer
         if sure.status == "refused":
@@ -58,60 +55,43 @@ class StrongestKind(Kind[Answer]):
         best = (sure, robust) if robust is not None else (sure,)
         places = partial(plotting.strongest_settings, amap, sure, robust)
         beside = partial(plotting.beside_strongest, amap, [each.best for each in best])
-        return [still(question.files, places), still(f"{question.files}-beside", beside)]
+        errors = "" if robust is None else " (□: robust, with its box of errors)"
+        numbered = f"Limit loads with their largest values, numbered as in the table{errors}."
+        closer = "Limit loads on both sides of the best, ever closer."
+        files = question.files
+        return [still(files, places, numbered), still(f"{files}-beside", beside, closer)]
 
-    def report(self, question: Question, answer: Answer, folder: Path) -> list[str]:
-        """A table of the settings, the price of robustness, and the figures."""
-        amap, sure, robust = answer
-        head = heading(question)
-        lead = html.extent(amap.grid.box, amap.fixed, amap.within)
+    def words(self, question: Question, answer: Answer) -> str:
+        """Name the best one, and the price of a robust one."""
+        _, sure, robust = answer
+        names, best = question["grid"].names, sure.best
+        load = f"limit load {question.section.load} = {html.number(best.value, 6)}"
+        words = f"**found**: largest {load} at {place_of(best.setting, names)} ({best.kind})."
+        if robust is None:
+            return words
+        if robust.status == "refused":
+            return f"{words} No robust setting: {robust.why}."
+        errors = ", ".join(f"{name} ± {size:g}" for name, size in robust.offsets.items())
+        loads = (robust.at_risk, robust.guaranteed, robust.best.value)
+        at_risk, guaranteed, nominal = (html.number(each, 6) for each in loads)
+        return (
+            f"{words} With errors {errors} it falls to {at_risk}. The robust setting "
+            f"{place_of(robust.best.setting, names)} carries {guaranteed} at least, and {nominal} "
+            f"without errors: its price is {html.number(robust.price)}."
+        )
+
+    def details(self, question: Question, answer: Answer) -> list[str]:
+        """Extent of the map, and a table of the settings."""
+        amap, sure, _ = answer
         if sure.status == "refused":
-            return [head, html.refusal_line(self.refusal(question, answer))]
-        captions = {
-            f"{question.files}.png": "Limit loads with their largest values, numbered as in the "
-            f"table{'' if robust is None else ' (□: robust, with its box of errors)'}.",
-            f"{question.files}-beside.png": "Limit loads on both sides of the best, ever closer.",
-        }
-        return [
-            head,
-            f'<p class="lead">{escape(" · ".join(lead))}</p>',
-            f"<p>{escape(_in_words(question, answer))}</p>",
-            _table(question, answer),
-            html.pictures(folder, {}, captions),
-        ]
+            return []
+        lead = html.extent(amap.grid.box, amap.fixed, amap.within)
+        return [f'<p class="lead">{escape(" · ".join(lead))}</p>', _table(question, answer)]
 
     def refusal(self, question: Question, answer: Answer) -> str:
         """Reason why no setting carries anything."""
         del question
         return f"{answer[1].why}." if answer[1].status == "refused" else ""
-
-    def verdict(self, question: Question, answer: Answer) -> str:
-        """Name the best one, and the price of a robust one."""
-        return f"{question.title}: [bold green]found[/]. {plain(_in_words(question, answer))}"
-
-
-def _in_words(question: Question, answer: Answer) -> str:
-    _, sure, robust = answer
-    load, best = question.section.load, sure.best
-    largest = html.number(best.value, 6)
-    words = f"Largest limit load {load} = {largest} at {_place(best.setting)} ({best.kind})."
-    if robust is None:
-        return words
-    if robust.status == "refused":
-        return f"{words} No robust setting: {robust.why}."
-    errors = ", ".join(f"{name} ± {size:g}" for name, size in robust.offsets.items())
-    loads = (robust.at_risk, robust.guaranteed, robust.best.value)
-    at_risk, guaranteed, nominal = (html.number(each, 6) for each in loads)
-    return (
-        f"{words} With errors {errors} it falls to {at_risk}. The robust setting "
-        f"{_place(robust.best.setting)} carries {guaranteed} at least, and {nominal} without "
-        f"errors: its price is {html.number(robust.price)}."
-    )
-
-
-def _place(setting: Mapping[str, float]) -> str:
-    numbers = {name: html.number(round(value, 12), 6) for name, value in setting.items()}
-    return ", ".join(f"{name} = {each}" for name, each in numbers.items())
 
 
 def _table(question: Question, answer: Answer) -> str:

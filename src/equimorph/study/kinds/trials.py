@@ -1,15 +1,12 @@
 """Schedules executed by imperfect structures: ``[[trials]]``."""
 
 from collections import Counter
-from collections.abc import Sequence
 from functools import partial
 from html import escape
-from pathlib import Path
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
-from equimorph.study.answers import heading
 from equimorph.study.question import Figure, Kind, Question, still
 from equimorph.tasks import Trials, random_trials
 
@@ -23,32 +20,21 @@ class TrialsKind(Kind[Trials]):
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Trials
-    ) -> Sequence[Figure]:
+    ) -> list[Figure]:
         """Return the trials by their offsets."""
         draw = partial(plotting.trials, question.structure, answer)
-        return [still(question.files, draw)]
+        return [still(question.files, draw, "Each trial by the errors of the parameters.")]
 
-    def report(self, question: Question, answer: Trials, folder: Path) -> list[str]:
-        """Share of the trials that arrived, and the ends of the rest."""
-        files = question.files
+    def words(self, question: Question, answer: Trials) -> str:
+        """Return the share that arrived."""
+        low, high = (html.number(end, 3) for end in answer.interval)
+        return (
+            f"{int(answer.arrived.sum())} of {len(answer.kind)} arrived; with 95 % confidence the "
+            f"probability lies between {low} and {high}."
+        )
+
+    def details(self, question: Question, answer: Trials) -> list[str]:
+        """How many ended where."""
         counts = Counter(answer.kind.tolist())
         rows = [[escape(kind), str(count)] for kind, count in counts.most_common()]
-        caption = "Each trial by the errors of the parameters."
-        return [
-            heading(question),
-            f"<p>{escape(_share(answer))}</p>",
-            html.table(["ended at", "trials"], rows),
-            html.pictures(folder, {}, {f"{files}.png": caption}),
-        ]
-
-    def verdict(self, question: Question, answer: Trials) -> str:
-        """Return the share that arrived."""
-        return f"{question.title}: {_share(answer)}"
-
-
-def _share(trials: Trials) -> str:
-    low, high = trials.interval
-    return (
-        f"{int(trials.arrived.sum())} of {len(trials.kind)} arrived; with 95 % confidence the "
-        f"probability lies between {html.number(low, 3)} and {html.number(high, 3)}."
-    )
+        return [html.table(["ended at", "trials"], rows)]
