@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Lanes, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.locate import (
     Located,
@@ -21,7 +22,7 @@ from equimorph.model import Constraint
 
 
 @dataclass(frozen=True)
-class Events:
+class Events(Columns):
     """Located events of lanes, sorted by lane and then by arclength.
 
     `code` holds members of `EventCode`, `index` the index before and after the event; `found` tells
@@ -35,10 +36,6 @@ class Events:
     travelled: Float[np.ndarray, " events"]
     index: Int[np.ndarray, "events 2"]
     found: Bool[np.ndarray, " events"]
-
-    def take(self, events: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"]) -> "Events":
-        """Return a selection of the events."""
-        return Events(*(column[events] for column in vars(self).values()))
 
     @classmethod
     def join(cls, parts: list["Events"], size: int) -> "Events":

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.trace import Traces, trace
@@ -39,7 +40,7 @@ def no_critical_states(lanes: int) -> Shaped[np.ndarray, " lanes"]:
 
 
 @dataclass(frozen=True)
-class _Walk:
+class _Walk(Columns):
     """Paths on their way: lane, state, what happened, the level where they are, and direction."""
 
     lane: Int[np.ndarray, " lanes"]
@@ -49,10 +50,6 @@ class _Walk:
     way: Int[np.ndarray, " lanes"]
     high: Flags
     up: Flags
-
-    def take(self, some: Flags) -> "_Walk":
-        """Return a selection of the lanes."""
-        return _Walk(*(column[some] for column in vars(self).values()))
 
 
 @dataclass(frozen=True)

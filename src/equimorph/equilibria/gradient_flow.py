@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.soft_modes import extent_of_guesses, metric_length
 from equimorph.structures import Structure
@@ -118,7 +119,7 @@ class Flow:
 
 
 @dataclass(frozen=True)
-class _Front:
+class _Front(Columns):
     """Where flows are: lane, point, next step in time, last velocity, time, way, failed steps."""
 
     lanes: Some
@@ -140,10 +141,6 @@ class _Front:
         count = len(z)
         nothing, still = np.zeros(count), np.zeros((count, unknowns))
         return cls(np.arange(count), z, h, still, nothing, length, np.zeros(count, int))
-
-    def take(self, at: Bool[np.ndarray, " some"]) -> "_Front":
-        """Return a selection of the flows."""
-        return _Front(*(column[at] for column in vars(self).values()))
 
 
 def implicit_step(

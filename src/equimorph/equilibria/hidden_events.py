@@ -101,7 +101,7 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
             continue
         front = replace(probe.front, index=np.array([points.index[last[i]], index[i]]))
         probe = replace(probe, front=front)
-        pair = probe.at(np.array([0])), probe.at(np.array([1]))
+        pair = probe.take(np.array([0])), probe.take(np.array([1]))
         events = locate_all(one, [step_between(pair, None)], (), TraceOptions())
         found.append(replace(events, lanes=lanes[i : i + 1]))
     return Events.join(found, size)
@@ -145,7 +145,7 @@ def hidden_events(
     probe = probe_at(many, fronts(many, points, near), points.travelled[near])
     low = _lowest(np.abs(probe.value), _neighbours(points, near), CLOSE)
     kept = np.flatnonzero(~low)
-    few, sign = probe.at(kept), np.sign(probe.value[kept])
+    few, sign = probe.take(kept), np.sign(probe.value[kept])
     values, slopes = sign * few.value, sign * few.slope
     ends = values[:-1], values[1:]
     least = least_inside(ends, (slopes[:-1], slopes[1:]), np.diff(few.length))[1]
@@ -155,7 +155,7 @@ def hidden_events(
     skips = np.diff(kept) > 1
     same = (np.diff(near[kept]) == 1 + skips) & (np.diff(lanes[kept]) == 0)
     for i in np.flatnonzero((close | skips) & same & (np.diff(index[kept]) == 0)):
-        pair = (few.at(np.array([i])), few.at(np.array([i + 1])))
+        pair = (few.take(np.array([i])), few.take(np.array([i + 1])))
         first = float(probe.length[kept[i] + 1]) if skips[i] else None
         lane = lanes[kept[i] : kept[i] + 1]
         inside = look_inside(curve.take(lane), pair, first, options)

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Lanes
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.events import Events, locate_all
@@ -38,18 +39,13 @@ TRIALS = 30
 
 
 @dataclass(frozen=True)
-class Probe:
+class Probe(Columns):
     """Points with tangents, the eigenvalue nearest to zero and its slope, lengths on the way."""
 
     front: Front
     value: Values
     slope: Values
     length: Values
-
-    def at(self, some: Int[np.ndarray, " some"]) -> "Probe":
-        """Return a selection of the points."""
-        columns = (self.value[some], self.slope[some], self.length[some])
-        return Probe(self.front.take(some), *columns)
 
 
 def probe_at(curve: Curve, front: Front, length: Values) -> Probe:
@@ -77,7 +73,7 @@ def inside_step(
     # a path may start or arrive right at an event: that is no hidden one
     if smaller <= AT_EVENT * larger:
         return []
-    pair, first = (probe.at(np.array([0])), probe.at(np.array([1]))), (*lengths[2:], None)[0]
+    pair, first = (probe.take(np.array([0])), probe.take(np.array([1]))), (*lengths[2:], None)[0]
     return look_inside(curve, pair, first, options)
 
 

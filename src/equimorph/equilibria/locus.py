@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.equilibria.newton_step import Planes, Tangents
 from equimorph.equilibria.point_conditions import Condition, Directions, Move, Plane, Vanishing
@@ -94,7 +95,7 @@ class Locus:
 
 
 @dataclass(frozen=True)
-class Spots:
+class Spots(Columns):
     """Points of loci, one a lane: coordinates, orthonormal kernels of [F_z F_p], borders, index.
 
     The first direction of a kernel is the unit tangent of the curve. The index counts the negative
@@ -110,10 +111,6 @@ class Spots:
     def tangent(self) -> Points:
         """Unit tangents."""
         return np.ascontiguousarray(self.basis[:, 0])
-
-    def take(self, lanes: Some | Flags | slice) -> "Spots":
-        """Return a selection of the lanes."""
-        return Spots(*(column[lanes] for column in vars(self).values()))
 
     def turn(self, sign: Values) -> "Spots":
         """The same with tangents times a sign of each lane."""

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.optimize import brentq
 
-from equimorph.arrays import Flags, Some, Values
+from equimorph.arrays import Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import Test
 from equimorph.equilibria.locus import Locus, Points, Spots, advance, onto_set, test_slopes
 from equimorph.equilibria.trace_options import EventKind
@@ -52,7 +52,7 @@ class Landmark:
 
 
 @dataclass(frozen=True)
-class Walks:
+class Walks(Columns):
     """Where curves are, one a lane.
 
     Points, watched values with slopes, length of the next step, way so far, and the points before
@@ -71,26 +71,6 @@ class Walks:
     def index(self) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues in addition to those that vanish."""
         return self.spots.index
-
-    def take(self, lanes: Some | Flags | slice) -> "Walks":
-        """Return a selection of the lanes."""
-        columns = list(vars(self).values())
-        return Walks(columns[0].take(lanes), *(column[lanes] for column in columns[1:]))
-
-    def with_others(self, others: "Walks", at: Some) -> "Walks":
-        """Return all lanes, those at some places replaced."""
-        pick = np.arange(len(self.length))
-        pick[at] = len(pick) + np.arange(len(at))
-
-        def mix(one: Any, other: Any) -> Any:
-            columns = zip(vars(one).values(), vars(other).values(), strict=True)
-            return [
-                mix(*pair) if isinstance(pair[0], Spots) else np.concatenate(pair)[pick]
-                for pair in columns
-            ]
-
-        spots, *rest = mix(self, others)
-        return Walks(Spots(*spots), *rest)
 
 
 def predict(locus: Locus, here: Walks, lengths: Values) -> Points:

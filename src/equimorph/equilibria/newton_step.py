@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_kernels import (
     amount_lanes,
@@ -26,7 +27,7 @@ Numbers = Int[np.ndarray, " lanes"]
 
 
 @dataclass(frozen=True)
-class Tangents:
+class Tangents(Columns):
     """Coordinates along the set: its tangent spaces, found on the way. Regular at folds, too.
 
     Parameters
@@ -41,13 +42,9 @@ class Tangents:
     unfolded: bool = False
     border: Lanes | None = None
 
-    def take(self, some: Some) -> "Tangents":
-        """Return those of some of the lanes."""
-        return self if self.border is None else Tangents(self.unfolded, self.border[some])
-
 
 @dataclass(frozen=True)
-class Planes:
+class Planes(Columns):
     """Coordinates along the set: projections to given planes that are near its tangent spaces.
 
     Parameters
@@ -70,20 +67,10 @@ class Planes:
         """Whether β is one more unknown."""
         return self.by_beta is not None
 
-    def take(self, some: Some) -> "Planes":
-        """Return the planes of some of the lanes."""
-        beta = None if self.by_beta is None else self.by_beta[some]
-        border = None if self.border is None else self.border[some]
-        return Planes(self.by_z[some], self.by_p[some], beta, border)
-
 
 @dataclass(frozen=True)
-class Held:
+class Held(Columns):
     """Coordinates along the set: the parameters along the directions. Singular at folds."""
-
-    def take(self, some: Some) -> "Held":
-        """Return the same."""
-        return self
 
 
 Frame = Tangents | Planes | Held
@@ -176,7 +163,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Points:
+class Points(Columns):
     """Where the lanes are: points, β, the border b of F_z, rows that see the tangent space."""
 
     problem: Problem
@@ -185,11 +172,6 @@ class Points:
     beta: Values
     b: Float[np.ndarray, "lanes border"]
     rows: Float[np.ndarray, "lanes rows bordered"]
-
-    def take(self, some: Some) -> "Points":
-        """Return some of the lanes."""
-        columns = (self.z, self.p, self.beta, self.b, self.rows)
-        return Points(self.problem.take(some), *(column[some] for column in columns))
 
     def moved(self, step: Step, share: Values) -> "Points":
         """Points after shares of a step, with the border and the rows of the points before."""

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters, Scalars
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.model.descriptor import Evaluate
 from equimorph.structures.equations import Direction
@@ -64,7 +65,7 @@ class Condition(Protocol):
 
 
 @dataclass(frozen=True)
-class Fold:
+class Fold(Columns):
     """det F_z = 0: the test function g of the bordered system vanishes."""
 
     critical = True
@@ -75,13 +76,9 @@ class Fold:
         seconds = second_derivatives(at, [(at.v, np.zeros_like(at.p))], [*move.along, onto])
         return Linear(at.g[:, None] - seconds[:, :, -1], -seconds[:, :, :-1])
 
-    def take(self, some: Some) -> "Fold":
-        """Return the same: nothing differs between lanes."""
-        return self
-
 
 @dataclass(frozen=True)
-class Crossing:
+class Crossing(Columns):
     """Gradient of the reduced equation r = 0 is zero: branch points, and crossings of sheets.
 
     Lyapunov–Schmidt reduction with a border b [Govaerts2000]_: where the residual is r b, the set
@@ -115,13 +112,9 @@ class Crossing:
         scale = np.maximum(np.abs(slopes).max(axis=(1, 2)), 1e-300)
         return Linear(gradient / scale[:, None], slopes / scale[:, None, None])
 
-    def take(self, some: Some) -> "Crossing":
-        """Return the condition for some of the lanes."""
-        return Crossing(self.directions[some])
-
 
 @dataclass(frozen=True)
-class Plane:
+class Plane(Columns):
     """Points in planes through given points: parameters held, arclength, normal spaces of groups.
 
     Parameters
@@ -146,13 +139,9 @@ class Plane:
         slopes += self.by_p @ np.swapaxes(move.along_p, 1, 2)
         return Linear(value, slopes)
 
-    def take(self, some: Some) -> "Plane":
-        """Return the planes of some of the lanes."""
-        return Plane(self.z[some], self.p[some], self.by_z[some], self.by_p[some])
-
 
 @dataclass(frozen=True)
-class Values:
+class Values(Columns):
     """Scalars of states take given values: descriptors, targets, active constraints.
 
     Parameters
@@ -197,14 +186,9 @@ class Values:
 
         return _differences(excess, at, move, self.difference, one_sided=self.one_sided)
 
-    def take(self, some: Some) -> "Values":
-        """Return the condition for some of the lanes."""
-        targets = self.targets[some]
-        return Values(self.functions, targets, self.difference, self.one_sided, self.reach)
-
 
 @dataclass(frozen=True)
-class Vanishing:
+class Vanishing(Columns):
     """Tests of nearly singular states vanish: cusps, swallowtails, grazing of bounds.
 
     Parameters
@@ -242,11 +226,6 @@ class Vanishing:
             return found
 
         return _differences(scalars, at, move, self.difference, one_sided=self.one_sided)
-
-    def take(self, some: Some) -> "Vanishing":
-        """Return the tests of some of the lanes."""
-        lanes = self.lanes[some]
-        return Vanishing(self.tests, lanes, self.difference, self.one_sided, self.at_null)
 
 
 def second_derivatives(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.arrays import Lanes, Parameters, Some, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.curves import growing_force
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.soft_modes import metric_length
@@ -28,16 +29,12 @@ STEPS = 150
 
 
 @dataclass(frozen=True)
-class Pairs:
+class Pairs(Columns):
     """Pairs of minima, each over one point of the parameter space, a pair per lane."""
 
     start: Lanes
     goal: Lanes
     p: Parameters
-
-    def take(self, some: Some) -> "Pairs":
-        """Return some of the lanes."""
-        return Pairs(self.start[some], self.goal[some], self.p[some])
 
     def both_ways(self) -> "Pairs":
         """All pairs, then all of them from goal to start."""

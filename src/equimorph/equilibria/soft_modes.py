@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.columns import Columns
 from equimorph.linalg import multiply
 from equimorph.structures import Structure, stability_margin
 from equimorph.tolerances import SAME_STATE
@@ -34,7 +35,7 @@ how often it becomes known better."""
 
 
 @dataclass(frozen=True)
-class SoftModes:
+class SoftModes(Columns):
     """Smallest eigenvalue of the constrained Hessian in the metric, and its mode, per lane.
 
     Parameters
@@ -62,10 +63,6 @@ class SoftModes:
     length: Values
     rate: Values
     critical: Flags
-
-    def take(self, some: Some) -> "SoftModes":
-        """Return a selection of the lanes."""
-        return SoftModes(*(column[some] for column in vars(self).values()))
 
 
 def soft_modes(structure: Structure, z: Lanes, p: Parameters) -> SoftModes:

@@ -3,9 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Values
+from equimorph.columns import Columns
 from equimorph.equilibria import event_kernels, kernels
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length
 from equimorph.equilibria.newton_step import Planes
@@ -13,7 +14,7 @@ from equimorph.equilibria.settle import Guards, settle
 
 
 @dataclass(frozen=True)
-class Front:
+class Front(Columns):
     """Points on the curves with unit tangents: where each lane is now."""
 
     z: Lanes
@@ -22,30 +23,9 @@ class Front:
     tangent_t: Values
     index: Int[np.ndarray, " lanes"]
 
-    def take(self, lanes: Int[np.ndarray, " some"] | Flags) -> "Front":
-        """Return a selection of the lanes."""
-        return Front(
-            self.z[lanes],
-            self.t[lanes],
-            self.tangent_z[lanes],
-            self.tangent_t[lanes],
-            self.index[lanes],
-        )
-
-    def update(self, new: "Front", where: Flags) -> "Front":
-        """Return `new` on the flagged lanes and this on the rest."""
-        wide = where[:, None]
-        return Front(
-            np.where(wide, new.z, self.z),
-            np.where(where, new.t, self.t),
-            np.where(wide, new.tangent_z, self.tangent_z),
-            np.where(where, new.tangent_t, self.tangent_t),
-            np.where(where, new.index, self.index),
-        )
-
 
 @dataclass(frozen=True)
-class Bracket:
+class Bracket(Columns):
     """Steps in which something happened: lane numbers, both ends, step lengths, arclength before.
 
     what: bits of `EventCode`.
@@ -57,17 +37,6 @@ class Bracket:
     step: Float[np.ndarray, " some"]
     travelled: Float[np.ndarray, " some"]
     what: Int[np.ndarray, " some"]
-
-    def take(self, at: Int[np.ndarray, " fewer"]) -> "Bracket":
-        """Return a selection of the brackets."""
-        return Bracket(
-            self.lanes[at],
-            self.before.take(at),
-            self.after.take(at),
-            self.step[at],
-            self.travelled[at],
-            self.what[at],
-        )
 
 
 def initial_front(curve: Curve, z: Lanes, t: Values) -> Front:
@@ -126,7 +95,7 @@ def new_scalars(
 
 
 @dataclass(frozen=True)
-class Points:
+class Points(Columns):
     """Regular points of many lanes: lane, length from its start, place, index."""
 
     lanes: Int[np.ndarray, " points"]
@@ -134,10 +103,6 @@ class Points:
     z: Float[np.ndarray, "points size"]
     t: Float[np.ndarray, " points"]
     index: Int[np.ndarray, " points"]
-
-    def take(self, at: Int[np.ndarray, " some"] | Bool[np.ndarray, " points"]) -> "Points":
-        """Return a selection of the points."""
-        return Points(*(column[at] for column in vars(self).values()))
 
     @classmethod
     def join(cls, parts: list["Points"], size: int) -> "Points":

@@ -105,14 +105,14 @@ def step(
     there = _look(locus, here.take(at), spots.take(at), watches, options)
     good = found.copy()
     good[at] = _judge(here.take(at), there, options)
-    return here.with_others(there, at), good
+    return here.with_rows(at, there), good
 
 
 def update(here: Walks, there: Walks, good: Flags) -> Walks:
     """Accept good steps, and shorten the rest."""
     if good.all():
         return there
-    new = here.with_others(there.take(good), np.flatnonzero(good))
+    new = here.where(~good, there)
     return replace(new, length=np.where(good, new.length, BACK * new.length))
 
 

@@ -16,7 +16,7 @@ from equimorph.manifold.geometry.tangents import fold_slopes, split_step
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.least_squares import DIFFERENCE, Residuals, nearest
 from equimorph.manifold.queries.locate import ValueFit, different, pieces_of
-from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
+from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, shape_coordinate
 
@@ -202,26 +202,26 @@ def _fit(eset: EquilibriumSet, measured: Measured, errors: Measured) -> ValueFit
 
 def _minima(
     eset: EquilibriumSet, residuals: Residuals, unstable: bool
-) -> tuple[Spot, Values, Flags]:
+) -> tuple[SetPoints, Values, Flags]:
     """Best fits, their misfits, and whether they are minima; fits on folds are not."""
     ground = Ground(eset.setting, eset)
     value = np.linalg.norm(residuals(eset.points.z, eset.points.p), axis=1)
     cells = eset.cells if unstable else eset.cells[eset.cell_index == 0]
     starts = local_minima(faces_of(cells, 2), value)[:STARTS]
-    found, misfit, inside = nearest(ground, spots(eset, starts), residuals)
+    found, misfit, inside = nearest(ground, points_at_vertices(eset, starts), residuals)
     if unstable:
         return found, misfit, inside
     stable = eset.structure.index(found.z, found.p) == 0
     kept, (edge, value) = (found.take(stable), misfit[stable]), _at_edge(ground, residuals, value)
     pairs = zip(vars(kept[0]).values(), vars(edge).values(), strict=True)
-    whole = Spot(*(np.concatenate(pair) for pair in pairs))
+    whole = SetPoints(*(np.concatenate(pair) for pair in pairs))
     flags = np.concatenate([inside[stable], np.zeros(len(value), bool)])
     return whole, np.concatenate([kept[1], value]), flags
 
 
 def _at_edge(
     ground: Ground, residuals: Residuals, value: Float[np.ndarray, " V"]
-) -> tuple[Spot, Values]:
+) -> tuple[SetPoints, Values]:
     """States at the edge of stability beyond which alone the fit would become better."""
     eset = ground.eset
     every = [_facets(piece, len(eset.names)) for piece in eset.folds]
@@ -229,14 +229,14 @@ def _at_edge(
     facets = facets[(eset.index[facets] == 0).all(axis=1)]
     single = facets.shape[1] == 1
     starts = facets[:, 0] if single else local_minima(faces_of(facets, 2), value)[:STARTS]
-    begin = spots(eset, starts)
+    begin = points_at_vertices(eset, starts)
     if len(starts) == 0:
         return begin, np.zeros(0)
     edge, misfit, _ = nearest(Ground(ground.setting, eset, fold=True), begin, residuals)
     frames, rows = ground.frames(edge)
     across = fold_slopes(ground.setting, edge.z, edge.p, frames)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    here = Spot(edge.z, edge.p, rows)
+    here = SetPoints(edge.z, edge.p, rows)
     inner, there = ground.moved(here, frames, INWARD * across)
     outer, back = ground.moved(here, frames, -INWARD * across)
     stable = [eset.structure.index(side.z, side.p) == 0 for side in (inner, outer)]
@@ -307,7 +307,9 @@ def _coordinates(states: States) -> dict[Descriptor, float]:
     }
 
 
-def _standard_errors(eset: EquilibriumSet, spot: Spot, residuals: Residuals) -> dict[str, Values]:
+def _standard_errors(
+    eset: EquilibriumSet, spot: SetPoints, residuals: Residuals
+) -> dict[str, Values]:
     """Linearised: covariance (JᵀJ)⁻¹ of tangent coordinates, carried over to the parameters."""
     setting, d = eset.setting, len(eset.names)
     frames, _ = Ground(setting, eset).frames(spot)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.columns import Columns
 from equimorph.manifold.geometry.crossings import crossing_frames
 from equimorph.manifold.geometry.exact_points import Corrected
 from equimorph.manifold.geometry.points import VertexKind
@@ -32,7 +33,7 @@ class _Room:
 
 
 @dataclass(frozen=True)
-class Vertices:
+class Vertices(Columns):
     """Exact points with their tangent frames."""
 
     z: Float[np.ndarray, "V size"]
@@ -59,10 +60,6 @@ class Vertices:
     def columns(self) -> dict[str, np.ndarray]:
         """All that is known of each vertex."""
         return {name: column for name, column in vars(self).items() if name != "room"}
-
-    def take(self, some: Int[np.ndarray, " some"]) -> "Vertices":
-        """Return a selection of the vertices."""
-        return replace(self, **{k: column[some] for k, column in self.columns.items()}, room=None)
 
     def join(self, *more: "Vertices") -> "Vertices":
         """Return these vertices and more.

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.point_conditions import Condition, Crossing, Fold, Plane
 from equimorph.equilibria.point_conditions import Values as TakesValues
@@ -51,7 +52,7 @@ class Pinned:
 
 
 @dataclass(frozen=True)
-class Corrected:
+class Corrected(Columns):
     """Points of the set, which of them can be trusted, and what is known there."""
 
     z: Lanes
@@ -60,13 +61,9 @@ class Corrected:
     index: Numbers
     found: Flags
 
-    def take(self, some: Flags) -> "Corrected":
-        """Return some of the points."""
-        return Corrected(*(column[some] for column in vars(self).values()))
-
 
 @dataclass(frozen=True)
-class Aim:
+class Aim(Columns):
     """What is sought: points on a fold, on a constraint, at a crossing, in planes through middles.
 
     Parameters
@@ -94,12 +91,6 @@ class Aim:
     rows: Float[np.ndarray, "lanes m coordinates"]
     crossing: bool = False
     tangents: Rows | None = None
-
-    def take(self, some: Int[np.ndarray, " some"]) -> "Aim":
-        """Return some of the lanes."""
-        span, middle, rows = self.span[some], self.middle[some], self.rows[some]
-        tangents = None if self.tangents is None else self.tangents[some]
-        return replace(self, span=span, middle=middle, rows=rows, tangents=tangents)
 
     @property
     def plain(self) -> bool:

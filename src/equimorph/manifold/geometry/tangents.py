@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import free_directions, weights_of
 from equimorph.equilibria.point_conditions import second_derivatives
@@ -80,16 +81,12 @@ def cap_slopes(
 
 
 @dataclass(frozen=True)
-class Ends:
+class Ends(Columns):
     """One end of edges: its point, tangent space, and the slopes of what must stay zero on them."""
 
     place: Float[np.ndarray, "edges coordinates"]
     rows: Rows
     slopes: Float[np.ndarray, "edges m d"]
-
-    def take(self, some: Int[np.ndarray, " some"]) -> "Ends":
-        """Return some of the ends."""
-        return Ends(self.place[some], self.rows[some], self.slopes[some])
 
     def along(self, chord: Float[np.ndarray, "edges coordinates"]) -> Float[np.ndarray, "edges d"]:
         """Coordinates, in the frame, of the tangent vector that a chord is nearest to.

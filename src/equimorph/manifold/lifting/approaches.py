@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Some, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.settle import free_directions
 from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.geometry.setting import Setting
@@ -38,16 +39,12 @@ Shares = Float[np.ndarray, "n corners"]
 
 
 @dataclass(frozen=True)
-class _Pairs:
+class _Pairs(Columns):
     """Pairs of sheets over grid cells: their points over the corners, in the same order."""
 
     cell: Some
     one: Corners
     other: Corners
-
-    def take(self, some: Some | Flags) -> "_Pairs":
-        """Return some of the pairs."""
-        return _Pairs(self.cell[some], self.one[some], self.other[some])
 
 
 def approaches(pairing: Pairing, cells: Cells, wanted: Flags) -> Starts:

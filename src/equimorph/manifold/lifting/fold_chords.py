@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Some, Values
+from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.balls import depths
@@ -32,7 +33,7 @@ BEYOND = -0.05
 
 
 @dataclass(frozen=True)
-class FoldChords:
+class FoldChords(Columns):
     """Chords of folds from side to side of grid triangles.
 
     ends (n, 2): points; triangle: below them; normals: of unit length towards the existing sheets,
@@ -43,10 +44,6 @@ class FoldChords:
     triangle: Some
     normals: Float[np.ndarray, "n 2 d"]
     cusped: Flags
-
-    def take(self, some: Some | Flags) -> "FoldChords":
-        """Return some of the chords."""
-        return FoldChords(*(column[some] for column in vars(self).values()))
 
     @property
     def cosines(self) -> Values:
@@ -79,7 +76,7 @@ def fold_chords(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) 
 
 
 @dataclass(frozen=True)
-class Turns:
+class Turns(Columns):
     """Folds that turn sharply in triangles.
 
     ends (n, 2): points; triangle: below them; normals: see `FoldChords`; z, p: a point of the fold
@@ -92,10 +89,6 @@ class Turns:
     z: Float[np.ndarray, "n size"]
     p: Float[np.ndarray, "n parameters"]
     inside: Flags
-
-    def take(self, some: Some | Flags) -> "Turns":
-        """Return some of the turns."""
-        return Turns(*(column[some] for column in vars(self).values()))
 
 
 def sharp_turns(pairing: Pairing, chords: FoldChords) -> Turns | None:

@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import Points, VertexKind
@@ -58,16 +59,12 @@ class Curves:
 
 
 @dataclass(frozen=True)
-class Rays:
+class Rays(Columns):
     """Edges seen from points over one of their ends: the first or the second."""
 
     points: Int[np.ndarray, " n"]
     edges: Int[np.ndarray, " n"]
     sides: Int[np.ndarray, " n"]
-
-    def take(self, some: Int[np.ndarray, " m"] | Bool[np.ndarray, " n"] | slice) -> "Rays":
-        """Return some of the rays."""
-        return Rays(self.points[some], self.edges[some], self.sides[some])
 
 
 @dataclass

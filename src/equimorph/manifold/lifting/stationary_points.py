@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
 from equimorph.manifold.geometry.crossings import Reduction, reduction
 from equimorph.manifold.geometry.setting import Setting
@@ -34,7 +35,7 @@ FARTHEST = 2.0
 
 
 @dataclass(frozen=True)
-class Starts:
+class Starts(Columns):
     """Guesses in grid cells.
 
     cell: grid cells; corners: of these, in free parameters; shares: barycentric coordinates of the
@@ -45,10 +46,6 @@ class Starts:
     corners: Float[np.ndarray, "n corners d"]
     shares: Float[np.ndarray, "n corners"]
     z: Lanes
-
-    def take(self, some: Flags) -> "Starts":
-        """Return some of the guesses."""
-        return Starts(*(column[some] for column in vars(self).values()))
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
 """Cells over points, and cells near them at curved folds and constraints."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.columns import Columns
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, keys_of
 from equimorph.manifold.lookup.kernels import cells_near
@@ -21,7 +21,7 @@ TRIANGLE = 3
 
 
 @dataclass(frozen=True)
-class Hits:
+class Hits(Columns):
     """Pairs of a point and a cell near it, sorted by point.
 
     weights: barycentric coordinates of the point in the cell; inside: whether the cell contains the
@@ -32,16 +32,6 @@ class Hits:
     cell: Int[np.ndarray, " hits"]
     weights: Float[np.ndarray, "hits corners"]
     inside: Bool[np.ndarray, " hits"]
-
-    def take(self, some: Bool[np.ndarray, " hits"] | Int[np.ndarray, " some"]) -> "Hits":
-        """Some of the pairs."""
-        return Hits(*(column[some] for column in vars(self).values()))
-
-    @classmethod
-    def join(cls, parts: Sequence["Hits"]) -> "Hits":
-        """All pairs of some parts, at least one."""
-        columns = zip(*(vars(part).values() for part in parts), strict=True)
-        return cls(*(np.concatenate(column) for column in columns))
 
     def with_others(self, others: "Hits") -> "Hits":
         """All pairs of both, each point's own first; `others` are sorted, too."""

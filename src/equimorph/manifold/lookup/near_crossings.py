@@ -19,6 +19,7 @@ from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev, legendre
 
 from equimorph.arrays import Cells, Flags, Lanes, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Plane
@@ -66,7 +67,7 @@ class Branches:
 
 
 @dataclass(frozen=True)
-class Centres:
+class Centres(Columns):
     """Crossing points close to points: z₀, p and r there, border, amplitude's length, index."""
 
     z: Lanes
@@ -78,10 +79,6 @@ class Centres:
     low: Int[np.ndarray, " lanes"]
     """Number of negative eigenvalues below the one that vanishes."""
     point: Int[np.ndarray, " lanes"]
-
-    def take(self, some: Int[np.ndarray, " n"] | Flags) -> "Centres":
-        """Some of the crossing points."""
-        return Centres(*(column[some] for column in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)

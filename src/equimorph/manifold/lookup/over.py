@@ -130,7 +130,7 @@ class Sheets:
         parts = [found for found, _ in chunks]
         doubtful = [near for _, near in chunks if near is not None]
         if doubtful:
-            parts.extend(self._search(p, Hits.join(doubtful)))
+            parts.extend(self._search(p, Hits.concatenate(doubtful)))
         z, point, cell = (
             column[0] if len(parts) == 1 else np.concatenate(column)
             for column in zip(*parts, strict=True)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import placed_frames
-from equimorph.manifold.queries.nearest import Ground, Spot, joined
+from equimorph.manifold.queries.nearest import Ground, SetPoints
 
 SWEEPS, HALVINGS = 60, 8
 """Largest number of sweeps that straighten a chain, and of lengths of a step that are tried."""
@@ -28,10 +28,10 @@ class _Move:
     gain: by how much the sum falls if it is quadratic.
     """
 
-    inner: Spot
+    inner: SetPoints
     frames: Float[np.ndarray, "inner d full"]
     step: Float[np.ndarray, "inner d"]
-    last: Spot
+    last: SetPoints
     edge: Float[np.ndarray, "1 k full"]
     end: Float[np.ndarray, "1 k"]
     gain: float
@@ -50,7 +50,7 @@ class Chains:
     side.
     """
 
-    def __init__(self, eset: EquilibriumSet, ways: Sequence[Spot]) -> None:
+    def __init__(self, eset: EquilibriumSet, ways: Sequence[SetPoints]) -> None:
         self.setting, self.chains = eset.setting, list(ways)
         self.on_set, self.on_fold = Ground(self.setting, eset), Ground(self.setting, eset, True)
 
@@ -64,27 +64,27 @@ class Chains:
             moving = self._sweep(moving)
         return [float(self._links(chain).sum()) for chain in self.chains]
 
-    def _links(self, chain: Spot) -> Float[np.ndarray, " links"]:
+    def _links(self, chain: SetPoints) -> Float[np.ndarray, " links"]:
         return np.asarray(np.linalg.norm(np.diff(self._places(chain), axis=0), axis=1))
 
-    def _energy(self, chain: Spot) -> float:
+    def _energy(self, chain: SetPoints) -> float:
         return float((self._links(chain) ** 2).sum())
 
-    def _places(self, chain: Spot) -> Float[np.ndarray, "points coordinates"]:
+    def _places(self, chain: SetPoints) -> Float[np.ndarray, "points coordinates"]:
         return embed(self.setting, chain.z, chain.p)
 
     def _divide(self, links: int) -> None:
         """Put equidistant points on the set along the chains."""
         near = [self._equidistant(chain, links) for chain in self.chains]
-        moved, good = self.on_set.corrected(joined(near))
+        moved, good = self.on_set.corrected(SetPoints.concatenate(near))
         for i, chain in enumerate(near):
             # the ends are what they were, and points that are not found are left out
             begin = i * (links + 1)
             inner = 1 + np.flatnonzero(good[begin + 1 : begin + links])
-            exact = chain.replaced(inner, moved.take(begin + inner))
+            exact = chain.with_rows(inner, moved.take(begin + inner))
             self.chains[i] = exact.take(np.concatenate([[0], inner, [links]]))
 
-    def _equidistant(self, chain: Spot, links: int) -> Spot:
+    def _equidistant(self, chain: SetPoints, links: int) -> SetPoints:
         """Points at equal distances along a chain of straight links."""
         length = np.concatenate([[0.0], np.cumsum(self._links(chain))])
         at = np.linspace(0.0, length[-1], links + 1)
@@ -95,7 +95,7 @@ class Chains:
             (1.0 - share) * column[before] + share * column[before + 1]
             for column in (chain.z, chain.p)
         )
-        return Spot(z, p, chain.rows[np.where(share[:, 0] < 0.5, before, before + 1)])
+        return SetPoints(z, p, chain.rows[np.where(share[:, 0] < 0.5, before, before + 1)])
 
     def _sweep(self, moving: Sequence[int]) -> list[int]:
         """One step of some chains towards straight ones; which of them are not straight yet."""
@@ -108,19 +108,21 @@ class Chains:
                 break
             tried = self._move([moves[i] for i in todo], float(share))
             for i, chain in zip(todo.copy(), tried, strict=True):
-                whole = None if chain is None else joined([self.chains[i].take(FIRST), chain])
-                if whole is not None and self._energy(whole) < energy[i]:
+                if chain is None:
+                    continue
+                whole = SetPoints.concatenate([self.chains[i].take(FIRST), chain])
+                if self._energy(whole) < energy[i]:
                     self.chains[i] = whole
                     todo.remove(i)
         return [i for i in left if i not in todo]
 
-    def _moves(self, chains: Sequence[Spot]) -> Iterator[_Move]:
+    def _moves(self, chains: Sequence[SetPoints]) -> Iterator[_Move]:
         """Steps of chains, with the tangent spaces of all their points from one call."""
-        inner = joined([chain.take(np.arange(1, len(chain.z) - 1)) for chain in chains])
-        last = joined([chain.take(LAST) for chain in chains])
+        inner = SetPoints.concatenate([chain.take(slice(1, -1)) for chain in chains])
+        last = SetPoints.concatenate([chain.take(LAST) for chain in chains])
         frames, rows = self.on_set.frames(inner)
         edges, edge_rows = self.on_fold.frames(last)
-        inner, last = Spot(inner.z, inner.p, rows), Spot(last.z, last.p, edge_rows)
+        inner, last = SetPoints(inner.z, inner.p, rows), SetPoints(last.z, last.p, edge_rows)
         ends = np.cumsum([len(chain.z) - 2 for chain in chains])[:-1]
         for i, own in enumerate(np.split(np.arange(len(inner.z)), ends)):
             edge = edges[i : i + 1]
@@ -128,11 +130,14 @@ class Chains:
             tip = last.take(np.array([i]))
             yield _Move(inner.take(own), frames[own], step[0], tip, edge, step[1], step[2])
 
-    def _move(self, moves: Sequence[_Move], share: float) -> list[Spot | None]:
+    def _move(self, moves: Sequence[_Move], share: float) -> list[SetPoints | None]:
         """Chains without their first points after a share of each step; None: not on the set."""
         frames, step = np.concatenate([m.frames for m in moves]), [m.step for m in moves]
         edge, end = np.concatenate([m.edge for m in moves]), [m.end for m in moves]
-        inner, goal = joined([m.inner for m in moves]), joined([m.last for m in moves])
+        inner, goal = (
+            SetPoints.concatenate([m.inner for m in moves]),
+            SetPoints.concatenate([m.last for m in moves]),
+        )
         middle, good = self.on_set.moved(inner, frames, share * np.concatenate(step))
         there = np.ones(len(moves), bool)
         if edge.shape[1]:
@@ -140,7 +145,7 @@ class Chains:
         ends = np.cumsum([len(m.step) for m in moves])[:-1]
         owns = np.split(np.arange(len(frames)), ends)
         return [
-            joined([middle.take(own), goal.take(np.array([i]))])
+            SetPoints.concatenate([middle.take(own), goal.take(np.array([i]))])
             if there[i] and good[own].all()
             else None
             for i, own in enumerate(owns)
@@ -148,7 +153,7 @@ class Chains:
 
     def _step(
         self,
-        chain: Spot,
+        chain: SetPoints,
         frames: Float[np.ndarray, "inner d full"],
         edge: Float[np.ndarray, "1 k full"],
     ) -> tuple[Float[np.ndarray, "inner d"], Float[np.ndarray, "1 k"], float]:

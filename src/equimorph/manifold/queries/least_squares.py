@@ -12,9 +12,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.columns import Columns
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import cap_slopes, placed_frames, split_step
-from equimorph.manifold.queries.nearest import Frames, Ground, Spot, free_steps
+from equimorph.manifold.queries.nearest import Frames, Ground, SetPoints, free_steps
 
 Residuals = Callable[[Lanes, Parameters], Float[np.ndarray, "lanes m"]]
 Steps = Float[np.ndarray, "lanes k"]
@@ -39,7 +40,9 @@ INWARDS = 1e-7
 """Fall of the norm per step inwards, relative to its largest slope, above which a side is left."""
 
 
-def nearest(ground: Ground, spot: Spot, residuals: Residuals) -> tuple[Spot, Values, Flags]:
+def nearest(
+    ground: Ground, spot: SetPoints, residuals: Residuals
+) -> tuple[SetPoints, Values, Flags]:
     """Local minima of ``½‖r‖²`` from points on, the norms ‖r‖, and which are minima inside.
 
     Newton with the second derivatives measured along the set. Minima on a side of the box or on a
@@ -74,14 +77,14 @@ class _Descent:
 
     ground: Ground
     residuals: Residuals
-    spot: Spot
+    spot: SetPoints
     value: Values
     held: Bool[np.ndarray, "lanes sides"]
     ended: Flags
     minimum: Flags
 
     @classmethod
-    def begun(cls, ground: Ground, spot: Spot, residuals: Residuals) -> "_Descent":
+    def begun(cls, ground: Ground, spot: SetPoints, residuals: Residuals) -> "_Descent":
         """At the starts, held nowhere."""
         count, d = len(spot.z), len(ground.setting.free)
         none = np.zeros(count, bool)
@@ -122,7 +125,7 @@ class _Descent:
         step = share[:, None] * move.step
         value = self.value[lanes]
         new, norm, better = _shorten(face, move, step, self.residuals, value)
-        self.spot, self.value[lanes] = self.spot.replaced(lanes, new), norm
+        self.spot, self.value[lanes] = self.spot.with_rows(lanes, new), norm
         self._release(lanes[~better], (move.fall < STALLED * value**2)[~better])
 
     def _room(self, move: "_Move") -> tuple[Values, Int[np.ndarray, " lanes"]]:
@@ -172,13 +175,13 @@ class _Descent:
             p[at, setting.free[side[at] - lower]] = bound[side[at] - lower]
         for k, lane in enumerate(lanes.tolist()):
             face, one = self.face(held[k]), slice(k, k + 1)
-            guess = Spot(z[one], p[one], move.spot.rows[one])
-            frames, rows = face.frames(Spot(move.spot.z[one], move.spot.p[one], guess.rows))
+            guess = SetPoints(z[one], p[one], move.spot.rows[one])
+            frames, rows = face.frames(SetPoints(move.spot.z[one], move.spot.p[one], guess.rows))
             new, good = face.moved(guess, frames, np.zeros(frames.shape[:2]))
             norm = np.linalg.norm(self.residuals(new.z, new.p), axis=1)
             near = share[k] * np.linalg.norm(move.step[k]) < STILL
             if good[0] and (norm[0] < self.value[lane] or near):
-                self.spot = self.spot.replaced(lanes[one], Spot(new.z, new.p, rows))
+                self.spot = self.spot.with_rows(lanes[one], SetPoints(new.z, new.p, rows))
                 self.value[lane], self.held[lane], landed[k] = norm[0], held[k], True
         return landed
 
@@ -210,17 +213,13 @@ class _Descent:
 
 
 @dataclass(frozen=True)
-class _Move:
+class _Move(Columns):
     """A Newton step along frames from points, and the fall of the squares that it predicts."""
 
-    spot: Spot
+    spot: SetPoints
     frames: Frames
     step: Steps
     fall: Values
-
-    def take(self, some: Some) -> "_Move":
-        """Some of the points."""
-        return _Move(self.spot.take(some), self.frames[some], self.step[some], self.fall[some])
 
     def small(self, value: Values) -> Flags:
         """Which steps are lost in round-off, in length or in what they gain."""
@@ -229,7 +228,7 @@ class _Move:
 
 
 def _gradient(
-    ground: Ground, spot: Spot, frames: Frames, residuals: Residuals
+    ground: Ground, spot: SetPoints, frames: Frames, residuals: Residuals
 ) -> tuple[Float[np.ndarray, "lanes k"], Float[np.ndarray, "lanes m k"]]:
     """Gradient of ½‖r‖² along frames, and the derivative of r."""
     lanes, k = frames.shape[:2]
@@ -242,10 +241,10 @@ def _gradient(
     return np.einsum("lmk,lm->lk", slope, values[0]), slope
 
 
-def _newton_step(ground: Ground, spot: Spot, residuals: Residuals) -> _Move:
+def _newton_step(ground: Ground, spot: SetPoints, residuals: Residuals) -> _Move:
     """Step towards a minimum: that of Newton, uphill directions reversed."""
     frames, rows = ground.frames(spot)
-    spot = Spot(spot.z, spot.p, rows)
+    spot = SetPoints(spot.z, spot.p, rows)
     lanes, k = frames.shape[:2]
     if k == 0:
         return _Move(spot, frames, np.zeros((lanes, 0)), np.zeros(lanes))
@@ -264,7 +263,7 @@ def _newton_step(ground: Ground, spot: Spot, residuals: Residuals) -> _Move:
 
 
 def _second_derivatives(
-    ground: Ground, spot: Spot, frames: Frames, residuals: Residuals
+    ground: Ground, spot: SetPoints, frames: Frames, residuals: Residuals
 ) -> tuple[Float[np.ndarray, "lanes k k"], Flags]:
     """Second derivatives along the set, from gradients on both sides; and where there are."""
     lanes, k = frames.shape[:2]
@@ -273,7 +272,7 @@ def _second_derivatives(
     each = np.tile(np.arange(lanes), 2 * k)
     many, own = spot.take(each), frames[each]
     there, good = ground.moved(many, own, step)
-    there = many.replaced(np.flatnonzero(good), there.take(good))
+    there = many.with_rows(np.flatnonzero(good), there.take(good))
     turned = _align(ground.setting, ground.frames(there)[0], own)
     gradient = _gradient(ground, there, turned, residuals)[0].reshape(2, k, lanes, k)
     curved = np.moveaxis(gradient[0] - gradient[1], 0, 1) / (2.0 * CURVING)
@@ -290,7 +289,7 @@ def _align(setting: Setting, frames: Frames, others: Frames) -> Frames:
 
 def _shorten(
     ground: Ground, move: _Move, step: Steps, residuals: Residuals, value: Values
-) -> tuple[Spot, Values, Flags]:
+) -> tuple[SetPoints, Values, Flags]:
     """Points after steps, halved until the norm falls; the norms, and where it does."""
     spot, frames = move.spot, move.frames
     best, norm = spot, value.copy()
@@ -309,7 +308,7 @@ def _shorten(
         longest = good.reshape(lengths.shape).argmax(axis=0) * len(todo) + np.arange(len(todo))
         some = np.flatnonzero(good[longest])
         at, taken = todo[some], longest[some]
-        best = best.replaced(at, there.take(taken))
+        best = best.with_rows(at, there.take(taken))
         norm[at], better[at] = size[taken], True
         share[todo] = 0.5 * lengths[-1]
     return best, norm, better

@@ -13,7 +13,7 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.lookup.states_over import StatesOver
 from equimorph.manifold.queries.least_squares import nearest
-from equimorph.manifold.queries.nearest import Ground, Spot, local_minima, spots
+from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
 from equimorph.model import Descriptor, position
 from equimorph.structures import State, States, Structure
 from equimorph.tolerances import SAME_SOLUTION
@@ -122,7 +122,7 @@ def locate(
     misfit = np.linalg.norm(fit.residuals(eset.points.z, eset.points.p), axis=1)
     starts = local_minima(faces_of(eset.cells, 2), misfit)[:CANDIDATES]
     ground = Ground(eset.setting, eset)
-    found, value, inside = nearest(ground, spots(eset, starts), fit.residuals)
+    found, value, inside = nearest(ground, points_at_vertices(eset, starts), fit.residuals)
     chosen = different(eset.structure, found, value)[:2]
     places = _places(eset, found.take(chosen), value[chosen], inside[chosen])
     return Location(places[0], places[1] if len(places) > 1 else None)
@@ -222,7 +222,7 @@ def _name(what: Descriptor | str) -> str:
 
 
 def different(
-    structure: Structure, found: Spot, value: Float[np.ndarray, " lanes"]
+    structure: Structure, found: SetPoints, value: Float[np.ndarray, " lanes"]
 ) -> Int[np.ndarray, " kept"]:
     """Different states, the best first."""
     kept: list[int] = []
@@ -236,7 +236,7 @@ def different(
 
 def _places(
     eset: EquilibriumSet,
-    found: Spot,
+    found: SetPoints,
     value: Float[np.ndarray, " lanes"],
     inside: Flags,
 ) -> list[Place]:

@@ -1,12 +1,12 @@
 """Points on an equilibrium set, its folds, sides of its box and its caps, and moves on these."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Rows
+from equimorph.columns import Columns
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.exact_points import Aim, corrected
 from equimorph.manifold.geometry.setting import Setting, embed
@@ -26,38 +26,26 @@ FAR = 1e3
 
 
 @dataclass(frozen=True)
-class Spot:
+class SetPoints(Columns):
     """Points of a set, with bases of spaces near their tangent spaces."""
 
     z: Lanes
     p: Parameters
     rows: Rows
 
-    def take(self, some: Int[np.ndarray, " n"] | Flags) -> "Spot":
-        """Some of the points."""
-        return Spot(self.z[some], self.p[some], self.rows[some])
-
-    def replaced(self, some: Int[np.ndarray, " n"], others: "Spot") -> "Spot":
-        """The same with some of the points replaced."""
-        z, p, rows = self.z.copy(), self.p.copy(), self.rows.copy()
-        z[some], p[some], rows[some] = others.z, others.p, others.rows
-        return Spot(z, p, rows)
+    def __len__(self) -> int:
+        """Number of points."""
+        return len(self.z)
 
 
-def joined(parts: Sequence[Spot]) -> Spot:
-    """All points of several groups."""
-    columns = zip(*(vars(each).values() for each in parts), strict=True)
-    return Spot(*(np.concatenate(column) for column in columns))
-
-
-def spots(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> Spot:
+def points_at_vertices(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> SetPoints:
     """Vertices of a set, with the planes of cells around them."""
     around = eset.cells[np.isin(eset.cells, vertices).any(axis=1)]
     used, corners = np.unique(around, return_inverse=True)
     near = eset.points[used]
     rows = best_corners(eset.setting, near.z, near.p, corners.reshape(around.shape))
     place = np.searchsorted(used, vertices)
-    return Spot(near.z[place], near.p[place], rows[place])
+    return SetPoints(near.z[place], near.p[place], rows[place])
 
 
 def local_minima(
@@ -95,7 +83,7 @@ class Ground:
     sides: tuple[int, ...] = ()
     cap: bool = False
 
-    def frames(self, spot: Spot) -> tuple[Frames, Rows]:
+    def frames(self, spot: SetPoints) -> tuple[Frames, Rows]:
         """Orthonormal directions along which points may move, and bases of the tangent spaces."""
         frames = tangent_frames(self.setting, spot.z, spot.p, spot.rows)
         rows = placed_frames(self.setting, frames)
@@ -110,15 +98,15 @@ class Ground:
         return frames, rows
 
     def moved(
-        self, spot: Spot, frames: Frames, step: Float[np.ndarray, "lanes k"]
-    ) -> tuple[Spot, Flags]:
+        self, spot: SetPoints, frames: Frames, step: Float[np.ndarray, "lanes k"]
+    ) -> tuple[SetPoints, Flags]:
         """Points of the set orthogonally above steps, and whether there are any in the box."""
         dz, dp = split_step(self.setting, np.einsum("lk,lkf->lf", step, frames))
         rows = placed_frames(self.setting, frames)
-        there, good = self.corrected(Spot(spot.z + dz, spot.p + dp, rows))
-        return Spot(there.z, there.p, spot.rows), good
+        there, good = self.corrected(SetPoints(spot.z + dz, spot.p + dp, rows))
+        return SetPoints(there.z, there.p, spot.rows), good
 
-    def corrected(self, spot: Spot) -> tuple[Spot, Flags]:
+    def corrected(self, spot: SetPoints) -> tuple[SetPoints, Flags]:
         """Points of the set orthogonally above points, and whether there are any in the box."""
         lanes, d = len(spot.z), len(self.setting.free)
         span = np.tile(np.delete(np.eye(d), self.sides, axis=0), (lanes, 1, 1))
@@ -126,7 +114,7 @@ class Ground:
         aim = Aim(self.setting, self.fold, self.cap, span, middle, spot.rows)
         pinned = corrected(aim, spot.z, spot.p, np.full(lanes, FAR))
         good = pinned.found & self.eset.box.holds(pinned.p[:, self.setting.free], slack=1e-9)
-        return Spot(pinned.z, pinned.p, spot.rows), good
+        return SetPoints(pinned.z, pinned.p, spot.rows), good
 
 
 def free_steps(setting: Setting, frames: Frames) -> Float[np.ndarray, "lanes k d"]:

@@ -20,9 +20,9 @@ from equimorph.manifold.queries.least_squares import nearest as nearest_points
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.manifold.queries.nearest import (
     Ground,
-    Spot,
+    SetPoints,
     local_minima,
-    spots,
+    points_at_vertices,
 )
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.structures import State, States
@@ -126,7 +126,9 @@ def _in_parameters(
 
     far = np.linalg.norm(change(eset.points.z, eset.points.p), axis=1)
     starts = _nearest_of_each_part(boundary, far)
-    found, length, _ = nearest_points(Ground(setting, eset, fold=True), spots(eset, starts), change)
+    found, length, _ = nearest_points(
+        Ground(setting, eset, fold=True), points_at_vertices(eset, starts), change
+    )
     best, nearest = np.inf, None
     for lane in np.argsort(length, kind="stable"):
         if length[lane] >= best:
@@ -207,7 +209,7 @@ def _along_the_set(
 
 def _ways(
     eset: EquilibriumSet, state: State, stratum: int, boundary: Int[np.ndarray, "n d"]
-) -> list[Spot]:
+) -> list[SetPoints]:
     """Shortest ways over the edges of a stratum from a state to different parts of its boundary."""
     setting = eset.setting
     cells = eset.cells[eset.stratum == stratum]
@@ -254,8 +256,8 @@ def _corners_around(
     return np.asarray(used[[np.linalg.norm(place[used] - own, axis=1).argmin()]])
 
 
-def _from_state(eset: EquilibriumSet, state: State, path: Int[np.ndarray, " n"]) -> Spot:
+def _from_state(eset: EquilibriumSet, state: State, path: Int[np.ndarray, " n"]) -> SetPoints:
     """A state, and vertices after it."""
-    on = spots(eset, path)
+    on = points_at_vertices(eset, path)
     z, p = np.concatenate([state.z[None], on.z]), np.concatenate([state.p[None], on.p])
-    return Spot(z, p, np.concatenate([on.rows[:1], on.rows]))
+    return SetPoints(z, p, np.concatenate([on.rows[:1], on.rows]))

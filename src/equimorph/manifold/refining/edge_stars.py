@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Cells, Edges
+from equimorph.columns import Columns
 from equimorph.manifold.complex.marked_complex import (
     CURVES,
     Fabric,
@@ -146,7 +147,7 @@ def _through_facets(
 
 
 @dataclass(frozen=True)
-class Rings:
+class Rings(Columns):
     """Edges with the cells around them.
 
     cells: around each edge, −1 where there are fewer; first, second: polygons around it that turn
@@ -160,10 +161,6 @@ class Rings:
     first: Int[np.ndarray, "n corners"]
     second: Int[np.ndarray, "n corners"]
     index: Int[np.ndarray, "n 2"]
-
-    def take(self, some: Int[np.ndarray, " k"] | Bool[np.ndarray, " n"]) -> "Rings":
-        """Return a selection of the rings."""
-        return Rings(*(column[some] for column in vars(self).values()))
 
     @property
     def chord(self) -> Edges:

@@ -1,12 +1,13 @@
 """Samples of a map, and pairs of them between which it jumps or bends, narrowed by division."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
 from equimorph.arrays import Edges, Lanes, Parameters, Settings, Values
+from equimorph.columns import Columns
 from equimorph.structures import Structure
 
 RATIO = 2.0
@@ -22,7 +23,7 @@ ASIDE = (0.0, 0.4, -0.37)
 
 
 @dataclass(frozen=True)
-class Samples:
+class Samples(Columns):
     """Values of a map at settings, with the states that they were read from.
 
     Attributes
@@ -49,23 +50,8 @@ class Samples:
     p: Parameters
     passed: Shaped[np.ndarray, " lanes"]
 
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "Samples":
-        """Return a selection of the lanes."""
-        return Samples(*(column[lanes] for column in vars(self).values()))
-
-    def where(self, left: np.ndarray, other: "Samples") -> "Samples":
-        """Return these lanes where `left` and those of `other` elsewhere."""
-        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return Samples(*(np.where(left[:, None] if a.ndim > 1 else left, a, b) for a, b in pairs))
-
 
 Sampler = Callable[[Settings], Samples]
-
-
-def join_samples(parts: Sequence[Samples]) -> Samples:
-    """All lanes one after the other."""
-    columns = zip(*(vars(part).values() for part in parts), strict=True)
-    return Samples(*(np.concatenate(column) for column in columns))
 
 
 def sample_distance(structure: Structure, a: Samples, b: Samples) -> Values:
@@ -81,7 +67,7 @@ def sample_distance(structure: Structure, a: Samples, b: Samples) -> Values:
 
 
 @dataclass(frozen=True)
-class Brackets:
+class Brackets(Columns):
     """Pairs of settings between which a map may not be smooth, and the grid edges they lie on.
 
     Attributes
@@ -99,15 +85,6 @@ class Brackets:
     def __len__(self) -> int:
         """Return the number of pairs."""
         return len(self.edge)
-
-    def take(self, some: Int[np.ndarray, " some"]) -> "Brackets":
-        """Return a selection of the pairs."""
-        return Brackets(self.a.take(some), self.b.take(some), self.edge[some])
-
-    def with_more(self, more: "Brackets") -> "Brackets":
-        """Return these pairs and more."""
-        edge = np.concatenate([self.edge, more.edge])
-        return Brackets(join_samples([self.a, more.a]), join_samples([self.b, more.b]), edge)
 
 
 def grid_edges(shape: tuple[int, int]) -> Edges:
@@ -143,7 +120,7 @@ def divide(structure: Structure, sampler: Sampler, pairs: Brackets) -> Brackets:
     count = len(pairs)
     before = sample_distance(structure, pairs.a, pairs.b)
     # one after the other: all first ends, all first dividing points, ..., all second ends
-    cuts = join_samples([pairs.a, _between(sampler, pairs), pairs.b])
+    cuts = Samples.concatenate([pairs.a, _between(sampler, pairs), pairs.b])
     a, b = (cuts.take(np.arange(PARTS * count) + shift) for shift in (0, count))
     now = sample_distance(structure, a, b)
     least = np.where(np.isfinite(before), PARTS**-SHRINKING * before, np.inf)
@@ -171,7 +148,7 @@ def _between(sampler: Sampler, pairs: Brackets) -> Samples:
     for aside in ASIDE:
         here = (share[open_] + aside / PARTS)[:, None]
         order[open_] = len(found.kind) + np.arange(len(open_))
-        found = join_samples([found, sampler(start[open_] + here * length[open_])])
+        found = Samples.concatenate([found, sampler(start[open_] + here * length[open_])])
         lost = ~np.isfinite(found.z[order[open_]]).all(axis=1) & defined[open_]
         open_ = open_[lost]
         if not len(open_):

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.first_stable import no_critical_states
 from equimorph.equilibria.natural_sheet import NaturalSheet
@@ -175,7 +176,7 @@ def equal_extrema(
 
 
 @dataclass(frozen=True)
-class Candidates:
+class Candidates(Columns):
     """Places found for causes of pairs: number of the cause (−1: none), kind, state, parameters."""
 
     cause: Int[np.ndarray, " pairs"]
@@ -192,10 +193,6 @@ class Candidates:
         """Replace some."""
         for old, column in zip(vars(self).values(), vars(new).values(), strict=True):
             old[pairs] = column
-
-    def take(self, pairs: Int[np.ndarray, " some"]) -> "Candidates":
-        """Return some."""
-        return Candidates(*(column[pairs] for column in vars(self).values()))
 
 
 def candidates(paths: Paths, pairs: Brackets) -> Candidates:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Settings
+from equimorph.columns import Columns
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.structures import States
 from equimorph.tasks.maps.brackets import (
@@ -73,7 +74,7 @@ class MapCurve:
 
 
 @dataclass(frozen=True)
-class Places:
+class Places(Columns):
     """Places at which a map is not smooth, with their kinds, errors, states and brackets."""
 
     brackets: Brackets
@@ -82,20 +83,6 @@ class Places:
     setting: Float[np.ndarray, "brackets 2"]
     z: Float[np.ndarray, "brackets size"]
     p: Float[np.ndarray, "brackets parameters"]
-
-    def take(self, some: Int[np.ndarray, " some"]) -> "Places":
-        """Return a selection of the places."""
-        return Places(self.brackets.take(some), *(column[some] for column in self._columns))
-
-    def with_more(self, more: "Places") -> "Places":
-        """Return these places and more."""
-        pairs = zip(self._columns, more._columns, strict=True)
-        brackets = self.brackets.with_more(more.brackets)
-        return Places(brackets, *(np.concatenate(pair) for pair in pairs))
-
-    @property
-    def _columns(self) -> tuple[np.ndarray, ...]:
-        return self.kind, self.error, self.setting, self.z, self.p
 
 
 def explain(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
@@ -133,7 +120,9 @@ def _confirm(
     left, right = wide.a.where(low, left), wide.b.where(high, right)
     sure = is_sharp(paths, left, right, wide, BESIDE)
     sure &= paths.is_known(left) & paths.is_known(right)
-    rest = Brackets(wide.a, left, wide.edge).with_more(Brackets(right, wide.b, wide.edge))
+    rest = Brackets.concatenate(
+        [Brackets(wide.a, left, wide.edge), Brackets(right, wide.b, wide.edge)]
+    )
     again = np.isinf(sample_distance(structure, rest.a, rest.b)) & np.tile(sure, 2)
     narrow = Brackets(left, right, wide.edge)
     confirmed = replace(here, brackets=narrow).take(np.flatnonzero(sure))
@@ -179,14 +168,14 @@ def _resolve(paths: Paths, pairs: Brackets) -> tuple[list[Places], Brackets]:
             return found, pairs
         places, rest, more = explain(paths, pairs)
         found.append(places)
-        pairs = divide(structure, paths, rest).with_more(more) if len(rest) else more
+        pairs = Brackets.concatenate([divide(structure, paths, rest), more]) if len(rest) else more
     return found, narrow(structure, paths, pairs, DIVISIONS)
 
 
 def _together(parts: list[Places]) -> Places:
     whole = parts[0]
     for part in parts[1:]:
-        whole = whole.with_more(part)
+        whole = Places.concatenate([whole, part])
     return whole
 
 

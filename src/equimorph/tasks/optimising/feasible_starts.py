@@ -12,17 +12,11 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Cells, Flags, Lanes, Parameters
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.queries.nearest import SetPoints, points_at_vertices
 from equimorph.model import Constraint, Descriptor
 from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
-from equimorph.tasks.optimising.tangent_steps import (
-    SetPoints,
-    join_points,
-    points_at_vertices,
-    project_onto_set,
-    step_along,
-    tangents_at,
-)
+from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangents_at
 from equimorph.tasks.stable_part import vertex_values
 
 DIVISIONS = {1: 8, 2: 5, 3: 3}
@@ -103,7 +97,7 @@ def least_violation(
     if not ends:
         return FeasibleStarts(starts.take(np.zeros(0, int)), np.inf, starts.take(np.zeros(0, int)))
     least = [float(end.expansion.f.max()) for end in ends]
-    spots = join_points([end.point for end in ends])
+    spots = SetPoints.concatenate([end.point for end in ends])
     return FeasibleStarts(
         spots.take(np.array(least) <= MET), min(least), spots.take(np.array([np.argmin(least)]))
     )

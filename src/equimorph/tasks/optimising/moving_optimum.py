@@ -11,6 +11,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import Event, EventKind, Leg
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.motion.blocks import stable_path
@@ -25,12 +26,7 @@ from equimorph.tasks.optimising.optimum_path import (
 )
 from equimorph.tasks.optimising.programme import Objective, Programme, is_stability, stability
 from equimorph.tasks.optimising.sqp import ITERATIONS, LocalMinimum, descend
-from equimorph.tasks.optimising.tangent_steps import (
-    SetPoints,
-    project_onto_set,
-    step_along,
-    tangent_plane_at,
-)
+from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangent_plane_at
 from equimorph.tasks.route import schedule_of
 from equimorph.tasks.start import Start, check_stable, start_state
 from equimorph.tolerances import FEASIBLE

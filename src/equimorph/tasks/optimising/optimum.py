@@ -11,7 +11,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.queries.nearest import local_minima
+from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.distances import distinct
@@ -24,9 +24,6 @@ from equimorph.tasks.optimising.feasible_starts import (
 from equimorph.tasks.optimising.programme import Objective, Programme, is_stability, stability
 from equimorph.tasks.optimising.sqp import LocalMinimum, descend
 from equimorph.tasks.optimising.tangent_steps import (
-    SetPoints,
-    join_points,
-    points_at_vertices,
     project_onto_set,
     step_along,
     tangent_plane_at,
@@ -271,7 +268,7 @@ def _starts(
         cells = eset.cells[eset.cell_index == 0]
         thin = feasible_points_in_cells(eset, programme, constraints, cells)
         some = programme.objective.values(thin.z, thin.p).argsort(kind="stable")[:CANDIDATES]
-        parts = join_points([parts, thin.take(some)])
+        parts = SetPoints.concatenate([parts, thin.take(some)])
         if not len(parts):
             least = least_violation(eset, programme, constraints, cells)
             return least.spots, least
@@ -311,7 +308,7 @@ def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum
             feasible.append(end)
     if not feasible:
         return []
-    points = join_points([end.point for end in feasible])
+    points = SetPoints.concatenate([end.point for end in feasible])
     return [feasible[k] for k in distinct(States(structure, points.z, points.p), SAME_SOLUTION)]
 
 

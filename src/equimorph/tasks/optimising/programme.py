@@ -10,10 +10,10 @@ from jaxtyping import Float
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Values
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import Structure, margin_of, value_of
 from equimorph.tasks.optimising.tangent_steps import (
-    SetPoints,
     project_onto_set,
     step_along,
     unconstrained_setting,

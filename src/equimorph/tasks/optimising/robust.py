@@ -14,13 +14,14 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria import Corner, corners_of, worst_over
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.optimum import Optimum, Sense, optimise
 from equimorph.tasks.optimising.programme import Objective, Programme, stability
 from equimorph.tasks.optimising.sqp import LocalMinimum, descend
-from equimorph.tasks.optimising.tangent_steps import SetPoints, tangent_plane_at
+from equimorph.tasks.optimising.tangent_steps import tangent_plane_at
 from equimorph.tolerances import FEASIBLE
 
 Branches = Float[np.ndarray, "lanes m"]

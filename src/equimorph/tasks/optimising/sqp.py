@@ -10,15 +10,10 @@ from jaxtyping import Float
 
 from equimorph.arrays import Frames
 from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.tasks.optimising.programme import Expansion, Programme
 from equimorph.tasks.optimising.quadratic import Answer, Quadratic, solve
-from equimorph.tasks.optimising.tangent_steps import (
-    SetPoints,
-    join_points,
-    project_onto_set,
-    step_along,
-    tangents_at,
-)
+from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangents_at
 from equimorph.tolerances import FEASIBLE
 
 ITERATIONS, HALVINGS = 40, 10
@@ -108,7 +103,7 @@ def descend(
         todo = [lane for lane in lanes if lane.done is None and lane.reach > 0.0]
         if not todo:
             break
-        here = join_points([lane.point for lane in todo])
+        here = SetPoints.concatenate([lane.point for lane in todo])
         alone = _first_of_each(programme, here)
         for k in set(range(len(todo))) - set(alone):
             todo[k].reach = 0.0
@@ -140,7 +135,7 @@ def _stop(programme: Programme, lanes: list[_Lane]) -> None:
     if not left:
         return
     best = [lane.best for lane in left if lane.best is not None]
-    iterate = _Iterate.at(programme, join_points(best))
+    iterate = _Iterate.at(programme, SetPoints.concatenate(best))
     for k, lane in enumerate(left):
         answer = _answer(iterate.expansion, k, lane)
         if answer is not None:

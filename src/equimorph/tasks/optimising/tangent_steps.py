@@ -1,9 +1,9 @@
 """Moving on an equilibrium set in coordinates of its tangent spaces."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.equilibria.sensitivity import answers
@@ -11,45 +11,13 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.exact_points import Aim, corrected
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
-from equimorph.manifold.queries.nearest import spots
+from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.structures import State
 
 Steps = Float[np.ndarray, "lanes d"]
 
 ANYWHERE = 1e3
 """Distance from its guess within which a corrected point will do."""
-
-
-@dataclass(frozen=True)
-class SetPoints:
-    """Points of a set with orthonormal bases of spaces near their tangent spaces."""
-
-    z: Lanes
-    p: Parameters
-    rows: Rows
-
-    def __len__(self) -> int:
-        """Number of points."""
-        return len(self.z)
-
-    def take(self, some: Int[np.ndarray, " n"] | Flags) -> "SetPoints":
-        """Some of the points."""
-        return SetPoints(self.z[some], self.p[some], self.rows[some])
-
-
-def join_points(parts: list[SetPoints]) -> SetPoints:
-    """All points of several batches."""
-    return SetPoints(
-        np.concatenate([each.z for each in parts]),
-        np.concatenate([each.p for each in parts]),
-        np.concatenate([each.rows for each in parts]),
-    )
-
-
-def points_at_vertices(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> SetPoints:
-    """Vertices of a set, with the planes of cells around them."""
-    found = spots(eset, vertices)
-    return SetPoints(found.z, found.p, found.rows)
 
 
 def tangent_plane_at(setting: Setting, state: State) -> Float[np.ndarray, "1 d coordinates"]:

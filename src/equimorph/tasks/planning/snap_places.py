@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.arrays import Flags, Parameters, Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet, Snap
-from equimorph.manifold.queries.nearest import Ground, Spot, spots
+from equimorph.manifold.queries.nearest import Ground, SetPoints, points_at_vertices
 from equimorph.structures import State, States
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
 
@@ -46,7 +46,7 @@ class SnapPlace:
 class _Places:
     """Places of a fold, in order along it, with what straight moves there and on cost."""
 
-    folds: Spot
+    folds: SetPoints
     landings: States
     approach: States
     beyond: States
@@ -77,17 +77,17 @@ def cheapest_place(
     return places.best() if len(places.cost) else None
 
 
-def _vertices(eset: EquilibriumSet, snap: Snap, demands: Demands) -> tuple[Spot, States]:
+def _vertices(eset: EquilibriumSet, snap: Snap, demands: Demands) -> tuple[SetPoints, States]:
     """Vertices of a run of the stability boundary, with landings lifted from the known ones."""
     ordered = snap.along if len(eset.names) == 2 else snap.vertices
     place = {vertex: k for k, vertex in enumerate(ordered.tolist())}
     known = np.array([place[vertex] for vertex in snap.vertices.tolist()])
     nearest = np.abs(np.arange(len(ordered))[:, None] - known).argmin(axis=1)
     z, p = (np.stack([getattr(snap.landings[k].state, name) for k in nearest]) for name in "zp")
-    return _landed(spots(eset, ordered), States(eset.structure, z, p), demands)
+    return _landed(points_at_vertices(eset, ordered), States(eset.structure, z, p), demands)
 
 
-def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[Spot, States]:
+def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[SetPoints, States]:
     """Places between the best one and its neighbours, these among them, and their landings."""
     best, last = int(places.cost.argmin()), len(places.cost) - 1
     ends = sorted({max(best - 1, 0), best, min(best + 1, last)})
@@ -96,7 +96,7 @@ def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[S
     low = np.floor(at).astype(int)
     high, part = np.minimum(low + 1, last), (at - low)[:, None]
     folds = places.folds
-    guess = Spot(
+    guess = SetPoints(
         (1.0 - part) * folds.z[low] + part * folds.z[high],
         (1.0 - part) * folds.p[low] + part * folds.p[high],
         folds.rows[low],
@@ -107,7 +107,7 @@ def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[S
     return _landed(exact.take(found), places.landings[low[found]], demands)
 
 
-def _landed(folds: Spot, landings: States, demands: Demands) -> tuple[Spot, States]:
+def _landed(folds: SetPoints, landings: States, demands: Demands) -> tuple[SetPoints, States]:
     """Folds with landings lifted there from near ones, where that is possible."""
     z, there, _ = lift_straight(landings, folds.p, demands)
     states = States(landings.structure, z, folds.p)
@@ -117,7 +117,7 @@ def _landed(folds: Spot, landings: States, demands: Demands) -> tuple[Spot, Stat
 
 def _priced(
     eset: EquilibriumSet,
-    folds: Spot,
+    folds: SetPoints,
     landings: States,
     ends: tuple[State, State],
     demands: Demands,

@@ -13,7 +13,7 @@ from equimorph.manifold import EquilibriumSet, StabilityDistance, stability_dist
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.least_squares import nearest
 from equimorph.manifold.queries.locate import pieces_of
-from equimorph.manifold.queries.nearest import Ground, Spot, spots
+from equimorph.manifold.queries.nearest import Ground, SetPoints, points_at_vertices
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.structures import State, States
 
@@ -197,7 +197,7 @@ class _Moves:
         near = np.argsort(np.linalg.norm(place - here, axis=1), kind="stable")[:BESIDE]
         share = np.repeat(0.5 ** np.arange(HALVINGS), len(near))[:, None]
         each = np.tile(near, HALVINGS)
-        between = Spot(
+        between = SetPoints(
             (1.0 - share) * tip.z + share * some.z[each],
             (1.0 - share) * tip.p + share * some.p[each],
             np.repeat(tip.rows, len(each), axis=0),
@@ -264,21 +264,21 @@ class _Moves:
     def _folds(self) -> Ground:
         return Ground(self.eset.setting, self.eset, fold=True)
 
-    def _on_folds(self, spot: Spot) -> tuple[Spot, Flags]:
+    def _on_folds(self, spot: SetPoints) -> tuple[SetPoints, Flags]:
         """Folds orthogonally above points, and whether there are any in the box."""
         frames, _ = self._folds.frames(spot)
         return self._folds.moved(spot, frames, np.zeros(frames.shape[:2]))
 
-    def _spot(self, fold: State) -> Spot:
+    def _spot(self, fold: State) -> SetPoints:
         """A fold, with a basis of the tangent space there."""
         eset = self.eset
         vertices = np.unique(np.concatenate([np.ravel(piece) for piece in eset.folds]))
         place = embed(eset.setting, eset.points.z[vertices], eset.points.p[vertices])
         here = embed(eset.setting, fold.z[None], fold.p[None])
         closest = vertices[[np.linalg.norm(place - here, axis=1).argmin()]]
-        spot = Spot(fold.z[None], fold.p[None], spots(eset, closest).rows)
-        return Spot(spot.z, spot.p, self._folds.frames(spot)[1])
+        spot = SetPoints(fold.z[None], fold.p[None], points_at_vertices(eset, closest).rows)
+        return SetPoints(spot.z, spot.p, self._folds.frames(spot)[1])
 
 
-def _midway(one: Spot, other: Spot) -> Spot:
-    return Spot(0.5 * (one.z + other.z), 0.5 * (one.p + other.p), one.rows)
+def _midway(one: SetPoints, other: SetPoints) -> SetPoints:
+    return SetPoints(0.5 * (one.z + other.z), 0.5 * (one.p + other.p), one.rows)

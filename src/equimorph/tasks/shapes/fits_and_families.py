@@ -8,12 +8,11 @@ from equimorph.arrays import Edges
 from equimorph.manifold import Level, level_set
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import pieces
-from equimorph.manifold.queries.nearest import local_minima
+from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import Constraint, combined
 from equimorph.structures import States
 from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
-from equimorph.tasks.optimising.tangent_steps import SetPoints, points_at_vertices
 from equimorph.tasks.shapes.prediction import Predictor, states_with_values
 from equimorph.tolerances import FEASIBLE
 

@@ -13,8 +13,9 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Descriptor
-from equimorph.tasks.optimising.tangent_steps import SetPoints, unconstrained_setting
+from equimorph.tasks.optimising.tangent_steps import unconstrained_setting
 from equimorph.tasks.stable_part import from_cache, vertex_values
 
 CLOSE = 0.5

@@ -13,12 +13,11 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
-from equimorph.manifold.queries.nearest import local_minima
+from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.programme import stability
-from equimorph.tasks.optimising.tangent_steps import SetPoints, points_at_vertices
 from equimorph.tasks.planning import plan
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes.fits_and_families import best_fits, solution_family

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.columns import Columns
 from equimorph.structures import Direction, Majorant, States, Structure
 
 Matrices = Float[np.ndarray, "lanes size size"]
@@ -43,7 +44,7 @@ SAFETY = 2.0
 
 
 @dataclass(frozen=True)
-class Bounds:
+class Bounds(Columns):
     """What is known of segments.
 
     Parameters
@@ -71,17 +72,6 @@ class Bounds:
     index: Int[np.ndarray, " lanes"]
     weights: Lanes
     margin: Values
-
-    def take(self, at: Int[np.ndarray, " some"]) -> "Bounds":
-        """Return a selection of the segments."""
-        return Bounds(*(column[at] for column in vars(self).values()))
-
-    @classmethod
-    def join(cls, parts: list["Bounds"]) -> "Bounds":
-        """All segments of some parts."""
-        return cls(
-            *(np.concatenate(c) for c in zip(*(vars(b).values() for b in parts), strict=True))
-        )
 
 
 def segment_bounds(first: States, last: States, target: float = 0.0) -> Bounds:

@@ -137,7 +137,7 @@ def _all_bounds(first: States, last: States, margin: float) -> Bounds:
         segment_bounds(first[k : k + count], last[k : k + count], margin)
         for k in range(0, len(first), count)
     ]
-    return Bounds.join(parts)
+    return Bounds.concatenate(parts)
 
 
 def _wrong(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
@@ -195,7 +195,7 @@ def _renew(
     kept = np.setdiff1d(np.arange(len(bounds.proved)), bad)
     place = np.setdiff1d(np.arange(len(states) - 1), halves)
     order = np.argsort(np.concatenate([place, halves]))
-    return Bounds.join([bounds.take(kept), fresh]).take(order)
+    return Bounds.concatenate([bounds.take(kept), fresh]).take(order)
 
 
 def _errors(bounds: Bounds) -> Float[np.ndarray, " segments"]:

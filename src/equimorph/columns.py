@@ -1,0 +1,64 @@
+"""Records of columns: what is known of many lanes, points or cells, one row for each."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from equimorph.arrays import Some
+
+
+class Columns:
+    """Base of frozen dataclasses whose fields have one row for each lane.
+
+    Fields are arrays, other such records, or None; anything else (a structure, a number, a
+    function) is the same for all rows.
+    """
+
+    __match_args__: ClassVar[tuple[str, ...]] = ()
+
+    def take(self, rows: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"] | slice) -> Self:
+        """Return a selection of the rows, by numbers, flags or a slice."""
+        return type(self)(*[_selection(field, rows) for field in self._fields])
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
+        """All rows of some parts, at least one, part by part."""
+        return cls(
+            *(_chain(fields) for fields in zip(*(each._fields for each in parts), strict=True))
+        )
+
+    def with_rows(self, rows: Some, others: Self) -> Self:
+        """Return all rows, those with some numbers replaced."""
+        pairs = zip(self._fields, others._fields, strict=True)
+        return type(self)(*(_replacement(field, rows, other) for field, other in pairs))
+
+    def where(self, flags: Bool[np.ndarray, " rows"], others: Self) -> Self:
+        """Return these rows where flags are set, and those of others elsewhere."""
+        return self.with_rows(np.flatnonzero(~flags), others.take(~flags))
+
+    @property
+    def _fields(self) -> list[Any]:
+        return [getattr(self, name) for name in self.__match_args__]
+
+
+def _selection(field: Any, rows: Any) -> Any:
+    if isinstance(field, np.ndarray):
+        return field[rows]
+    return field.take(rows) if hasattr(field, "take") else field
+
+
+def _chain(fields: Sequence[Any]) -> Any:
+    first = fields[0]
+    if isinstance(first, np.ndarray):
+        return np.concatenate(fields)
+    return type(first).concatenate(fields) if isinstance(first, Columns) else first
+
+
+def _replacement(field: Any, rows: Some, other: Any) -> Any:
+    if isinstance(field, np.ndarray):
+        field = field.copy()
+        field[rows] = other
+        return field
+    return field.with_rows(rows, other) if isinstance(field, Columns) else field
