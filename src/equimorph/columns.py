@@ -1,12 +1,14 @@
 """Records of columns: what is known of many lanes, points or cells, one row for each."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.arrays import Some
+
+Record = TypeVar("Record", bound="Columns")
 
 
 class Columns:
@@ -18,23 +20,25 @@ class Columns:
 
     __match_args__: ClassVar[tuple[str, ...]] = ()
 
-    def take(self, rows: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"] | slice) -> Self:
+    def take(
+        self: Record, rows: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"] | slice
+    ) -> Record:
         """Return a selection of the rows, by numbers, flags or a slice."""
         return type(self)(*[_selection(field, rows) for field in self._fields])
 
     @classmethod
-    def concatenate(cls, parts: Sequence[Self]) -> Self:
+    def concatenate(cls: type[Record], parts: Sequence[Record]) -> Record:
         """All rows of some parts, at least one, part by part."""
         return cls(
             *(_chain(fields) for fields in zip(*(each._fields for each in parts), strict=True))
         )
 
-    def with_rows(self, rows: Some, others: Self) -> Self:
+    def with_rows(self: Record, rows: Some, others: Record) -> Record:
         """Return all rows, those with some numbers replaced."""
         pairs = zip(self._fields, others._fields, strict=True)
         return type(self)(*(_replacement(field, rows, other) for field, other in pairs))
 
-    def where(self, flags: Bool[np.ndarray, " rows"], others: Self) -> Self:
+    def where(self: Record, flags: Bool[np.ndarray, " rows"], others: Record) -> Record:
         """Return these rows where flags are set, and those of others elsewhere."""
         return self.with_rows(np.flatnonzero(~flags), others.take(~flags))
 
