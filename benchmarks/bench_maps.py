@@ -12,7 +12,8 @@ import pytest
 
 from equimorph.model import Grid
 from equimorph.structures import Rod
-from equimorph.tasks import curvature_map, limit_load_map
+from equimorph.tasks.maps.curvature import curvature_map
+from equimorph.tasks.maps.limit_load import limit_load_map
 
 INTERVALS = (93, 160)
 LOADS = ["uniform", "left-half"]

@@ -13,7 +13,7 @@ import pytest
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Rod
-from equimorph.tasks import plan
+from equimorph.tasks.planning.planner import plan
 
 VIA = [{"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0}]
 

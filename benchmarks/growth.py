@@ -22,7 +22,8 @@ from bench_sets import lifted
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.plotting.style import DOUBLE_COLUMN, INDEX_COLOURS, INK, house_style
 from equimorph.structures import Rod
-from equimorph.tasks import curvature_map, limit_load_map
+from equimorph.tasks.maps.curvature import curvature_map
+from equimorph.tasks.maps.limit_load import limit_load_map
 
 DOCS = Path(__file__).parent.parent / "docs"
 LANES = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000, 30_000, 100_000)

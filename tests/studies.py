@@ -11,7 +11,7 @@ from PIL import Image
 from equimorph import plotting
 from equimorph.study import Outcome, run_study
 from equimorph.study.folder import PRIVATE
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 from typecheck import unchecked
 
 SPRING = """\

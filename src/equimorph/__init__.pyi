@@ -144,65 +144,127 @@ from .structures import (
     outside as outside,
     value_of as value_of,
 )
-from .tasks import (
+from .tasks.calibration.calibrate import (
     Calibration as Calibration,
-    Certificate as Certificate,
-    CurvatureMap as CurvatureMap,
-    Family as Family,
-    FollowedOptimum as FollowedOptimum,
-    ImperfectionLaw as ImperfectionLaw,
-    Landscape as Landscape,
-    LeastSnap as LeastSnap,
-    LimitLoadMap as LimitLoadMap,
-    MapCurve as MapCurve,
+    calibrate as calibrate,
+)
+from .tasks.calibration.measurements import (
     MeasuredShape as MeasuredShape,
     MeasuredValues as MeasuredValues,
-    Objective as Objective,
+)
+from .tasks.calibration.unknowns import (
+    Family as Family,
+)
+from .tasks.estimation import (
+    StateEstimate as StateEstimate,
+    estimate_state as estimate_state,
+)
+from .tasks.maps.curvature import (
+    CurvatureMap as CurvatureMap,
+    curvature_map as curvature_map,
+)
+from .tasks.maps.curves import (
+    MapCurve as MapCurve,
+)
+from .tasks.maps.limit_load import (
+    LimitLoadMap as LimitLoadMap,
+    limit_load_map as limit_load_map,
+)
+from .tasks.motion.tracking import (
+    Tracking as Tracking,
+    track as track,
+)
+from .tasks.optimising.certificates import (
+    Certificate as Certificate,
+)
+from .tasks.optimising.landscapes import (
+    Landscape as Landscape,
+    landscape as landscape,
+)
+from .tasks.optimising.moving_optimum import (
+    follow_optimum as follow_optimum,
+)
+from .tasks.optimising.optimum import (
     Optima as Optima,
     Optimum as Optimum,
-    Proof as Proof,
-    ProofStatus as ProofStatus,
-    Reach as Reach,
+    optimise as optimise,
+)
+from .tasks.optimising.optimum_path import (
+    FollowedOptimum as FollowedOptimum,
+)
+from .tasks.optimising.robust import (
     RobustOptimum as RobustOptimum,
-    Room as Room,
-    Route as Route,
-    SamplingOptions as SamplingOptions,
-    Sensitivity as Sensitivity,
-    Shapes as Shapes,
-    SpeedLimit as SpeedLimit,
-    StateEstimate as StateEstimate,
+    robust_optimum as robust_optimum,
+)
+from .tasks.optimising.strength import (
     Strongest as Strongest,
     StrongestSettings as StrongestSettings,
-    Tracking as Tracking,
-    Trials as Trials,
-    Verification as Verification,
-    alternatives as alternatives,
-    attainable as attainable,
-    calibrate as calibrate,
-    curvature_map as curvature_map,
-    deviation_bound as deviation_bound,
-    estimate_state as estimate_state,
-    follow_optimum as follow_optimum,
-    imperfection_law as imperfection_law,
-    landscape as landscape,
-    least_snap as least_snap,
-    limit_load_map as limit_load_map,
-    limit_sensitivity as limit_sensitivity,
-    optimise as optimise,
+    strongest as strongest,
+)
+from .tasks.planning.objectives import (
+    Objective as Objective,
+)
+from .tasks.planning.planner import (
     plan as plan,
+)
+from .tasks.planning.route_classes import (
+    alternatives as alternatives,
+)
+from .tasks.planning.sampling import (
+    SamplingOptions as SamplingOptions,
     plan_sampled as plan_sampled,
-    random_trials as random_trials,
-    reachable as reachable,
-    retime as retime,
-    robust_optimum as robust_optimum,
-    sensitivity as sensitivity,
+)
+from .tasks.planning.smoothing import (
     smoothed as smoothed,
+)
+from .tasks.reach.reachable_sets import (
+    Reach as Reach,
+    attainable as attainable,
+    reachable as reachable,
+)
+from .tasks.robustness.derivatives import (
+    Sensitivity as Sensitivity,
+    limit_sensitivity as limit_sensitivity,
+    sensitivity as sensitivity,
+)
+from .tasks.robustness.imperfection import (
+    ImperfectionLaw as ImperfectionLaw,
+    imperfection_law as imperfection_law,
+)
+from .tasks.robustness.room import (
+    Room as Room,
+    stable_room as stable_room,
+)
+from .tasks.robustness.snaps import (
+    LeastSnap as LeastSnap,
+    least_snap as least_snap,
+)
+from .tasks.robustness.trials import (
+    Trials as Trials,
+    random_trials as random_trials,
+)
+from .tasks.route import (
+    Route as Route,
+)
+from .tasks.shapes.solutions import (
+    Shapes as Shapes,
     solve_shape as solve_shape,
     solve_shapes as solve_shapes,
+)
+from .tasks.timing.retiming import (
+    retime as retime,
+)
+from .tasks.timing.speed import (
+    SpeedLimit as SpeedLimit,
+    deviation_bound as deviation_bound,
     speed_limit as speed_limit,
-    stable_room as stable_room,
-    strongest as strongest,
-    track as track,
+)
+from .tasks.verification.proof import (
+    Proof as Proof,
+    ProofStatus as ProofStatus,
+)
+from .tasks.verification.schedule_check import (
+    Verification as Verification,
     verify as verify,
 )
 

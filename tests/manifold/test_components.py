@@ -7,7 +7,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import components, equilibrium_set, refine
 from equimorph.model import Box, combined
 from equimorph.structures import Spring
-from equimorph.tasks import plan
+from equimorph.tasks.planning.planner import plan
 from typecheck import unchecked
 
 TILT = 0.2

@@ -5,7 +5,7 @@ import pytest
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Spring
-from equimorph.tasks import plan
+from equimorph.tasks.planning.planner import plan
 
 AROUND = [{"F": -0.1}, {"x_l": 1.2}, {"F": 0.1}, {"x_l": 0.8}, {"F": 0.0}]
 INTO_THE_FOLD = [{"F": 0.1}, {"x_l": 1.2}, {"F": -0.1}, {"x_l": 0.8}, {"F": 0.0}]

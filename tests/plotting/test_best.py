@@ -8,7 +8,8 @@ import equimorph as em
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.model import Schedule
-from equimorph.tasks import Barriers, Jump
+from equimorph.tasks.optimising.landscapes import Barriers
+from equimorph.tasks.optimising.optimum_path import Jump
 from typecheck import unchecked
 
 

@@ -11,8 +11,8 @@ from equimorph import plotting
 from equimorph.charts.regions import count_regions, empty_regions
 from equimorph.errors import InputError
 from equimorph.plotting.labels import label_contours
-from equimorph.tasks import Route
-from equimorph.tasks.planning import smoothed
+from equimorph.tasks.planning.smoothing import smoothed
+from equimorph.tasks.route import Route
 from typecheck import unchecked
 
 

@@ -6,7 +6,8 @@ from matplotlib.figure import Figure
 
 from equimorph import plotting
 from equimorph.errors import InputError
-from equimorph.tasks import attainable, reachable, track
+from equimorph.tasks.motion.tracking import track
+from equimorph.tasks.reach.reachable_sets import attainable, reachable
 from typecheck import unchecked
 
 

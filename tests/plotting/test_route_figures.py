@@ -17,7 +17,7 @@ from equimorph.model import Disc, HalfPlane, Schedule, names_of
 from equimorph.plotting.curves import states_along
 from equimorph.plotting.surroundings import Surroundings, obstacles_of
 from equimorph.structures import Couple, PointForce, Rod, distance_to
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 NOWHERE = Route("refused", "the goal is unstable", [])
 

@@ -5,7 +5,8 @@ import pytest
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Spring
-from equimorph.tasks import Route, plan
+from equimorph.tasks.planning.planner import plan
+from equimorph.tasks.route import Route
 from typecheck import unchecked
 
 

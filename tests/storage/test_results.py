@@ -11,7 +11,7 @@ import xarray
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.storage import Results, read_results, write_results
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 
 @pytest.fixture

@@ -14,7 +14,8 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.storage import load_set, read_results, schemas, write_results
 from equimorph.storage.schemas import Change, Schema, UnreadableError
 from equimorph.structures import Spring
-from equimorph.tasks import Route, StateEstimate, estimate_state
+from equimorph.tasks.estimation import StateEstimate, estimate_state
+from equimorph.tasks.route import Route
 from typecheck import unchecked
 
 DATA = Path(__file__).parent / "data"

@@ -15,7 +15,7 @@ from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box, Descriptor
 from equimorph.storage import append_results, load_set, read_results, save_set, write_surface
 from equimorph.structures import Spring
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 from typecheck import unchecked
 
 BOXES = {

@@ -10,7 +10,7 @@ import pytest
 import equimorph as em
 from equimorph.equilibria import lift
 from equimorph.model import Descriptor
-from equimorph.tasks import plan
+from equimorph.tasks.planning.planner import plan
 from typecheck import unchecked
 
 VIA = [{"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0}]

@@ -7,8 +7,8 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import InputError
-from equimorph.tasks import plan
-from equimorph.tasks.planning import objective_of
+from equimorph.tasks.planning.objectives import objective_of
+from equimorph.tasks.planning.planner import plan
 from typecheck import unchecked
 
 WISHES = {

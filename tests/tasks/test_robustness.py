@@ -10,14 +10,11 @@ from scipy.stats import norm
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.structures import Rod, Spring, State
-from equimorph.tasks.robustness import (
-    imperfection_law,
-    least_snap,
-    limit_sensitivity,
-    random_trials,
-    sensitivity,
-    stable_room,
-)
+from equimorph.tasks.robustness.derivatives import limit_sensitivity, sensitivity
+from equimorph.tasks.robustness.imperfection import imperfection_law
+from equimorph.tasks.robustness.room import stable_room
+from equimorph.tasks.robustness.snaps import least_snap
+from equimorph.tasks.robustness.trials import random_trials
 from oracles.polynomial import Polynomial, pitchfork_form
 from typecheck import unchecked
 

@@ -7,7 +7,8 @@ import equimorph as em
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.structures import Rod, Spring, State
-from equimorph.tasks import plan, verify
+from equimorph.tasks.planning.planner import plan
+from equimorph.tasks.verification.schedule_check import verify
 from typecheck import unchecked
 
 TEN_TIMES = em.TraceOptions(largest_step=0.002, first_step=0.001, turning=0.005, steps=400000)

@@ -10,7 +10,8 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import InputError
-from equimorph.tasks import SamplingOptions, plan, plan_sampled
+from equimorph.tasks.planning.planner import plan
+from equimorph.tasks.planning.sampling import SamplingOptions, plan_sampled
 from typecheck import unchecked
 
 BOX = em.Box(Theta=(0.2, 2.5), Delta=(-2, 2))

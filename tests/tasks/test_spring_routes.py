@@ -11,7 +11,7 @@ import pytest
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Spring, State
-from equimorph.tasks import plan
+from equimorph.tasks.planning.planner import plan
 from typecheck import unchecked
 
 LOAD = (1 - 0.8 / np.cos(0.62)) * np.sin(0.62)

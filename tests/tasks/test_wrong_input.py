@@ -8,7 +8,7 @@ import pytest
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.structures import Rod
-from equimorph.tasks import plan
+from equimorph.tasks.planning.planner import plan
 
 BOX = "Box(Theta=(0.2, 2.5), Delta=(-2, 2))"
 

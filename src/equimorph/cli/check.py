@@ -11,7 +11,7 @@ from equimorph.study import Problem, read_problem
 from equimorph.study.lookup import Extent
 from equimorph.study.memory import amount, estimated_memory
 from equimorph.study.question import Question
-from equimorph.tasks import unloaded_base
+from equimorph.tasks.maps.actuator_map import unloaded_base
 
 
 def check_and_show(file: Path, *, as_json: bool = False) -> int:

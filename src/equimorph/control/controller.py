@@ -24,7 +24,8 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
-from equimorph.tasks import Route, plan
+from equimorph.tasks.planning.planner import plan
+from equimorph.tasks.route import Route
 from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, check_stable
 from equimorph.tolerances import SAME_STATE, SAME_TO_ROUNDING
 

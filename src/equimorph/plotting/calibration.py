@@ -13,7 +13,8 @@ from equimorph.plotting import style
 from equimorph.plotting.labels import with_unit
 from equimorph.plotting.shapes import prepare_axes
 from equimorph.plotting.viewpoint import flat_shapes
-from equimorph.tasks import Calibration, MeasuredShape
+from equimorph.tasks.calibration.calibrate import Calibration
+from equimorph.tasks.calibration.measurements import MeasuredShape
 
 _ROOM = 0.06
 """Empty border, as a share of the width of the outlines."""

@@ -11,7 +11,7 @@ from equimorph.manifold import Division, EquilibriumSet
 from equimorph.manifold.geometry.topology import adjacency, pieces
 from equimorph.model import position
 from equimorph.structures import States
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 # Relative to the width of the box: boundary vertices lie on it to rounding.
 _ON_BOX = 1e-9

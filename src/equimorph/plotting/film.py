@@ -28,7 +28,7 @@ from equimorph.plotting.plane import draw_folds, draw_track, frame_plane
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
 from equimorph.plotting.viewpoint import draw_triad
 from equimorph.structures import States
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 _WIDTH, _HEIGHT, _DOTS = 6.4, 3.1, 120
 """Inches of a frame, and pixels per inch."""

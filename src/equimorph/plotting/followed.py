@@ -11,7 +11,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, parameter_label
-from equimorph.tasks import FollowedOptimum
+from equimorph.tasks.optimising.optimum_path import FollowedOptimum
 
 _ROOM = (0.6, 0.38, 0.1, 0.1)
 """Inches around the panels: left, bottom, right, top."""

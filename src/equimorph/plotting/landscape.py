@@ -19,7 +19,7 @@ from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, parameter_label
 from equimorph.plotting.maps import GROUND, new_map_axes, value_colours, write_legend
 from equimorph.structures import Structure
-from equimorph.tasks import Landscape
+from equimorph.tasks.optimising.landscapes import Landscape
 
 _LOOKS: dict[str, dict[str, Any]] = {
     "stability": {"linewidths": 1.5, "linestyles": "-"},

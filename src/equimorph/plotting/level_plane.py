@@ -20,7 +20,7 @@ from equimorph.plotting.curves import fold_pieces, path_of, states_along
 from equimorph.plotting.labels import descriptor_label, roomiest
 from equimorph.plotting.plane import check_two_parameters
 from equimorph.structures import State, States
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 _TINT = 0.22
 """Strength of the colours of indices: lines and words on top stay readable."""

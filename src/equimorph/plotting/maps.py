@@ -28,7 +28,8 @@ from equimorph.plotting.labels import (
     symbol,
 )
 from equimorph.plotting.map_faces import Faces, corners, faces
-from equimorph.tasks import CurvatureMap, LimitLoadMap
+from equimorph.tasks.maps.curvature import CurvatureMap
+from equimorph.tasks.maps.limit_load import LimitLoadMap
 
 ActuatorMap = LimitLoadMap | CurvatureMap
 Points = Float[np.ndarray, "_ 2"]

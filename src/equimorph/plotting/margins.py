@@ -11,7 +11,7 @@ from equimorph.model import Schedule
 from equimorph.plotting import style
 from equimorph.plotting.curves import corner_steps, path_of, snap_steps
 from equimorph.plotting.labels import descriptor_label
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 _CURVATURE = "max_curvature"
 _MARGIN_COLOUR = style.INDEX_COLOURS[0]

@@ -36,7 +36,7 @@ from equimorph.plotting.labels import (
     parameter_label,
 )
 from equimorph.structures import States
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 _STABILITY_BOUNDARY: dict[str, Any] = {"color": style.INK, "linewidth": 1.4, "zorder": 4}
 _OTHER_FOLD: dict[str, Any] = {"color": style.INK, "linewidth": 0.6, "zorder": 3}

@@ -20,7 +20,8 @@ from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, number_way_points, parameter_label
 from equimorph.plotting.shapes import numbered_shapes
 from equimorph.plotting.surface import surface
-from equimorph.tasks import Reach, Tracking
+from equimorph.tasks.motion.tracking import Tracking
+from equimorph.tasks.reach.reachable_sets import Reach
 
 _HEIGHT = 148 * style.MILLIMETRE
 # distinguishable in black and white, too

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from equimorph.argument_checks import check_arguments
 from equimorph.dynamics import Replay
 from equimorph.plotting import style
-from equimorph.tasks import SpeedLimit
+from equimorph.tasks.timing.speed import SpeedLimit
 
 _SMALLEST = 1e-7
 """Least deviation that is drawn, relative to the largest."""

@@ -14,7 +14,10 @@ from equimorph.plotting import style
 from equimorph.plotting.labels import parameter_label, symbol
 from equimorph.plotting.plane import parameter_plane
 from equimorph.structures import State, Structure
-from equimorph.tasks import ImperfectionLaw, Room, Sensitivity, Trials
+from equimorph.tasks.robustness.derivatives import Sensitivity
+from equimorph.tasks.robustness.imperfection import ImperfectionLaw
+from equimorph.tasks.robustness.room import Room
+from equimorph.tasks.robustness.trials import Trials
 
 _ROOM_AROUND = (0.72, 0.42, 0.12, 0.3)
 """Inches around the axes: left, bottom, right, top."""

@@ -20,7 +20,7 @@ from equimorph.plotting.curves import corner_steps, track
 from equimorph.plotting.plane import legend_below, parameter_plane
 from equimorph.plotting.shapes import number_in_space, numbered_shapes
 from equimorph.plotting.surface import ASPECT, surface
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 _HEIGHT = 108 * style.MILLIMETRE
 _ZOOM = 1.06

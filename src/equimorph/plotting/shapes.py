@@ -20,7 +20,7 @@ from equimorph.plotting.curves import path_of, states_along
 from equimorph.plotting.labels import BOX
 from equimorph.plotting.surroundings import Surroundings, frame_shapes, limits
 from equimorph.structures import States
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 _MARGINS = (0.54, 0.36, 0.14, 0.06)
 """Inches around the frame: left, bottom, right, top."""

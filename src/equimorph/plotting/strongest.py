@@ -11,7 +11,8 @@ from equimorph.argument_checks import check_arguments
 from equimorph.plotting import style
 from equimorph.plotting.labels import number_points, parameter_label
 from equimorph.plotting.maps import load_map
-from equimorph.tasks import LimitLoadMap, Strongest, StrongestSettings
+from equimorph.tasks.maps.limit_load import LimitLoadMap
+from equimorph.tasks.optimising.strength import Strongest, StrongestSettings
 
 _SURE: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": style.ROUTE_COLOUR, "mec": "white"}
 _ROBUST: dict[str, Any] = {"marker": "s", "ms": 5.5, "mfc": "white", "mec": style.ROUTE_COLOUR}

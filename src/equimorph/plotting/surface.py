@@ -28,7 +28,8 @@ from equimorph.plotting.curves import (
 from equimorph.plotting.labels import constraint_label, descriptor_label, parameter_label
 from equimorph.plotting.scene import Curve, Scene
 from equimorph.plotting.shading import Paint, corner_normals
-from equimorph.tasks import Route, Tracking
+from equimorph.tasks.motion.tracking import Tracking
+from equimorph.tasks.route import Route
 
 Points = Float[np.ndarray, "vertices 3"]
 Cells = Float[np.ndarray, "cells 3 3"]

@@ -13,7 +13,10 @@ from equimorph.storage.files import number_text, write_csv
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json
 from equimorph.storage.owner import Owner, words_of
 from equimorph.structures import States, Structure
-from equimorph.tasks import ActuatorMap, CurvatureMap, LimitLoadMap, MapCurve, natural_states_over
+from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over
+from equimorph.tasks.maps.curvature import CurvatureMap
+from equimorph.tasks.maps.curves import MapCurve
+from equimorph.tasks.maps.limit_load import LimitLoadMap
 
 ABOUT = "about"
 

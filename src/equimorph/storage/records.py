@@ -24,7 +24,9 @@ from equimorph.storage.schemas import UnreadableError
 from equimorph.storage.sets import read_set, write_set
 from equimorph.storage.values import read_states, read_value, write_states, write_value
 from equimorph.structures import State, States, Structure, from_identity
-from equimorph.tasks import ActuatorMap, Calibration, Route
+from equimorph.tasks.calibration.calibrate import Calibration
+from equimorph.tasks.maps.actuator_map import ActuatorMap
+from equimorph.tasks.route import Route
 
 FORMAT = "an equimorph checkpoint"
 VERSION = 2

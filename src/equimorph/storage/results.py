@@ -32,7 +32,8 @@ from equimorph.storage.records import label, read_record, write_record
 from equimorph.storage.schemas import UnreadableError
 from equimorph.storage.sets import link_grid, write_set
 from equimorph.structures import States, Structure, from_identity
-from equimorph.tasks import ActuatorMap, Route
+from equimorph.tasks.maps.actuator_map import ActuatorMap
+from equimorph.tasks.route import Route
 
 FORMAT = "equimorph results"
 VERSION = 3

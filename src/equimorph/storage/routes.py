@@ -9,7 +9,7 @@ from equimorph.storage.hdf import get, get_json, put, put_json
 from equimorph.storage.owner import Owner
 from equimorph.storage.values import read_value, write_value
 from equimorph.structures import State, States, Structure
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 ABOUT, EVENTS, SCHEDULE, SNAPS = "about", "events", "schedule", "snaps"
 

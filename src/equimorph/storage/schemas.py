@@ -19,7 +19,9 @@ from equimorph.equilibria import Event, Landing, LimitLoad, Path
 from equimorph.errors import InputError
 from equimorph.manifold import Audit, Component, Snap, StabilityDistance, Stratum
 from equimorph.model import Schedule
-from equimorph.tasks.reach import Answer, Region
+from equimorph.tasks.maps.actuator_map import ActuatorMap
+from equimorph.tasks.reach.query import Answer
+from equimorph.tasks.reach.regions import Region
 
 OTHERS = (
     *(Audit, Component, Stratum, Snap, StabilityDistance),
@@ -139,7 +141,7 @@ def build(kind: type, values: Mapping[str, Any], version: int = 1) -> Any:
 def schemas() -> dict[str, Schema]:
     """All records, by the names of their schemas; those of tasks are found by themselves."""
     # maps have a special layout
-    found = [kind for kind in _dataclasses(tasks) if not issubclass(kind, tasks.ActuatorMap)]
+    found = [kind for kind in _dataclasses(tasks) if not issubclass(kind, ActuatorMap)]
     kinds = [*found, *OTHERS]
     return {
         _name(kind): Schema(_name(kind), kind, CHANGES.get(kind.__name__, Change()))
@@ -152,15 +154,14 @@ def _name(kind: type) -> str:
 
 
 def _dataclasses(package: ModuleType) -> list[type]:
-    """Dataclasses that the modules of a package define, those that it exports last."""
+    """Dataclasses that the modules of a package define."""
     found: list[type] = []
     for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
         inside = vars(import_module(module.name)).values()
         found += [each for each in inside
                   if isinstance(each, type) and is_dataclass(each)
                   and each.__module__ == module.name]  # fmt: skip
-    exported = {getattr(package, name) for name in package.__all__}
-    return sorted(found, key=lambda kind: kind in exported)
+    return found
 
 
 def _optional(each: Field[Any]) -> bool:

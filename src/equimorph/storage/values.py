@@ -20,7 +20,8 @@ from equimorph.storage.owner import Owner, words_of
 from equimorph.storage.schemas import find_schema, schema_of
 from equimorph.storage.sets import read_set, write_set
 from equimorph.structures import State, States
-from equimorph.tasks import CurvatureMap, LimitLoadMap
+from equimorph.tasks.maps.curvature import CurvatureMap
+from equimorph.tasks.maps.limit_load import LimitLoadMap
 
 ABOUT = "about"
 Inner = Callable[[Any], Any]

@@ -13,7 +13,9 @@ from equimorph.plotting.curves import snap_steps
 from equimorph.structures import State, States
 from equimorph.study import html
 from equimorph.study.question import Figure, Question, still
-from equimorph.tasks import Route, Tracking, Verification
+from equimorph.tasks.motion.tracking import Tracking
+from equimorph.tasks.route import Route
+from equimorph.tasks.verification.schedule_check import Verification
 
 
 def figures_of_states(

@@ -22,8 +22,8 @@ from equimorph.study.lookup import (
     check_values,
 )
 from equimorph.study.states import StateSection
-from equimorph.tasks import unloaded_base
-from equimorph.tasks.verification import first_state
+from equimorph.tasks.maps.actuator_map import unloaded_base
+from equimorph.tasks.verification.schedule_check import first_state
 
 Intervals = Annotated[list[Count], Field(min_length=2, max_length=2)]
 OBJECTIVES = ("length", "travel", "work", "clearance", "time")

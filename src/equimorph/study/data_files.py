@@ -17,7 +17,7 @@ from equimorph.storage.files import fingerprint
 from equimorph.structures import Structure
 from equimorph.study.fields import LARGEST, Section, requirement
 from equimorph.study.lookup import at_key, check_value
-from equimorph.tasks import MeasuredShape
+from equimorph.tasks.calibration.measurements import MeasuredShape
 
 FOLDER = "folder"
 """In the context of validation: the folder from which names of files count."""

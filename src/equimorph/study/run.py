@@ -27,7 +27,7 @@ from equimorph.study.prepare import Answered, Outcome, Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text, sound_part
 from equimorph.study.question import Question
 from equimorph.study.report import draw_figures, report
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 LOG = log_of(__name__)
 

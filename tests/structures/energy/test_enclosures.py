@@ -6,7 +6,7 @@ import pytest
 from equimorph.structures import EnergyStructure
 from equimorph.structures.energy.enclosures import can_enclose, enclosure
 from equimorph.structures.energy.tape import casadi, tape
-from equimorph.tasks import verify
+from equimorph.tasks.verification.schedule_check import verify
 
 FORMULAS = [
     "x*y - x/(2 + y)",

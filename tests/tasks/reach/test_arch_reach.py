@@ -9,9 +9,9 @@ import pytest
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Rod
-from equimorph.tasks import track
-from equimorph.tasks.reach import reachable
+from equimorph.tasks.motion.tracking import track
 from equimorph.tasks.reach.query import jacobian_of
+from equimorph.tasks.reach.reachable_sets import reachable
 from typecheck import unchecked
 
 

@@ -10,7 +10,7 @@ import pytest
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.manifold import part
-from equimorph.tasks.reach import attainable, reachable
+from equimorph.tasks.reach.reachable_sets import attainable, reachable
 from typecheck import unchecked
 
 LOW, HIGH, LOAD = 0.3, 1.3, 0.5

@@ -6,9 +6,10 @@ import pytest
 import equimorph as em
 from equimorph.equilibria import settle
 from equimorph.structures import Rod, Spring, States
-from equimorph.tasks import plan, verify
-from equimorph.tasks.verification import prove
+from equimorph.tasks.planning.planner import plan
 from equimorph.tasks.verification.newton_kantorovich import segment_bounds
+from equimorph.tasks.verification.proof import prove
+from equimorph.tasks.verification.schedule_check import verify
 from oracles.polynomial import bead_on_a_circle, fold_form
 from oracles.specimens import arch_truss, toggle
 from typecheck import unchecked

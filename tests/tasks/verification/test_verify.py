@@ -8,7 +8,8 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import InputError
-from equimorph.tasks import plan, verify
+from equimorph.tasks.planning.planner import plan
+from equimorph.tasks.verification.schedule_check import verify
 
 VIA = [{"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0}]
 OTHER_WAY = [{"Delta": 1.3}, {"Theta": 1.3}, {"Delta": 0.0}, {"Theta": 1.0}]

@@ -24,7 +24,9 @@ from equimorph.study.data_files import DataFile, Measured, measured_shapes
 from equimorph.study.fields import Point, Positive
 from equimorph.study.lookup import at_key
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
-from equimorph.tasks import Calibration, Family, MeasuredShape, calibrate
+from equimorph.tasks.calibration.calibrate import Calibration, calibrate
+from equimorph.tasks.calibration.measurements import MeasuredShape
+from equimorph.tasks.calibration.unknowns import Family
 from equimorph.tasks.calibration.unknowns import Kind as UnknownKind
 
 

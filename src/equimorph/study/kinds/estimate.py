@@ -5,7 +5,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.answers import figures_of_states, free_columns, place_of, table_of_states
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks import StateEstimate, estimate_state
+from equimorph.tasks.estimation import StateEstimate, estimate_state
 
 
 class EstimateKind(Kind[StateEstimate]):

@@ -10,7 +10,9 @@ from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.question import Figure, Kind, Question, still
-from equimorph.tasks import Certificate, FollowedOptimum, follow_optimum
+from equimorph.tasks.optimising.certificates import Certificate
+from equimorph.tasks.optimising.moving_optimum import follow_optimum
+from equimorph.tasks.optimising.optimum_path import FollowedOptimum
 
 MOST_ROWS = 12
 """Optima that a page shows."""

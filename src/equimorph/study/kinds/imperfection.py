@@ -14,7 +14,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.lookup import check_parameters
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
-from equimorph.tasks import ImperfectionLaw, imperfection_law
+from equimorph.tasks.robustness.imperfection import ImperfectionLaw, imperfection_law
 
 
 class ImperfectionKind(Kind[Mapping[str, ImperfectionLaw]]):

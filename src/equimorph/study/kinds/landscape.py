@@ -9,7 +9,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.storage.files import number_text
 from equimorph.study import html
 from equimorph.study.question import DataTable, Figure, Kind, Question, still
-from equimorph.tasks import Landscape, landscape
+from equimorph.tasks.optimising.landscapes import Landscape, landscape
 
 NO_JUMP = 1e-9
 """Jump relative to the values that is rounding."""

@@ -17,13 +17,9 @@ from equimorph.study.composite_arguments import unloaded_load
 from equimorph.study.fields import Number, requirement
 from equimorph.study.lookup import Extent, at_key
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
-from equimorph.tasks import (
-    ActuatorMap,
-    CurvatureMap,
-    LimitLoadMap,
-    curvature_map,
-    limit_load_map,
-)
+from equimorph.tasks.maps.actuator_map import ActuatorMap
+from equimorph.tasks.maps.curvature import CurvatureMap, curvature_map
+from equimorph.tasks.maps.limit_load import LimitLoadMap, limit_load_map
 
 
 class MapKind(Kind[ActuatorMap]):

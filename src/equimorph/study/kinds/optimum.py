@@ -10,7 +10,8 @@ from equimorph.structures import States
 from equimorph.study import html
 from equimorph.study.answers import figures_of_states, free_columns, place_of, table_of_states
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks import Optima, RobustOptimum, optimise, robust_optimum
+from equimorph.tasks.optimising.optimum import Optima, optimise
+from equimorph.tasks.optimising.robust import RobustOptimum, robust_optimum
 
 ROUNDING = 1e-12
 """Price that is shown as zero."""

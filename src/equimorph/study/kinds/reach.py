@@ -15,8 +15,8 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.fields import Number, requirement
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
-from equimorph.tasks import Reach, attainable, reachable
-from equimorph.tasks.reach import Answer
+from equimorph.tasks.reach.query import Answer
+from equimorph.tasks.reach.reachable_sets import Reach, attainable, reachable
 
 Reached = tuple[Reach, tuple[Answer, ...]]
 """What is reached, and answers to the queries in their order."""

@@ -9,7 +9,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.structures import State
 from equimorph.study import html
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
-from equimorph.tasks import Room, stable_room
+from equimorph.tasks.robustness.room import Room, stable_room
 
 
 class RoomKind(Kind[tuple[State, Room]]):

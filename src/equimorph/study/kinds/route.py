@@ -20,7 +20,11 @@ from equimorph.study.names import PLANE, STABLE_PLANE, route_name
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 from equimorph.study.signatures import MEANINGS
 from equimorph.study.states import NaturalSection
-from equimorph.tasks import Route, alternatives, plan, plan_sampled, smoothed
+from equimorph.tasks.planning.planner import plan
+from equimorph.tasks.planning.route_classes import alternatives
+from equimorph.tasks.planning.sampling import plan_sampled
+from equimorph.tasks.planning.smoothing import smoothed
+from equimorph.tasks.route import Route
 
 Routes = tuple[Route, ...]
 """The route, or its refusal; then alternatives, if the study asks for them."""

@@ -12,7 +12,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.plotting.robustness import MOST_BARS
 from equimorph.study import html
 from equimorph.study.question import Figure, Kind, Question, still
-from equimorph.tasks import Sensitivity, sensitivity
+from equimorph.tasks.robustness.derivatives import Sensitivity, sensitivity
 
 
 class SensitivityKind(Kind[Sensitivity]):

@@ -4,7 +4,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.answers import figures_of_states, free_columns, table_of_states
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks import Shapes, solve_shape
+from equimorph.tasks.shapes.solutions import Shapes, solve_shape
 
 
 class ShapeKind(Kind[Shapes]):

@@ -16,7 +16,7 @@ from equimorph.study import html
 from equimorph.study.answers import counted, figures_of_states, table_of_states
 from equimorph.study.lookup import descriptor_at
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
-from equimorph.tasks import LeastSnap, least_snap
+from equimorph.tasks.robustness.snaps import LeastSnap, least_snap
 
 Snaps = tuple[tuple[int, ...], tuple[Snap, ...], tuple[States, ...]]
 """Stable strata, runs of their boundaries, and the states from which the snaps of each begin."""

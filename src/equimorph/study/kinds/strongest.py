@@ -12,7 +12,8 @@ from equimorph.study import html
 from equimorph.study.answers import place_of
 from equimorph.study.lookup import Extent
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
-from equimorph.tasks import LimitLoadMap, StrongestSettings, limit_load_map, strongest
+from equimorph.tasks.maps.limit_load import LimitLoadMap, limit_load_map
+from equimorph.tasks.optimising.strength import StrongestSettings, strongest
 
 Answer = tuple[LimitLoadMap, StrongestSettings, StrongestSettings | None]
 """Map, its largest values, and those that errors of the settings leave."""

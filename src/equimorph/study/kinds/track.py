@@ -8,7 +8,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.answers import as_route, figures_of_way
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks import Tracking, track
+from equimorph.tasks.motion.tracking import Tracking, track
 
 MOST_ROWS = 8
 """Compromises that a page shows."""

@@ -8,7 +8,7 @@ from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.question import Figure, Kind, Question, still
-from equimorph.tasks import Trials, random_trials
+from equimorph.tasks.robustness.trials import Trials, random_trials
 
 
 class TrialsKind(Kind[Trials]):

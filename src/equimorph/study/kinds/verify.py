@@ -10,7 +10,8 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.answers import as_route, figures_of_way
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks import Proof, ProofStatus, Verification, verify
+from equimorph.tasks.verification.proof import Proof, ProofStatus
+from equimorph.tasks.verification.schedule_check import Verification, verify
 
 STANDINGS: Mapping[ProofStatus, tuple[str, str]] = {
     ProofStatus.PROVED: ("Proved", ""),

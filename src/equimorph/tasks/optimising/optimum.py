@@ -29,7 +29,7 @@ from equimorph.tasks.optimising.tangent_steps import (
     tangent_plane_at,
     unconstrained_setting,
 )
-from equimorph.tasks.planning import plan
+from equimorph.tasks.planning.planner import plan
 from equimorph.tasks.route import Route
 from equimorph.tasks.stable_part import (
     feasible_vertices,

@@ -33,7 +33,7 @@ class Quadratic:
 
 
 @dataclass(frozen=True)
-class Answer:
+class QuadraticStep:
     """Step, multipliers of the functions (their sum is 1) and of the constraints."""
 
     step: Vector
@@ -41,7 +41,7 @@ class Answer:
     multipliers: Float[np.ndarray, " k"]
 
 
-def solve(problem: Quadratic, reach: float) -> Answer | None:
+def solve(problem: Quadratic, reach: float) -> QuadraticStep | None:
     """Solve by trying sets of up to d + 1 active rows; None without a feasible step.
 
     The programme is strictly convex: the first set whose KKT point is feasible, with multipliers
@@ -75,7 +75,7 @@ def solve(problem: Quadratic, reach: float) -> Answer | None:
                 weights, multipliers = np.zeros(len(problem.f)), np.zeros(len(problem.g))
                 weights[functions] = found.weights
                 multipliers[constraints] = found.multipliers[: len(constraints)]
-                return Answer(found.step, weights, multipliers)
+                return QuadraticStep(found.step, weights, multipliers)
     return None
 
 
@@ -100,7 +100,7 @@ def _different(
     return np.flatnonzero(~np.tril(close, -1).any(axis=1))
 
 
-def _first(problem: Quadratic, size: int, more: int) -> Answer | None:
+def _first(problem: Quadratic, size: int, more: int) -> QuadraticStep | None:
     """KKT point with `size` functions and `more` constraints active, if it is the solution."""
     (m, d), k = problem.a.shape, len(problem.g)
     own = np.array(list(combinations(range(m), size)), int).reshape(comb(m, size), size)
@@ -120,7 +120,7 @@ def _first(problem: Quadratic, size: int, more: int) -> Answer | None:
     at = hits[0]
     weights, multipliers = np.zeros(m), np.zeros(k)
     weights[own[at]], multipliers[rows[at]] = x[at, d + 1 : d + 1 + size], x[at, d + 1 + size :]
-    return Answer(step[at], weights, multipliers)
+    return QuadraticStep(step[at], weights, multipliers)
 
 
 def _kkt_points(

@@ -12,7 +12,8 @@ from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, 
 from equimorph.equilibria.locus import Locus, Spots, advance, nearest
 from equimorph.model import position
 from equimorph.structures import State
-from equimorph.tasks.maps import LimitLoadMap, MapCurve
+from equimorph.tasks.maps.curves import MapCurve
+from equimorph.tasks.maps.limit_load import LimitLoadMap
 
 ITERATIONS = 20
 """Steps along a curve towards its highest point."""

@@ -12,7 +12,7 @@ from equimorph.arrays import Frames
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.tasks.optimising.programme import Expansion, Programme
-from equimorph.tasks.optimising.quadratic import Answer, Quadratic, solve
+from equimorph.tasks.optimising.quadratic import Quadratic, QuadraticStep, solve
 from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangents_at
 from equimorph.tolerances import FEASIBLE
 
@@ -53,7 +53,7 @@ class LocalMinimum:
     point: SetPoints
     frames: Frames
     expansion: Expansion
-    answer: Answer
+    answer: QuadraticStep
     converged: bool
 
 
@@ -71,7 +71,7 @@ class _Iterate:
         frames, points = tangents_at(programme.setting, points)
         return cls(points, frames, programme.expand(points, frames))
 
-    def minimum(self, k: int, answer: Answer, converged: bool) -> LocalMinimum:
+    def minimum(self, k: int, answer: QuadraticStep, converged: bool) -> LocalMinimum:
         """Lane `k` as a point from which no step is made."""
         expansion = Expansion(*(column[k : k + 1] for column in vars(self.expansion).values()))
         points = self.points.take(np.array([k]))
@@ -85,7 +85,7 @@ class _Lane:
     point: SetPoints
     reach: float = LONGEST
     penalty: float = 1.0
-    answer: Answer | None = None
+    answer: QuadraticStep | None = None
     done: LocalMinimum | None = None
     best: SetPoints | None = None
     least: float = np.inf
@@ -152,7 +152,7 @@ def _first_of_each(programme: Programme, here: SetPoints) -> list[int]:
     return kept
 
 
-def _answer(expansion: Expansion, k: int, lane: _Lane) -> Answer | None:
+def _answer(expansion: Expansion, k: int, lane: _Lane) -> QuadraticStep | None:
     """Step of the quadratic model; where constraints contradict each other, towards these."""
     d = expansion.f_slope.shape[2]
     f, g, known = expansion.f[k], expansion.g[k], lane.answer
@@ -176,19 +176,19 @@ def _positive(bend: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
     return np.asarray((vectors * size) @ vectors.T)
 
 
-def _restoration_step(model: Quadratic, reach: float) -> Answer:
+def _restoration_step(model: Quadratic, reach: float) -> QuadraticStep:
     """Shortest step that meets the violated constraints, or a part of it."""
     bad = model.g > 0.0
     step = np.linalg.lstsq(model.b[bad], -model.g[bad], rcond=None)[0]
     step = step * min(1.0, reach / max(float(np.linalg.norm(step)), 1e-300))
-    return Answer(step, np.full(len(model.f), 1.0 / len(model.f)), np.zeros(len(model.g)))
+    return QuadraticStep(step, np.full(len(model.f), 1.0 / len(model.f)), np.zeros(len(model.g)))
 
 
 def _advance(
-    programme: Programme, todo: list[_Lane], at: _Iterate, answers: list[Answer | None]
+    programme: Programme, todo: list[_Lane], at: _Iterate, answers: list[QuadraticStep | None]
 ) -> None:
     """Move every lane by its step, shortened until its merit falls."""
-    steps: dict[int, Answer] = {}
+    steps: dict[int, QuadraticStep] = {}
     for k, (lane, answer) in enumerate(zip(todo, answers, strict=True)):
         lane.answer = answer
         if answer is None:

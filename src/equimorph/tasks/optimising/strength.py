@@ -12,8 +12,9 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Settings, Values
 from equimorph.equilibria import LimitLoad
 from equimorph.errors import InputError
-from equimorph.tasks.maps import LimitLoadMap, MapCurve
 from equimorph.tasks.maps.actuator_map import settings_of
+from equimorph.tasks.maps.curves import MapCurve
+from equimorph.tasks.maps.limit_load import LimitLoadMap
 from equimorph.tasks.optimising.ridges import BESIDE, highest_point, settings_across
 from equimorph.tasks.optimising.two_parameter_search import climb, maximise_least
 

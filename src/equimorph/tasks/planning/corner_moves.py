@@ -24,7 +24,7 @@ LEAST_GAIN = 2e-6
 
 
 @dataclass(frozen=True)
-class Room:
+class ActuatorBox:
     """Box in which corners may move, and the places of its parameters among all."""
 
     box: Box
@@ -55,7 +55,7 @@ class _Moves:
         return _Moves(self.tried[some], self.new[some], self.legs[:, some], lifts)
 
 
-def move_by_chords(corners: States, demands: Demands, room: Room) -> States:
+def move_by_chords(corners: States, demands: Demands, room: ActuatorBox) -> States:
     """Move corners as long as that makes their chords cheaper.
 
     A chord runs through the exact state halfway between two corners; costs are summed over its two
@@ -65,7 +65,7 @@ def move_by_chords(corners: States, demands: Demands, room: Room) -> States:
     return _move_corners(corners, demands, room, SIZES, ROUNDS, by_lifts=False)
 
 
-def move_by_lifts(corners: States, demands: Demands, room: Room, quick: bool) -> States:
+def move_by_lifts(corners: States, demands: Demands, room: ActuatorBox, quick: bool) -> States:
     """Move corners as long as that makes the straight lifts between them cheaper.
 
     `quick`: with small steps and few rounds, for the last improvements.
@@ -85,7 +85,7 @@ def chords(
 def _move_corners(
     corners: States,
     demands: Demands,
-    room: Room,
+    room: ActuatorBox,
     sizes: tuple[float, ...],
     rounds: int,
     by_lifts: bool,
@@ -124,7 +124,9 @@ def _chords(
     return good, cost
 
 
-def _move_every_other(chain: _Chain, odd: int, size: float, demands: Demands, room: Room) -> _Chain:
+def _move_every_other(
+    chain: _Chain, odd: int, size: float, demands: Demands, room: ActuatorBox
+) -> _Chain:
     """Chain with every other corner moved, if that makes its two legs cheaper."""
     tried, new = _candidates(chain.corners.states, odd, size, room)
     some = np.flatnonzero(demands.admissible(new)) if len(tried) else tried
@@ -161,7 +163,7 @@ def _interleave(first: Places, second: Places) -> Places:
     )
 
 
-def _candidates(corners: States, odd: int, size: float, room: Room) -> tuple[Some, States]:
+def _candidates(corners: States, odd: int, size: float, room: ActuatorBox) -> tuple[Some, States]:
     """Equilibria near every second corner, and the corner that each of them would replace.
 
     Whether these lie on the branch of the corner is what lifts from its neighbours show.

@@ -12,7 +12,7 @@ from equimorph.equilibria import way_points
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, Descriptor, position
 from equimorph.structures import State, States, Structure
-from equimorph.tasks.planning.corner_moves import Room
+from equimorph.tasks.planning.corner_moves import ActuatorBox
 from equimorph.tasks.planning.network import Demands, connect, lift_straight
 from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.random_trees import (
@@ -277,7 +277,7 @@ def _corners(course: LoadCourse, path: TreePath, demands: Demands) -> Corners:
         section = states[inside]
         if course.legs == 0:
             section = relax_corners(
-                straighten(section, demands), demands, Room(course.box, course.free)
+                straighten(section, demands), demands, ActuatorBox(course.box, course.free)
             )
         else:
             section = straighten(section, demands)

@@ -13,7 +13,7 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, position
 from equimorph.structures import States
-from equimorph.tasks.planning.corner_moves import Room, chords, move_by_chords, move_by_lifts
+from equimorph.tasks.planning.corner_moves import ActuatorBox, chords, move_by_chords, move_by_lifts
 from equimorph.tasks.planning.network import Demands, Ends, connect, shortest_path
 from equimorph.tasks.route import Corners, Route, refusal, verify_route
 from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, inadmissible
@@ -85,7 +85,7 @@ def _swept(
 def relax_corners(
     corners: States,
     demands: Demands,
-    room: Room,
+    room: ActuatorBox,
     same_class: bool = False,
 ) -> States:
     """Corners moved to where the chain of straight lifts costs least.
@@ -237,7 +237,7 @@ def straight_corners(
     """Corners of a straightened path, both ends among them."""
     corners = straighten(path, demands, same_class)
     free = np.array([position(eset.structure.parameters, name) for name in eset.names])
-    return relax_corners(corners, demands, Room(eset.box, free), same_class)
+    return relax_corners(corners, demands, ActuatorBox(eset.box, free), same_class)
 
 
 def check_margin(route: Route, demands: Demands) -> Route:

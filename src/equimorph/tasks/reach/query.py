@@ -15,7 +15,7 @@ from equimorph.manifold.queries.locate import cell_of
 from equimorph.model import Constraint, Descriptor, Schedule, position
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.motion.tracking import Tracking, track
-from equimorph.tasks.planning import plan
+from equimorph.tasks.planning.planner import plan
 from equimorph.tasks.reach.regions import Region
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes.solutions import solve_shape

@@ -18,7 +18,7 @@ from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.programme import stability
-from equimorph.tasks.planning import plan
+from equimorph.tasks.planning.planner import plan
 from equimorph.tasks.route import Route
 from equimorph.tasks.shapes.fits_and_families import best_fits, solution_family
 from equimorph.tasks.shapes.prediction import (

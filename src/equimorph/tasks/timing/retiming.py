@@ -11,7 +11,7 @@ from equimorph.errors import InputError
 from equimorph.model import Constraint, Rates, Schedule
 from equimorph.structures import State, Structure
 from equimorph.tasks.timing.filtered_motion import FilteredMotion, Rows
-from equimorph.tasks.verification import Verification, first_state, verify
+from equimorph.tasks.verification.schedule_check import Verification, first_state, verify
 
 SPEEDS = (1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05)
 """Shares of the largest rates that are tried: short legs are faster with less to accelerate."""

@@ -14,7 +14,7 @@ from equimorph.model import Rates, Schedule, names_of
 from equimorph.structures import State, States, Structure
 from equimorph.structures.vibration import vibrations
 from equimorph.tasks.route import describe_place
-from equimorph.tasks.verification import verify
+from equimorph.tasks.verification.schedule_check import verify
 
 STATIONS = 120
 """States along a schedule at which frequencies are computed, at most."""
