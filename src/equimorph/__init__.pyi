@@ -46,6 +46,7 @@ from .dynamics import (
     HeldLanding as HeldLanding,
     Replay as Replay,
     ReplaySettings as ReplaySettings,
+    SimulatedPlant as SimulatedPlant,
     SnapInTime as SnapInTime,
     replay as replay,
     snap_in_time as snap_in_time,

@@ -65,3 +65,33 @@ def wandering(start: float, random: np.random.Generator, drift: float, jump: flo
         number += 1
         if number == when:
             value += jump * random.choice([-1.0, 1.0])
+
+
+@dataclass
+class PlantInMuJoCo(Plant):
+    """The same, moved and measured in MuJoCo; the statics of the library tell whether it snapped.
+
+    Parameters
+    ----------
+    simulated
+        The structure in the simulator, at rest in `state`.
+    most
+        Distance from the statics above which it has snapped.
+    """
+
+    simulated: em.SimulatedPlant | None = None
+    most: float = 0.05
+
+    def write(self, command: Mapping[str, float]) -> None:
+        """Move actuators and load together."""
+        names = [*command, self.name]
+        super().write(command)
+        self.simulated.move({name: self.state[name] for name in names})
+        self.snapped |= self.simulated.departure(self.state) > self.most
+
+    def read(self) -> dict[em.Descriptor, float]:
+        """Measured values."""
+        return {
+            what: self.simulated.measure(what) + error * self.random.standard_normal()
+            for what, error in self.errors.items()
+        }

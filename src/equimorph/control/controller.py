@@ -1,41 +1,31 @@
 """`Controller`: steps from measured values to commands for actuators, none beyond what is safe."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 from scipy.stats import chi2
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Values
-from equimorph.control.belief import (
-    Belief,
-    ControlStatus,
-    Estimate,
-    Measurement,
-    Moved,
-    extremes,
-    fitted,
-    moved,
-    positions,
-)
+from equimorph.control.belief import Belief, ControlStatus
+from equimorph.control.estimate import Estimate, Measurement, fitted
+from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
+from equimorph.control.moving_target import MovingTarget
+from equimorph.control.safe_routes import route_is_safe, safe_route
+from equimorph.control.strides import Strides
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
-from equimorph.tasks.planning.planner import plan
+from equimorph.tasks.motion.tracking import Tracking
+from equimorph.tasks.planning.network import Demands
 from equimorph.tasks.route import Route
 from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, check_stable
 from equimorph.tolerances import SAME_STATE, SAME_TO_ROUNDING
 
 SURPRISING = 1e-4
 """Probability of a measurement below which the structure is looked for on other sheets."""
-SHARES = (1.0, 0.5, 0.25)
-"""Parts of a stride that are tried, the longest first."""
-RESERVES = (0.0, 0.25, 0.45)
-"""Margins with which routes are planned: shares of what the ends leave above the one that is kept.
-The longer way around folds bears more loads."""
 STALE = 1.0
 """Change of the loads, in standard deviations, after which the whole route is checked again."""
 
@@ -48,10 +38,10 @@ class Controller:
     In each step the state and the unknown loads are estimated from the measurement and the belief
     before it. The next stride is lifted under the estimated loads and under those that are likely,
     `deviations` standard deviations and a jump away; only one that keeps the constraints and the
-    margin in all of these is commanded. Where the rest of the route is not safe under the loads as
-    they are now, another one is planned; where the present place is not, it is left. What cannot be
-    done safely is refused by name. Nothing is hidden in the controller: the same belief and
-    measurement give the same answer.
+    margin in all of these is commanded. Where the rest of the route is not safe under these loads,
+    one that is is searched over the set as it is under the estimated loads; where the present place
+    is not, it is left. What cannot be done safely is refused by name. Nothing is hidden in the
+    controller: the same belief and measurement give the same answer.
 
     Motions are taken as quasi-static; see `speed_limit` for how fast strides may follow each other.
 
@@ -60,7 +50,9 @@ class Controller:
     eset
         Equilibrium set over the actuators, at nominal loads.
     goal
-        State over the set at nominal loads, or a route that arrived, which is followed.
+        State over the set at nominal loads; a route that arrived, which is followed as long as it
+        is safe; or a motion of `track` that arrived, whose targets are met under the estimated
+        loads, one leg after the other.
     errors
         Standard error of each descriptor that is measured.
     unknown
@@ -75,6 +67,8 @@ class Controller:
         Standard deviations of the loads that every commanded state must bear.
     jumps
         Largest sudden change of each load, by name, that every commanded state must bear as well.
+    pace
+        Legs of a moving target that are followed in a step.
 
     Raises
     ------
@@ -100,7 +94,7 @@ class Controller:
     def __init__(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         self,
         eset: EquilibriumSet,
-        goal: State | Route,
+        goal: State | Route | Tracking,
         errors: Mapping[Descriptor, float],
         unknown: Mapping[str, float],
         *,
@@ -109,17 +103,24 @@ class Controller:
         stride: float = 0.05,
         deviations: float = 2.0,
         jumps: Mapping[str, float] | None = None,
+        pace: float = 1.0,
     ) -> None:
         self.eset, self.structure = eset, eset.structure
         self.goal, self.errors, self.unknown = goal, dict(errors), dict(unknown)
         self.margin, self.within = margin, (*eset.constraints, *within)
         self.stride, self.deviations, self.jumps = stride, deviations, dict(jumps or {})
+        self.pace = pace
         self._check()
         self._actuators = positions(self.structure, eset.names)
         self._loads = positions(self.structure, unknown)
-        self._goal = goal if isinstance(goal, State) else _end_of(goal)
+        self._goal = _end_of(goal)
+        self._target = (
+            MovingTarget.of(goal, self._actuators) if isinstance(goal, Tracking) else None
+        )
+        self._strides = Strides(eset.box, self._actuators, stride)
         self._jumps = np.array([self.jumps.get(name, 0.0) for name in unknown])
         self._drift = np.diag(np.array(list(unknown.values()), float) ** 2)
+        self._demands = Demands.of(self.structure, "length", self.within, margin)
 
     def _check(self) -> None:
         if not self.errors:
@@ -141,9 +142,10 @@ class Controller:
         ):  # fmt: skip
             _check_sizes(argument, named)
         _check_sizes("stride", {"the stride": self.stride})
-        if isinstance(self.goal, Route) and not self.goal.arrived:
-            raise InputError("`goal` must be a state or a route that arrived; got a refused route.")
-        self._check_end("goal", self.goal if isinstance(self.goal, State) else _end_of(self.goal))
+        _check_sizes("pace", {"the pace": self.pace})
+        if not isinstance(self.goal, State) and not self.goal.arrived:
+            raise InputError(f"`goal` must be a motion that arrived; got {self.goal!r}.")
+        self._check_end("goal", _end_of(self.goal))
 
     def _check_end(self, name: str, state: State) -> None:
         check_equilibrium(name, state)
@@ -170,10 +172,15 @@ class Controller:
         """
         self._check_end("state", state)
         here = Belief(state, self._drift, (), state.p[self._loads], ControlStatus.FOLLOWING)
-        likely = self._under(state, self._loads_of(here))
-        if isinstance(self.goal, Route) and self._route_is_safe(likely, self.goal.way_points):
-            return replace(here, way_points=tuple(self.goal.way_points))
-        planned = self._replanned(here, likely)
+        if self._target is not None:
+            return here
+        likely = self._likely(here)
+        place = likely.under(state.batch)
+        if isinstance(self.goal, Route):
+            followed = replace(here, way_points=tuple(self.goal.way_points))
+            if self._follows_safely(followed, likely, place):
+                return followed
+        planned = self._replanned(here, likely, place)
         is_found = planned.status == ControlStatus.REPLANNED
         return replace(planned, status=ControlStatus.FOLLOWING) if is_found else planned
 
@@ -193,20 +200,23 @@ class Controller:
         InputError
             If a descriptor has no standard error, or a value is not a number.
         """
-        belief = self._estimated(belief, self._measurement(measured))
+        belief = self._estimated(belief, Measurement.of(measured, self.errors))
         if belief.status == ControlStatus.NOT_EXPLAINED:
             return belief
-        likely = self._under(belief.state, self._loads_of(belief))
-        if not likely.keep(self.margin).all():
-            return self._retreat(belief)
+        likely = self._likely(belief)
+        place = likely.under(belief.state.batch)
+        if not place.safe[0]:
+            return self._retreat(belief, likely)
+        if self._target is not None:
+            return self._tracked(belief, likely, place)
         if self._is_stale(belief):
-            if self._route_is_safe(likely, belief.way_points):
+            if self._follows_safely(belief, likely, place):
                 belief = replace(belief, checked=belief.state.p[self._loads])
             else:
-                belief = self._replanned(belief, likely)
+                belief = self._replanned(belief, likely, place)
         if belief.status == ControlStatus.NO_SAFE_WAY:
             return belief
-        return self._strode(belief, likely)
+        return self._strode(belief, likely, place)
 
     @check_arguments
     def run(
@@ -238,15 +248,6 @@ class Controller:
 
     # what is estimated
 
-    def _measurement(self, measured: Mapping[Descriptor, float]) -> Measurement:
-        for each, value in measured.items():
-            if each not in self.errors:
-                raise InputError(f"`measured` must have standard errors; got {each.name}.")
-            if not np.isfinite(value):
-                raise InputError(f"`measured` must have numbers; got {each.name}: {value!r}.")
-        values = np.array(list(measured.values()), float)
-        return Measurement(tuple(measured), values, np.array([self.errors[d] for d in measured]))
-
     def _estimated(self, belief: Belief, measured: Measurement) -> Belief:
         """Belief with the measurement; on another sheet if this one does not explain it."""
         prior = belief.covariance + self._drift
@@ -270,7 +271,7 @@ class Controller:
         )  # fmt: skip
 
     def _fit(self, state: State, prior: np.ndarray, measured: Measurement) -> Estimate:
-        return fitted(state, list(self.unknown), prior, measured)
+        return fitted(state, self._loads, prior, measured)
 
     def _is_surprising(self, estimate: Estimate, measured: Measurement) -> bool:
         return bool(chi2.sf(estimate.misfit, len(measured.values)) < SURPRISING)
@@ -281,35 +282,14 @@ class Controller:
         if len(over) == 0:
             return [belief.state]
         loads = belief.state.p[self._loads][None].repeat(len(over), 0)
-        found = moved(over, list(self.unknown), loads)
-        return [belief.state, *found.states[np.flatnonzero(found.arrived)]]
+        states, arrived = moved(over, self._loads, loads)
+        return [belief.state, *states[np.flatnonzero(arrived)]]
 
-    # what is safe
-
-    def _loads_of(self, belief: Belief) -> Float[np.ndarray, "m k"]:
+    def _likely(self, belief: Belief) -> LikelyLoads:
+        """Loads about the estimated ones, without and with jumps."""
+        spread = self.deviations * np.sqrt(np.diag(belief.covariance + self._drift))
         loads = belief.state.p[self._loads]
-        spread = np.sqrt(np.diag(belief.covariance + self._drift))
-        usual = extremes(loads, self.deviations * spread)
-        return np.concatenate([usual, extremes(loads, self.deviations * spread + self._jumps)[1:]])
-
-    def _under(self, state: State, loads: Float[np.ndarray, "m k"]) -> Moved:
-        """The state under each of some loads."""
-        count = len(loads)
-        z, p = state.z[None].repeat(count, 0), state.p[None].repeat(count, 0)
-        return moved(States(self.structure, z, p), list(self.unknown), loads, self.within)
-
-    def _driven(self, likely: Moved, target: Float[np.ndarray, " d"]) -> Moved:
-        """The states under likely loads after a move of the actuators."""
-        goals = target[None].repeat(len(likely.states), 0)
-        return moved(likely.states, self.eset.names, goals, self.within)
-
-    def _borne(self, belief: Belief, target: Float[np.ndarray, " d"]) -> float:
-        """Smallest margin under likely loads after a move under the estimated ones."""
-        found = moved(belief.state.batch, self.eset.names, target[None], self.within)
-        if not found.arrived[0]:
-            return -np.inf
-        likely = self._under(found.states[0], self._loads_of(belief))
-        return float(likely.states.margin.min()) if likely.arrived.all() else -np.inf
+        return LikelyLoads.around(self._loads, loads, spread, self._jumps, self._demands)
 
     # what is done
 
@@ -318,57 +298,41 @@ class Controller:
         spread = np.sqrt(np.diag(belief.covariance + self._drift))
         return bool((np.abs(change) > STALE * spread).any())
 
-    def _route_is_safe(self, likely: Moved, way_points: Sequence[Command]) -> bool:
-        """Whether the whole rest of a route is safe under all likely loads, without jumps.
-
-        After a jump another route may be taken; the place at which it happens must bear it.
-        """
-        likely = likely.first(2 * len(self._loads) + 1)
-        for point in way_points:
-            if not likely.keep(self.margin).all():
-                return False
-            here = likely.states.p[0, self._actuators]  # the actuators are the same in all
-            likely = self._driven(likely, _towards(point, self.eset.names, here))
-        return bool(likely.keep(self.margin).all() and self._is_goal(likely.states).all())
+    def _follows_safely(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> bool:
+        return route_is_safe(place, belief.way_points, likely.under(self._goal.batch), likely)
 
     def _is_goal(self, states: States) -> Flags:
         """Which states are the goal under their loads."""
-        there = self._under(self._goal, states.p[:, self._loads])
-        gap = (there.states.z - states.z)[:, : self.structure.unknowns]
-        return np.asarray(there.arrived & (gap**2 @ self.structure.mass < SAME_STATE**2))
+        loads = states.p[:, self._loads]
+        z, p = (each[None].repeat(len(states), 0) for each in (self._goal.z, self._goal.p))
+        there, arrived = moved(States(self.structure, z, p), self._loads, loads)
+        gap = (there.z - states.z)[:, : self.structure.unknowns]
+        return np.asarray(arrived & (gap**2 @ self.structure.mass < SAME_STATE**2))
 
-    def _replanned(self, belief: Belief, likely: Moved) -> Belief:
-        """Another route over the set, found at nominal loads and safe under the present ones."""
-        loads = np.array([[self.eset.fixed[name] for name in self.unknown]])
-        nominal = moved(belief.state.batch, list(self.unknown), loads)
-        usual = likely.first(2 * len(self._loads) + 1).states.p[:, self._loads]
-        if not self._under(self._goal, usual).arrived.all():
-            why = "the goal does not exist under all likely loads"
+    def _replanned(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> Belief:
+        """Another route over the set, safe under all likely loads."""
+        goal, route = likely.under(self._goal.batch), None
+        if not place.safe[0]:
+            why = "the present place does not bear the likely loads"
+        elif not goal.safe[0]:
+            why = "the goal does not bear the likely loads, or does not exist under them"
+        else:
+            route = safe_route(self.eset, place, goal, likely)
+            why = "no route over the set leads to the goal safely under the likely loads"
+        if route is None:
             return replace(belief, status=ControlStatus.NO_SAFE_WAY, why=why)
-        why = "the state does not follow the loads back to those of the set"
-        most = min(nominal.states.margin[0], self._goal.margin) if nominal.arrived[0] else -np.inf
-        for reserve in RESERVES if most >= self.margin else ():
-            margin = self.margin + reserve * (most - self.margin)
-            route = plan(
-                self.eset, nominal.states[0], self._goal, margin=margin, within=self.within
-            )
-            if not route.arrived:
-                why = route.why if reserve == 0.0 else why
-                break
-            why = "routes of the set do not lead to the goal safely under the likely loads"
-            if self._route_is_safe(likely, route.way_points):
-                return replace(
-                    belief,
-                    way_points=tuple(route.way_points),
-                    checked=belief.state.p[self._loads],
-                    status=ControlStatus.REPLANNED,
-                )
-        return replace(belief, status=ControlStatus.NO_SAFE_WAY, why=why)
+        names = self.eset.names
+        return replace(
+            belief,
+            way_points=tuple({name: state[name] for name in names} for state in list(route)[1:]),
+            checked=belief.state.p[self._loads],
+            status=ControlStatus.REPLANNED,
+            why="",
+        )
 
-    def _strode(self, belief: Belief, likely: Moved) -> Belief:
+    def _strode(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> Belief:
         """Belief after the longest safe stride towards the next way-point."""
-        names, scales = self.eset.names, self.structure.scales[self._actuators]
-        here = belief.state.p[self._actuators]
+        names, here = self.eset.names, belief.state.p[self._actuators]
         ahead = list(belief.way_points)
         while ahead and np.allclose(
             _towards(ahead[0], names, here), here, rtol=0, atol=SAME_TO_ROUNDING
@@ -377,34 +341,47 @@ class Controller:
         if not ahead and self._is_goal(belief.state.batch)[0]:
             return replace(belief, way_points=(), status=ControlStatus.ARRIVED)
         if not ahead:
-            return self._replanned(belief, likely)
+            return self._replanned(belief, likely, place)
         there = _towards(ahead[0], names, here)
-        whole = min(1.0, self.stride / float(np.linalg.norm((there - here) / scales)))
-        for share in SHARES:
-            target = there if share * whole == 1.0 else here + share * whole * (there - here)
-            after = self._driven(likely, target)
-            if after.keep(self.margin).all():
-                return replace(belief, state=after.states[0], way_points=tuple(ahead))
-        changed = self._replanned(belief, likely)
+        stride = self._strides.towards(belief.state, likely, place, there)
+        if stride.state is not None:
+            return replace(belief, state=stride.state, way_points=tuple(ahead))
+        changed = self._replanned(belief, likely, place)
         if changed.status == ControlStatus.REPLANNED:
             return changed
-        place = ", ".join(f"{name} = {value:.6g}" for name, value in ahead[0].items())
-        return replace(changed, why=f"no stride towards {place} is safe; {changed.why}")
+        return replace(changed, why=f"no stride towards {_words(ahead[0])} is safe; {changed.why}")
 
-    def _retreat(self, belief: Belief) -> Belief:
+    def _tracked(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> Belief:
+        """Belief after the longest safe stride towards the next values of the moving target."""
+        target = self._target
+        assert target is not None
+        at = min(belief.at + self.pace, target.duration)
+        there = target.place(belief.state, at)
+        if there is None or not self.eset.box.holds(there, slack=0.0):
+            why = f"no setting of the actuators in the box meets the target at leg {at:.6g}"
+            return replace(belief, status=ControlStatus.NO_SAFE_WAY, why=why)
+        stride = self._strides.towards(belief.state, likely, place, there)
+        if stride.state is None:
+            why = f"no stride towards the target at leg {at:.6g} is safe"
+            return replace(belief, status=ControlStatus.NO_SAFE_WAY, why=why)
+        if not stride.whole:
+            return replace(belief, state=stride.state)
+        ended = belief.at == target.duration
+        status = ControlStatus.ARRIVED if ended else ControlStatus.FOLLOWING
+        return replace(belief, state=stride.state, at=at, status=status)
+
+    def _retreat(self, belief: Belief, likely: LikelyLoads) -> Belief:
         """Belief after the move to the place nearby that bears the loads best."""
-        here, scales = belief.state.p[self._actuators], self.structure.scales[self._actuators]
-        steps = self.stride * np.concatenate([np.diag(scales), -np.diag(scales)])
-        places = [row for row in here + steps if self.eset.box.holds(row, slack=0.0)]
-        borne = [self._borne(belief, place) for place in places]
-        if not borne or max(borne) == -np.inf:
+        there = self._strides.away(belief.state, likely)
+        if there is None:
             why = "the present place does not bear the likely loads, and no place nearby does"
             return replace(belief, status=ControlStatus.NO_SAFE_WAY, why=why)
-        place = places[int(np.argmax(borne))]
-        found = moved(belief.state.batch, self.eset.names, place[None])
         unchecked = np.full(len(self._loads), np.inf)
-        status = ControlStatus.RETREATING
-        return replace(belief, state=found.states[0], status=status, checked=unchecked)
+        return replace(belief, state=there, status=ControlStatus.RETREATING, checked=unchecked)
+
+
+def _words(point: Command) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
 
 
 def _check_sizes(argument: str, named: Mapping[str, float]) -> None:
@@ -413,9 +390,11 @@ def _check_sizes(argument: str, named: Mapping[str, float]) -> None:
             raise InputError(f"`{argument}` must be positive; got {name}: {value!r}.")
 
 
-def _end_of(route: Route) -> State:
-    assert route.states is not None
-    return route.states[-1]
+def _end_of(goal: State | Route | Tracking) -> State:
+    if isinstance(goal, State):
+        return goal
+    assert goal.states is not None
+    return goal.states[-1]
 
 
 def _towards(point: Command, names: tuple[str, ...], here: Values) -> Values:

@@ -1,6 +1,15 @@
 """Schedules in time: replay in a simulator of rigid bodies, and what happens at folds."""
 
 from equimorph.dynamics.replay import Replay, ReplaySettings, replay
+from equimorph.dynamics.simulated_plant import SimulatedPlant
 from equimorph.dynamics.snap_in_time import HeldLanding, SnapInTime, snap_in_time
 
-__all__ = ["HeldLanding", "Replay", "ReplaySettings", "SnapInTime", "replay", "snap_in_time"]
+__all__ = [
+    "HeldLanding",
+    "Replay",
+    "ReplaySettings",
+    "SimulatedPlant",
+    "SnapInTime",
+    "replay",
+    "snap_in_time",
+]

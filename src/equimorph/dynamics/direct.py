@@ -49,7 +49,8 @@ class DirectModel(Model):
         last = self.reference(found.end.batch)[0]
         fold = float(np.interp(found.at, np.arange(len(times)), times))
         if found.kind != "fold":
-            return Course(found.points, float("nan"), None, last)
+            ends = fold if found.kind == "branch point" else float("nan")
+            return Course(found.points, ends, None, last)
         return Course(found.points, fold, self._normal_form(found.end, fold, motion, damping), last)
 
     def _normal_form(self, fold: State, time: float, motion: Motion, damping: float) -> FoldDelay:

@@ -94,10 +94,6 @@ class LinkageModel(Model):
             raise ArithmeticError("the chain of links has no stable equilibrium near the start")
         return found
 
-    def lowest_frequency(self, start: State) -> float:
-        """Lowest angular frequency of the chain at a state, in units of 1/T."""
-        return float(np.sqrt(self.begin(start).least))
-
     def quasistatics(
         self, start: State, motion: Motion, times: Float[np.ndarray, " times"]
     ) -> Quasistatics:

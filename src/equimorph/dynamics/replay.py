@@ -266,11 +266,11 @@ def _run(model: Model, begin: State, motion: TimedCorners, used: ReplaySettings)
     return _judge(model, begin, motion, np.array(samples), plant, record, used)
 
 
-def hold(plant: Plant, used: ReplaySettings) -> int:
+def hold(plant: Plant, used: ReplaySettings, still: float = STILL) -> int:
     """Let the plant move at constant parameters until it rests; number of steps."""
     once = max(1, round(used.hold / used.step))
     done = 0
-    while done == 0 or (plant.speed > STILL and done < LONGEST_HOLD * once):
+    while done == 0 or (plant.speed > still and done < LONGEST_HOLD * once):
         for _ in range(once):
             plant.step()
         done += once

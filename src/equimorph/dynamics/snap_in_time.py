@@ -7,18 +7,21 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
-from equimorph.dynamics.linkage_model import LinkageModel
-from equimorph.dynamics.model import landing
-from equimorph.dynamics.motion import timed_corners
+from equimorph.dynamics.model import Model, landing
+from equimorph.dynamics.motion import TimedCorners, timed_corners
 from equimorph.dynamics.replay import STILL, ReplaySettings, Simulator
 from equimorph.dynamics.simulators import model_of
-from equimorph.equilibria import lift, snap_landing
+from equimorph.equilibria import Event, lift, snap_landing
 from equimorph.errors import InputError
 from equimorph.structures import State
+from equimorph.tasks.route import FINE
+from equimorph.tasks.verification.schedule_check import follow_polyline
 from equimorph.tolerances import DEPARTURE
 
 PIECES = 60
-"""Steps with which the chain's equilibria are followed to their fold."""
+"""Steps with which the plant's equilibria are followed to where they end."""
+CRITICAL = ("fold", "branch point")
+"""Ends of a branch at which a structure may snap."""
 PATIENCE = 40.0
 """Time for which a setting is held, in units of T over the root of the relative distance from the
 fold: a motion passes a fold at distance δ in a time ∝ 1/√δ."""
@@ -44,14 +47,14 @@ class HeldLanding:
 
 @dataclass(frozen=True, eq=False)
 class SnapInTime:
-    """A fold in a simulator.
+    """A fold or a branch point in a simulator.
 
     Parameters
     ----------
     fold
-        Share of the way at which the library's equilibria fold.
+        Share of the way at which the library's stable equilibria end.
     fold_of_chain
-        The same of the chain of links.
+        The same of the simulator's own: of the chain of links for rods and frames.
     apart
         Distance from the chain's fold at which it was held, as a share of the way.
     held_below
@@ -78,7 +81,7 @@ class SnapInTime:
 
 @check_arguments
 def snap_in_time(
-    to: Mapping[str, float],
+    to: Sequence[Mapping[str, float]] | Mapping[str, float],
     start: State,
     *,
     simulator: Simulator = "mujoco",
@@ -94,13 +97,13 @@ def snap_in_time(
     Parameters
     ----------
     to
-        Way-point beyond the fold.
+        Way-points, the last one beyond the fold or branch point at which stable states end.
     start
         Stable state before it.
     simulator
-        "mujoco"; structures of rods and frames.
+        "mujoco" or "own".
     apart
-        Distance of the holds from the chain's fold, as a share of the way.
+        Distance of the holds from the simulator's own fold, as a share of the way.
     dampings
         Damping ratios of the lowest mode at the start.
     settings
@@ -113,27 +116,28 @@ def snap_in_time(
     """
     used = settings or ReplaySettings()
     model = model_of(start, simulator, used.links)
-    if not isinstance(model, LinkageModel):
-        raise InputError(
-            f"`start` must be a state of a rod or a frame; got one of a {start.structure.kind}."
-        )
     _, way = timed_corners(to, start, None, None, 1.0)
-    found = model.quasistatics(start, way.at, np.linspace(0.0, 1.0, PIECES + 1))
-    path = lift(start, to)
-    if found.fold is None or path.end.kind != "fold":
+    end = follow_polyline(start, way.rows[1:], (), FINE).end
+    if end.kind not in CRITICAL:
         raise InputError(
-            f"`to` must lie beyond a fold; got a way that ends with {path.end.kind}. Choose a "
-            "way-point at which no equilibrium of the branch exists."
+            f"`to` must lie beyond a fold; got a way that ends with {end.kind}. Choose a "
+            "way-point at which no stable equilibrium of the branch exists."
         )
-    fold = found.fold
-    frequency = model.lowest_frequency(start)
+    ends_at = float(np.interp(end.at, np.arange(len(way.times)), way.times))
+    times = np.union1d(np.linspace(0.0, 1.0, PIECES + 1), way.times)
+    fold = model.statics(start, way.at, times, used.damping).fold
+    if fold is None or not np.isfinite(fold):
+        raise InputError(
+            f"`settings` must resolve the fold at {ends_at:.6g} of the way; got {used.links} "
+            "links, whose equilibria have none. Take more links."
+        )
+    near = _state_at(start, way, min(fold - apart, 0.999 * ends_at))
     below, above = way.at(fold - apart), way.at(fold + apart)
-    near = _state_at(start, way.at(min(fold - apart, 0.999 * path.end.at)))
     hold = _Hold(model, near, min(LONGEST, PATIENCE / np.sqrt(apart)), used)
     stays, _, _ = hold.run(below, used.damping)
-    expected = next((each.state for each in snap_landing(path.end.state) if each.landed), None)
-    there = None if expected is None else lift(expected, _values(start, above)).end.state
+    there = _expected(end, start.parameters, above)
     beyond = []
+    frequency = float(start.batch.natural_frequencies(1)[0, 0]) * model.unit
     for ratio in dampings:
         left, time, state = hold.run(above, 2.0 * ratio / frequency)
         gap = float("nan")
@@ -141,23 +145,29 @@ def snap_in_time(
             own = model.reference(there.batch)[0]
             gap = float(np.linalg.norm(hold.points - own, axis=1).max())
         beyond.append(HeldLanding(ratio, left, time, state, gap))
-    return SnapInTime(path.end.at, fold, apart, not stays, tuple(beyond))
+    return SnapInTime(ends_at, fold, apart, not stays, tuple(beyond))
 
 
-def _values(start: State, row: Float[np.ndarray, " parameters"]) -> dict[str, float]:
-    return dict(zip(start.parameters, row.tolist(), strict=True))
+def _state_at(start: State, way: TimedCorners, time: float) -> State:
+    passed = way.rows[1:][way.times[1:] < time]
+    rows = np.concatenate([passed, way.at(time)[None]])
+    return follow_polyline(start, rows, (), FINE).end.state
 
 
-def _state_at(start: State, row: Float[np.ndarray, " parameters"]) -> State:
-    return lift(start, _values(start, row)).end.state
+def _expected(
+    end: Event, names: Mapping[str, float], row: Float[np.ndarray, " parameters"]
+) -> State | None:
+    """Where the gradient flow lands at the end of a branch, followed to the parameters of a row."""
+    landed = next((each.state for each in snap_landing(end.state) if each.landed), None)
+    if landed is None:
+        return None
+    return lift(landed, dict(zip(names, row.tolist(), strict=True))).end.state
 
 
 class _Hold:
     """Holds that begin at one state."""
 
-    def __init__(
-        self, model: LinkageModel, start: State, patience: float, used: ReplaySettings
-    ) -> None:
+    def __init__(self, model: Model, start: State, patience: float, used: ReplaySettings) -> None:
         self._model, self._start, self._patience, self._used = model, start, patience, used
         self.points = np.zeros((0, 2))
 

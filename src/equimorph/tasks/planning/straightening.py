@@ -44,7 +44,7 @@ def straighten(states: States, demands: Demands, same_class: bool = False) -> St
     states between are reached, too, so that the short cut sweeps over the set.
     """
     most = STATIONS_WITH_MARGINS if demands.objective.needs_margins else STATIONS
-    first, second = _pairs(len(states), None if same_class else most)
+    first, second = pairs_on_path(len(states), None if same_class else most)
     linked, cost = connect(states[first], states[second], demands)
     if same_class:
         linked &= _swept(first, second, linked)
@@ -54,7 +54,7 @@ def straighten(states: States, demands: Demands, same_class: bool = False) -> St
     return states if path is None else states[path]
 
 
-def _pairs(
+def pairs_on_path(
     count: int, most: int | None
 ) -> tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]]:
     """Pairs of neighbours on a path, and pairs of all, or of `most`, of its states."""

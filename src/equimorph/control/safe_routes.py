@@ -1,0 +1,171 @@
+"""Routes that are safe under all likely loads, over the stable cells of an equilibrium set."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Int
+
+from equimorph.arrays import Values
+from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
+from equimorph.equilibria import TraceOptions
+from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.model import names_of
+from equimorph.structures import States
+from equimorph.tasks.planning.network import (
+    Pairs,
+    connect,
+    network_of,
+    on_paths,
+    shortest_path,
+)
+from equimorph.tasks.planning.objectives import objective_of
+from equimorph.tasks.planning.straightening import CORNER, STATIONS_WITH_MARGINS, pairs_on_path
+from equimorph.tasks.stable_part import from_cache
+from equimorph.tasks.verification.schedule_check import follow_polyline
+
+MOST_INTERVALS = 20
+"""Grid intervals of a set that is lifted anew under estimated loads: a second for an arch."""
+DIGITS = 2
+"""Digits of the loads of such sets, so that the next step finds the one of the step before."""
+
+
+def safe_route(
+    eset: EquilibriumSet, start: Bundles, goal: Bundles, likely: LikelyLoads
+) -> States | None:
+    """States of a route from one place to another, under the estimated loads; None for none.
+
+    The set is moved to the estimated loads, and where that does not lead to the goal it is lifted
+    anew there, on a coarse grid: sheets that other loads do not have can be used, too.
+    """
+    found = _over(eset, start, goal, likely)
+    if found is None and not np.allclose(likely.values[0], _loads_of(eset, likely)):
+        found = _over(_lifted_anew(eset, likely), start, goal, likely)
+    return found
+
+
+def route_is_safe(
+    start: Bundles, way_points: Sequence[Mapping[str, float]], goal: Bundles, likely: LikelyLoads
+) -> bool:
+    """Whether straight moves over way-points lead to the goal safely under all likely loads."""
+    here, ahead = start.estimated[0], goal
+    rows = [here.p]
+    for point in way_points:
+        row = rows[-1].copy()
+        row[positions(here.structure, point)] = list(point.values())
+        if (row != rows[-1]).any():
+            rows.append(row)
+    if len(rows) > 1:
+        way = follow_polyline(here, np.array(rows[1:]), (), TraceOptions())
+        if way.end.kind != "arrived":
+            return False
+        ahead = likely.under(way.states[way.corners[1:]]).follow(goal)
+    path, legs = start.follow(ahead), np.arange(len(ahead))
+    return bool(likely.linked(path.take(legs), path.take(legs + 1)).all())
+
+
+def _loads_of(eset: EquilibriumSet, likely: LikelyLoads) -> Values:
+    names = names_of(eset.structure.parameters)
+    return np.array([eset.fixed[names[k]] for k in likely.at])
+
+
+def _lifted_anew(eset: EquilibriumSet, likely: LikelyLoads) -> EquilibriumSet:
+    """The set under the estimated loads, rounded; kept with the set."""
+    scales = eset.structure.scales[likely.at]
+    loads = np.round(likely.values[0] / scales, DIGITS) * scales
+    names = names_of(eset.structure.parameters)
+    rounded = {names[k]: float(load) for k, load in zip(likely.at, loads, strict=True)}
+    intervals = tuple(min(each, MOST_INTERVALS) for each in eset.intervals)
+
+    def lift() -> EquilibriumSet:
+        return equilibrium_set(
+            eset.structure,
+            eset.box,
+            fixed={**eset.fixed, **rounded},
+            within=eset.constraints,
+            intervals=intervals,
+            checks=0,
+        )
+
+    return from_cache(eset, ("under", *loads.tolist()), lift)  # type: ignore[no-any-return]
+
+
+def _over(
+    eset: EquilibriumSet, start: Bundles, goal: Bundles, likely: LikelyLoads
+) -> States | None:
+    """A route over the network of a set, moved to the estimated loads.
+
+    A link costs its length in the scaled actuators over the least margin of its ends under any of
+    the likely loads; links are lifted under all of these only where a path uses them.
+    """
+    network = network_of(eset)
+    vertices = np.flatnonzero(network.stable)
+    here, arrived = moved(
+        eset.points[vertices], likely.at, np.tile(likely.values[0], (len(vertices), 1))
+    )
+    nodes = likely.under(here[np.flatnonzero(arrived)])
+    vertices = vertices[arrived][nodes.safe]
+    nodes = nodes.take(np.flatnonzero(nodes.safe)).follow(start).follow(goal)
+    count = len(nodes)
+    number = np.full(len(eset.points), -1)
+    number[vertices] = np.arange(len(vertices))
+    pairs = number[network.pairs]
+    pairs = np.concatenate([
+        pairs[(pairs >= 0).all(axis=1)],
+        _around(eset, vertices, start, count - 2),
+        _around(eset, vertices, goal, count - 1),
+        [[count - 2, count - 1]],
+    ])  # fmt: skip
+    path = _cheapest(nodes, pairs, likely)
+    return None if path is None else _straightened(nodes.take(path), likely)
+
+
+def _straightened(path: Bundles, likely: LikelyLoads) -> States:
+    """Corners of the chain of safe straight moves between places of a path with most clearance."""
+    first, second = pairs_on_path(len(path), STATIONS_WITH_MARGINS)
+    good = likely.linked(path.take(first), path.take(second))
+    first, second, estimated = first[good], second[good], path.estimated
+    clear = replace(likely.demands, objective=objective_of("clearance", estimated.structure))
+    _, costs = connect(estimated[first], estimated[second], clear)
+    costs += CORNER * costs[second - first == 1].sum()
+    pairs = np.stack([first, second], axis=1)
+    chain = shortest_path(len(path), pairs, costs, (0, len(path) - 1))
+    return estimated if chain is None else estimated[chain]
+
+
+def _around(
+    eset: EquilibriumSet, vertices: Int[np.ndarray, " n"], place: Bundles, node: int
+) -> Pairs:
+    """Links from a place to the vertices over its grid cell and those around."""
+    state, cells = place.estimated[0], eset.mesh.cells
+    own = eset.mesh.locate(np.array([state[name] for name in eset.names]))
+    around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
+    near = np.flatnonzero(np.isin(eset.grid_vertex[vertices], around))
+    return np.stack([np.full(len(near), node), near], axis=1)
+
+
+def _cheapest(nodes: Bundles, pairs: Pairs, likely: LikelyLoads) -> Int[np.ndarray, " path"] | None:
+    """The cheapest path from the last node but one to the last whose links are all safe."""
+    weights = _costs(nodes, pairs)
+    lifted = np.zeros(len(pairs), bool)
+    count = len(nodes)
+    while True:
+        path = shortest_path(count, pairs, weights, (count - 2, count - 1))
+        if path is None:
+            return None
+        used = np.flatnonzero(on_paths(pairs, [path]))
+        fresh = used[~lifted[used]]
+        good = likely.linked(*(nodes.take(side) for side in pairs[fresh].T))
+        lifted[fresh] = True
+        if good.all():
+            return path
+        keep = np.ones(len(pairs), bool)
+        keep[fresh[~good]] = False
+        pairs, weights, lifted = pairs[keep], weights[keep], lifted[keep]
+
+
+def _costs(nodes: Bundles, pairs: Pairs) -> Values:
+    estimated = nodes.estimated
+    first, second = (estimated.p[side] / estimated.structure.scales for side in pairs.T)
+    least = nodes.margins[pairs].min(axis=1)
+    return np.asarray(np.linalg.norm(second - first, axis=1) / least)
