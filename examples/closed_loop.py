@@ -1,6 +1,6 @@
 """An arch in MuJoCo turns over under a load that its controller does not know.
 
-The load, 2.5 λ_cr at first, walks by 1 % a step and jumps by 0.4; heights are measured with 2 % noise.
+The load, 2.5 λ_cr at first, walks by 1 % a step and jumps by 0.4; heights have 2 % noise.
 Known answer: the inverted arch, without a snap. MuJoCo moves a chain of 20 links in time.
 """
 

@@ -122,7 +122,7 @@ class LikelyLoads:
         if len(self.values) > self.usual and good.any():
             some = np.flatnonzero(good)
             good[some] = self._bear_jumps(source.take(some).estimated, target.take(some).estimated)
-        return good
+        return np.asarray(good)
 
     def _bear_jumps(self, source: States, target: States) -> Flags:
         """Whether places on straight moves, not far from each other, bear the jumps."""
@@ -146,7 +146,7 @@ class LikelyLoads:
         states = States(source.structure, z, to)
         there[there] = self.demands.admissible(states[np.flatnonzero(there)])
         count = len(self.values)
-        return Bundles(states, there.reshape(-1, count).all(axis=1), count)
+        return Bundles(states, np.asarray(there.reshape(-1, count).all(axis=1)), count)
 
 
 def moved(states: States, at: Places, to: Float[np.ndarray, "n k"]) -> tuple[States, Flags]:
