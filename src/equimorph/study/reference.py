@@ -49,8 +49,8 @@ def meanings(task: Callable[..., Any]) -> dict[str, str]:
 
     Examples
     --------
-    >>> from equimorph.tasks import least_snap
-    >>> sorted(meanings(least_snap))
+    >>> import equimorph as em
+    >>> sorted(meanings(em.least_snap))
     ['eset', 'state']
     """
     text = inspect.getdoc(task) or ""
