@@ -1,5 +1,6 @@
 """Small studies, one finished run, and dots for figures, for the tests of the outer layers."""
 
+import csv
 import re
 import shutil
 from functools import partial
@@ -9,7 +10,8 @@ import pytest
 from PIL import Image
 
 from equimorph import plotting
-from equimorph.study import Outcome, run_study
+from equimorph.errors import InputError
+from equimorph.study import Outcome, parse_study, prepare, run_study
 from equimorph.study.folder import PRIVATE
 from equimorph.tasks.route import Route
 from typecheck import unchecked
@@ -56,10 +58,24 @@ margin = 0.1
 """
 
 
+SPRING_SET = """\
+[structure]
+kind = "spring"
+
+[set]
+box = { x_l = [0.5, 1.3], F = [-0.2, 0.2] }
+within = ["angle <= 1.4", "angle >= -1.4"]
+intervals = [9, 9]
+
+"""
+"""F = (1 − x_l/cos δ) sin δ with folds at x_l = cos³δ, F = sin³δ (PHYSICS section 2)."""
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
 def coarse_examples() -> list[str]:
     """Examples whose structures or maps are described in the file itself, on coarse grids."""
-    folder = Path(__file__).parents[1] / "examples"
-    texts = [(folder / f"{name}.toml").read_text() for name in ("column", "truss", "maps")]
+    texts = [(EXAMPLES / f"{name}.toml").read_text() for name in ("column", "truss", "maps")]
     return [re.sub(r"intervals = .*", "intervals = [5, 5]", text) for text in texts]
 
 
@@ -69,6 +85,52 @@ def finished_run(base: Path) -> tuple[Outcome, Path]:
     with pytest.MonkeyPatch.context() as patch, unchecked():  # the layers below check themselves
         patch.setattr(plotting, "film", partial(plotting.film, frames=12))
         return run_study(base / "spring.toml", base / "out"), base / "out"
+
+
+_SETS: list[Path] = []
+"""Results folders with the answer to `SPRING_SET`, from which later studies take it."""
+
+
+def answered(folder: Path, text: str, *, dots: bool = True) -> tuple[Outcome, Path]:
+    """Run a study in a folder; the set of `SPRING_SET` is computed once for all of them."""
+    study, out = folder / "spring.toml", folder / "out"
+    study.write_text(text)
+    if text.startswith(SPRING_SET) and _SETS:
+        with_answers_of(_SETS[0], out)
+    with pytest.MonkeyPatch.context() as patch, unchecked():
+        if dots:
+            draw_dots(patch)
+        outcome = run_study(study, out)
+    if text.startswith(SPRING_SET):
+        _SETS.append(out)
+    return outcome, out
+
+
+def answered_again(study: Path, out: Path) -> Outcome:
+    """Run a study that was run before; whatever is not read from the folder fails."""
+    with pytest.MonkeyPatch.context() as patch, unchecked():
+        draw_dots(patch)
+        patch.setattr("equimorph.study.question.Question.answer", None)
+        return run_study(study, out)
+
+
+def page(out: Path) -> str:
+    """Page of a results folder."""
+    return (out / "index.html").read_text(encoding="utf-8")
+
+
+def rows_of(file: Path) -> list[list[str]]:
+    """Rows of a table in a results folder."""
+    with file.open(encoding="utf-8", newline="") as table:
+        return list(csv.reader(table))
+
+
+def refuse(text: str, old: str, new: str, message: str) -> None:
+    """A study with something replaced is refused in one line."""
+    assert old in text
+    with pytest.raises(InputError, match=message) as found:
+        prepare(parse_study(text.replace(old, new, 1), "study.toml"))
+    assert "\n" not in str(found.value)
 
 
 def only_route(outcome: Outcome) -> Route:

@@ -14,6 +14,7 @@ from equimorph.manifold import part
 from oracles.charted import lifted, spring_fold
 from oracles.polynomial import fold_form
 from oracles.surfaces import cusp, sphere, swallowtail, three_sheets
+from sets import arch_set
 from typecheck import unchecked
 
 
@@ -288,13 +289,9 @@ def test_a_chart_of_the_arch_gives_no_other_of_two_states(largest):
 
     On all sheets of this coarse set, up to index 13, 6 of 3000 still are.
     """
-    rod = em.Rod()
-    box = em.Box(Theta=(0.2, 2.5), Delta=(-2, 2))
+    eset = arch_set()
+    rod = eset.structure
     with unchecked():
-        eset = em.equilibrium_set(
-            rod, box, fixed={"q": 2.5}, within=[rod.max_curvature <= 20], intervals=(12, 21),
-            checks=0,
-        )  # fmt: skip
         eset = part(eset, eset.cell_index <= largest)
         crown, third, other = rod.height(1 / 2), rod.height(1 / 3), rod.height(2 / 3)
         for chosen in ((third, other), (crown, "Delta"), (other, "Delta")):

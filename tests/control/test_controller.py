@@ -8,6 +8,7 @@ import pytest
 
 import equimorph as em
 from oracles.wandering_load import Plant, PlantInMuJoCo, wandering
+from sets import arch_set
 from typecheck import unchecked
 
 NOISE, DRIFT = 0.01, 0.01
@@ -182,12 +183,9 @@ def test_wrong_input_is_refused(controller, begun, spring_set):
 @pytest.fixture(scope="module")
 def turning():
     """Controller that turns an arch over under an unknown load, its start, and its sensors."""
-    arch = em.Rod()
-    box, within = em.Box(Theta=(0.2, 2.5), Delta=(-2, 2)), [arch.max_curvature <= 20]
+    eset = arch_set()
+    arch = eset.structure
     with unchecked():
-        eset = em.equilibrium_set(
-            arch, box, fixed={"q": 2.5}, within=within, intervals=(12, 21), checks=0
-        )
         inverted, upright = sorted(eset.at(Theta=1, Delta=0).stable, key=arch.height(0.5))
         errors = {arch.height(s): 0.005 for s in (1 / 3, 0.5, 2 / 3)}
         controller = em.Controller(

@@ -2,28 +2,8 @@
 
 import pytest
 
-from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.model import Box
-from equimorph.structures import Rod, Spring
-from typecheck import unchecked
-
-ARCH_BOX = Box(Theta=(0.2, 2.5), Delta=(-2, 2))
-
-
-def lifted_arch(
-    intervals: tuple[int, int], checks: int = 2, accuracy: float | None = None
-) -> EquilibriumSet:
-    arch = Rod()
-    with unchecked():  # shapes are checked on small surfaces
-        return equilibrium_set(
-            arch,
-            ARCH_BOX,
-            fixed={"q": 2.5},
-            within=[arch.max_curvature <= 20],
-            intervals=intervals,
-            checks=checks,
-            accuracy=accuracy,
-        )
+import sets
+from equimorph.manifold import EquilibriumSet
 
 
 @pytest.fixture(
@@ -39,26 +19,20 @@ def lifted_arch(
     ids="{0[0]}x{0[1]}".format,
 )
 def arch_set(request) -> EquilibriumSet:
-    return lifted_arch(request.param)
+    return sets.arch_set(request.param, checks=2)
 
 
 @pytest.fixture(scope="session")
 def refined_arch():
     """Refined sets of the arch by intervals and accuracy."""
-
-    def refined(intervals: tuple[int, int], accuracy: float) -> EquilibriumSet:
-        return lifted_arch(intervals, checks=0, accuracy=accuracy)
-
-    return refined
+    return lambda intervals, accuracy: sets.arch_set(intervals, accuracy=accuracy)
 
 
 @pytest.fixture(scope="session")
 def even_arch_set() -> EquilibriumSet:
-    return lifted_arch((8, 14), checks=0)
+    return sets.arch_set((8, 14))
 
 
 @pytest.fixture(scope="session")
 def spring_set() -> EquilibriumSet:
-    box = Box(x_l=(0.3, 1.3), F=(-0.5, 0.5))
-    with unchecked():
-        return equilibrium_set(Spring(), box, intervals=(12, 12))
+    return sets.spring_set(checks=2)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from draws import few
 from equimorph import lift
 from equimorph.manifold import (
     EquilibriumSet,
@@ -21,13 +22,6 @@ from oracles.polynomial import Polynomial
 from oracles.surfaces import integral
 from typecheck import unchecked
 
-few = settings(
-    max_examples=2,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
-    derandomize=True,
-    phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes
-)
 intervals = st.tuples(*(st.integers(2, 3) for _ in range(3)))
 slants = st.sampled_from([-0.4, 0.0, 0.3])
 BOX = Box(a=(-1.0, 1.1), b=(-1.0, 1.2), c=(-1.05, 1.15))
@@ -69,7 +63,7 @@ def assert_on_crossing(eset: EquilibriumSet, slant: float, other: float) -> None
     assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
 
 
-@few
+@few(2)
 @given(st.sampled_from([-2.0, -0.7, 0.6, 1.0]), slants, slants, intervals)
 def test_pitchfork_surface_joins_both_halves_of_a_cylinder(cubic, slant, other, grid):
     eset = lifted(pitchforks(cubic, slant, other), grid)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from draws import few
 from equimorph import lift, plotting, storage
 from equimorph.manifold import (
     EquilibriumSet,
@@ -32,13 +33,6 @@ from oracles.surfaces import (
 )
 from typecheck import unchecked
 
-few = settings(
-    max_examples=4,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
-    derandomize=True,
-    phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes
-)
 intervals = st.tuples(st.integers(3, 7), st.integers(3, 7))
 cubics = st.sampled_from([-2.0, -0.7, 0.6, 1.0, 1.9])
 slants = st.sampled_from([-0.4, 0.0, 0.3])
@@ -57,7 +51,7 @@ def crossed(eset: EquilibriumSet) -> np.ndarray:
     return np.column_stack([eset.points.z[at], eset.coordinates[at]])
 
 
-@few
+@few(4)
 @given(cubics, st.integers(2, 12))
 def test_pitchfork_diagram_has_all_four_branches_in_one_point(cubic, count):
     """x (cubic·x² − a) = 0 over a."""
@@ -76,7 +70,7 @@ def test_pitchfork_diagram_has_all_four_branches_in_one_point(cubic, count):
     assert np.sort(states.z[:, 0]) == pytest.approx([-root, 0.0, root], abs=1e-12)
 
 
-@few
+@few(4)
 @given(cubics, slants, st.integers(2, 12))
 def test_transcritical_diagram_exchanges_stability(skew, b, count):
     """x (skew·x − a − b/2) = 0: both branches change their index where they cross."""
@@ -96,7 +90,7 @@ def test_slaved_unknowns_and_checks_of_shapes_change_nothing():
     assert eset.audit.missing == 0
 
 
-@few
+@few(4)
 @given(cubics, slants, intervals)
 def test_pitchfork_curve_joins_both_halves_of_a_cylinder_to_a_plane(cubic, slant, grid):
     """x (cubic·x² − a − slant·b) = 0; the crossing a + slant·b = 0 runs through the box."""
@@ -115,7 +109,7 @@ def test_pitchfork_curve_joins_both_halves_of_a_cylinder_to_a_plane(cubic, slant
     assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
 
 
-@few
+@few(4)
 @given(cubics, slants, intervals)
 def test_transcritical_planes_cross_along_a_line(skew, slant, grid):
     eset = lifted(transcriticals(skew, slant), BOX, intervals=grid)
@@ -125,7 +119,7 @@ def test_transcritical_planes_cross_along_a_line(skew, slant, grid):
     assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
 
 
-@few
+@few(4)
 @given(cubics, intervals)
 def test_folds_leave_the_pitchforks_where_these_turn_subcritical(cubic, grid):
     """x (x⁴ + cubic·b x² − a): one fold curve a = −(cubic·b)²/4 through the origin."""
@@ -141,7 +135,7 @@ def test_folds_leave_the_pitchforks_where_these_turn_subcritical(cubic, grid):
     assert sorted(piece.index for piece in eset.strata) == [0, 0, 0, 1, 1, 1]
 
 
-@few
+@few(4)
 @given(st.sampled_from([0.4, 1.0, 2.5]), intervals)
 def test_fold_of_the_symmetric_sheet_passes_its_pitchforks(k, grid):
     """s² + k x² = a, x (s − b) = 0: hilltop at the origin, where two eigenvalues vanish."""
@@ -155,7 +149,7 @@ def test_fold_of_the_symmetric_sheet_passes_its_pitchforks(k, grid):
     np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
 
 
-@few
+@few(4)
 @given(intervals)
 def test_sheet_can_fold_where_it_crosses_another(grid):
     """x (x² + b x + a): the second sheet, a = −x² − b x, folds at x = −b/2."""

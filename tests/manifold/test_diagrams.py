@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from draws import few
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
@@ -13,9 +14,6 @@ from oracles.polynomial import fold_form, pitchfork_form
 from oracles.surfaces import cusp, sphere, swallowtail
 from typecheck import unchecked
 
-few = settings(
-    max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
-)
 grids = st.integers(2, 12).map(lambda n: (n,))
 
 
@@ -48,7 +46,7 @@ def test_fold_joins_a_stable_and_an_unstable_branch():
     assert np.sort(eset.at(a=0.25).z[:, 0]) == pytest.approx([-0.5, 0.5], rel=1e-12)
 
 
-@few
+@few(5)
 @given(st.floats(-0.9, 0.9), grids)
 def test_isola_is_closed_with_two_folds(b, grid):
     """x² + a² = 1 − b², which natural states do not reach along b."""
@@ -60,7 +58,7 @@ def test_isola_is_closed_with_two_folds(b, grid):
     assert np.sort(fold_points(eset)[:, 1]) == pytest.approx([-radius, radius], rel=1e-12)
 
 
-@few
+@few(5)
 @given(st.floats(0.2, 2.0), grids)
 def test_hysteresis_has_two_folds(a, grid):
     """x³ − a x + b = 0 folds at x = ±√(a/3)."""
@@ -72,7 +70,7 @@ def test_hysteresis_has_two_folds(a, grid):
     assert len(eset.strata) == 3
 
 
-@few
+@few(5)
 @given(st.floats(0.02, 0.5), grids)
 def test_imperfect_pitchfork_has_a_fold_apart_from_the_main_branch(b, grid):
     """x³ − a x = b: the side branch folds at x = −∛(b/2), a = 3x²."""
@@ -83,7 +81,7 @@ def test_imperfect_pitchfork_has_a_fold_apart_from_the_main_branch(b, grid):
     np.testing.assert_allclose(fold_points(eset), [[x, 3 * x**2]], rtol=0, atol=1e-9)
 
 
-@few
+@few(5)
 @given(grids)
 def test_folds_within_one_interval_are_told_apart(grid):
     """c = x² − x⁴ − x/5 over c: three folds, where 4x³ − 2x + 1/5 = 0."""

@@ -12,6 +12,7 @@ from equimorph.structures import EnergyStructure, Rod, Unknown
 from equimorph.study.prepare import prepare
 from equimorph.study.problem import parse_study
 from oracles.complexes import assert_faithful
+from sets import arch_set
 from typecheck import unchecked
 
 Places = Float[np.ndarray, "places 2"]
@@ -27,16 +28,7 @@ CASES = [
 @pytest.mark.parametrize(("q", "cap"), CASES)
 def test_left_half_load_runs_clean(q, cap):
     """Loads from 0, where the rod is symmetric, to 12; caps of max |κ| from 10 to 80."""
-    rod = Rod(load="left-half")
-    with unchecked():
-        eset = equilibrium_set(
-            rod,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": q},
-            within=[rod.max_curvature <= cap],
-            intervals=(12, 21),
-            checks=1,
-        )
+    eset = arch_set(load="left-half", q=q, cap=cap, checks=1)
     assert eset.audit.clean, eset.audit
     assert eset.crossings == ()
 
@@ -51,16 +43,7 @@ def test_points_that_close_cells_along_a_constraint_are_of_their_sheet(load, int
     Near (0.80, 0) points on the constraint amid two of index 13 have index 14, far outside: cells
     that they close hide the fold.
     """
-    rod = Rod(load=load)
-    with unchecked():
-        eset = equilibrium_set(
-            rod,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[rod.max_curvature <= 40],
-            intervals=intervals,
-            checks=0,
-        )
+    eset = arch_set(intervals, load=load, cap=40.0)
     assert eset.audit.bisected > 0
     assert eset.audit.clean, eset.audit
     assert_faithful(eset)
@@ -72,16 +55,7 @@ def test_a_tongue_that_leaves_its_cell_between_vertices_is_lifted_to_its_tip():
     No grid vertex lies in them from Θ = 0.8305 on. That of index 9 ends at Θ = 0.8476, where its
     fold is exact (`fold_curve` turns there).
     """
-    rod = Rod(load="uniform")
-    with unchecked():
-        eset = equilibrium_set(
-            rod,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[rod.max_curvature <= 40],
-            intervals=(51, 19),
-            checks=0,
-        )
+    eset = arch_set((51, 19), cap=40.0)
     assert eset.audit.clean, eset.audit
     assert eset.audit.unresolved > 0
     most = [

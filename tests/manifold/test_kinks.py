@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from draws import few
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.complex.description import contradictions, turned_off_folds
 from equimorph.manifold.geometry.topology import adjacency, senses
@@ -17,9 +18,6 @@ from oracles.surfaces import integral
 from typecheck import unchecked
 
 BOX = Box(a=(-1.3, 1.2), b=(-1.5, 1.4), c=(-1.4, 1.3))
-many = settings(
-    max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
-)
 weights = st.tuples(*(st.floats(0.3, 2.5) for _ in range(3)))
 bounds = st.floats(0.2, 0.9)
 coarse = st.tuples(*(st.integers(2, 5) for _ in range(3)))
@@ -98,7 +96,7 @@ def test_kinks_cut_the_three_sphere_without_wrong_cells(shape, weights, bound, g
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", [ridge_of, roof_of, valley_of])
-@many
+@few(12)
 @given(weights, bounds, coarse)
 def test_random_kinks_cut_the_three_sphere_without_wrong_cells(shape, weights, bound, grid):
     assert_right(shape, weights, bound, grid)

@@ -7,6 +7,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, locate
 from equimorph.model import Box
 from equimorph.structures import Rod, Spring
+from sets import arch_set
 from typecheck import unchecked
 
 
@@ -118,16 +119,9 @@ def test_wrong_measurements_are_refused(spring_set):
 @pytest.mark.slow
 def test_states_of_the_arch_are_located_by_descriptors_and_shapes():
     """Random vertices of all indices from two heights and max |κ|, and from 21 points."""
-    arch = Rod()
+    eset = arch_set((24, 41))
+    arch = eset.structure
     with unchecked():
-        eset = equilibrium_set(
-            arch,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[arch.max_curvature <= 20],
-            intervals=(24, 41),
-            checks=0,
-        )
         descriptors = (arch.height(1 / 3), arch.height(2 / 3), arch.max_curvature)
         s = np.linspace(0, 1, 21)
         for vertex in np.random.default_rng(2).integers(len(eset.points), size=12):

@@ -2,21 +2,15 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from draws import few
 from equimorph.manifold import EquilibriumSet, equilibrium_set, part, refine
 from equimorph.model import Box
 from oracles.surfaces import pitchforks, transcriticals
 from typecheck import unchecked
 
-few = settings(
-    max_examples=2,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
-    derandomize=True,
-    phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes
-)
 factors = st.sampled_from([-2.0, -0.7, 0.6, 1.0, 1.9])
 slants = st.sampled_from([-0.4, 0.0, 0.3])
 BOX = Box(a=(-1.0, 1.1), b=(-1.0, 1.2))
@@ -69,7 +63,7 @@ def assert_all_are_found(eset: EquilibriumSet, slant: float, b: np.ndarray, root
             assert np.isin(found_index, index).all()
 
 
-@few
+@few(2)
 @given(factors, slants, st.integers(0, 99))
 def test_all_three_states_beside_a_pitchfork_curve(cubic, slant, seed):
     eset = lifted(pitchforks(cubic, slant))
@@ -77,7 +71,7 @@ def test_all_three_states_beside_a_pitchfork_curve(cubic, slant, seed):
     assert_all_are_found(eset, slant, b, lambda u: pitchfork_roots(cubic, u))
 
 
-@few
+@few(2)
 @given(factors, slants, st.integers(0, 99))
 def test_both_states_beside_a_transcritical_curve(skew, slant, seed):
     eset = lifted(transcriticals(skew, slant))

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from draws import few
 from equimorph.manifold import (
     EquilibriumSet,
     cell_sizes,
@@ -21,13 +22,6 @@ from oracles.complexes import assert_crossings, assert_faithful, assert_upright
 from oracles.surfaces import crossing_sheets, hilltop, pitchforks, transcriticals, tricritical
 from typecheck import unchecked
 
-few = settings(
-    max_examples=2,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
-    derandomize=True,
-    phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes
-)
 intervals = st.tuples(st.integers(3, 5), st.integers(3, 5))
 cubics = st.sampled_from([-2.0, -0.7, 0.6, 1.0, 1.9])
 slants = st.sampled_from([-0.4, 0.0, 0.3])
@@ -61,7 +55,7 @@ def area(cubic: float, slant: float, inside) -> float:
     return float(plane + (there * stretch).mean() * 2 * widest * size[1])
 
 
-@few
+@few(2)
 @given(cubics, slants, intervals)
 def test_refined_pitchforks_keep_their_common_curve(cubic, slant, grid):
     """x (cubic·x² − a − slant·b) = 0, within a tolerance; the crossing stays exact."""
@@ -106,7 +100,7 @@ def test_triangles_beside_crossings_are_not_thin(structure, grid):
     assert eset.audit.smallest_free_angle >= eset.audit.smallest_angle
 
 
-@few
+@few(2)
 @given(cubics, slants)
 def test_areas_of_pitchforks_and_of_their_parts(cubic, slant):
     """Chords lose at most the deviation per radius: the rest falls with the tolerance."""
@@ -183,7 +177,7 @@ def test_what_does_not_steer_each_sheet_is_found_on_each():
     assert (level.lost, len(level.pieces)) == (0, 2)
 
 
-@few
+@few(2)
 @given(cubics, slants, intervals)
 def test_planes_that_cross_need_no_refinement(skew, slant, grid):
     coarse = lifted(transcriticals(skew, slant), grid)
@@ -236,7 +230,7 @@ def test_cusps_lie_where_pitchforks_change_their_criticality(accuracy):
     assert found[0].index.tolist() == [0]
 
 
-@few
+@few(2)
 @given(cubics, st.integers(2, 12))
 def test_refined_pitchfork_diagram(cubic, count):
     """x (cubic·x² − a) = 0 over a: four branches from one point."""

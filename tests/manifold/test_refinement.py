@@ -5,9 +5,10 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from draws import few
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.complex.description import Complex
@@ -40,10 +41,6 @@ from oracles.polynomial import bead_on_a_circle, fold_form
 from oracles.surfaces import cusp, sphere, swallowtail, torus
 from typecheck import unchecked
 
-few = settings(
-    max_examples=4, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
-)
-
 
 def lifted(structure, box, intervals):
     with unchecked():
@@ -67,7 +64,7 @@ def inside_cells(eset, seed=0):
     return np.einsum("ck,ckd->cd", weights, place[eset.cells])
 
 
-@few
+@few(4)
 @given(st.tuples(st.integers(6, 10), st.integers(6, 10)), st.floats(0.004, 0.1))
 def test_cells_of_the_refined_sphere_are_within_the_accuracy(grid, accuracy):
     """Distance from the unit sphere: | |x| − 1 |."""
@@ -120,7 +117,7 @@ def test_folds_and_sides_of_the_box_carry_the_new_vertices_on_them():
     assert off.max() < 0.001 * 2.0  # it is measured at the chord's x, not across the curve
 
 
-@few
+@few(4)
 @given(st.booleans(), st.tuples(st.integers(4, 9), st.integers(4, 9)))
 def test_no_cell_is_folded_over_beside_cusps(several, grid):
     """There folds run along what vanishes in the parameters, and the outer sheet goes round."""

@@ -14,7 +14,8 @@ from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import faces_of, keys_of
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.model import Box
-from equimorph.structures import Rod, Spring, State
+from equimorph.structures import Spring, State
+from sets import arch_set
 from typecheck import unchecked
 
 
@@ -133,16 +134,9 @@ def test_shortest_way_along_the_surface_of_the_spring(spring_set, x, force):
 @pytest.mark.slow
 def test_no_straight_move_of_the_arch_loses_stability_before():
     """Lifts in 48 directions end no earlier; the one to the nearest fold ends there."""
-    arch = Rod()
+    eset = arch_set((24, 41))
+    arch = eset.structure
     with unchecked():
-        eset = equilibrium_set(
-            arch,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[arch.max_curvature <= 20],
-            intervals=(24, 41),
-            checks=0,
-        )
         for state in eset.at(Theta=1.0, Delta=0.0).stable:
             distance = stability_distance(eset, state)
             for bearing in np.linspace(0, 2 * np.pi, 48, endpoint=False):
@@ -196,17 +190,8 @@ def shortest_over_triangles(eset, state, stratum: int) -> float:
 @pytest.mark.slow
 def test_shortest_ways_along_the_arch_against_a_graph_of_its_triangles():
     """Dijkstra between points on all sides of the triangles, which is at most 5 % too long."""
-    arch = Rod()
+    eset = arch_set((24, 41), accuracy=0.003)
     with unchecked():
-        eset = equilibrium_set(
-            arch,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[arch.max_curvature <= 20],
-            intervals=(24, 41),
-            checks=0,
-            accuracy=0.003,
-        )
         for theta, delta in [
             (1.0, 0.0),
             (1.3, 0.5),

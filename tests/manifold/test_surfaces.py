@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from draws import few
 from equimorph.manifold import build, equilibrium_set
 from equimorph.manifold.lifting.seeds import seeds
 from equimorph.model import Box, Descriptor
@@ -20,9 +21,6 @@ from oracles.surfaces import (
 )
 from typecheck import unchecked
 
-few = settings(
-    max_examples=3, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
-)
 intervals = st.tuples(st.integers(3, 9), st.integers(3, 9))
 # round numbers, which put grid lines through cusps and vertices on folds, on purpose
 sizes = st.integers(2, 20).map(lambda tenths: tenths / 10)
@@ -40,7 +38,7 @@ def topology(eset):
     return audit.components, audit.euler_characteristic, len(eset.boundaries)
 
 
-@few
+@few(3)
 @given(st.tuples(sizes, sizes, sizes, sizes), intervals)
 def test_cusp_is_a_disc_with_one_fold_curve(box, grid):
     """b = −x³ − a x is a graph over (x, a); a box meets a = −3x², b = 2x³ in one piece."""
@@ -76,7 +74,7 @@ def test_cusp_without_its_folds_is_one_stable_sheet():
     assert (eset.cell_index == 0).all()
 
 
-@few
+@few(3)
 @given(intervals)
 def test_swallowtail_is_a_disc_with_one_fold_curve_with_two_cusps(grid):
     """c = −(x⁴ − x² + b x), folds b = 2x − 4x³: the curve turns at x = ±1/√6."""
@@ -91,7 +89,7 @@ def test_swallowtail_is_a_disc_with_one_fold_curve_with_two_cusps(grid):
     assert (np.diff(x[eset.folds[0]]) > 0).all() or (np.diff(x[eset.folds[0]]) < 0).all()
 
 
-@few
+@few(3)
 @given(intervals)
 def test_three_sheets_that_never_meet_are_three_discs(grid):
     eset = lifted(three_sheets(), Box(a=(-2, 1), b=(-1.5, 1.5)), intervals=grid)
@@ -150,7 +148,7 @@ def test_islands_between_grid_lines_are_found(radius, places, euler):
     assert len(eset.folds) == (2 if len(places) == 1 else 1)
 
 
-@few
+@few(3)
 @given(st.tuples(st.integers(6, 20), st.integers(6, 20)))
 def test_sphere_is_closed_with_one_closed_fold(grid):
     eset = lifted(sphere(), Box(a=(-1.3, 1.2), b=(-1.5, 1.5)), intervals=grid)

@@ -33,7 +33,11 @@ from oracles.specimens import (
 STEP = 1e-30
 DRAWN = settings(max_examples=5, deadline=None, derandomize=True, database=None)
 every_structure = pytest.mark.parametrize("specimen", SPECIMENS, ids=lambda each: each.name)
-any_seed = st.integers(0, 2**32 - 1)
+
+
+def drawn_states(test):
+    """Try a test with random states of every structure."""
+    return every_structure(given(seed=st.integers(0, 2**32 - 1))(DRAWN(test)))
 
 
 def gradient(function, x):
@@ -60,9 +64,7 @@ def full_matrix(structure, z, p):
     return np.linalg.inv(structure.solve(z, p, unit).x.transpose(0, 2, 1))
 
 
-@every_structure
-@given(seed=any_seed)
-@DRAWN
+@drawn_states
 def test_residual_is_the_gradient_of_the_lagrangian(specimen, seed):
     """Complex step of an independent L. 1e-12: sums of a hundred terms of order one."""
     structure = specimen.structure
@@ -71,9 +73,7 @@ def test_residual_is_the_gradient_of_the_lagrangian(specimen, seed):
     np.testing.assert_allclose(structure.residual(z, p), exact, rtol=1e-11, atol=1e-12)
 
 
-@every_structure
-@given(seed=any_seed)
-@DRAWN
+@drawn_states
 def test_effort_is_the_derivative_by_the_parameters(specimen, seed):
     """Complex step of an independent L. 1e-12 as above."""
     structure = specimen.structure
@@ -82,9 +82,7 @@ def test_effort_is_the_derivative_by_the_parameters(specimen, seed):
     np.testing.assert_allclose(structure.effort(z, p), exact, rtol=1e-11, atol=1e-12)
 
 
-@every_structure
-@given(seed=any_seed)
-@DRAWN
+@drawn_states
 def test_energy_is_the_lagrangian_without_its_constraints(specimen, seed):
     """1e-13 of terms of order one: round-off."""
     structure = specimen.structure
@@ -94,9 +92,7 @@ def test_energy_is_the_lagrangian_without_its_constraints(specimen, seed):
     np.testing.assert_allclose(structure.energy(z, p), exact, rtol=1e-13, atol=1e-13)
 
 
-@every_structure
-@given(seed=any_seed)
-@DRAWN
+@drawn_states
 def test_matrix_is_symmetric_and_the_derivative_of_the_residual(specimen, seed):
     """Central differences, step 1e-3: error 1e-12 of the fifth derivative, 1e-13 of round-off."""
     structure = specimen.structure
@@ -109,9 +105,7 @@ def test_matrix_is_symmetric_and_the_derivative_of_the_residual(specimen, seed):
     np.testing.assert_allclose(product, slope, rtol=1e-7, atol=1e-8 * np.abs(product).max())
 
 
-@every_structure
-@given(seed=any_seed)
-@DRAWN
+@drawn_states
 def test_parameter_derivative_is_that_of_the_residual(specimen, seed):
     """Central differences as above."""
     structure = specimen.structure
@@ -121,9 +115,7 @@ def test_parameter_derivative_is_that_of_the_residual(specimen, seed):
     np.testing.assert_allclose(found, slope, rtol=1e-8, atol=1e-9 * np.abs(slope).max())
 
 
-@every_structure
-@given(seed=any_seed)
-@DRAWN
+@drawn_states
 def test_second_derivative_is_that_of_the_residual_along_a_line(specimen, seed):
     """Second differences, step 1e-3, of fourth order: 1e-6 from round-off over step squared."""
     structure = specimen.structure
@@ -139,9 +131,7 @@ def test_second_derivative_is_that_of_the_residual_along_a_line(specimen, seed):
     np.testing.assert_allclose(found, second, rtol=1e-6, atol=1e-6 * np.abs(second).max())
 
 
-@every_structure
-@given(seed=any_seed)
-@DRAWN
+@drawn_states
 def test_second_derivative_is_bilinear_and_symmetric(specimen, seed):
     """Polarisation: 4 B(v, w) = B(v+w, v+w) − B(v−w, v−w). 1e-12: round-off."""
     structure = specimen.structure

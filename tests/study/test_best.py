@@ -3,7 +3,6 @@
 Of the spring: F = k (1 − x_l/cos δ) sin δ, folds at x_l = cos³δ, F = k sin³δ (PHYSICS section 2).
 """
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +11,12 @@ import pytest
 from equimorph.errors import InputError
 from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, parse_study, prepare, run_study
-from studies import draw_dots
+from studies import EXAMPLES, SPRING_SET, answered, draw_dots, page, rows_of
 from typecheck import unchecked
 
 SPRING = """\
 [structure]
 kind = "spring"
-
-"""
-SET = f"""\
-{SPRING}[set]
-box = {{ x_l = [0.5, 1.3], F = [-0.2, 0.2] }}
-within = ["angle <= 1.4", "angle >= -1.4"]
-intervals = [9, 9]
 
 """
 UPPER = '{ at = { x_l = 0.8, F = 0.02 }, highest = "angle" }'
@@ -98,16 +90,9 @@ actuators = ["x_l", "k"]
 """
 
 
-def answered(folder: Path, text: str) -> tuple[Outcome, Path]:
-    (folder / "spring.toml").write_text(text)
-    with pytest.MonkeyPatch.context() as patch, unchecked():
-        draw_dots(patch)
-        return run_study(folder / "spring.toml", folder / "out"), folder / "out"
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> tuple[Outcome, Path]:
-    return answered(tmp_path_factory.mktemp("best"), SET + QUESTIONS)
+    return answered(tmp_path_factory.mktemp("best"), SPRING_SET + QUESTIONS)
 
 
 @pytest.fixture(scope="module")
@@ -115,17 +100,8 @@ def redundant(tmp_path_factory) -> Outcome:
     return answered(tmp_path_factory.mktemp("redundant"), REDUNDANT)[0]
 
 
-def page(out: Path) -> str:
-    return (out / "index.html").read_text(encoding="utf-8")
-
-
-def rows(file: Path) -> list[list[str]]:
-    with file.open(encoding="utf-8", newline="") as table:
-        return list(csv.reader(table))
-
-
 def test_a_landscape_has_values_where_the_piece_of_the_start_has_states(run):
-    head, *settings = rows(run[1] / "upper-landscape.csv")
+    head, *settings = rows_of(run[1] / "upper-landscape.csv")
     assert head == ["x_l", "F", "angle"]
     assert len(settings) == 7 * 8
     known = np.array([[float(each) for each in row] for row in settings if row[2]])
@@ -146,7 +122,7 @@ def test_a_landscape_has_its_barriers(run):
     assert middles[:, 0].max() <= 1.0
     both = (1.0 - middles[:, 0] ** (2 / 3)) ** 1.5 > 0.2 / 11
     assert found.barriers.kind == tuple("preference" if go else "stability" for go in both)
-    table = rows(run[1] / "least-landscape-barriers.csv")
+    table = rows_of(run[1] / "least-landscape-barriers.csv")
     assert len(table) == 1 + len(found.barriers)
     assert {row[0] for row in table[1:]} <= {"stability", "preference"}
 
@@ -256,7 +232,7 @@ FOLLOW = f'[[follow]]\nname = "a"\nstart = {UPPER}\nobjective = "angle"\n'
 )
 def test_a_question_that_means_nothing(wrong, message):
     with pytest.raises(InputError, match=message):
-        prepare(parse_study(SET + wrong, "spring.toml"))
+        prepare(parse_study(SPRING_SET + wrong, "spring.toml"))
 
 
 @pytest.mark.parametrize("question", [STRONGEST, SAMPLED])
@@ -271,8 +247,7 @@ def test_a_load_drives_across_a_bridge_with_eight_actuators(tmp_path):
     """Without actuators mid-span sinks by 0.214; on the way no joint of the deck leaves ±0.03."""
     with pytest.MonkeyPatch.context() as patch, unchecked():
         draw_dots(patch)
-        example = Path(__file__).parents[2] / "examples" / "drive.toml"
-        found = run_study(example, tmp_path).of("sampled_route")["across"]
+        found = run_study(EXAMPLES / "drive.toml", tmp_path).of("sampled_route")["across"]
     assert found.arrived
     deck = [found.schedule.descriptors[f"displacement(b{k},y)"] for k in range(1, 6)]
     assert np.abs(deck).max() <= 0.03 * (1 + 1e-6)

@@ -11,23 +11,19 @@ from scipy.optimize import brentq
 
 from equimorph.errors import InputError
 from equimorph.storage import read_results
-from equimorph.study import Outcome, parse_study, prepare, run_study
-from studies import draw_dots
+from equimorph.study import Outcome, parse_study, prepare
+from studies import SPRING_SET, answered, page
 from typecheck import unchecked
 
-SET = """\
-[structure]
-kind = "spring"
-
-[set]
-box = { x_l = [0.5, 1.3], F = [-0.2, 0.2] }
-within = ["angle <= 1.4", "angle >= -1.4"]
-intervals = [9, 9]
+SET = (
+    SPRING_SET.rstrip()
+    + """
 seed = 3
 checks = 1
 accuracy = 0.05
 
 """
+)
 QUESTIONS = """\
 [[chart]]
 name = "plane"
@@ -59,15 +55,7 @@ prefer = { first_stable_on_path = "F", bound = 2.0 }
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> tuple[Outcome, Path]:
-    folder = tmp_path_factory.mktemp("charts")
-    (folder / "spring.toml").write_text(SET + QUESTIONS)
-    with pytest.MonkeyPatch.context() as patch, unchecked():
-        draw_dots(patch)
-        return run_study(folder / "spring.toml", folder / "out"), folder / "out"
-
-
-def page(out: Path) -> str:
-    return (out / "index.html").read_text(encoding="utf-8")
+    return answered(tmp_path_factory.mktemp("charts"), SET + QUESTIONS)
 
 
 def test_every_option_of_a_set_can_be_asked_for(run):

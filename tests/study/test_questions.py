@@ -9,18 +9,9 @@ import pytest
 from equimorph.errors import InputError
 from equimorph.storage import read_schedule
 from equimorph.study import Outcome, parse_study, prepare, run_study
+from studies import SPRING_SET, answered, answered_again, page
 from typecheck import unchecked
 
-SET = """\
-[structure]
-kind = "spring"
-
-[set]
-box = { x_l = [0.5, 1.3], F = [-0.2, 0.2] }
-within = ["angle <= 1.4", "angle >= -1.4"]
-intervals = [9, 9]
-
-"""
 QUESTIONS = """\
 [[shape]]
 name = "flat"
@@ -58,10 +49,7 @@ errors = { angle = 0.01, x_l = 0.002 }
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> tuple[Outcome, Path]:
-    folder = tmp_path_factory.mktemp("questions")
-    (folder / "spring.toml").write_text(SET + QUESTIONS)
-    with unchecked():
-        return run_study(folder / "spring.toml", folder / "out"), folder / "out"
+    return answered(tmp_path_factory.mktemp("questions"), SPRING_SET + QUESTIONS, dots=False)
 
 
 def test_a_shape_is_found_with_the_way_to_it(run):
@@ -107,26 +95,20 @@ def test_a_motion_that_meets_instability_is_refused_with_the_place(run):
     motion = run[0].of("track")["too-far"]
     assert motion.failure == "snap-through"
     np.testing.assert_allclose(motion.values["angle"][-1], np.arcsin(0.02 ** (1 / 3)), rtol=1e-6)
-    assert "After 1.5" in (run[1] / "index.html").read_text(encoding="utf-8")
+    assert "After 1.5" in page(run[1])
 
 
 def test_the_page_tells_every_answer(run):
-    page = (run[1] / "index.html").read_text(encoding="utf-8")
+    told = page(run[1])
     for words in ("Shape flat", "Shape never", "Refused.", "Optimum flattest", "Estimate seen"):
-        assert words in page
-    assert "stability boundary" in page
+        assert words in told
+    assert "stability boundary" in told
     for name in ("flat-shape", "flattest-optimum", "seen-estimate"):
         assert (run[1] / f"{name}.svg").exists()
 
 
-@pytest.mark.usefixtures("plain_figures")
-def test_the_answers_come_from_the_folder_when_asked_again(run, monkeypatch, tmp_path):
-    def fail(*_, **__):
-        raise AssertionError
-
-    monkeypatch.setattr("equimorph.study.question.Question.answer", fail)
-    (tmp_path / "spring.toml").write_text(SET + QUESTIONS)
-    again = run_study(tmp_path / "spring.toml", run[1])
+def test_the_answers_come_from_the_folder_when_asked_again(run):
+    again = answered_again(run[1].parent / "spring.toml", run[1])
     before, after = (each.of("optimum")["flattest"].best.state for each in (run[0], again))
     np.testing.assert_array_equal(after.z, before.z)
 
@@ -145,7 +127,7 @@ def test_the_answers_come_from_the_folder_when_asked_again(run, monkeypatch, tmp
 )
 def test_an_optimum_that_means_nothing(wrong, message):
     with pytest.raises(InputError, match=message):
-        prepare(parse_study(f'{SET}[[optimum]]\nname = "best"\n{wrong}', "spring.toml"))
+        prepare(parse_study(f'{SPRING_SET}[[optimum]]\nname = "best"\n{wrong}', "spring.toml"))
 
 
 @pytest.mark.parametrize(
@@ -159,7 +141,7 @@ def test_an_optimum_that_means_nothing(wrong, message):
 def test_a_motion_that_means_nothing(wrong, message):
     start = 'start = { at = { x_l = 0.8, F = 0.02 }, highest = "angle" }'
     with pytest.raises(InputError, match=message):
-        prepare(parse_study(f'{SET}[[track]]\nname = "go"\n{start}\n{wrong}', "spring.toml"))
+        prepare(parse_study(f'{SPRING_SET}[[track]]\nname = "go"\n{start}\n{wrong}', "spring.toml"))
 
 
 @pytest.mark.parametrize(
@@ -172,7 +154,7 @@ def test_a_motion_that_means_nothing(wrong, message):
 )
 def test_an_estimate_that_means_nothing(wrong, message, tmp_path):
     study = tmp_path / "spring.toml"
-    study.write_text(f'{SET}[[estimate]]\nname = "seen"\n{wrong}')
+    study.write_text(f'{SPRING_SET}[[estimate]]\nname = "seen"\n{wrong}')
     with pytest.raises(InputError, match=message):
         run_study(study, tmp_path / "out")
 
@@ -184,7 +166,7 @@ def test_a_question_needs_a_set():
 
 
 def test_a_set_over_one_parameter_gets_its_diagram(tmp_path):
-    text = re.sub("box = .*", "box = { F = [-0.1, 0.1] }\nfixed = { x_l = 0.8 }", SET)
+    text = re.sub("box = .*", "box = { F = [-0.1, 0.1] }\nfixed = { x_l = 0.8 }", SPRING_SET)
     text = text.replace("[9, 9]", "[9]")
     text += '[[route]]\nname = "a"\nstart = { at = { F = 0.0 }, highest = "angle" }\n'
     text += 'goal = { at = { F = -0.05 }, highest = "angle" }\n'
@@ -200,10 +182,10 @@ def test_a_set_over_one_parameter_gets_its_diagram(tmp_path):
 
 def test_intervals_that_do_not_fit_the_box():
     with pytest.raises(InputError, match="one number of intervals for each parameter"):
-        parse_study(SET.replace("[9, 9]", "[9]"), "spring.toml")
+        parse_study(SPRING_SET.replace("[9, 9]", "[9]"), "spring.toml")
 
 
 def test_a_box_over_four_parameters_is_refused():
     box = "box = { a = [0, 1], b = [0, 1], c = [0, 1], d = [0, 1] }"
     with pytest.raises(InputError, match="span one, two or three free parameters"):
-        parse_study(re.sub("box = .*", box, SET), "spring.toml")
+        parse_study(re.sub("box = .*", box, SPRING_SET), "spring.toml")

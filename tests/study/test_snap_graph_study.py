@@ -8,9 +8,8 @@ import pytest
 
 from equimorph.errors import InputError
 from equimorph.storage import read_results
-from equimorph.study import Outcome, parse_study, prepare, run_study
-from studies import draw_dots
-from typecheck import unchecked
+from equimorph.study import Outcome, parse_study, prepare
+from studies import answered
 
 STUDY = """\
 [structure]
@@ -29,11 +28,7 @@ descriptor = "height"
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> tuple[Outcome, Path]:
-    folder = tmp_path_factory.mktemp("snaps")
-    (folder / "spring.toml").write_text(STUDY)
-    with pytest.MonkeyPatch.context() as patch, unchecked():
-        draw_dots(patch)
-        return run_study(folder / "spring.toml", folder / "out"), folder / "out"
+    return answered(tmp_path_factory.mktemp("snaps"), STUDY)
 
 
 def test_every_snap_that_was_followed_is_in_the_table(run):

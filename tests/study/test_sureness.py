@@ -13,19 +13,8 @@ import equimorph as em
 from equimorph.errors import InputError
 from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, html, parse_study, prepare, run_study
-from studies import draw_dots
-from typecheck import unchecked
+from studies import SPRING_SET, answered, answered_again, page
 
-SET = """\
-[structure]
-kind = "spring"
-
-[set]
-box = { x_l = [0.5, 1.3], F = [-0.2, 0.2] }
-within = ["angle <= 1.4", "angle >= -1.4"]
-intervals = [9, 9]
-
-"""
 UPPER = '{ at = { x_l = 0.8, F = 0.0 }, highest = "angle" }'
 QUESTIONS = f"""\
 [[reach]]
@@ -119,20 +108,14 @@ def write_study(folder: Path) -> Path:
     (folder / "ways").mkdir()
     schedule = em.verify([{"F": -0.03}, {"x_l": 0.9}], upper).schedule
     em.storage.write_schedule(schedule, folder / "ways" / "up.csv")
-    (folder / "spring.toml").write_text(SET + QUESTIONS)
+    (folder / "spring.toml").write_text(SPRING_SET + QUESTIONS)
     return folder / "spring.toml"
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> tuple[Outcome, Path]:
     folder = tmp_path_factory.mktemp("sureness")
-    with pytest.MonkeyPatch.context() as patch, unchecked():
-        draw_dots(patch)
-        return run_study(write_study(folder), folder / "out"), folder / "out"
-
-
-def page(out: Path) -> str:
-    return (out / "index.html").read_text(encoding="utf-8")
+    return answered(folder, write_study(folder).read_text())
 
 
 def test_every_answer_is_in_the_results(run):
@@ -262,16 +245,9 @@ def test_every_kind_has_its_figure(run):
         assert (run[1] / f"{name}.png").exists(), name
 
 
-def test_answers_come_from_the_folder_until_the_schedule_changes(run, monkeypatch, tmp_path):
-    draw_dots(monkeypatch)
+def test_answers_come_from_the_folder_until_the_schedule_changes(run, tmp_path):
     study = write_study(tmp_path)
-
-    def fail(*_, **__):
-        raise AssertionError
-
-    with monkeypatch.context() as patch:
-        patch.setattr("equimorph.study.question.Question.answer", fail)
-        run_study(study, run[1])
+    answered_again(study, run[1])
     schedule = read_schedule(tmp_path / "ways" / "up.csv")
     schedule.values[-1, 1] += 1e-3
     em.storage.write_schedule(schedule, tmp_path / "ways" / "up.csv")
@@ -356,11 +332,13 @@ WRONG = {
 @pytest.mark.parametrize(("table", "wrong", "message"), WRONG.values(), ids=WRONG)
 def test_questions_that_mean_nothing(table, wrong, message, tmp_path):
     with pytest.raises(InputError, match=message):
-        prepare(parse_study(f'{SET}[[{table}]]\nname = "x"\n{wrong}', "spring.toml", tmp_path))
+        prepare(
+            parse_study(f'{SPRING_SET}[[{table}]]\nname = "x"\n{wrong}', "spring.toml", tmp_path)
+        )
 
 
 @pytest.mark.parametrize("text", ["worst(angle for F)", "worst(angle for F ± -1)", "worst(angle)"])
 def test_worst_cases_that_mean_nothing(text):
     wrong = f'[[optimum]]\nname = "x"\nobjective = "{text}"'
     with pytest.raises(InputError, match=r"in `optimum\[0\]\.objective`"):
-        prepare(parse_study(SET + wrong, "spring.toml"))
+        prepare(parse_study(SPRING_SET + wrong, "spring.toml"))

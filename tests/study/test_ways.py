@@ -11,20 +11,9 @@ import pytest
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.storage import read_results, read_schedule
-from equimorph.study import Outcome, parse_study, prepare, run_study
-from studies import draw_dots
-from typecheck import unchecked
+from equimorph.study import Outcome, parse_study, prepare
+from studies import SPRING_SET, answered, answered_again, page
 
-SET = """\
-[structure]
-kind = "spring"
-
-[set]
-box = { x_l = [0.5, 1.3], F = [-0.2, 0.2] }
-within = ["angle <= 1.4", "angle >= -1.4"]
-intervals = [9, 9]
-
-"""
 ENDS = """
 start = { at = { x_l = 0.8, F = 0.01 }, highest = "angle" }
 goal = { at = { x_l = 0.8, F = 0.01 }, lowest = "angle" }
@@ -61,16 +50,9 @@ def both_sides(eset, start, goal, count, within, margin, monitor):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> tuple[Outcome, Path]:
-    folder = tmp_path_factory.mktemp("ways")
-    (folder / "spring.toml").write_text(SET + ROUTES)
-    with pytest.MonkeyPatch.context() as patch, unchecked():
-        draw_dots(patch)
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr("equimorph.study.kinds.route.alternatives", both_sides)
-        return run_study(folder / "spring.toml", folder / "out"), folder / "out"
-
-
-def page(out: Path) -> str:
-    return (out / "index.html").read_text(encoding="utf-8")
+        return answered(tmp_path_factory.mktemp("ways"), SPRING_SET + ROUTES)
 
 
 def test_a_snap_is_told_with_its_place_and_the_energy_it_frees(run):
@@ -122,11 +104,8 @@ def test_alternatives_have_schedules_of_their_own_and_one_table(run):
     assert (run[1] / "several-alternatives.png").exists()
 
 
-def test_routes_come_from_the_folder_when_asked_again(run, monkeypatch):
-    monkeypatch.setattr("equimorph.study.question.Question.answer", None)
-    draw_dots(monkeypatch)
-    with unchecked():
-        again = run_study(run[1].parent / "spring.toml", run[1])
+def test_routes_come_from_the_folder_when_asked_again(run):
+    again = answered_again(run[1].parent / "spring.toml", run[1])
     assert again.of("route")["several"][1].length == pytest.approx(
         run[0].of("route")["several"][1].length, rel=0, abs=0
     )
@@ -151,11 +130,13 @@ def test_routes_come_from_the_folder_when_asked_again(run, monkeypatch):
 )
 def test_a_route_that_means_nothing(wrong, message):
     with pytest.raises(InputError, match=message):
-        prepare(parse_study(f'{SET}[[route]]\nname = "way"\n{ENDS}{wrong}', "spring.toml"))
+        prepare(parse_study(f'{SPRING_SET}[[route]]\nname = "way"\n{ENDS}{wrong}', "spring.toml"))
 
 
 def test_alternatives_need_two_parameters():
-    narrow = SET.replace("F = [-0.2, 0.2]", "").replace("[9, 9]", "[9]").replace("1.3],", "1.3]")
+    narrow = (
+        SPRING_SET.replace("F = [-0.2, 0.2]", "").replace("[9, 9]", "[9]").replace("1.3],", "1.3]")
+    )
     ends = ENDS.replace(", F = 0.01", "")
     text = f'{narrow}[[route]]\nname = "way"\nalternatives = 2\n{ends}'
     with pytest.raises(InputError, match=r"`route\[0\]\.alternatives` needs a set over"):
@@ -165,7 +146,7 @@ def test_alternatives_need_two_parameters():
 def test_files_of_two_questions_never_have_the_same_name():
     routes = [f'[[route]]\nname = "{name}"\n{ENDS}' for name in ("a", "a-2", "a-reach")]
     with pytest.raises(InputError, match=r"give its route a-2 a name without .* route a \(a-2\)"):
-        parse_study(f"{SET}{routes[0]}alternatives = 2\n{routes[1]}", "spring.toml")
+        parse_study(f"{SPRING_SET}{routes[0]}alternatives = 2\n{routes[1]}", "spring.toml")
     reach = '[[reach]]\nname = "a"\nstart = { at = { x_l = 0.8, F = 0.0 } }\ndescriptors = ["F"]\n'
     with pytest.raises(InputError, match=r"reach a a name without the files of the route a-reach"):
-        parse_study(SET + reach + routes[2], "spring.toml")
+        parse_study(SPRING_SET + reach + routes[2], "spring.toml")

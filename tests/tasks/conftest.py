@@ -2,24 +2,14 @@
 
 import pytest
 
-from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.model import Box
-from equimorph.structures import Rod, Spring, State
-from typecheck import unchecked
+import sets
+from equimorph.manifold import EquilibriumSet
+from equimorph.structures import State
 
 
 @pytest.fixture(scope="session")
 def arch_set() -> EquilibriumSet:
-    arch = Rod()
-    with unchecked():  # the tests of sets check
-        return equilibrium_set(
-            arch,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[arch.max_curvature <= 20],
-            intervals=(12, 21),
-            checks=0,
-        )
+    return sets.arch_set()
 
 
 @pytest.fixture(scope="session")
@@ -32,14 +22,10 @@ def ends(arch_set) -> tuple[State, State]:
 
 @pytest.fixture(scope="session")
 def spring_set() -> EquilibriumSet:
-    box = Box(x_l=(0.3, 1.3), F=(-0.5, 0.5))
-    with unchecked():
-        return equilibrium_set(Spring(), box, intervals=(12, 12), checks=0)
+    return sets.spring_set()
 
 
 @pytest.fixture(scope="session")
 def short_spring_set() -> EquilibriumSet:
     """Without the stretched states x_l > 1 around which the two stable components hang together."""
-    box = Box(x_l=(0.3, 0.95), F=(-0.5, 0.5))
-    with unchecked():
-        return equilibrium_set(Spring(), box, intervals=(12, 13), checks=0)
+    return sets.spring_set((12, 13), 0.95)

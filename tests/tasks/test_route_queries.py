@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.locate import pieces_of
-from equimorph.structures import Rod, Spring, State
+from equimorph.structures import State
 from equimorph.tasks.planning.planner import plan
 from equimorph.tasks.verification.schedule_check import verify
+from sets import arch_set, spring_set
 from typecheck import unchecked
 
 TEN_TIMES = em.TraceOptions(largest_step=0.002, first_step=0.001, turning=0.005, steps=400000)
@@ -42,26 +43,9 @@ def _query(eset: EquilibriumSet, finer: EquilibriumSet, queries: int, seed: int)
     return held, right
 
 
-def _spring(intervals: tuple[int, int]) -> EquilibriumSet:
-    box = em.Box(x_l=(0.3, 0.95), F=(-0.5, 0.5))
-    return equilibrium_set(Spring(), box, intervals=intervals, checks=0)
-
-
-def _arch(intervals: tuple[int, int]) -> EquilibriumSet:
-    arch = Rod()
-    return equilibrium_set(
-        arch,
-        em.Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-        fixed={"q": 2.5},
-        within=[arch.max_curvature <= 20],
-        intervals=intervals,
-        checks=0,
-    )
-
-
 def test_routes_of_the_spring_hold_and_refusals_are_right():
     with unchecked():
-        held, right = _query(_spring((12, 13)), _spring((24, 26)), 20, 1)
+        held, right = _query(spring_set((12, 13), 0.95), spring_set((24, 26), 0.95), 20, 1)
     assert held > 0
     assert right > 0
 
@@ -69,8 +53,8 @@ def test_routes_of_the_spring_hold_and_refusals_are_right():
 @pytest.mark.slow
 def test_two_hundred_routes_hold_or_are_rightly_refused():
     with unchecked():
-        spring = _query(_spring((12, 13)), _spring((24, 26)), 100, 2)
-        arch = _query(_arch((12, 21)), _arch((24, 42)), 100, 3)
+        spring = _query(spring_set((12, 13), 0.95), spring_set((24, 26), 0.95), 100, 2)
+        arch = _query(arch_set((12, 21)), arch_set((24, 42)), 100, 3)
     assert sum(spring) + sum(arch) >= 190
     assert min(spring) > 0
     assert arch[0] > 50

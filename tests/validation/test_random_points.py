@@ -9,7 +9,8 @@ import pytest
 from equimorph.equilibria import find_equilibria
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box
-from equimorph.structures import Rod, Spring, Truss
+from equimorph.structures import Spring, Truss
+from sets import arch_set
 from typecheck import unchecked
 
 TEN_TIMES = 2000
@@ -44,16 +45,8 @@ def test_spring_over_load_and_actuator_lacks_no_stable_state():
 
 @pytest.mark.slow
 def test_arch_lacks_no_stable_state():
-    arch = Rod()
     with unchecked():
-        eset = equilibrium_set(
-            arch,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[arch.max_curvature <= 20],
-            intervals=(24, 41),
-        )
-        assert missing(eset, 40) == []
+        assert missing(arch_set((24, 41), checks=2), 40) == []
 
 
 @pytest.mark.slow

@@ -8,8 +8,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, PathPatch
-from matplotlib.path import Path as Outline
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from equimorph.argument_checks import check_arguments
@@ -167,8 +166,7 @@ def _place(
 
 def _fill(ax: Axes, domain: Domain, look: dict[str, Any]) -> None:
     if domain.loops:
-        outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in domain.loops))
-        ax.add_patch(PathPatch(outline, linewidth=0.0, zorder=1, **look))
+        ax.add_patch(style.area(domain.loops, linewidth=0.0, zorder=1, **look))
 
 
 def _edges_to_draw(chart: Chart) -> list[Edge]:

@@ -9,9 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import PathPatch
-from matplotlib.path import Path as Outline
-from matplotlib.patheffects import withStroke
-from mpl_toolkits.axes_grid1 import make_axes_locatable
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
@@ -43,8 +40,7 @@ def shade_regions(ax: Axes, eset: EquilibriumSet, regions: Regions) -> int:
     largest = max((k for k, area in regions.areas().items() if area > visible), default=0)
     shades = style.count_shades(largest)
     for level, shade in zip(regions.levels[:largest], shades[1:], strict=True):
-        outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in level))
-        ax.add_patch(PathPatch(outline, facecolor=shade, edgecolor="none", zorder=1))
+        ax.add_patch(style.area(level, facecolor=shade, edgecolor="none", zorder=1))
     return largest
 
 
@@ -62,8 +58,7 @@ def hatch_cut(
     for loops in empty_regions(regions, eset.box.lower, eset.box.upper):
         near, _ = tree.query(np.concatenate(loops) / size)
         if near.min() <= _SAME_PLACE:
-            outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in loops))
-            patches.append(PathPatch(outline, **_CUT, label=label))
+            patches.append(style.area(loops, **_CUT, label=label))
             ax.add_patch(patches[-1])
     return patches
 
@@ -98,18 +93,16 @@ def write_counts(
             j, i = np.unravel_index(room.argmax(), room.shape)
             if room[j, i] > _ROOM * _RASTER:
                 text = ax.text(x[i], y[j], str(number), ha="center", va="center", zorder=5)
-                text.set_path_effects([withStroke(linewidth=1.5, foreground=shades[number])])
+                text.set_path_effects(style.rim(1.5, shades[number]))
 
 
 def count_bar(ax: Axes, largest: int, what: str) -> None:
     """Colour bar with one shade per count."""
     shades = ListedColormap(style.count_shades(largest))
     norm = BoundaryNorm(np.arange(largest + 2) - 0.5, largest + 1)
-    beside = make_axes_locatable(ax).append_axes("right", size=0.08, pad=0.06)
-    bar = ax.figure.colorbar(ScalarMappable(norm, shades), cax=beside)
+    bar = style.colour_bar(ax, ScalarMappable(norm, shades), what)
     bar.set_ticks(list(range(largest + 1)), labels=[str(k) for k in range(largest + 1)])
     bar.ax.tick_params(length=0)
-    bar.set_label(what)
 
 
 def counted(what: str, constraints: Sequence[Constraint]) -> str:

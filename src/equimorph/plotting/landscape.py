@@ -10,14 +10,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.argument_checks import check_arguments
 from equimorph.manifold.geometry.topology import chains
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, parameter_label
-from equimorph.plotting.maps import GROUND, new_map_axes, value_colours, write_legend
+from equimorph.plotting.maps import GROUND, new_map_axes, value_colours
 from equimorph.structures import Structure
 from equimorph.tasks.optimising.landscapes import Landscape
 
@@ -67,7 +66,7 @@ def landscape(
         entries: list[Line2D | Patch] = list(_draw_barriers(ax, found))
         if found.gaps.any():
             entries.append(Patch(label="no stable state", **GROUND))
-        write_legend(ax, entries, room=own)
+        style.legend_below(ax, entries, room=own)
     return ax
 
 
@@ -84,10 +83,7 @@ def _fill(ax: Axes, found: Landscape, norm: Normalize, label: str) -> None:
         interpolation="nearest", zorder=1.5, **look,
     )  # fmt: skip
     ax.set(xlim=limits[0], ylim=limits[1])
-    beside = make_axes_locatable(ax).append_axes("right", size=0.08, pad=0.06)
-    bar = ax.figure.colorbar(ScalarMappable(norm, look["cmap"]), cax=beside)
-    bar.outline.set_linewidth(style.HAIRLINE)
-    bar.set_label(label)
+    style.colour_bar(ax, ScalarMappable(norm, look["cmap"]), label)
 
 
 def _draw_barriers(ax: Axes, found: Landscape) -> list[Line2D]:

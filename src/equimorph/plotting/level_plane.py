@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.patheffects import AbstractPathEffect, withStroke
 
 from equimorph.argument_checks import check_arguments
 from equimorph.manifold import EquilibriumSet, Level, level_set
@@ -28,7 +27,7 @@ _STABLE: dict[str, Any] = {"color": style.INK, "linewidth": 0.8}
 _UNSTABLE: dict[str, Any] = {"color": style.INK, "linewidth": 0.6, "linestyle": (0, (3, 2))}
 _BOUNDARY: dict[str, Any] = {"color": style.INK, "linewidth": 1.8}
 _ROUTE: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.6}
-_RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.4, foreground="white")]
+_RIM = style.rim(2.4)
 _ROUTE_POINTS = 240
 """States at which a route is drawn."""
 _HEIGHT, _MARGINS, _LEGEND = 2.6, (0.52, 0.4, 0.12, 0.08), 0.37

@@ -12,10 +12,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
-from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.argument_checks import check_arguments
 from equimorph.model.descriptor import CONSTRAINT
@@ -38,8 +36,6 @@ _FRAME_HEIGHT = 2.3
 """Inches of the frame."""
 _LEFT, _BOTTOM, _RIGHT, _TOP = 0.5, 0.4, 0.5, 0.08
 """Inches around the frame."""
-_LEGEND_COLUMNS, _LEGEND_ROW, _LEGEND_GAP = 2, 0.15, 0.06
-"""Columns of the legend; inches of one of its rows, and of the gap above it."""
 _MARGIN = 0.06
 """Room beyond the settings that have a natural state, as a share of their range."""
 
@@ -61,7 +57,7 @@ _MARK: dict[str, Any] = {
     "linewidth": 0.0,
     "alpha": 0.55,
 }
-_RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.2, foreground="white")]
+_RIM = style.rim(2.2)
 
 
 @dataclass(frozen=True)
@@ -138,7 +134,7 @@ def draw_map(amap: ActuatorMap, panel: Panel, ax: Axes | None) -> Axes:
                 entries.append(Patch(label=mark.label, **_MARK, hatch=mark.hatch))
         if not np.isfinite(amap.value).all():
             entries.append(Patch(label=panel.ground_label, **GROUND))
-        write_legend(ax, entries, room=own)
+        style.legend_below(ax, entries, room=own)
     return ax
 
 
@@ -200,10 +196,7 @@ def _fill(ax: Axes, amap: ActuatorMap, panel: Panel, found: Faces) -> None:
         )  # fmt: skip
         drawn = [curve.points for curve in amap.curves if curve.kind in panel.looks]
         label_contours(ax, lines, np.concatenate([np.empty((0, 2)), *drawn]))
-    beside = make_axes_locatable(ax).append_axes("right", size=0.08, pad=0.06)
-    bar = ax.figure.colorbar(ScalarMappable(norm, look["cmap"]), cax=beside)
-    bar.outline.set_linewidth(style.HAIRLINE)
-    bar.set_label(panel.bar)
+    style.colour_bar(ax, ScalarMappable(norm, look["cmap"]), panel.bar)
 
 
 def _mark(
@@ -234,19 +227,6 @@ def _draw_curves(ax: Axes, amap: ActuatorMap, panel: Panel) -> list[Line2D]:
         if look.label:
             kinds[curve.kind] = line
     return [kinds[kind] for kind in panel.looks if kind in kinds]
-
-
-def write_legend(ax: Axes, entries: list[Line2D | Patch], *, room: bool) -> None:
-    """Legend below the frame; with `room`, the figure grows by its height."""
-    if not entries:
-        return
-    if room:
-        style.grow_below(ax, _LEGEND_GAP + -(-len(entries) // _LEGEND_COLUMNS) * _LEGEND_ROW)
-    below = -(_BOTTOM + 0.5 * _LEGEND_GAP) / _FRAME_HEIGHT
-    ax.legend(
-        handles=entries, loc="upper center", bbox_to_anchor=(0.5, below), ncols=_LEGEND_COLUMNS,
-        borderaxespad=0.0, borderpad=0.0,
-    )  # fmt: skip
 
 
 _DASHED, _CHAIN, _DOTTED = (0, (6, 1.5)), (0, (4, 1.5, 1, 1.5)), (0, (1, 1.2))

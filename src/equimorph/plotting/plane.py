@@ -5,10 +5,8 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import AbstractPathEffect, withStroke
 
 from equimorph.argument_checks import check_arguments
 from equimorph.charts.regions import count_regions
@@ -63,8 +61,6 @@ _FRAME_HEIGHT = 2.16
 """Inches of the frame."""
 _LEFT, _BOTTOM, _RIGHT, _TOP = 0.58, 0.4, 0.4, 0.08
 """Inches around the frame."""
-_LEGEND_COLUMNS, _LEGEND_ROW, _LEGEND_GAP = 2, 0.15, 0.06
-"""Columns of the legend; inches of one of its rows, and of the gap above it."""
 _LONG_LEG, _BETWEEN = 0.12, 0.6
 """Length, as a share of the picture, from which on a leg gets arrow heads, and length between two
 of them."""
@@ -135,24 +131,8 @@ def parameter_plane(
         what = "equilibria" if count == "all" else "stable equilibria"
         count_bar(ax, largest, counted(what, eset.constraints))
         entries = [*lines, *hatched[:1]]
-        if entries:
-            legend_below(ax, entries, room=own)
+        style.legend_below(ax, entries, room=own)
     return ax
-
-
-def legend_below(ax: Axes, lines: Sequence[Artist], *, room: bool) -> None:
-    """Legend below the frame, after the entries that are there; with `room`, the figure grows."""
-    legend = ax.get_legend()
-    known = [] if legend is None else [each for each in legend.legend_handles if each is not None]
-    entries = [*known, *lines]
-    if room:
-        rows, before = (-(-len(each) // _LEGEND_COLUMNS) for each in (entries, known))
-        style.grow_below(ax, (0.0 if known else _LEGEND_GAP) + (rows - before) * _LEGEND_ROW)
-    below = -(_BOTTOM + 0.5 * _LEGEND_GAP) / _FRAME_HEIGHT
-    ax.legend(
-        handles=entries, loc="upper center", bbox_to_anchor=(0.54, below), ncols=_LEGEND_COLUMNS,
-        borderaxespad=0.0, borderpad=0.0,
-    )  # fmt: skip
 
 
 def check_two_parameters(eset: EquilibriumSet) -> None:
@@ -232,13 +212,12 @@ def draw_track(ax: Axes, eset: EquilibriumSet, route: Route, path: Path) -> Line
     """
     places = track(eset, path.states)
     (line,) = ax.plot(*places.T, **_ROUTE, label="route")
-    rim: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]
-    line.set_path_effects(rim)
+    line.set_path_effects(style.rim(3.0))
     if route.status != "arrived":
         line.set_label(f"route, refused (× {path.end.kind})")
         ax.plot(*way_points_of(eset, route).T, **_ROUTE | {"linewidth": 0.9, "linestyle": ":"})
         (cross,) = ax.plot(*places[-1:].T, "x", color=style.ROUTE_COLOUR, ms=6, mew=1.6, zorder=8)
-        cross.set_path_effects(rim)
+        cross.set_path_effects(style.rim(3.0))
     return line
 
 

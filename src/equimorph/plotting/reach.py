@@ -9,9 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path as Outline
-from matplotlib.patheffects import AbstractPathEffect, withStroke
 
 from equimorph.argument_checks import check_arguments
 from equimorph.charts.regions import count_regions
@@ -33,9 +30,7 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "open": {"color": style.FAINT, "linewidth": 0.8, "linestyle": (0, (1, 3))},
 }
 _MOTION: dict[str, Any] = {"color": style.ROUTE_COLOUR, "linewidth": 1.4, "zorder": 6}
-_RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.6, foreground="white")]
-_COLUMNS, _LINE = 2, 0.16
-"""Columns of the legend, and inches of one of its rows."""
+_RIM = style.rim(2.6)
 _VISIBLE = 2e-3
 """Area that is covered several times, as a share of the image, below which it is a trace of
 chords."""
@@ -83,8 +78,7 @@ def reach_plane(
         last = max((k for k, area in areas.items() if area > _VISIBLE * whole), default=0)
         shades = style.count_shades(last + 2)
         for level, shade in zip(levels.levels[:last], shades[1:], strict=False):
-            outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in level))
-            ax.add_patch(PathPatch(outline, facecolor=shade, edgecolor="none", zorder=1))
+            ax.add_patch(style.area(level, facecolor=shade, edgecolor="none", zorder=1))
         _boundary(ax, reach, [piece.values for piece in reach.boundary])
         start = np.array([each(reach.start) for each in reach.descriptors])
         _motion(ax, start, None if motion is None else _values(motion))
@@ -98,7 +92,7 @@ def reach_plane(
             ax.autoscale_view()
             number_way_points(ax, np.array(targets, dtype=float))
         if own:
-            _legend(ax, reach)
+            style.legend_below(ax, _entries(reach), room=True)
     return ax
 
 
@@ -144,7 +138,7 @@ def reach_parameters(reach: Reach, motion: Tracking | None = None, ax: Axes | No
         if motion is not None and track is not None:
             number_way_points(ax, _corners(motion, track))
         if own:
-            _legend(ax, reach)
+            style.legend_below(ax, _entries(reach), room=True)
     return ax
 
 
@@ -184,8 +178,7 @@ def reach_panels(reach: Reach, motion: Tracking) -> Figure:
         reach_parameters(reach, motion, plane)
         numbered_shapes(shapes, motion.states[np.array(_steps(motion))])
         shapes.set_anchor("C")
-        for letter, ax in zip("acd", (image, plane, shapes), strict=True):
-            ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
+        style.letter_panels("acd", (image, plane, shapes))
         figure.text(0.515, 0.968, "(b)", weight="bold", size=8)
         entries = _entries(reach)
         entries.append(Line2D([], [], label="motion", **_MOTION))
@@ -217,18 +210,6 @@ def _entries(reach: Reach) -> list[Line2D]:
     """Lines for a legend of the kinds of the boundary."""
     kinds = {piece.kind for piece in reach.boundary}
     return [Line2D([], [], label=kind, **_LOOKS[kind]) for kind in _LOOKS if kind in kinds]
-
-
-def _legend(ax: Axes, reach: Reach) -> None:
-    """Kinds of the boundary, below the frame of a new figure."""
-    entries = _entries(reach)
-    rows = -(-len(entries) // _COLUMNS)
-    height = 0.9 * style.SINGLE_COLUMN - 0.5
-    style.grow_below(ax, rows * _LINE)
-    ax.legend(
-        handles=entries, loc="upper center", bbox_to_anchor=(0.45, -0.4 / height), ncols=_COLUMNS,
-        borderaxespad=0.0, borderpad=0.0,
-    )  # fmt: skip
 
 
 def _motion(ax: Axes, start: Float[np.ndarray, " 2"], line: Line | None) -> None:

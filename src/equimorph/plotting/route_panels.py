@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
-from matplotlib.patheffects import withStroke
 
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
@@ -17,7 +16,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.curves import corner_steps, track
-from equimorph.plotting.plane import legend_below, parameter_plane
+from equimorph.plotting.plane import parameter_plane
 from equimorph.plotting.shapes import number_in_space, numbered_shapes
 from equimorph.plotting.surface import ASPECT, surface
 from equimorph.tasks.route import Route
@@ -81,8 +80,7 @@ def route_panels(
         corners = np.column_stack([track(eset, states), height_descriptor(states)])
         number_in_space(solid, corners)
         numbered_shapes(shapes, states)
-        for letter, ax in (("b", plane), ("c", shapes)):
-            ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
+        style.letter_panels("bc", (plane, shapes))
         figure.text(0.012, 0.962, "(a)", weight="bold", size=8)
         figure.legend(
             handles=list(entries.values()), loc="lower center", ncols=4, bbox_to_anchor=(0.5, 0.0)
@@ -144,9 +142,9 @@ def alternative_routes(
             look = {"color": shade, "linestyle": _DASHES[(number - 1) % len(_DASHES)]}
             label = f"{number}: length {route.length:.3g}"
             (line,) = ax.plot(*places.T, **look, linewidth=1.7, zorder=6, label=label)
-            line.set_path_effects([withStroke(linewidth=3.0, foreground="white")])
+            line.set_path_effects(style.rim(3.0))
             lines.append(line)
         for at, face in ((0, "white"), (-1, style.ROUTE_COLOUR)):
             ax.plot(*places[at : at + 1 or None].T, "o", mfc=face, **_ENDS)
-        legend_below(ax, lines, room=own)
+        style.legend_below(ax, lines, room=own)
     return ax

@@ -73,8 +73,7 @@ def snap_panels(graph: SnapGraph, descriptor: Descriptor | None = None) -> Figur
         entries = _draw_plane(plane, graph, shades) + _entries(graph)
         _draw_along(along, graph, descriptor or eset.structure.elevation, shades)
         figure.colorbar(shades, cax=bar, label=f"energy released{_unit(graph)}")
-        for letter, ax in zip("ab", (plane, along), strict=True):
-            ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
+        style.letter_panels("ab", (plane, along))
         figure.legend(handles=entries, loc="lower center", ncols=6, bbox_to_anchor=(0.5, 0.0))
     return figure
 

@@ -14,12 +14,17 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from jaxtyping import Float
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.argument_checks import check_arguments
 
@@ -32,13 +37,29 @@ RESOLUTION = 200
 
 INK = "#1a1a1a"
 FAINT = "#8c8c8c"
+_LABELS, _LEGEND_ROW, _LEGEND_GAP = 0.4, 0.15, 0.06
+"""Inches of the labels below a frame, of a row of the legend below them, and of the gap between."""
 HAIRLINE = 0.5
 """Width of axes and ticks, in typographic points."""
 ROUTE_COLOUR = "#d1004b"
 LIMIT_LINE: dict[str, Any] = {"color": INK, "linewidth": 1.2, "linestyle": (0, (2.4, 1.0))}
 """Bounds that a set was not cut at: wider than its edges, longer dashes than hidden folds."""
 
-RIM: list[AbstractPathEffect] = [withStroke(linewidth=2.0, foreground="white")]
+
+def rim(width: float, colour: Any = "white") -> list[AbstractPathEffect]:
+    """Return the effect that sets off a line or letters from what lies below, by default in white.
+
+    Parameters
+    ----------
+    width
+        Of the line with its rim, in typographic points.
+    colour
+        Of the rim.
+    """
+    return [withStroke(linewidth=width, foreground=colour)]
+
+
+RIM = rim(2.0)
 """White around letters that lie on lines."""
 
 # Lightness (CIE L*) 38, 67, 86, 94: four greys that are distinct in print.
@@ -125,6 +146,60 @@ def grow_below(ax: Axes, inches: float) -> None:
     figure.set_size_inches(width, taller)
     left, bottom, across, up = frame.bounds
     ax.set_position((left, (bottom * height + inches) / taller, across, up * height / taller))
+
+
+def legend_below(ax: Axes, entries: Sequence[Artist], *, room: bool, columns: int = 2) -> None:
+    """Legend below the labels of a frame, after the entries that are there.
+
+    Parameters
+    ----------
+    ax
+        The frame.
+    entries
+        What to add; nothing happens without any.
+    room
+        Whether the figure grows by the height of the legend.
+    columns
+        How many entries stand side by side.
+    """
+    legend = ax.get_legend()
+    known = [] if legend is None else [each for each in legend.legend_handles if each is not None]
+    handles = [*known, *entries]
+    if not handles:
+        return
+    if room:
+        rows, before = (-(-len(each) // columns) for each in (handles, known))
+        grow_below(ax, (0.0 if known else _LEGEND_GAP) + (rows - before) * _LEGEND_ROW)
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    frame = ax.get_position(original=True).height * figure.get_size_inches()[1]
+    ax.legend(
+        handles=handles, loc="upper center", ncols=columns, borderaxespad=0.0, borderpad=0.0,
+        bbox_to_anchor=(0.5, -(_LABELS + 0.5 * _LEGEND_GAP) / frame),
+    )  # fmt: skip
+
+
+def colour_bar(ax: Axes, shades: ScalarMappable, label: str) -> Any:
+    """Scale of the colours at the right of a frame; returns the bar, for its ticks."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    beside = make_axes_locatable(ax).append_axes("right", size=0.08, pad=0.06)
+    bar = figure.colorbar(shades, cax=beside)
+    bar.outline.set_linewidth(HAIRLINE)
+    bar.set_label(label)
+    return bar
+
+
+def area(loops: Sequence[Float[np.ndarray, "_ 2"]], **look: Any) -> PathPatch:
+    """Area inside closed lines, and outside those that lie within others."""
+    outline = Outline.make_compound_path(*(Outline(loop, closed=True) for loop in loops))
+    return PathPatch(outline, **look)
+
+
+def letter_panels(letters: str, panels: Sequence[Axes]) -> None:
+    """Write bold letters in brackets above the left corners of panels."""
+    for letter, ax in zip(letters, panels, strict=True):
+        ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
 
 
 def attach_canvas(figure: Figure) -> Figure:

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.patheffects import AbstractPathEffect, withStroke
 from mpl_toolkits.mplot3d import Axes3D, proj3d
 
 from equimorph.argument_checks import check_arguments
@@ -68,7 +67,7 @@ _HIDDEN_FOLD: dict[str, Any] = {
     "linestyle": (0, (3, 2)),
     "alpha": 0.45,
 }
-_RIM: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]
+_RIM = style.rim(3.0)
 _ROUTE: dict[str, Any] = {
     "color": style.ROUTE_COLOUR,
     "linewidth": 1.6,
@@ -255,8 +254,7 @@ def _route_entry(status: str, path: Path) -> Line2D:
 
 def _draw_ends(ax: Axes3D, places: Points) -> None:
     """Draw a ring at the start of a route and a dot at its end."""
-    rim: list[AbstractPathEffect] = [withStroke(linewidth=2.8, foreground="white")]
     colour = style.ROUTE_COLOUR
     for end, fill in ((places[0], "white"), (places[-1], colour)):
         (mark,) = ax.plot(*end[:, None], "o", color=colour, ms=4.5, mfc=fill, zorder=6)
-        mark.set_path_effects(rim)
+        mark.set_path_effects(style.rim(2.8))

@@ -5,6 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import InputError
+from sets import arch_set
 from typecheck import unchecked
 
 K_S = (1.0 - 0.80 / np.cos(0.62)) * np.sin(0.62)
@@ -20,16 +21,7 @@ def level_set_of_spring():
 @pytest.fixture(scope="module")
 def left_half():
     """The arch under a load on its left half."""
-    arch = em.Rod("left-half")
-    with unchecked():
-        return em.equilibrium_set(
-            arch,
-            em.Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[arch.max_curvature <= 20],
-            intervals=(12, 21),
-            checks=0,
-        )
+    return arch_set(load="left-half")
 
 
 def test_flattest_spring_on_its_level_ends_on_the_stability_boundary(level_set_of_spring):

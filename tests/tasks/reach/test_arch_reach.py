@@ -6,28 +6,19 @@ Symmetric under y(1/3) ↔ y(2/3), which Δ → −Δ brings about; actuators wi
 import numpy as np
 import pytest
 
-from equimorph.manifold import equilibrium_set
-from equimorph.model import Box
-from equimorph.structures import Rod
 from equimorph.tasks.motion.tracking import track
 from equimorph.tasks.reach.query import jacobian_of
 from equimorph.tasks.reach.reachable_sets import reachable
+from sets import arch_set
 from typecheck import unchecked
 
 
 @pytest.fixture(scope="module")
 def reach():
-    arch = Rod()
+    eset = arch_set((24, 41), cap=60.0)
+    arch = eset.structure
     left, right = arch.height(1 / 3), arch.height(2 / 3)
     with unchecked():
-        eset = equilibrium_set(
-            arch,
-            Box(Theta=(0.2, 2.5), Delta=(-2, 2)),
-            fixed={"q": 2.5},
-            within=[arch.max_curvature <= 60],
-            intervals=(24, 41),
-            checks=0,
-        )
         up = max(eset.at(Theta=1, Delta=0).stable, key=arch.height(0.5))
         middle = track(up, {left: 0.15, right: 0.15}, actuators=["Theta", "Delta"])
         return reachable(eset, middle.path.end.state, [left, right])
