@@ -52,7 +52,7 @@ class Output:
         if self.quiet:
             yield Silent()
         elif self.verbose:
-            with _logged():
+            with _show_log():
                 yield LoggedProgress()
         else:
             with ScreenProgress() as bars:
@@ -60,7 +60,7 @@ class Output:
 
 
 @contextmanager
-def _logged() -> Generator[None]:
+def _show_log() -> Generator[None]:
     """Show the logs of the package on stderr while a block lasts."""
     log, handler = logging.getLogger(PACKAGE), logging.StreamHandler()
     handler.setFormatter(logging.Formatter(FORM))

@@ -105,7 +105,7 @@ def count_bar(ax: Axes, largest: int, what: str) -> None:
     bar.ax.tick_params(length=0)
 
 
-def counted(what: str, constraints: Sequence[Constraint]) -> str:
+def label_of_counts(what: str, constraints: Sequence[Constraint]) -> str:
     """What the colours count; the set has no states beyond its constraints."""
     if len(constraints) != 1:
         return f"number of {what}" + (" of the set" if constraints else "")

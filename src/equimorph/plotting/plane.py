@@ -15,7 +15,13 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, divided_by
 from equimorph.model import Constraint
 from equimorph.plotting import style
-from equimorph.plotting.counts import count_bar, counted, hatch_cut, shade_regions, write_counts
+from equimorph.plotting.counts import (
+    count_bar,
+    hatch_cut,
+    label_of_counts,
+    shade_regions,
+    write_counts,
+)
 from equimorph.plotting.curves import (
     boundary_pieces,
     crossing_pieces,
@@ -129,7 +135,7 @@ def parameter_plane(
             )
         write_counts(ax, regions, largest, covered, hatched)
         what = "equilibria" if count == "all" else "stable equilibria"
-        count_bar(ax, largest, counted(what, eset.constraints))
+        count_bar(ax, largest, label_of_counts(what, eset.constraints))
         entries = [*lines, *hatched[:1]]
         style.legend_below(ax, entries, room=own)
     return ax

@@ -81,7 +81,7 @@ def trajectory_message(
     """
     schedule.at(0.0)  # refuses a schedule without times
     unit = _seconds(schedule, seconds)
-    named = _named(schedule) if joints is None else dict(joints)
+    named = _moving_actuators(schedule) if joints is None else dict(joints)
     columns = [_column(schedule, name) for name in named]
     factors = np.array([_factor(schedule.names[k], schedule.units[k]) for k in columns])
     given = (schedule.values, schedule.velocities, schedule.accelerations)
@@ -122,7 +122,7 @@ def _column(schedule: Schedule, name: str) -> int:
     return schedule.names.index(name)
 
 
-def _named(schedule: Schedule) -> dict[str, str]:
+def _moving_actuators(schedule: Schedule) -> dict[str, str]:
     """Actuators that move, under their own names."""
     roles = dict(zip(schedule.names, schedule.roles, strict=True))
     return {name: name for name in schedule.moving if roles[name] == "actuator"}

@@ -38,7 +38,7 @@ from equimorph.structures.rod import (
 from equimorph.structures.space_frame import SpatialFrame, SpatialMember
 from equimorph.structures.spatial import SpatialEnd, SpatialRod
 from equimorph.structures.spring import Spring
-from equimorph.structures.states import SpaceStability, State, States, natural_state
+from equimorph.structures.states import SpaceStability, State, States, join_states, natural_state
 from equimorph.structures.truss import Bar, Truss
 
 KINDS: dict[str, Callable[..., Structure]] = {
@@ -89,6 +89,7 @@ __all__ = [
     "distance_to",
     "effort_of",
     "from_identity",
+    "join_states",
     "margin_of",
     "natural_state",
     "outside",

@@ -1,10 +1,10 @@
 """Equilibrium states: a single one, and batches of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, Protocol, overload
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -188,6 +188,34 @@ class States:
     def drawing(self) -> Drawing:
         """Supports, loads and actuators to draw around the shapes."""
         return self.structure.drawing(self.z, self.p)
+
+
+class Points(Protocol):
+    """What has unknowns and parameters: states, one or several, and points of other records."""
+
+    @property
+    def z(self) -> Float[np.ndarray, "..."]:
+        """Unknowns and multipliers."""
+
+    @property
+    def p(self) -> Float[np.ndarray, "..."]:
+        """Parameters."""
+
+
+def join_states(structure: Structure, parts: Iterable[Points]) -> States:
+    """States of several batches, and single ones, one after the other.
+
+    Parameters
+    ----------
+    structure
+        To which all belong.
+    parts
+        Any number of them, also none.
+    """
+    given = list(parts)
+    z = [np.zeros((0, structure.size)), *(np.atleast_2d(each.z) for each in given)]
+    p = [np.zeros((0, len(structure.parameters))), *(np.atleast_2d(each.p) for each in given)]
+    return States(structure, np.concatenate(z), np.concatenate(p))
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,7 +52,7 @@ def place_of(values: State | Mapping[str, float], names: Sequence[str]) -> str:
     return ", ".join(f"{name} = {html.number(round(values[name], 12), 6)}" for name in names)
 
 
-def counted(number: int, noun: str) -> str:
+def count_of(number: int, noun: str) -> str:
     """Return a number with its noun: ``1 run``, ``2 runs``."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
@@ -101,7 +101,7 @@ def snaps_in_words(route: Route) -> str:
     count = len(route.snaps)
     released = html.number(sum(each.released for each in route.snaps))
     verb = "releases" if count == 1 else "release"
-    return f"by {counted(count, 'snap')} that {verb} {released} of energy"
+    return f"by {count_of(count, 'snap')} that {verb} {released} of energy"
 
 
 def table_of_snaps(route: Route) -> list[str]:

@@ -64,11 +64,11 @@ def extent_of_set(structure: Structure, wanted: Any) -> Extent:
     with at_key("set.box"):
         box = Box(**{name: (bounds[0], bounds[1]) for name, bounds in wanted.box.items()})
     for name, corner in zip(box.names * 2, [*box.lower, *box.upper], strict=True):
-        with findings.collected(), at_key("set.box"):
+        with findings.collect(), at_key("set.box"):
             check_value(structure, name, corner)
-    with findings.collected():
+    with findings.collect():
         _check_fixed(structure, box, wanted.fixed)
-    with findings.collected():
+    with findings.collect():
         constraints = _bounds(structure, wanted.within)
     findings.refuse()
     options = {each.name: getattr(wanted, each.key) for each in OPTIONS}

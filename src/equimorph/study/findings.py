@@ -28,7 +28,7 @@ class Findings:
         self._lines: list[str] = []
 
     @contextmanager
-    def collected(self) -> Generator[None]:
+    def collect(self) -> Generator[None]:
         """Keep the lines of an `InputError` that the block raises, and end the block there."""
         try:
             yield

@@ -120,19 +120,19 @@ def prepare(study: Study, places: Mapping[str, Sequence[int]] | None = None) -> 
     section = study.equilibrium_set
     ground = Ground(structure, None if section is None else extent_of_set(structure, section))
     findings = Findings()
-    for key, point in _numbered("equilibria", study.equilibria, places):
-        with findings.collected():
+    for key, point in _number_entries("equilibria", study.equilibria, places):
+        with findings.collect():
             check_point(ground.box, point.at, f"{key}.at")
     questions = []
     for kind in KINDS:
-        for key, section in _numbered(kind.table, study.tasks[kind.table], places):
-            with findings.collected():
+        for key, section in _number_entries(kind.table, study.tasks[kind.table], places):
+            with findings.collect():
                 questions.append(kind.look_up(ground, section, key))
     findings.refuse()
     return Problem(ground, tuple(point.at for point in study.equilibria), tuple(questions))
 
 
-def _numbered(
+def _number_entries(
     table: str, sections: Sequence[Any], places: Mapping[str, Sequence[int]] | None
 ) -> list[tuple[str, Any]]:
     """Pair entries of a list of tables with their keys for messages."""

@@ -251,7 +251,7 @@ class Kind(ABC, Generic[A]):
         """Look up all names of a section; `InputError` names the key of what does not fit."""
         findings, values = Findings(), dict[str, Any]()
         for each in self.arguments:
-            with findings.collected():
+            with findings.collect():
                 values[each.name] = each.look_up(ground, section, key)
         findings.refuse()
         question = Question(self, key, section, ground, values)

@@ -19,7 +19,7 @@ from equimorph.model import parameter_vector
 from equimorph.storage.files import number_text
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study import html
-from equimorph.study.answers import counted
+from equimorph.study.answers import count_of
 from equimorph.study.data_files import DataFile, Measured, measured_shapes
 from equimorph.study.fields import Point, Positive
 from equimorph.study.lookup import at_key
@@ -129,7 +129,7 @@ class CalibrationKind(Kind[Calibration]):
             f"{name} = {html.number(x, 6)} ± {html.number(error, 2)}" for name, x, error in triples
         )
         data: Data = question.extra
-        states = counted(len(data.measured.parameters), "measured state")
+        states = count_of(len(data.measured.parameters), "measured state")
         return (
             f"**fitted** to {data.measured.count} coordinates of {states} "
             f"({question.section.data.file}): {values}. {_scatter(data, answer)}"

@@ -13,7 +13,7 @@ from equimorph import plotting
 from equimorph.charts import Atlas, Chart, DescriptorChart, Projection, Reduction, dissect, reduce
 from equimorph.manifold import EquilibriumSet, part
 from equimorph.study import html
-from equimorph.study.answers import counted
+from equimorph.study.answers import count_of
 from equimorph.study.fields import requirement
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
 
@@ -76,7 +76,7 @@ class ChartKind(Kind[Chart | Atlas]):
         if isinstance(answer, Atlas):
             kinds = Counter(each.kind for each in answer.transitions)
             joined = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(kinds.items()))
-            charts = counted(len(answer), "chart")
+            charts = count_of(len(answer), "chart")
             return f"{charts} over {names}; transitions: {joined or 'none'}."
         if answer.single_valued:
             return f"({names}) are coordinates: one state over each point."
@@ -108,7 +108,7 @@ class ReductionKind(Kind[Reduction]):
 
     def words(self, question: Question, answer: Reduction) -> str:
         """How many barriers and gaps there are."""
-        count = counted(len(answer.barriers), "barrier") if answer.barriers else "no barriers"
+        count = count_of(len(answer.barriers), "barrier") if answer.barriers else "no barriers"
         size = answer.gaps.size
         gaps = f"gaps of size {html.number(size)}" if size > 0.0 else "no gaps"
         lost = f" {answer.lost} edges end where no end was found." if answer.lost else ""

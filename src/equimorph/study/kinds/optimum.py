@@ -6,7 +6,7 @@ import numpy as np
 
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Schedule
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 from equimorph.study import html
 from equimorph.study.answers import figures_of_states, free_columns, place_of, table_of_states
 from equimorph.study.question import Figure, Kind, Question
@@ -83,9 +83,7 @@ def _both_optima(answer: RobustOptimum) -> States:
     """The nominal and the robust optimum."""
     assert answer.nominal is not None
     assert answer.state is not None
-    both = (answer.nominal.state, answer.state)
-    z, p = (np.stack([getattr(each, name) for each in both]) for name in "zp")
-    return States(answer.state.structure, z, p)
+    return join_states(answer.state.structure, (answer.nominal.state, answer.state))
 
 
 def _value(value: float) -> str:

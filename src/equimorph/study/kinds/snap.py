@@ -11,9 +11,9 @@ from pydantic import Field
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
 from equimorph.model import Descriptor
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 from equimorph.study import html
-from equimorph.study.answers import counted, figures_of_states, table_of_states
+from equimorph.study.answers import count_of, figures_of_states, table_of_states
 from equimorph.study.lookup import descriptor_at
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
 from equimorph.tasks.robustness.snaps import LeastSnap, least_snap
@@ -71,10 +71,8 @@ class SnapKind(Kind[tuple[State, LeastSnap]]):
 def _stations(answer: tuple[State, LeastSnap]) -> States:
     """State, fold and landing."""
     state, snap = answer
-    if snap.states is None:
-        return state.batch
-    z, p = (np.vstack([getattr(each, name) for each in (state, snap.states)]) for name in "zp")
-    return States(state.structure, z, p)
+    further = () if snap.states is None else (snap.states,)
+    return join_states(state.structure, (state, *further))
 
 
 class SnapGraphKind(Kind[Snaps]):
@@ -139,7 +137,7 @@ class SnapGraphKind(Kind[Snaps]):
             return "no stability boundary in the box: nothing snaps."
         most = max(snap.released[1] for snap in snaps)
         stable = "1 stable stratum" if len(strata) == 1 else f"{len(strata)} stable strata"
-        runs = f"{counted(len(snaps), 'run')} of the stability boundary"
+        runs = f"{count_of(len(snaps), 'run')} of the stability boundary"
         return f"{stable}, {runs}; a snap releases {most:.4g} at most."
 
     def details(self, question: Question, answer: Snaps) -> list[str]:

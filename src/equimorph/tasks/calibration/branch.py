@@ -70,7 +70,7 @@ class Branch:
         return self._misfit(self.unknowns.made(x), z, p)
 
     def _misfit(self, structure: Structure, z: Lanes, p: Parameters) -> Residuals:
-        predicted = [each.predicted(structure, z, p) for each in self.measurements]
+        predicted = [each.predict(structure, z, p) for each in self.measurements]
         return self._at_measurements(np.concatenate(predicted, axis=1) - self.measured)
 
     def jacobian(self, x: Vector) -> Jacobian:
@@ -112,7 +112,7 @@ class Branch:
         z, p = self.z, self.p
 
         def predicted(made: Structure, at: Lanes) -> Columns:
-            return np.concatenate([each.predicted(made, at, p) for each in self.measurements], 1)
+            return np.concatenate([each.predict(made, at, p) for each in self.measurements], 1)
 
         if k in self.unknowns.data.values():
             return by_data(predicted, self._structures_near(k), abs(self.x[k]), z, moves)

@@ -38,7 +38,7 @@ class Measurement(Protocol):
     def table(self, start: States) -> Readings:
         """Measured numbers and standard deviations; `InputError` if they do not fit the states."""
 
-    def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
+    def predict(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
         """Return what a measurement without errors would give."""
 
 
@@ -68,7 +68,7 @@ class MeasuredValues:
         values = _fitting(name, np.atleast_1d(self.values), (len(start),)).reshape(shape)
         return Readings(values, _deviations(self.sigma, shape, 1))
 
-    def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
+    def predict(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
         """Return the values of the descriptor, or of its namesake on another structure."""
         own = self.descriptor
         if own.origin != structure.signature:
@@ -103,7 +103,7 @@ class MeasuredShape:
         points = _fitting("points of the shape", np.asarray(self.points), drawn)
         return Readings(points.reshape(len(start), -1), _deviations(self.sigma, drawn, 3))
 
-    def predicted(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
+    def predict(self, structure: Structure, z: Lanes, p: Parameters) -> Columns:
         """Return the coordinates of the points."""
         return structure.shape(z, p, self._places).reshape(len(z), -1)
 
@@ -125,7 +125,7 @@ def derivative(
     length = np.sqrt(squared + ((dp / structure.scales) ** 2).sum(axis=1))
     h = (STEP / np.maximum(length, 1e-300))[:, None]
     total = sum(
-        weight * measurement.predicted(structure, z + steps * h * dz, p + steps * h * dp)
+        weight * measurement.predict(structure, z + steps * h * dz, p + steps * h * dp)
         for steps, weight in WEIGHTS
     )
     return np.asarray(total / h)

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 from equimorph.equilibria import Event, EventKind
 from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint
-from equimorph.structures import State, States
+from equimorph.structures import State, join_states
 from equimorph.tasks.motion.blocks import Stretch
 from equimorph.tasks.motion.course import (
     Course,
@@ -98,8 +98,8 @@ def follow_redundant(
 
 
 def _join_track(course: Course, track: list[_Here]) -> Stretch:
-    z, p = (np.concatenate([getattr(here, name) for here in track]) for name in "zp")
-    return Stretch(States(course.structure, z, p), np.array([here.time for here in track]))
+    states = join_states(course.structure, track)
+    return Stretch(states, np.array([here.time for here in track]))
 
 
 def _velocity(
@@ -221,17 +221,13 @@ def _end(course: Course, track: list[_Here], why: str, limits: Limits) -> Event:
     if why not in ("error", "long", "unstable"):
         return Event(EventKind.CONSTRAINT, state, here.time, None, why)
     middle = track[len(track) // 2 if len(track) > 2 else 0]
-    margins = States(course.structure, *_pair(here, track[0], middle)).margin
+    margins = join_states(course.structure, (here, track[0], middle)).margin
     if margins[0] <= SOFT * margins.max():
         return Event(EventKind.CRITICAL, state, here.time)
     sizes = [_singular(course, each) for each in (here, track[0], middle)]
     if sizes[0] <= FAINT * max(sizes) or sizes[0] <= SOFT**0.5 * max(sizes):
         return Event(EventKind.FOLD, state, here.time)
     return Event(EventKind.LOST, state, here.time, None, "the step became too small")
-
-
-def _pair(*some: _Here) -> tuple[np.ndarray, np.ndarray]:
-    return np.concatenate([each.z for each in some]), np.concatenate([each.p for each in some])
 
 
 def _singular(course: Course, here: _Here) -> float:

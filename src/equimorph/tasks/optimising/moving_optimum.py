@@ -13,7 +13,7 @@ from equimorph.errors import InputError
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint, Descriptor
-from equimorph.structures import State, States
+from equimorph.structures import State, join_states
 from equimorph.tasks.motion.blocks import stable_path
 from equimorph.tasks.motion.course import Course, actuator_bounds
 from equimorph.tasks.optimising.certificates import Certificate, certificate
@@ -360,15 +360,12 @@ def _jump(here: _Found, after: _Found | None) -> Jump:
 
 def _result(track: _Track, why: str, start: State) -> FollowedOptimum:
     problem, optima = track.problem, track.optima
-    structure = problem.course.structure
-    none = np.zeros((0, len(start.z))), np.zeros((0, len(start.p)))
-    z = np.concatenate([none[0], *(each.end.point.z for each in optima)])
-    p = np.concatenate([none[1], *(each.end.point.p for each in optima)])
+    states = join_states(problem.course.structure, [each.end.point for each in optima])
     values = [
         float(each.programme.objective.descriptor.function(each.end.point.z, each.end.point.p)[0])
         for each in optima
     ]
-    states, times = States(structure, z, p), np.array([each.time for each in optima])
+    times = np.array([each.time for each in optima])
     found = FollowedOptimum(
         "refused" if why else "arrived",
         why,

@@ -13,7 +13,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import Constraint, Descriptor, Schedule
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.feasible_starts import (
@@ -220,8 +220,8 @@ def optimise(  # the knobs of the public face, all by keyword
         found = [replace(found[number], route=route), *found[number + 1 :]]
     if not found:
         return _refusal(_nothing(within, least), sense, eset)
-    z, p = (np.array([getattr(each.state, key) for each in found]) for key in "zp")
-    return Optima("found", "", sense, tuple(found), States(eset.structure, z, p))
+    states = join_states(eset.structure, [each.state for each in found])
+    return Optima("found", "", sense, tuple(found), states)
 
 
 def _refusal(why: str, sense: Sense, eset: EquilibriumSet) -> Optima:

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.arrays import Values
 from equimorph.equilibria import Guards, settle
 from equimorph.model import Box
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 from equimorph.tasks.planning.network import Demands, connect
 from equimorph.tasks.planning.objectives import Places
 
@@ -153,11 +153,7 @@ def _move_every_other(
 
 def _interleave(first: Places, second: Places) -> Places:
     return Places(
-        States(
-            first.states.structure,
-            np.concatenate([first.states.z, second.states.z]),
-            np.concatenate([first.states.p, second.states.p]),
-        ),
+        join_states(first.states.structure, (first.states, second.states)),
         np.concatenate([first.efforts, second.efforts]),
         np.concatenate([first.nearness, second.nearness]),
     )

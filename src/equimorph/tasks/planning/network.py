@@ -16,7 +16,7 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint, eased
-from equimorph.structures import State, States, Structure
+from equimorph.structures import State, States, Structure, join_states
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
 from equimorph.tasks.stable_part import from_cache
@@ -274,11 +274,7 @@ def on_paths(pairs: Pairs, paths: list[Int[np.ndarray, " n"]]) -> Flags:
 
 def nodes_with_ends(eset: EquilibriumSet, ends: Ends) -> States:
     """Vertices of the set, start and goal."""
-    return States(
-        eset.structure,
-        np.concatenate([eset.points.z, *(end.z[None] for end in ends)]),
-        np.concatenate([eset.points.p, *(end.p[None] for end in ends)]),
-    )
+    return join_states(eset.structure, (eset.points, *ends))
 
 
 def end_links(eset: EquilibriumSet, ends: Ends, demands: Demands) -> tuple[Pairs, Values]:

@@ -19,8 +19,8 @@ from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.snap_routes import route_with_snaps
 from equimorph.tasks.planning.straightening import (
     check_ends,
-    directed,
-    ordered,
+    follow_direction,
+    order_ends,
     route_over_corners,
     straight_corners,
     verify_way_points,
@@ -132,9 +132,9 @@ def _with_reserves(
     """Route, the last one that was refused, or None where no path leads to the goal."""
     route = None
     for tightened in demands.with_reserves(min(end.margin for end in ends)):
-        path = cheapest_path(eset, ordered(ends), tightened)
+        path = cheapest_path(eset, order_ends(ends), tightened)
         if path is not None:
-            corners = directed(straight_corners(eset, path, tightened), ends)
+            corners = follow_direction(straight_corners(eset, path, tightened), ends)
             route = route_over_corners(eset, corners, demands, monitor)
             if route.arrived:
                 return route

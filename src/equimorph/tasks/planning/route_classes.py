@@ -26,8 +26,8 @@ from equimorph.tasks.planning.network import (
 from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.straightening import (
     check_ends,
-    directed,
-    ordered,
+    follow_direction,
+    order_ends,
     route_over_corners,
     straight_corners,
     violation,
@@ -96,10 +96,11 @@ def alternatives(
         return (refusal(why),)
     best, failed = list[Route](), list[Route]()
     for tightened in demands.with_reserves(min(end.margin for end in ends)):
-        paths = _Classes(eset, ordered(ends), tightened).paths(count)
+        paths = _Classes(eset, order_ends(ends), tightened).paths(count)
         corners = [straight_corners(eset, path, tightened, same_class=True) for path in paths]
         routes = [
-            route_over_corners(eset, directed(each, ends), demands, monitor) for each in corners
+            route_over_corners(eset, follow_direction(each, ends), demands, monitor)
+            for each in corners
         ]
         best = max(best, [route for route in routes if route.arrived], key=len)
         failed += routes

@@ -9,7 +9,7 @@ from equimorph.arrays import Flags, Parameters, Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet, Snap
 from equimorph.manifold.queries.nearest import Ground, SetPoints, points_at_vertices
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
 
 BEYOND = 5e-4
@@ -69,11 +69,11 @@ def cheapest_place(
     Among the vertices of the fold; over two parameters also between the neighbours of the best one,
     which are divided again and again. None if straight moves lead over none of them.
     """
-    places = _priced(eset, *_vertices(eset, snap, demands), (before, after), demands)
+    places = _price(eset, *_vertices(eset, snap, demands), (before, after), demands)
     for _ in range(ROUNDS if len(eset.names) == 2 else 0):
         if not np.isfinite(places.cost).any():
             return None
-        places = _priced(eset, *_between(eset, places, demands), (before, after), demands)
+        places = _price(eset, *_between(eset, places, demands), (before, after), demands)
     return places.best() if len(places.cost) else None
 
 
@@ -83,8 +83,8 @@ def _vertices(eset: EquilibriumSet, snap: Snap, demands: Demands) -> tuple[SetPo
     place = {vertex: k for k, vertex in enumerate(ordered.tolist())}
     known = np.array([place[vertex] for vertex in snap.vertices.tolist()])
     nearest = np.abs(np.arange(len(ordered))[:, None] - known).argmin(axis=1)
-    z, p = (np.stack([getattr(snap.landings[k].state, name) for k in nearest]) for name in "zp")
-    return _landed(points_at_vertices(eset, ordered), States(eset.structure, z, p), demands)
+    landings = join_states(eset.structure, [snap.landings[k].state for k in nearest])
+    return _land(points_at_vertices(eset, ordered), landings, demands)
 
 
 def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[SetPoints, States]:
@@ -104,10 +104,10 @@ def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[S
     ground = Ground(eset.setting, eset, fold=True)
     frames, _ = ground.frames(guess)
     exact, found = ground.moved(guess, frames, np.zeros(frames.shape[:2]))
-    return _landed(exact.take(found), places.landings[low[found]], demands)
+    return _land(exact.take(found), places.landings[low[found]], demands)
 
 
-def _landed(folds: SetPoints, landings: States, demands: Demands) -> tuple[SetPoints, States]:
+def _land(folds: SetPoints, landings: States, demands: Demands) -> tuple[SetPoints, States]:
     """Folds with landings lifted there from near ones, where that is possible."""
     z, there, _ = lift_straight(landings, folds.p, demands)
     states = States(landings.structure, z, folds.p)
@@ -115,7 +115,7 @@ def _landed(folds: SetPoints, landings: States, demands: Demands) -> tuple[SetPo
     return folds.take(there), states[there]
 
 
-def _priced(
+def _price(
     eset: EquilibriumSet,
     folds: SetPoints,
     landings: States,
@@ -146,8 +146,7 @@ def _priced(
 def _last_steps(approach: States, folds: States, demands: Demands) -> Values:
     """Costs of the chords from just before the folds to these."""
     number = np.arange(len(folds))
-    z, p = (np.concatenate([getattr(approach, n), getattr(folds, n)]) for n in "zp")
-    both = States(folds.structure, z, p)
+    both = join_states(folds.structure, (approach, folds))
     return demands.objective.costs(both, number, number + len(folds))
 
 

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from equimorph.equilibria import Landing, Path, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, Snap, snap_graph
 from equimorph.model import Descriptor
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 from equimorph.tasks.distances import distance
 from equimorph.tasks.planning.network import (
     Demands,
@@ -27,7 +27,7 @@ from equimorph.tasks.planning.network import (
 from equimorph.tasks.planning.objectives import ROUGH
 from equimorph.tasks.planning.snap_places import cheapest_place
 from equimorph.tasks.planning.straightening import (
-    directed,
+    follow_direction,
     route_over_corners,
     straight_corners,
     way_points_of,
@@ -139,11 +139,7 @@ class _Search:
         self.gates = gates_of(eset, demands)
         states = nodes_with_ends(eset, ends)
         landed = [gate.landing.state for gate in self.gates]
-        self.states = States(
-            eset.structure,
-            np.concatenate([states.z, *(state.z[None] for state in landed)]),
-            np.concatenate([states.p, *(state.p[None] for state in landed)]),
-        )
+        self.states = join_states(eset.structure, (states, *landed))
         self.first = len(states)
         allowed = self.network.admissible(eset, demands)
         own, costs = end_links(eset, ends, demands)
@@ -224,8 +220,8 @@ def _verify(
 ) -> Route:
     """Lift every part finely; snaps start from where the lifts meet the folds."""
     if not path.gates:
-        corners = straight_corners(eset, directed(path.stable[0], ends), demands)
-        return route_over_corners(eset, directed(corners, ends), demands, monitor)
+        corners = straight_corners(eset, follow_direction(path.stable[0], ends), demands)
+        return route_over_corners(eset, follow_direction(corners, ends), demands, monitor)
     gates = gates_of(eset, demands)
     here, paths, snaps = ends[0], list[Path](), list[Landing]()
     part, begin, way_points = path.stable[0], Corners(), Corners()
@@ -284,18 +280,18 @@ def _crossing(
             break
     else:
         return None
-    before = straight_corners(eset, _joined(part[: i + 1], place.approach.batch), demands)
-    after = straight_corners(eset, _joined(place.beyond.batch, onward[j:]), demands)
+    before = straight_corners(
+        eset, join_states(eset.structure, (part[: i + 1], place.approach.batch)), demands
+    )
+    after = straight_corners(
+        eset, join_states(eset.structure, (place.beyond.batch, onward[j:])), demands
+    )
     better = cheapest_place(eset, snap, before[len(before) - 2], after[1], demands)
     place = place if better is None else better
     return _Crossing(
-        _joined(before[:-1], place.approach.batch), _joined(place.beyond.batch, after[1:])
+        join_states(eset.structure, (before[:-1], place.approach.batch)),
+        join_states(eset.structure, (place.beyond.batch, after[1:])),
     )
-
-
-def _joined(first: States, second: States) -> States:
-    z, p = (np.concatenate([getattr(each, name) for each in (first, second)]) for name in "zp")
-    return States(first.structure, z, p)
 
 
 def _landing(fold: State, gate: Gate) -> Landing | None:
@@ -314,9 +310,7 @@ def _join_paths(
     monitor: Sequence[Descriptor],
 ) -> Route:
     """One route of all parts."""
-    structure = paths[0].states.structure
-    z = np.concatenate([path.states.z for path in paths])
-    p = np.concatenate([path.states.p for path in paths])
+    states = join_states(paths[0].states.structure, [path.states for path in paths])
     index = np.concatenate([path.index for path in paths])
     lengths, ats, before, legs = [], [], 0.0, 0.0
     for path in paths:
@@ -324,7 +318,6 @@ def _join_paths(
         ats.append(legs + path.at)
         before, legs = lengths[-1][-1], np.ceil(ats[-1][-1])
     events = tuple(event for path in paths for event in path.events)
-    states = States(structure, z, p)
     whole = Path(states, np.concatenate(ats), np.concatenate(lengths), index, events)
     margins = np.maximum(states.margin, 0.0)
     told = dict.fromkeys((*(c.descriptor for c in demands.constraints), *monitor))

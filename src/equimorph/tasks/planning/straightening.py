@@ -177,7 +177,7 @@ def _promising(
     return np.flatnonzero(leg | (good & (cost <= allowed)))
 
 
-def ordered(ends: Ends) -> Ends:
+def order_ends(ends: Ends) -> Ends:
     """Both ends in an order that does not depend on which of them is the start.
 
     No objective depends on the direction of a route; searched from the same end, a question and its
@@ -187,9 +187,9 @@ def ordered(ends: Ends) -> Ends:
     return ends if first <= second else ends[::-1]
 
 
-def directed(corners: States, ends: Ends) -> States:
+def follow_direction(corners: States, ends: Ends) -> States:
     """Corners between ordered ends, as they follow each other from start to goal."""
-    if ordered(ends) is ends:
+    if order_ends(ends) is ends:
         return corners
     return States(corners.structure, corners.z[::-1].copy(), corners.p[::-1].copy())
 

@@ -10,7 +10,7 @@ from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import pieces
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import Constraint, combined
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
 from equimorph.tasks.shapes.prediction import Predictor, states_with_values
@@ -60,11 +60,8 @@ def best_fits(
         if end.expansion.g.max(initial=-1.0) <= FEASIBLE
     ]
     ends.sort(key=lambda end: float(end.expansion.f.max()))
-    structure = eset.structure
-    z = np.concatenate([np.zeros((0, structure.size)), *(end.point.z for end in ends)])
-    p = np.concatenate([np.zeros((0, len(structure.parameters))), *(end.point.p for end in ends)])
     misfit = np.sqrt(np.maximum([float(end.expansion.f.max()) for end in ends], 0.0))
-    return States(structure, z, p), misfit
+    return join_states(eset.structure, [end.point for end in ends]), misfit
 
 
 def solution_family(known: Predictor, targets: Float[np.ndarray, " k"]) -> Level:

@@ -127,7 +127,7 @@ def retime(
     met = np.interp(number, np.arange(len(corners)), motion.corner_times)
     met[0], met[-1] = 0.0, motion.duration
     marks = _nearest(inner, met)
-    timed = _timed(done, values, times, marks)
+    timed = _schedule_in_time(done, values, times, marks)
     if motion.windows:
         timed = replace(timed, velocities=motion.at(inner, 1) / stretch)
         timed = replace(timed, accelerations=motion.at(inner, 2) / stretch**2)
@@ -170,12 +170,12 @@ def _motion(
         grown = list(windows)
         grown[over] *= GROWTH
         windows = tuple(grown)
-    if _gaps(motion, scales).max() > _allowed(tolerance, corners, scales):
+    if _gaps(motion, scales).max() > _largest_deviation(tolerance, corners, scales):
         return None
     return motion
 
 
-def _allowed(tolerance: float | None, corners: Rows, scales: Scales) -> float:
+def _largest_deviation(tolerance: float | None, corners: Rows, scales: Scales) -> float:
     way = float(np.abs(np.diff(corners, axis=0) / scales).sum())
     return EXACT * way if tolerance is None else tolerance
 
@@ -266,7 +266,7 @@ def _nearest(
     return np.unique(np.abs(times[:, None] - wanted).argmin(axis=0))
 
 
-def _timed(
+def _schedule_in_time(
     done: Verification,
     values: Rows,
     times: Float[np.ndarray, " samples"],

@@ -22,7 +22,7 @@ from equimorph.equilibria import (
 )
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
-from equimorph.structures import State, States, Structure, from_identity
+from equimorph.structures import State, States, Structure, from_identity, join_states
 from equimorph.tasks.distances import path_lengths
 from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
 from equimorph.tasks.start import inadmissible
@@ -125,25 +125,23 @@ def _part(start: State, lifts: Lifts, legs: int, before: int) -> LiftedPolyline:
     lane = np.concatenate([points.lane[ours], ends])
     at = np.concatenate([points.at[ours], lifts.at[:legs]])
     order = np.lexsort((at, lane))
-    z = np.concatenate([points.states.z[ours], lifts.states.z[:legs]])[order]
-    p = np.concatenate([points.states.p[ours], lifts.states.p[:legs]])[order]
+    both = (points.states[ours], lifts.states[:legs])
     corner = np.flatnonzero(order >= len(ours))
     end = lifts[legs - 1]
     kind = "arrived" if _there(lifts)[legs - 1] else end.kind
     ended = Event(kind, end.state, before + legs - 1 + end.at, end.criticality, end.detail)
-    states = States(start.structure, z, p)
+    states = join_states(start.structure, both)[order]
     return LiftedPolyline(states, before + (lane + at)[order], corner, ended)
 
 
 def _join_parts(start: State, parts: list[LiftedPolyline]) -> LiftedPolyline:
-    z = np.concatenate([start.z[None], *(part.states.z for part in parts)])
-    p = np.concatenate([start.p[None], *(part.states.p for part in parts)])
+    states = join_states(start.structure, (start, *(part.states for part in parts)))
     at = np.concatenate([np.zeros(1), *(part.at for part in parts)])
     corners, count = [np.zeros(1, int)], 1
     for part in parts:
         corners.append(part.corners + count)
         count += len(part.states)
-    return LiftedPolyline(States(start.structure, z, p), at, np.concatenate(corners), parts[-1].end)
+    return LiftedPolyline(states, at, np.concatenate(corners), parts[-1].end)
 
 
 @dataclass(frozen=True, eq=False)
