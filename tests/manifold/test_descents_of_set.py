@@ -13,12 +13,12 @@ from typecheck import unchecked
 BOX = em.Box(p=(-1, 1), r=(-1, 1))
 
 
-def blind(search):
-    """Search that overlooks stable states at x < 2."""
+def blind(search, overlooks=lambda states: (states.index == 0) & (states.z[:, 0] <= 2.0)):
+    """Search that overlooks some states: here stable ones at x < 2."""
 
     def some(*args, **options):
         found = search(*args, **options)
-        seen = [np.flatnonzero((each.index > 0) | (each.z[:, 0] > 2.0)) for each in found]
+        seen = [np.flatnonzero(~overlooks(each)) for each in found]
         return [
             replace(each, z=each.z[some], p=each.p[some])
             for each, some in zip(found, seen, strict=True)
@@ -41,6 +41,36 @@ def test_a_stable_sheet_that_no_search_sees_is_found(monkeypatch, distance):
     here = eset.at(p=0.3, r=0.2)
     # Newton ends at corrections of 1e-10
     assert np.sort(here.z[:, 0]) == pytest.approx(close_roots(distance, 3, 0.3, 0.2), abs=1e-9)
+
+
+@pytest.mark.parametrize("narrow", [1.0, 0.02])
+def test_sheets_that_join_others_only_beyond_the_box_are_met_by_lines(monkeypatch, narrow):
+    """E' = x³ − p x + r, p > 1: the sheets x > 0 and x < 0 join where r² > 4 p³/27, off the box.
+
+    The search sees neither the unstable sheet nor the lower one; all three are there. Descents do
+    not begin at a stable sheet, so lines beyond the box meet what it lacks.
+    """
+
+    def lower(states):
+        return states.z[:, 0] < 0.5
+
+    for module in (seeds, completeness):
+        monkeypatch.setattr(module, "search_points", blind(module.search_points, lower))
+    monkeypatch.setattr(completeness, "_scattered", lambda eset, *_: eset.points[:0])
+    cusp = em.EnergyStructure(
+        "x**4/4 - p*x**2/2 + r*x",
+        [em.Unknown("x", "1", guesses=(-2.0, 2.0))],
+        [em.Parameter("p", "1", 1.0, "actuator", 1.0), em.Parameter("r", "1", 1.0, "load", 0.0)],
+    )
+    with unchecked():
+        eset = em.equilibrium_set(
+            cusp, em.Box(p=(1.1, 1.5), r=(-0.2 * narrow, 0.2 * narrow)), intervals=(5, 4)
+        )
+    assert eset.audit.clean
+    assert eset.audit.recovered > 0
+    assert sorted(each.index for each in eset.strata) == [0, 0, 1]
+    assert np.sort(eset.at(p=1.21, r=0.0).z[:, 0]) == pytest.approx([-1.1, 0.0, 1.1], abs=1e-12)
+    assert "met" in dict(eset.audit.rows())["lines through all strata"]
 
 
 def test_the_audit_says_what_descents_mean():

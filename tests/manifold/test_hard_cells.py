@@ -111,6 +111,28 @@ def test_tongues_narrower_than_cells_are_lifted_whole(seeds):
     assert lost <= asked / 50
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_tongues_that_join_others_only_beyond_the_box_are_met(seed):
+    """Arch, κ ≤ 40, over the same box with 12 elements: indices 13 and 14 over a tenth of it.
+
+    Random states hardly lead to them: of four seeds only one found them, under a clean audit. The
+    numbers of states over single points are those of thorough searches.
+    """
+    rod = Rod(load="uniform", elements=12)
+    within = [rod.max_curvature <= 40]
+    box = Box(Theta=(0.78, 0.92), Delta=(-0.08, 0.08))
+    with unchecked():
+        eset = equilibrium_set(
+            rod, box, fixed={"q": 2.5}, within=within, intervals=(28, 16), seed=seed
+        )
+    assert eset.audit.clean
+    assert eset.audit.on_lines > 100
+    known = {(0.782, 0.02): 29, (0.8, 0.01): 29, (0.82, 0.005): 29, (0.82, 0.03): 19}
+    for (theta, delta), count in known.items():
+        assert len(eset.at(Theta=theta, Delta=delta)) == count
+
+
 def test_what_the_discretisation_does_not_resolve_is_told_to_be_left_out():
     """Arch, κ ≤ 40, over a small box: states of index 7 and more are not resolved by 6 elements.
 
@@ -128,8 +150,7 @@ def test_what_the_discretisation_does_not_resolve_is_told_to_be_left_out():
             )
         audits.append(eset.audit)
         most.append(int(eset.at(Theta=0.82, Delta=0.0).index.max()))
-    assert most[0] == most[2] == 6
-    assert most[1] >= 8
+    assert most == [6, 12, 6]
     assert audits[0].left_out > 0
     assert "left out" in dict(audits[0].rows())["not resolved"]
     assert audits[2].left_out == audits[2].unresolved == 0

@@ -122,7 +122,7 @@ class Pools:
             begin = len(self.z)
             if len(new) == 0:
                 return
-            self._along_lines(np.repeat(new, LINES))
+            self.lay_lines(np.repeat(new, LINES))
 
     def push(self, begin: int = 0) -> None:
         """Push equilibria, those before `begin` left out, both ways by random forces through folds.
@@ -188,7 +188,8 @@ class Pools:
             known[mine, : len(mine)] = self.z[mine, :n]
         return known
 
-    def _along_lines(self, lanes: Int[np.ndarray, " lanes"]) -> None:
+    def lay_lines(self, lanes: Int[np.ndarray, " lanes"]) -> None:
+        """Follow a random line in actuators and loads both ways through each of these states."""
         group = np.tile(self.group[lanes], 2)
         direction = self._directions(len(lanes))
         velocity = np.concatenate([direction, -direction])

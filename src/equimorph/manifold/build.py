@@ -219,6 +219,7 @@ def _of_grid(
         recovered=recovered,
         descents=found.descents,
         left_out=found.left_out,
+        on_lines=found.on_lines,
         stopped=stopped,
         cell_size=_cell_size(box, intervals),
         touching=tuple(_named(box, place) for place in cells.touching),

@@ -60,7 +60,7 @@ class Change:
 
 
 CHANGES: Mapping[str, Change] = {
-    "Audit": Change(version=6),
+    "Audit": Change(version=7),
     "LeastSnap": Change(version=2),
     "Proof": Change(version=2, removed=("status",)),  # it follows from `why` and `bounds`
     "Schedule": Change(version=2),  # older ones have no times

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import equimorph as em
 from equimorph.errors import InputError
@@ -42,6 +43,30 @@ def test_the_uniform_arch_is_strongest_on_its_ridge(uniform):
     assert best.one_sided == pytest.approx((best.value, best.value), abs=1e-5)
     fall = best.value - best.sides[0]
     assert fall[1:] / fall[:-1] == pytest.approx(0.1 ** (2 / 3), rel=0.05)
+
+
+def test_an_optimum_where_the_map_ends_is_found():
+    """A round arch that must not leave its plane is strongest where κ = 10 without load, Δ = 0.
+
+    2.2925 was the answer over most of the plane, on a cliff, while many vertices had more. The
+    place is that of a root of κ − 10 along Δ = 0.
+    """
+    rod = em.Rod("uniform", torsion=1.0 / 1.3, lateral=1.0)
+    grid = em.Grid(Theta=(1.4, 1.6, 2), Delta=(-0.2, 0.25, 2))
+    within = [rod.max_curvature <= 10, rod.stable_in_space]
+    with unchecked():
+        best = em.strongest(em.limit_load_map(rod, grid, "q", within=within)).best
+
+        def excess(theta):
+            rest, _ = rod.natural_states(np.array([(theta, 0.0, 0.0, np.sin(1.0))]))
+            return float(rod.max_curvature(rest)[0]) - 10.0
+
+        theta = brentq(excess, 1.5, 1.6)
+        rest, _ = rod.natural_states(np.array([(theta - 1e-9, 0.0, 0.0, np.sin(1.0))]))
+        known = em.limit_load(rest, "q", within=within).value[0]
+    assert best.kind == "edge"
+    assert best.value == pytest.approx(known, abs=1e-5)
+    assert tuple(best.setting.values()) == pytest.approx((theta, 0.0), abs=1e-5)
 
 
 def test_the_best_setting_under_half_a_load_is_at_the_edge_of_a_cliff(left_half):

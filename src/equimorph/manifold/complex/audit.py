@@ -34,7 +34,9 @@ class Audit:
     been added; in the last round, `missing` of `checked` were, which must be zero too.
 
     `descents` counts how descents from vertices of the strata of index one, and from folds, ended;
-    what they landed on and the set lacked has been added, too. Closed pieces narrower than
+    `on_lines` how many equilibria random lines in actuators and loads met that begin at vertices of
+    all strata and return to the same parameters. What these found and the set lacked has been
+    added, too. Closed pieces narrower than
     `cell_size`, the widths of the grid's cells by parameter, may escape all of this. Where two
     sheets approach each other inside a cell they are followed to where they are nearest, and cells
     with a neck inside are bisected; `touching`, of which there must be none, are the points at
@@ -89,12 +91,14 @@ class Audit:
     touching: tuple[tuple[tuple[str, float], ...], ...] = ()
     unresolved: int = 0
     left_out: int = 0
+    on_lines: int = 0
 
     def __repr__(self) -> str:
         """Whether it is clean, else what is not; sizes."""
         faults = ", ".join(f"{name} {count}" for name, count in self.faults.items())
         large = f"largest residual {self.largest_residual:.1e}"
         state = "clean" if self.clean else f"NOT clean: {faults or large}"
+        state += f", {self.left_out} states not resolved are left out" if self.left_out else ""
         return f"Audit({state}; {self.vertices} equilibria, {self.cells} cells)"
 
     def _repr_html_(self) -> str:
@@ -106,9 +110,9 @@ class Audit:
     def missing_at_most(self) -> float:
         """Upper 95 % confidence limit of the share of equilibria that are missing.
 
-        It refers to what the independent search can find at random points: the largest share for
-        which at most `missing` of `checked` has a probability of 5 % (Clopper and Pearson). 1
-        without checks.
+        It refers to what the independent search finds at random points, each state as often as it
+        is found: those that are hard to find count for less. It is the largest share for which at
+        most `missing` of `checked` has a probability of 5 % (Clopper and Pearson). 1 without checks.
         """
         if self.missing >= self.checked:
             return 1.0
@@ -177,11 +181,13 @@ class Audit:
                 "completeness check",
                 f"{self.missing} of {self.checked} equilibria found at random points are missing, "
                 f"{self.recovered} added before; with 95 % confidence fewer than "
-                f"{_percent(self.missing_at_most)} of those that it can find are missing"
+                f"{_percent(self.missing_at_most)} of what such searches meet is missing; states "
+                "that they meet rarely may be missing more often"
                 if self.checked
                 else "not made: pieces that the seeds do not reach may be missing",
             ),
             ("descents from unstable strata", self._descents),
+            ("lines through all strata", self._lines),
             *([("not resolved", self._unresolved)] if self.unresolved + self.left_out else []),
             *([("sheets touch", self._touching)] if self.touching else []),
             *([("closed pieces, necks", self._unseen)] if self.cell_size else []),
@@ -210,6 +216,13 @@ class Audit:
         searched = ", but for those that Newton's method met from random guesses"
         found = searched if self.checked else ""
         return f"may be missed below {size}{found}; {NECKS}"
+
+    @property
+    def _lines(self) -> str:
+        """What lines beyond the box say: one line."""
+        if not self.checked:
+            return "not made"
+        return f"met {self.on_lines} equilibria; sheets that join others beyond the box are met so"
 
     @property
     def _descents(self) -> str:

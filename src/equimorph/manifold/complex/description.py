@@ -139,6 +139,7 @@ def describe_again(eset: EquilibriumSet, given: Complex, setting: Setting) -> Eq
         recovered=audit.recovered,
         descents=audit.descents,
         left_out=audit.left_out,
+        on_lines=audit.on_lines,
         stopped=audit.stopped,
         cell_size=audit.cell_size,
         touching=audit.touching,

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Lanes
 from equimorph.equilibria import search_points
+from equimorph.equilibria.random_search import Ground, Pools
 from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.lifting.descents_of_set import descents_of_set
+from equimorph.manifold.lifting.descents_of_set import descents_of_set, spread_over_strata
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.model import Progress, position
@@ -35,12 +37,14 @@ class Check:
     """How many equilibria a search found, and those of them that the set lacks.
 
     descents: how many descents from unstable strata ended how; what they landed on is among those
-    that were found. left_out: states that the set lacks, and the discretisation does not resolve.
+    that were found. on_lines: states that lines through the strata met. left_out: states that the
+    set lacks, and the discretisation does not resolve.
     """
 
     found: int
     missing: States
     descents: tuple[tuple[str, int], ...] = ()
+    on_lines: int = 0
     left_out: int = 0
 
 
@@ -80,12 +84,15 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     )
     scattered = _scattered(eset, SCATTERED, np.random.default_rng(seed))
     resolved = scattered.resolved
-    led = descents_of_set(eset)
+    led, pools = descents_of_set(eset), _on_lines(eset, np.random.default_rng(seed))
+    begun = len(pools.ground.p)
+    met = _within(pools, pools.z[begun:], pools.group[begun:])
     found = _together([*searched, scattered[np.flatnonzero(resolved)]])
-    lacking = _together([_lacking(each, eset) for each in (found, led.landed)])
+    lacking = _together([_lacking(each, eset) for each in (found, led.landed, met)])
     dropped = [each.unresolved for each in searched if each.unresolved is not None]
+    dropped += [_within(pools, *each) for each in pools.unresolved]
     left_out = _lacking(_together([*dropped, scattered[np.flatnonzero(~resolved)]]), eset)
-    return Check(len(found), lacking, led.outcomes, len(left_out))
+    return Check(len(found), lacking, led.outcomes, len(met), len(left_out))
 
 
 def _together(parts: Sequence[States]) -> States:
@@ -117,6 +124,27 @@ def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator)
     for constraint in eset.constraints:
         found[found] = constraint.excess(z[found], p[found]) <= 0.0
     return States(structure, z[found], p[found])
+
+
+def _on_lines(eset: EquilibriumSet, generator: np.random.Generator) -> Pools:
+    """Vertices of all strata, and what random lines through them meet over the same points.
+
+    Lines in all actuators and loads are followed both ways through folds, beyond the box: sheets
+    that hang together there and are narrow inside it are met from those beside them.
+    """
+    anywhere = range(eset.structure.size + 1)
+    vertices = [own for _, own in spread_over_strata(eset, anywhere)]
+    chosen = np.concatenate([np.zeros(0, int), *vertices])
+    lanes, states = np.arange(len(chosen)), eset.points[chosen]
+    pools = Pools(Ground(eset.structure, states.p, eset.constraints), generator, states.z, lanes)
+    pools.lay_lines(lanes)
+    return pools
+
+
+def _within(pools: Pools, z: Lanes, group: Int[np.ndarray, " lanes"]) -> States:
+    """Those of the states over points of some pools that obey the constraints."""
+    good = pools.ground.excess(z, group) <= 0.0
+    return States(pools.ground.structure, z[good], pools.ground.p[group[good]])
 
 
 def _lacking(found: States, eset: EquilibriumSet) -> States:

@@ -4,6 +4,7 @@ See docs/decisions.md, "Sets are checked by descents".
 """
 
 from collections import Counter
+from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,9 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.structures import States
 
 VERTICES = 8
-"""Vertices of each stratum of index one from which the energy is followed downwards."""
+"""Vertices of each stratum that is probed, far from each other."""
 MOST = 50
-"""Strata, the largest ones, and folds from which descents begin: a set may be in shreds."""
+"""Strata, the largest ones, and folds from which is probed: a set may be in shreds."""
 BISECTIONS = 2
 """Rounds in which vertices between neighbours are added whose descents land on other strata."""
 NOWHERE = -1
@@ -86,18 +87,28 @@ def descents_of_set(eset: EquilibriumSet) -> SetDescents:
 def _first(eset: EquilibriumSet) -> tuple[Some, Some]:
     """Vertices spread over each stratum of index one, and one on each fold of a stable stratum."""
     chosen, stratum = [np.zeros(0, int)], [np.zeros(0, int)]
-    ones = [number for number, piece in enumerate(eset.strata) if piece.index == 1]
-    ones.sort(key=lambda number: -eset.strata[number].cells)
-    for number in ones[:MOST]:
-        own = _inside(eset, number)
-        chosen.append(own[_spread(eset.coordinates[own] / _scales(eset), VERTICES)])
-        stratum.append(np.full(len(chosen[-1]), number))
+    for number, own in spread_over_strata(eset, {1}):
+        chosen.append(own)
+        stratum.append(np.full(len(own), number))
     middles = np.array([fold.flat[fold.size // 2] for fold in eset.folds[:MOST]], int)
     lower = lower_index(eset.structure, eset.points.z[middles], eset.points.p[middles])
     stable = middles[lower == 0]
     chosen.append(stable)
     stratum.append(np.full(len(stable), FOLD))
     return np.concatenate(chosen), np.concatenate(stratum)
+
+
+def spread_over_strata(
+    eset: EquilibriumSet, indices: Container[int]
+) -> list[tuple[int, Some]]:
+    """Numbers of the largest strata of these indices, with vertices spread over each."""
+    chosen = [number for number, piece in enumerate(eset.strata) if piece.index in indices]
+    chosen.sort(key=lambda number: -eset.strata[number].cells)
+    inside = {number: _inside(eset, number) for number in chosen[:MOST]}
+    return [
+        (number, own[_spread(eset.coordinates[own] / _scales(eset), VERTICES)])
+        for number, own in inside.items()
+    ]
 
 
 def _inside(eset: EquilibriumSet, stratum: int) -> Some:

@@ -43,7 +43,7 @@ class Strongest:
     kind
         "interior" where the map is smooth, else the kind of the map's curve on which it lies, with
         ", cliff" if its value is the limit from one side; or "edge": at a kink or jump whose cause
-        is not known; or "robust".
+        is not known, or where the map ends; or "robust".
     slope
         Slope of the load along the curve, or largest slope of the map at an interior optimum: the
         residual of the optimality condition.
@@ -188,7 +188,7 @@ def strongest(
 
 
 def _sure(lmap: LimitLoadMap) -> list[Strongest]:
-    """Local optima without imperfections, the best first."""
+    """Local optima without imperfections, the best first; none is below any known value."""
     found: list[Strongest] = []
     for curve in sorted(lmap.curves, key=lambda each: -_level(each)):
         if found and _level(curve) < HOPELESS * found[0].value:
@@ -205,8 +205,11 @@ def _sure(lmap: LimitLoadMap) -> list[Strongest]:
             kind = f"{curve.kind}, cliff" if ridge.cliff else curve.kind
             found.append(_strongest(lmap, ridge.setting, ridge.value, kind, ridge.slope, sides))
     vertices = _vertices(lmap, lmap.value)
-    smooth = vertices[~_near_curves(lmap, vertices)]
-    for setting in smooth if found else vertices[:1]:
+    beside = _near_curves(lmap, vertices)
+    for setting, value, near in zip(vertices, lmap.rays(vertices), beside, strict=True):
+        # beside a curve a climb ends below its highest point, unless it leads elsewhere
+        if near and value <= max((each.value for each in found), default=-np.inf) + LEVEL:
+            continue
         top = climb(lmap.rays, setting, _steps(lmap), lmap.grid.box)
         sides = _sides(lmap, top.setting, _steps(lmap) / np.linalg.norm(_steps(lmap)))
         kind, slope = "interior" if top.smooth else "edge", float(np.abs(top.slope).max())
