@@ -112,7 +112,8 @@ class Audit:
 
         It refers to what the independent search finds at random points, each state as often as it
         is found: those that are hard to find count for less. It is the largest share for which at
-        most `missing` of `checked` has a probability of 5 % (Clopper and Pearson). 1 without checks.
+        most `missing` of `checked` has a probability of 5 % (Clopper and Pearson); 1 without
+        checks.
         """
         if self.missing >= self.checked:
             return 1.0

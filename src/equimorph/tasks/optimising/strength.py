@@ -189,6 +189,22 @@ def strongest(
 
 def _sure(lmap: LimitLoadMap) -> list[Strongest]:
     """Local optima without imperfections, the best first; none is below any known value."""
+    found = _on_curves(lmap)
+    vertices = _vertices(lmap, lmap.value)
+    beside = _near_curves(lmap, vertices)
+    for setting, value, near in zip(vertices, lmap.rays(vertices), beside, strict=True):
+        # beside a curve a climb ends below its highest point, unless it leads elsewhere
+        if near and value <= max((each.value for each in found), default=-np.inf) + LEVEL:
+            continue
+        top = climb(lmap.rays, setting, _steps(lmap), lmap.grid.box)
+        sides = _sides(lmap, top.setting, _steps(lmap) / np.linalg.norm(_steps(lmap)))
+        kind, slope = "interior" if top.smooth else "edge", float(np.abs(top.slope).max())
+        found.append(_strongest(lmap, top.setting, top.value, kind, slope, sides))
+    return _distinct(lmap, found)
+
+
+def _on_curves(lmap: LimitLoadMap) -> list[Strongest]:
+    """Highest points of the curves of a map, but for those that are far from the best."""
     found: list[Strongest] = []
     for curve in sorted(lmap.curves, key=lambda each: -_level(each)):
         if found and _level(curve) < HOPELESS * found[0].value:
@@ -204,17 +220,7 @@ def _sure(lmap: LimitLoadMap) -> list[Strongest]:
         if np.isfinite(sides).any() and np.isfinite(ridge.value):
             kind = f"{curve.kind}, cliff" if ridge.cliff else curve.kind
             found.append(_strongest(lmap, ridge.setting, ridge.value, kind, ridge.slope, sides))
-    vertices = _vertices(lmap, lmap.value)
-    beside = _near_curves(lmap, vertices)
-    for setting, value, near in zip(vertices, lmap.rays(vertices), beside, strict=True):
-        # beside a curve a climb ends below its highest point, unless it leads elsewhere
-        if near and value <= max((each.value for each in found), default=-np.inf) + LEVEL:
-            continue
-        top = climb(lmap.rays, setting, _steps(lmap), lmap.grid.box)
-        sides = _sides(lmap, top.setting, _steps(lmap) / np.linalg.norm(_steps(lmap)))
-        kind, slope = "interior" if top.smooth else "edge", float(np.abs(top.slope).max())
-        found.append(_strongest(lmap, top.setting, top.value, kind, slope, sides))
-    return _distinct(lmap, found)
+    return found
 
 
 def _level(curve: MapCurve) -> float:
