@@ -98,9 +98,7 @@ def _first(eset: EquilibriumSet) -> tuple[Some, Some]:
     return np.concatenate(chosen), np.concatenate(stratum)
 
 
-def spread_over_strata(
-    eset: EquilibriumSet, indices: Container[int]
-) -> list[tuple[int, Some]]:
+def spread_over_strata(eset: EquilibriumSet, indices: Container[int]) -> list[tuple[int, Some]]:
     """Numbers of the largest strata of these indices, with vertices spread over each."""
     chosen = [number for number, piece in enumerate(eset.strata) if piece.index in indices]
     chosen.sort(key=lambda number: -eset.strata[number].cells)
